@@ -1,0 +1,275 @@
+//! Diagnostics: what is wrong with an input, where, why, and what to do about it.
+//!
+//! Invariants:
+//! * Every piece of text that is parsed is a [`Source`] of its own: a whole `.xta` or `.q` file, or one `<declaration>`
+//!   or `<label>` of an XML file. A [`Span`] counts bytes of the *decoded* text of its source.
+//! * A source knows how its bytes map back to the file (entities such as `&lt;` make the two differ), so a diagnostic can
+//!   always be given as file, line and column, and in words ("template Gate, edge Free → Occ, guard").
+//! * Diagnostics are values. They are collected, sorted by position and reported together; nothing here prints.
+
+use std::fmt;
+
+/// Index of a [`Source`] in a [`SourceMap`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct SourceId(pub u32);
+
+/// A range of bytes in the decoded text of one source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Span {
+    /// The source that the range lies in.
+    pub source: SourceId,
+    /// First byte.
+    pub start: u32,
+    /// One past the last byte.
+    pub end: u32,
+}
+
+impl Span {
+    /// The smallest span that holds both; `self` where they lie in different sources.
+    #[must_use]
+    pub fn to(self, other: Span) -> Span {
+        if self.source != other.source {
+            return self;
+        }
+        Span {
+            source: self.source,
+            start: self.start.min(other.start),
+            end: self.end.max(other.end),
+        }
+    }
+}
+
+/// One parsed piece of text and the way back to the file it came from.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    /// The file as the user named it; empty for text given directly (a query on the command line).
+    pub path: String,
+    /// The place in words, for example `template Gate, edge Free → Occ, guard`; empty for a whole file.
+    pub place: String,
+    /// The decoded text that spans count in.
+    pub text: String,
+    /// Pairs (byte of `text`, byte of the file), ascending; between two entries both advance together.
+    pub offsets: Vec<(u32, u32)>,
+    /// The file's byte offsets at which its lines start; the first is 0. Empty: the text is the file.
+    pub line_starts: Vec<u32>,
+}
+
+/// Line and column of a place in a file, both counted from 1; columns count characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Position {
+    /// Line, from 1.
+    pub line: u32,
+    /// Column, from 1.
+    pub column: u32,
+}
+
+/// All sources of one load.
+#[derive(Clone, Debug, Default)]
+pub struct SourceMap {
+    sources: Vec<Source>,
+}
+
+impl SourceMap {
+    /// Adds a source and returns its index.
+    pub fn add(&mut self, source: Source) -> SourceId {
+        self.sources.push(source);
+        SourceId(u32::try_from(self.sources.len() - 1).expect("fewer than 2^32 sources"))
+    }
+
+    /// The source with this index.
+    pub fn get(&self, id: SourceId) -> &Source {
+        &self.sources[id.0 as usize]
+    }
+
+    /// Where a span starts, in the file.
+    pub fn position(&self, span: Span) -> Position {
+        let source = self.get(span.source);
+        if source.line_starts.is_empty() {
+            return position_in_text(&source.text, span.start);
+        }
+        let index = source
+            .offsets
+            .partition_point(|&(text, _)| text <= span.start);
+        let offset = match index.checked_sub(1).map(|i| source.offsets[i]) {
+            Some((text, file)) => file + (span.start - text),
+            None => span.start,
+        };
+        let line = source
+            .line_starts
+            .partition_point(|&start| start <= offset)
+            .max(1);
+        Position {
+            line: u32::try_from(line).unwrap_or(u32::MAX),
+            column: offset - source.line_starts[line - 1] + 1,
+        }
+    }
+
+    /// The text that a span covers.
+    pub fn text(&self, span: Span) -> &str {
+        self.get(span.source)
+            .text
+            .get(span.start as usize..span.end as usize)
+            .unwrap_or("")
+    }
+}
+
+fn position_in_text(text: &str, offset: u32) -> Position {
+    let before = &text[..floor_char_boundary(text, offset as usize)];
+    let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+    Position {
+        line: u32::try_from(before.matches('\n').count() + 1).unwrap_or(u32::MAX),
+        column: u32::try_from(before[line_start..].chars().count() + 1).unwrap_or(u32::MAX),
+    }
+}
+
+fn floor_char_boundary(text: &str, mut index: usize) -> usize {
+    index = index.min(text.len());
+    while !text.is_char_boundary(index) {
+        index -= 1;
+    }
+    index
+}
+
+/// How bad it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// The input is rejected.
+    Error,
+    /// The input is accepted; the user should know.
+    Warning,
+}
+
+/// What is wrong, where, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Stable code and name of the kind of mistake, for example `E0123 unknown-name`.
+    pub code: Code,
+    /// Where.
+    pub span: Span,
+    /// One line: lower case, without a full stop.
+    pub message: String,
+    /// More facts, one a line.
+    pub notes: Vec<String>,
+    /// What the user can do about it.
+    pub help: Option<String>,
+}
+
+/// Code and name of a kind of mistake: named by the defect, readable after the word "allow".
+///
+/// The constants live with the layer that reports them (`syntax::codes`, `semantics::codes`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Code {
+    /// `E` or `W` and four digits; the letter decides the severity.
+    pub code: &'static str,
+    /// The defect in words joined by hyphens.
+    pub name: &'static str,
+}
+
+impl Code {
+    /// The severity that the code's letter stands for.
+    pub fn severity(self) -> Severity {
+        if self.code.starts_with('W') {
+            Severity::Warning
+        } else {
+            Severity::Error
+        }
+    }
+}
+
+impl Diagnostic {
+    /// A diagnostic without notes and help.
+    pub fn new(code: Code, span: Span, message: impl Into<String>) -> Diagnostic {
+        Diagnostic {
+            code,
+            span,
+            message: message.into(),
+            notes: Vec::new(),
+            help: None,
+        }
+    }
+
+    /// The same with one more note.
+    #[must_use]
+    pub fn note(mut self, note: impl Into<String>) -> Diagnostic {
+        self.notes.push(note.into());
+        self
+    }
+
+    /// The same with a help line.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// Whether the input must be rejected.
+    pub fn is_error(&self) -> bool {
+        self.code.severity() == Severity::Error
+    }
+
+    /// The diagnostic as text: a header line with file, line and column, the source line with a caret, notes and help.
+    pub fn render(&self, sources: &SourceMap) -> String {
+        Rendered {
+            diagnostic: self,
+            sources,
+        }
+        .to_string()
+    }
+}
+
+struct Rendered<'a> {
+    diagnostic: &'a Diagnostic,
+    sources: &'a SourceMap,
+}
+
+impl fmt::Display for Rendered<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Rendered {
+            diagnostic,
+            sources,
+        } = self;
+        let source = sources.get(diagnostic.span.source);
+        let position = sources.position(diagnostic.span);
+        let severity = match diagnostic.code.severity() {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+        };
+        let path = if source.path.is_empty() {
+            "<text>"
+        } else {
+            &source.path
+        };
+        writeln!(
+            f,
+            "{path}:{}:{}: {severity}[{}]: {}",
+            position.line, position.column, diagnostic.code.code, diagnostic.message
+        )?;
+        if !source.place.is_empty() {
+            writeln!(f, "  in {}", source.place)?;
+        }
+        let start = floor_char_boundary(&source.text, diagnostic.span.start as usize);
+        let line_start = source.text[..start].rfind('\n').map_or(0, |i| i + 1);
+        let line_end = source.text[start..]
+            .find('\n')
+            .map_or(source.text.len(), |i| start + i);
+        let line = source.text[line_start..line_end].trim_end_matches('\r');
+        if !line.trim().is_empty() {
+            let end = floor_char_boundary(&source.text, diagnostic.span.end as usize)
+                .clamp(start, line_end);
+            let width = source.text[start..end].chars().count().max(1);
+            let indent: String = source.text[line_start..start]
+                .chars()
+                .map(|c| if c == '\t' { '\t' } else { ' ' })
+                .collect();
+            writeln!(f, "  | {line}")?;
+            writeln!(f, "  | {indent}{}", "^".repeat(width))?;
+        }
+        for note in &diagnostic.notes {
+            writeln!(f, "  note: {note}")?;
+        }
+        if let Some(help) = &diagnostic.help {
+            writeln!(f, "  help: {help}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,599 @@
+//! The syntax tree of UPPAAL models and queries: what was written, with its place, and nothing of what it means.
+//!
+//! Invariants:
+//! * Names are text; nothing is resolved, no type is known, no constant is folded.
+//! * Every node carries the span that it was read from; a node made up by the reader has the span of its cause.
+//! * The three readers (XML, XTA, old TA syntax) produce the same tree.
+
+use crate::diagnostics::Span;
+
+/// A name and where it stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Name {
+    /// The identifier.
+    pub text: String,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A whole model file.
+#[derive(Clone, Debug, Default)]
+pub struct Document {
+    /// The global declarations.
+    pub declarations: Vec<Declaration>,
+    /// The templates, in file order.
+    pub templates: Vec<Template>,
+    /// What stands in `<instantiation>` and `<system>`: declarations, instantiations, the system line.
+    pub system: System,
+    /// The queries of the file, in order; empty and comment-only formulas are left out.
+    pub queries: Vec<QueryText>,
+    /// Constructs that were read and are not supported (LSC templates, dynamic templates, external functions): name and place.
+    pub unsupported: Vec<Name>,
+}
+
+/// The text of a query in a file, before it is parsed.
+#[derive(Clone, Debug)]
+pub struct QueryText {
+    /// The formula's source; the span covers the formula without surrounding blanks and comments.
+    pub span: Span,
+    /// The formula as written, blanks collapsed, comments removed.
+    pub text: String,
+    /// The comment that stands beside it, if any.
+    pub comment: String,
+    /// The expected verdict, from `<expect>` or an `EXPECT:` comment.
+    pub expect: Option<Expectation>,
+}
+
+/// The verdict that a file states for one of its queries.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expectation {
+    /// Satisfied.
+    True,
+    /// Not satisfied.
+    False,
+    /// Maybe satisfied.
+    MaybeTrue,
+    /// Maybe not satisfied.
+    MaybeFalse,
+    /// The query ends in an error.
+    Error,
+    /// A number, for `sup`, `inf` and the statistical queries.
+    Number(f64),
+}
+
+/// A type as written.
+#[derive(Clone, Debug)]
+pub struct TypeExpr {
+    /// The prefixes before it.
+    pub prefixes: Prefixes,
+    /// The type itself.
+    pub kind: TypeKind,
+    /// Where it stands, prefixes included.
+    pub span: Span,
+}
+
+/// The prefixes of a type.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is one keyword of the language"
+)]
+pub struct Prefixes {
+    /// `const`
+    pub constant: bool,
+    /// `meta`
+    pub meta: bool,
+    /// `urgent`
+    pub urgent: bool,
+    /// `broadcast`
+    pub broadcast: bool,
+    /// `hybrid`
+    pub hybrid: bool,
+}
+
+/// The kinds of types.
+#[derive(Clone, Debug)]
+pub enum TypeKind {
+    /// `void`
+    Void,
+    /// `int`
+    Int,
+    /// `int[low, high]`
+    Range(Box<Expr>, Box<Expr>),
+    /// `bool`
+    Bool,
+    /// `double`
+    Double,
+    /// `string`
+    String,
+    /// `clock`
+    Clock,
+    /// `chan`
+    Channel,
+    /// `scalar[size]`
+    Scalar(Box<Expr>),
+    /// `struct { … }`
+    Struct(Vec<StructField>),
+    /// A name given by `typedef`.
+    Named(Name),
+}
+
+/// One declarator of a `struct` field list.
+#[derive(Clone, Debug)]
+pub struct StructField {
+    /// Its type, without the dimensions.
+    pub ty: TypeExpr,
+    /// Its name.
+    pub name: Name,
+    /// Its dimensions.
+    pub dimensions: Vec<Dimension>,
+}
+
+/// One `[…]` after a declared name.
+#[derive(Clone, Debug)]
+pub enum Dimension {
+    /// `[expression]`: a size. A bare type name also parses as this; the semantics tells them apart.
+    Size(Expr),
+    /// `[int[0,3]]`, `[scalar[2]]`: an index type.
+    Type(TypeExpr),
+}
+
+/// A declaration.
+#[derive(Clone, Debug)]
+pub enum Declaration {
+    /// `typedef T name[…];`
+    Typedef {
+        /// The type, without the dimensions.
+        ty: TypeExpr,
+        /// The new name.
+        name: Name,
+        /// Its dimensions.
+        dimensions: Vec<Dimension>,
+    },
+    /// One declared name; `int a, b;` is two of these.
+    Variable(Variable),
+    /// A function.
+    Function(Function),
+    /// `chan priority a < default < b;`: the lowest level first.
+    ChannelPriority {
+        /// The levels; within a level, channel expressions, and `None` for `default`.
+        levels: Vec<Vec<Option<Expr>>>,
+        /// Where.
+        span: Span,
+    },
+    /// `before_update { … }`
+    BeforeUpdate(Vec<Expr>, Span),
+    /// `after_update { … }`
+    AfterUpdate(Vec<Expr>, Span),
+}
+
+/// One declared variable, constant, clock or channel.
+#[derive(Clone, Debug)]
+pub struct Variable {
+    /// Its type, without the dimensions.
+    pub ty: TypeExpr,
+    /// Its name.
+    pub name: Name,
+    /// Its dimensions.
+    pub dimensions: Vec<Dimension>,
+    /// Its initialiser.
+    pub initialiser: Option<Initialiser>,
+}
+
+/// What stands after `=` in a declaration.
+#[derive(Clone, Debug)]
+pub enum Initialiser {
+    /// An expression.
+    Expr(Expr),
+    /// `{ a, name: b, … }`
+    List(Vec<(Option<Name>, Initialiser)>, Span),
+}
+
+/// A formal parameter.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// Its type, without the dimensions.
+    pub ty: TypeExpr,
+    /// Whether `&` was written.
+    pub reference: bool,
+    /// Its name.
+    pub name: Name,
+    /// Its dimensions.
+    pub dimensions: Vec<Dimension>,
+}
+
+/// A function.
+#[derive(Clone, Debug)]
+pub struct Function {
+    /// The type of what it returns.
+    pub return_type: TypeExpr,
+    /// Its name.
+    pub name: Name,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// Its body.
+    pub body: Block,
+}
+
+/// `{ declarations statements }`
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Local declarations.
+    pub declarations: Vec<Declaration>,
+    /// The statements after them.
+    pub statements: Vec<Statement>,
+    /// Where.
+    pub span: Span,
+}
+
+/// A statement.
+#[derive(Clone, Debug)]
+pub enum Statement {
+    /// `;`
+    Empty,
+    /// `{ … }`
+    Block(Block),
+    /// `expression;`
+    Expr(Expr),
+    /// `for (init; condition; step) body`
+    For {
+        /// First part.
+        init: Option<Expr>,
+        /// Condition; missing means true.
+        condition: Option<Expr>,
+        /// Step.
+        step: Option<Expr>,
+        /// Body.
+        body: Box<Statement>,
+    },
+    /// `for (name : type) body`
+    Iterate {
+        /// The bound name.
+        name: Name,
+        /// What it ranges over.
+        ty: TypeExpr,
+        /// Body.
+        body: Box<Statement>,
+    },
+    /// `while (condition) body`
+    While(Expr, Box<Statement>),
+    /// `do body while (condition);`
+    DoWhile(Box<Statement>, Expr),
+    /// `if (condition) then else otherwise`
+    If(Expr, Box<Statement>, Option<Box<Statement>>),
+    /// `return expression;`
+    Return(Option<Expr>, Span),
+    /// `assert expression;`
+    Assert(Expr, Span),
+}
+
+/// An expression.
+#[derive(Clone, Debug)]
+pub struct Expr {
+    /// What it is.
+    pub kind: ExprKind,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// The kinds of expressions.
+#[derive(Clone, Debug)]
+pub enum ExprKind {
+    /// An integer. `2147483648` is kept as it is; only below a unary minus is it legal.
+    Int(i64),
+    /// A floating-point literal.
+    Double(f64),
+    /// `true`, `false`
+    Bool(bool),
+    /// A string literal, without the quotes.
+    String(String),
+    /// A name.
+    Name(String),
+    /// `e.name`
+    Field(Box<Expr>, Name),
+    /// `e[index]`
+    Index(Box<Expr>, Box<Expr>),
+    /// `f(arguments)`, also `P(1)` for a member of a process set, and the built-in functions.
+    Call(Box<Expr>, Vec<Expr>),
+    /// `op e`
+    Unary(UnaryOp, Box<Expr>),
+    /// `left op right`
+    Binary(BinaryOp, Box<Expr>, Box<Expr>),
+    /// `condition ? then : otherwise`
+    Ternary(Box<Expr>, Box<Expr>, Box<Expr>),
+    /// `target op= value`; `None` is plain assignment (`=` or `:=`).
+    Assign(Option<BinaryOp>, Box<Expr>, Box<Expr>),
+    /// `++e`, `e++`, `--e`, `e--`
+    Step {
+        /// The variable.
+        target: Box<Expr>,
+        /// +1 or -1.
+        delta: i32,
+        /// Whether the value is the old one.
+        postfix: bool,
+    },
+    /// `x'`
+    Rate(Box<Expr>),
+    /// `forall (name : type) body` and its kin.
+    Quantifier {
+        /// Which.
+        quantifier: Quantifier,
+        /// The bound name.
+        name: Name,
+        /// What it ranges over.
+        ty: Box<TypeExpr>,
+        /// The body.
+        body: Box<Expr>,
+    },
+    /// `deadlock`, in queries.
+    Deadlock,
+    /// An expression that could not be read; a diagnostic was reported.
+    Error,
+}
+
+/// Unary operators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnaryOp {
+    /// `!`, `not`
+    Not,
+    /// `-`
+    Minus,
+    /// `+`
+    Plus,
+}
+
+/// Binary operators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum BinaryOp {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Remainder,
+    /// `**`
+    Power,
+    ShiftLeft,
+    ShiftRight,
+    /// `<?`
+    Minimum,
+    /// `>?`
+    Maximum,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+    Equal,
+    NotEqual,
+    BitAnd,
+    BitXor,
+    BitOr,
+    And,
+    Or,
+    /// `xor` on truth values
+    Xor,
+    Imply,
+}
+
+/// Quantifiers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Quantifier {
+    ForAll,
+    Exists,
+    Sum,
+}
+
+/// A template, or the single process of an XTA `process` definition.
+#[derive(Clone, Debug)]
+pub struct Template {
+    /// Its name.
+    pub name: Name,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// Its local declarations.
+    pub declarations: Vec<Declaration>,
+    /// Its locations.
+    pub locations: Vec<Location>,
+    /// Its branch points.
+    pub branchpoints: Vec<Branchpoint>,
+    /// The identifier of the initial location; `None` was reported.
+    pub initial: Option<Name>,
+    /// Its edges and the legs of its branch points, in file order.
+    pub edges: Vec<Edge>,
+}
+
+/// A point of the drawing plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[expect(missing_docs, reason = "coordinates")]
+pub struct Point {
+    pub x: i32,
+    pub y: i32,
+}
+
+/// A location.
+#[derive(Clone, Debug)]
+pub struct Location {
+    /// What edges refer to it by: the `id` in XML, the name in XTA.
+    pub id: String,
+    /// The name that expressions use, if it has one.
+    pub name: Option<Name>,
+    /// Invariant.
+    pub invariant: Option<Expr>,
+    /// Exponential rate; only the statistical queries would use it.
+    pub exponential_rate: Option<Expr>,
+    /// `urgent`
+    pub urgent: bool,
+    /// `committed`
+    pub committed: bool,
+    /// Where it is drawn.
+    pub position: Option<Point>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A branch point.
+#[derive(Clone, Debug)]
+pub struct Branchpoint {
+    /// What edges refer to it by.
+    pub id: String,
+    /// Where it is drawn.
+    pub position: Option<Point>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A transition element: an edge, the entry of a branch point, or a leg of it.
+#[derive(Clone, Debug)]
+pub struct Edge {
+    /// The `id` of the location or branch point that it leaves.
+    pub source: Name,
+    /// The `id` of the location or branch point that it enters.
+    pub target: Name,
+    /// `select` bindings.
+    pub select: Vec<(Name, TypeExpr)>,
+    /// Guard.
+    pub guard: Option<Expr>,
+    /// Synchronisation.
+    pub sync: Option<Sync>,
+    /// Update: the expressions between the commas.
+    pub update: Vec<Expr>,
+    /// Weight of a leg.
+    pub probability: Option<Expr>,
+    /// Whose move it is; false for `controllable="false"` and `-u->`.
+    pub controllable: bool,
+    /// The bends of the arrow.
+    pub nails: Vec<Point>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// `channel!` or `channel?`
+#[derive(Clone, Debug)]
+pub struct Sync {
+    /// The channel expression.
+    pub channel: Expr,
+    /// `!` is true.
+    pub send: bool,
+    /// Where.
+    pub span: Span,
+}
+
+/// The system part of a model.
+#[derive(Clone, Debug, Default)]
+pub struct System {
+    /// Declarations, in order with the instantiations.
+    pub items: Vec<SystemItem>,
+    /// The `system` line: the processes of each priority level, lowest first (one level without `<`).
+    pub processes: Vec<Vec<Name>>,
+    /// `progress { … }`: read, type-checked, not used.
+    pub progress: Vec<Expr>,
+}
+
+/// One thing before the `system` line.
+#[derive(Clone, Debug)]
+pub enum SystemItem {
+    /// A declaration.
+    Declaration(Declaration),
+    /// `name(parameters) = template(arguments);`
+    Instantiation {
+        /// The new name.
+        name: Name,
+        /// Parameters of a partial instantiation.
+        parameters: Vec<Parameter>,
+        /// The template or instantiation that is bound.
+        template: Name,
+        /// The arguments.
+        arguments: Vec<Expr>,
+    },
+}
+
+/// A parsed query.
+#[derive(Clone, Debug)]
+pub struct Query {
+    /// `strategy name = …`
+    pub strategy: Option<Name>,
+    /// What is asked.
+    pub kind: QueryKind,
+    /// `under name`
+    pub under: Option<Name>,
+    /// The whole query.
+    pub span: Span,
+}
+
+/// The kinds of queries.
+#[derive(Clone, Debug)]
+pub enum QueryKind {
+    /// `E<> p`
+    Reachable(Expr),
+    /// `A[] p`
+    Invariantly(Expr),
+    /// `E[] p`
+    PotentiallyAlways(Expr),
+    /// `A<> p`
+    Eventually(Expr),
+    /// `p --> q`
+    LeadsTo(Expr, Expr),
+    /// `sup{p}: e, …`, `inf{p}: e, …`, `bounds{p}: e, …`
+    Extremum {
+        /// Which.
+        extremum: Extremum,
+        /// The states that count; all without it.
+        predicate: Option<Expr>,
+        /// What is measured.
+        items: Vec<Expr>,
+    },
+    /// `control: …` and its kin.
+    Control(Control),
+    /// `saveStrategy("file", S)`
+    SaveStrategy {
+        /// The file.
+        file: String,
+        /// The strategy.
+        strategy: Name,
+    },
+    /// `loadStrategy("file")`, only after `strategy S =`.
+    LoadStrategy {
+        /// The file.
+        file: String,
+    },
+    /// A query that was recognised and is not supported; the name says which kind (statistical, learning, cost, …).
+    Unsupported(Name),
+}
+
+/// `sup`, `inf`, `bounds`
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Extremum {
+    Sup,
+    Inf,
+    Bounds,
+}
+
+/// A game query.
+#[derive(Clone, Debug)]
+pub struct Control {
+    /// What the controller is to enforce.
+    pub objective: Objective,
+    /// `E<> control: …`: whether it can be enforced from some state that is reachable with the environment's help.
+    pub cooperative: bool,
+    /// `control_t*(u, g)`: the bounds, each optional; `None` for plain `control`.
+    pub time_optimal: Option<(Option<Expr>, Option<Expr>)>,
+    /// `{ o1, o2 } control: …`: what the controller sees; `None` for full observation.
+    pub observations: Option<Vec<Expr>>,
+}
+
+/// What the controller is to enforce.
+#[derive(Clone, Debug)]
+pub enum Objective {
+    /// `A<> p`
+    Reach(Expr),
+    /// `A[] p`
+    Safe(Expr),
+    /// `A[p U q]`
+    Until(Expr, Expr),
+    /// `A[p W q]`
+    WeakUntil(Expr, Expr),
+    /// `A[] (p && A<> q)`
+    Buchi(Expr, Expr),
+}
