@@ -1,0 +1,148 @@
+"""The scene: what is known of a steering task, as immutable values in mm, rad and s.
+
+A scene is made by the environment language (`ntagen.nsl`), turned into a model by `ntagen.render`,
+and replaced by a new one whenever the driver learns something (a pose, a radius, a region).
+
+Conventions (paper, section 2 and appendix; the code of the appendix wins over its comments):
+
+* A pose has the tip's position, its *heading* (the direction of travel; `TIP_X` in the model) and its
+  *bevel* direction (`TIP_Z`): the unit vector that points away from the centre of the motion circle.
+  The centre lies at ``position - radius * bevel``.
+* Heading and bevel are unit vectors at right angles. The third axis is ``bevel x heading`` (`TIP_Y`).
+* `Scene.axis` is the direction in which insertion makes progress: the heading written in the file.
+  It stays the same when the tip's pose is measured anew. The model calls this direction -y.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+Vector = tuple[float, float, float]
+"""Three numbers along the axes x, y, z."""
+
+RegionKind = Literal["target", "critical", "detection"]
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A sphere with a meaning.
+
+    Attributes:
+        name: The name in the file, or one that the driver gave (``learned 1``).
+        kind: ``target`` (to be reached), ``critical`` (never to be touched) or ``detection``
+            (the shell in which nearness to a critical region is sensed; critical while planning).
+        center_mm: The centre.
+        radius_mm: The radius, greater than 0.
+        around: For a detection region that was written as ``around C1 margin …``, the name of C1.
+    """
+
+    name: str
+    kind: RegionKind
+    center_mm: Vector
+    radius_mm: float
+    around: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where the tip is and how it lies; see the module's conventions."""
+
+    position_mm: Vector
+    heading: Vector
+    bevel: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Needle:
+    """The needle: its pose, the radius of its motion circle and its insertion speed."""
+
+    tip: Pose
+    radius_mm: float
+    speed_mm_per_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the controller may do between two syntheses.
+
+    Attributes:
+        step_s: Duration of one model step (`dt`).
+        roll_angles_rad: The rolls that may be chosen, as whole degrees in the model.
+        max_rolls: How many rolls one plan may hold (`MAX_ROT_COUNT`).
+        min_roll_distance_mm: Insertion between two rolls, at least (`MIN_PROG_BETWEEN_ROTS`).
+    """
+
+    step_s: float
+    roll_angles_rad: tuple[float, ...]
+    max_rolls: int
+    min_roll_distance_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tissue:
+    """How the tissue answers an action of the needle."""
+
+    kind: Literal["static"] = "static"
+
+
+@dataclass(frozen=True, slots=True)
+class NamedQuery:
+    """A query of the environment file: its name, and its text in UPPAAL's query language."""
+
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """All that is known of a task.
+
+    Attributes:
+        name: The name of the environment; also the stem of the generated files.
+        needle: The needle as it is now.
+        axis: Unit vector of insertion: the heading in the file; see the module's conventions.
+        limits: What the controller may do.
+        targets: Target regions in the order in which they are visited.
+        criticals: Critical regions, known or learned.
+        detections: Detection regions.
+        tissue: How the tissue behaves.
+        resolution_per_mm: Fixed-point units in one mm (`_SI_` of the model).
+        safety: ``sampled`` checks regions at the ends of model steps as the paper does;
+            ``swept`` also on the arc between them.
+        queries: Named queries beside the two of the paper.
+    """
+
+    name: str
+    needle: Needle
+    axis: Vector
+    limits: Limits
+    targets: tuple[Region, ...]
+    criticals: tuple[Region, ...] = ()
+    detections: tuple[Region, ...] = ()
+    tissue: Tissue = field(default_factory=Tissue)
+    resolution_per_mm: int = 1000
+    safety: Literal["sampled", "swept"] = "sampled"
+    queries: tuple[NamedQuery, ...] = ()
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        """Targets, critical and detection regions, in this order."""
+        return self.targets + self.criticals + self.detections
+
+    def with_needle(self, tip: Pose, radius_mm: float) -> Scene:
+        """The same scene with the tip's pose and the motion circle's radius measured anew."""
+        return replace(self, needle=replace(self.needle, tip=tip, radius_mm=radius_mm))
+
+    def with_targets(self, targets: Sequence[Region]) -> Scene:
+        """The same scene with other targets: those that are still to be visited."""
+        return replace(self, targets=tuple(targets))
+
+    def with_regions(self, *regions: Region) -> Scene:
+        """The same scene with critical and detection regions added."""
+        return replace(
+            self,
+            criticals=self.criticals + tuple(r for r in regions if r.kind == "critical"),
+            detections=self.detections + tuple(r for r in regions if r.kind == "detection"),
+        )
