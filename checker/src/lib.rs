@@ -4,5 +4,8 @@
 //! (`checker/ARCHITECTURE.md` says what each must not know, and a test enforces it).
 
 pub mod diagnostics;
-
 pub mod syntax;
+
+pub mod ir;
+
+pub mod exec;

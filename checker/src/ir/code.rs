@@ -1,0 +1,390 @@
+//! Code: functions over virtual registers, in basic blocks.
+//!
+//! Invariants:
+//! * Registers are typed and may be written more than once; every register is written before it is read.
+//! * Arithmetic on integers is 32-bit and *checked*: an overflow, a division by zero, a negative or too large shift, an index
+//!   or a value out of range ends the call with a [`RunTimeErrorKind`] at the instruction's [`SiteId`], and the state's words
+//!   are then of no further use.
+//! * Floating-point arithmetic is IEEE double precision in the order written; mathematical functions are those of the
+//!   platform's C library, in the interpreter and in compiled code alike, so that the two agree bit for bit.
+//! * Functions never call themselves, directly or indirectly.
+
+/// Index of a function in [`super::Network::functions`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FunctionId(pub u32);
+
+/// Index of a virtual register in its function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Register(pub u32);
+
+/// Index of a block in its function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct BlockId(pub u32);
+
+/// Index of a site in [`super::Network::sites`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SiteId(pub u32);
+
+/// The type of a register.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RegisterType {
+    /// A 32-bit integer; truth values are 0 and 1.
+    Integer,
+    /// A double.
+    Double,
+    /// The address of a word: a reference parameter, or the place of an array or struct.
+    Address,
+}
+
+/// A function.
+#[derive(Clone, Debug)]
+pub struct Function {
+    /// Its name, for diagnostics: `step`, or `template Gate, edge Free → Occ, guard`.
+    pub name: String,
+    /// The registers; the first ones are the parameters.
+    pub registers: Vec<RegisterType>,
+    /// How many of the registers are parameters.
+    pub parameters: u32,
+    /// The words of its frame.
+    pub frame_words: u32,
+    /// The type of what it returns.
+    pub result: Option<RegisterType>,
+    /// The blocks; execution starts at the first.
+    pub blocks: Vec<Block>,
+}
+
+/// A basic block.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// What is done, in order.
+    pub instructions: Vec<Instruction>,
+    /// Where it goes on.
+    pub terminator: Terminator,
+}
+
+/// Where execution goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Terminator {
+    /// To a block.
+    Jump(BlockId),
+    /// To the first block if the integer is not 0, to the second if it is.
+    Branch(Register, BlockId, BlockId),
+    /// Back to the caller.
+    Return(Option<Register>),
+    /// Nowhere: a run-time error.
+    Fail(RunTimeErrorKind, SiteId),
+}
+
+/// A word in memory: `base + offset + index`, in words. Indices were checked before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Address {
+    /// Where it counts from.
+    pub base: Base,
+    /// A constant number of words.
+    pub offset: u32,
+    /// A computed number of words, never negative.
+    pub index: Option<Register>,
+}
+
+/// Where an address counts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Base {
+    /// The state's words.
+    State,
+    /// The constant memory.
+    Constants,
+    /// The function's frame.
+    Frame,
+    /// An address in a register.
+    Register(Register),
+}
+
+/// A clock: `first + index`. The index was checked before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ClockOperand {
+    /// The first clock; 0 where the register holds the clock itself (a clock parameter of a function).
+    pub first: super::ClockId,
+    /// A computed offset.
+    pub index: Option<Register>,
+}
+
+/// An instruction. Registers named `target` are written, all others read.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(missing_docs, reason = "the fields are operands")]
+pub enum Instruction {
+    /// An integer constant.
+    Integer { target: Register, value: i32 },
+    /// A double constant.
+    Double { target: Register, value: f64 },
+    /// A copy between registers of one type.
+    Copy { target: Register, source: Register },
+    /// Checked integer arithmetic.
+    Arithmetic {
+        operator: IntegerOperator,
+        target: Register,
+        left: Register,
+        right: Register,
+        site: SiteId,
+    },
+    /// Comparison of integers: 0 or 1.
+    CompareIntegers {
+        relation: Relation,
+        target: Register,
+        left: Register,
+        right: Register,
+    },
+    /// Comparison of doubles: 0 or 1. A NaN is unequal to everything and in no order.
+    CompareDoubles {
+        relation: Relation,
+        target: Register,
+        left: Register,
+        right: Register,
+    },
+    /// 1 if the integer is 0, else 0.
+    Not { target: Register, source: Register },
+    /// Arithmetic of doubles.
+    DoubleArithmetic {
+        operator: DoubleOperator,
+        target: Register,
+        left: Register,
+        right: Register,
+    },
+    /// An integer as a double.
+    IntegerToDouble { target: Register, source: Register },
+    /// A double truncated towards zero; an error if it is no number or does not fit.
+    DoubleToInteger {
+        target: Register,
+        source: Register,
+        site: SiteId,
+    },
+    /// A function of the mathematical library. `arguments` and `target` have the types that [`MathFunction`] says.
+    Math {
+        function: MathFunction,
+        target: Register,
+        arguments: Vec<Register>,
+        site: SiteId,
+    },
+    /// Reads an integer.
+    LoadInteger { target: Register, address: Address },
+    /// Reads a double from two words.
+    LoadDouble { target: Register, address: Address },
+    /// Writes an integer.
+    StoreInteger { address: Address, source: Register },
+    /// Writes a double into two words.
+    StoreDouble { address: Address, source: Register },
+    /// Copies words; the two ranges are the same or disjoint.
+    CopyWords {
+        target: Address,
+        source: Address,
+        words: u32,
+    },
+    /// Whether two ranges of words are the same: 0 or 1.
+    EqualWords {
+        target: Register,
+        left: Address,
+        right: Address,
+        words: u32,
+    },
+    /// The address of a word, for a reference argument.
+    AddressOf { target: Register, address: Address },
+    /// An error unless `low <= value <= high`.
+    CheckRange {
+        value: Register,
+        low: i32,
+        high: i32,
+        site: SiteId,
+    },
+    /// `target = (index - first) * stride`, an error unless `0 <= index - first < length`.
+    ScaleIndex {
+        target: Register,
+        index: Register,
+        first: i32,
+        length: u32,
+        stride: u32,
+        site: SiteId,
+    },
+    /// `target = left + right` on scaled indices, which cannot overflow.
+    AddIndices {
+        target: Register,
+        left: Register,
+        right: Register,
+    },
+    /// Calls a function.
+    Call {
+        target: Option<Register>,
+        function: FunctionId,
+        arguments: Vec<Register>,
+    },
+    /// Emits the constraint `left - right ≺ bound` (guards and invariants only).
+    Constrain {
+        left: ClockOperand,
+        right: ClockOperand,
+        strict: bool,
+        bound: Register,
+        negate_bound: bool,
+        site: SiteId,
+    },
+    /// Emits `clock := value`; an error if the value is negative (updates only).
+    SetClock {
+        clock: ClockOperand,
+        value: Register,
+        site: SiteId,
+    },
+    /// Emits `clock := source + increment` (updates only).
+    CopyClock {
+        clock: ClockOperand,
+        source: ClockOperand,
+        increment: Option<Register>,
+        site: SiteId,
+    },
+    /// An error of this kind if the integer is 0 (assertions).
+    Require {
+        condition: Register,
+        kind: RunTimeErrorKind,
+        site: SiteId,
+    },
+}
+
+/// Integer operators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum IntegerOperator {
+    /// Sum; overflow is an error.
+    Add,
+    /// Difference; overflow is an error.
+    Subtract,
+    /// Product; overflow is an error.
+    Multiply,
+    /// Quotient, truncated towards zero; division by zero and `-2^31 / -1` are errors.
+    Divide,
+    /// Remainder with the dividend's sign; division by zero is an error, `-2^31 % -1` is 0.
+    Remainder,
+    /// Power; a negative exponent and overflow are errors; `0 ** 0` is 1.
+    Power,
+    /// Shift left by 0 to 31 bits; bits are lost without an error, as in C; other distances are errors.
+    ShiftLeft,
+    /// Arithmetic shift right by 0 to 31 bits; other distances are errors.
+    ShiftRight,
+    /// Bits.
+    And,
+    /// Bits.
+    Or,
+    /// Bits.
+    Xor,
+    /// The lesser.
+    Minimum,
+    /// The greater.
+    Maximum,
+}
+
+/// Operators on doubles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum DoubleOperator {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    /// `a < b ? a : b`
+    Minimum,
+    /// `a > b ? a : b`
+    Maximum,
+}
+
+/// Relations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum Relation {
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+    Equal,
+    NotEqual,
+}
+
+/// Functions of the mathematical library, with the meaning that C gives them (`Log` is base 10, `Ln` is natural).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "the names are those of the language")]
+pub enum MathFunction {
+    /// int → int: an error for `-2^31`.
+    Abs,
+    Fabs,
+    Exp,
+    Exp2,
+    Expm1,
+    Ln,
+    Log,
+    Log10,
+    Log2,
+    Log1p,
+    Sqrt,
+    Cbrt,
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Sinh,
+    Cosh,
+    Tanh,
+    Asinh,
+    Acosh,
+    Atanh,
+    Erf,
+    Erfc,
+    Tgamma,
+    Lgamma,
+    Ceil,
+    Floor,
+    Trunc,
+    Round,
+    Logb,
+    /// double → int: an error where the C function has no integer result.
+    Ilogb,
+    Fmod,
+    Fmax,
+    Fmin,
+    Fdim,
+    Pow,
+    Hypot,
+    Atan2,
+    Nextafter,
+    Copysign,
+    /// (double, int) → double
+    Ldexp,
+    /// Three doubles.
+    Fma,
+    /// double → 0 or 1
+    IsFinite,
+    IsInfinite,
+    IsNan,
+    IsNormal,
+    SignBit,
+    IsUnordered,
+}
+
+/// What can go wrong while a model runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RunTimeErrorKind {
+    /// The result of integer arithmetic does not fit into 32 bits.
+    Overflow,
+    /// A division by zero.
+    DivisionByZero,
+    /// A shift by a negative number of bits or by more than 31.
+    ShiftDistance,
+    /// A negative exponent of `**`.
+    NegativeExponent,
+    /// A value outside the range of the variable, parameter or result it is given to.
+    OutOfRange,
+    /// An array index outside the array.
+    IndexOutOfBounds,
+    /// A double that is no number or does not fit into an integer.
+    NotAnInteger,
+    /// A clock set to a negative value, or a clock bound beyond the limits of the engine.
+    ClockValue,
+    /// An `assert` that does not hold.
+    AssertionFailed,
+    /// A loop that ran longer than the limit of one call allows.
+    StepLimit,
+}
