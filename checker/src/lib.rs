@@ -9,3 +9,5 @@ pub mod syntax;
 pub mod ir;
 
 pub mod exec;
+
+pub mod network;

@@ -1,0 +1,130 @@
+//! Moves: one composed transition each, kept in flat buffers that are used again from state to state.
+
+use crate::exec::EmittedConstraint;
+
+/// One process's share in a move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Part {
+    /// Index of the process.
+    pub process: u32,
+    /// Index of the edge in its process.
+    pub edge: u32,
+    /// Index of the branch of the edge.
+    pub branch: u32,
+    /// Which combination of `select` values: the mixed-radix number over the bindings, the last binding fastest.
+    pub select: u32,
+}
+
+/// Ranges into the buffers of [`Moves`].
+#[derive(Clone, Copy, Debug)]
+struct Header {
+    parts: (u32, u32),
+    constraints: (u32, u32),
+    excluded: (u32, u32),
+    controllable: bool,
+}
+
+/// The moves of a state.
+#[derive(Debug, Default)]
+pub struct Moves {
+    headers: Vec<Header>,
+    parts: Vec<Part>,
+    constraints: Vec<EmittedConstraint>,
+    /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast receivers that abstain.
+    excluded: Vec<(u32, u32)>,
+}
+
+/// One move of [`Moves`].
+#[derive(Clone, Copy, Debug)]
+pub struct MoveRef<'a> {
+    /// The parts: the sender (or the only process) first, then receivers in process order.
+    pub parts: &'a [Part],
+    /// The clock constraints of the participants' guards.
+    pub constraints: &'a [EmittedConstraint],
+    /// Whether the controller owns the move: all participating edges are controllable.
+    pub controllable: bool,
+    moves: &'a Moves,
+    excluded: (u32, u32),
+}
+
+impl<'a> MoveRef<'a> {
+    /// The conjunctions of clock constraints that must not hold.
+    pub fn excluded(&self) -> impl Iterator<Item = &'a [EmittedConstraint]> {
+        let moves = self.moves;
+        moves.excluded[self.excluded.0 as usize..self.excluded.1 as usize]
+            .iter()
+            .map(move |&(first, last)| &moves.constraints[first as usize..last as usize])
+    }
+
+    /// Whether the move is possible at every clock valuation.
+    pub fn is_unconditional(&self) -> bool {
+        self.constraints.is_empty() && self.excluded.0 == self.excluded.1
+    }
+}
+
+impl Moves {
+    /// Forgets all moves and keeps the memory.
+    pub fn clear(&mut self) {
+        self.headers.clear();
+        self.parts.clear();
+        self.constraints.clear();
+        self.excluded.clear();
+    }
+
+    /// How many moves there are.
+    pub fn len(&self) -> usize {
+        self.headers.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.headers.is_empty()
+    }
+
+    /// The move with this index.
+    pub fn get(&self, index: usize) -> MoveRef<'_> {
+        let header = self.headers[index];
+        MoveRef {
+            parts: &self.parts[header.parts.0 as usize..header.parts.1 as usize],
+            constraints: &self.constraints
+                [header.constraints.0 as usize..header.constraints.1 as usize],
+            controllable: header.controllable,
+            moves: self,
+            excluded: header.excluded,
+        }
+    }
+
+    /// All moves, in order.
+    pub fn iter(&self) -> impl Iterator<Item = MoveRef<'_>> {
+        (0..self.len()).map(|index| self.get(index))
+    }
+
+    /// Adds a move.
+    pub(super) fn push<'c>(
+        &mut self,
+        parts: &[Part],
+        constraints: impl IntoIterator<Item = &'c [EmittedConstraint]>,
+        excluded: impl IntoIterator<Item = &'c [EmittedConstraint]>,
+        controllable: bool,
+    ) {
+        let first_part = self.parts.len() as u32;
+        self.parts.extend_from_slice(parts);
+        let first_constraint = self.constraints.len() as u32;
+        for group in constraints {
+            self.constraints.extend_from_slice(group);
+        }
+        let last_constraint = self.constraints.len() as u32;
+        let first_excluded = self.excluded.len() as u32;
+        for group in excluded {
+            let first = self.constraints.len() as u32;
+            self.constraints.extend_from_slice(group);
+            self.excluded.push((first, self.constraints.len() as u32));
+        }
+        self.headers.push(Header {
+            parts: (first_part, self.parts.len() as u32),
+            constraints: (first_constraint, last_constraint),
+            excluded: (first_excluded, self.excluded.len() as u32),
+            controllable,
+        });
+    }
+}

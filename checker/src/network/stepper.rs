@@ -1,0 +1,598 @@
+//! Enabled moves of a state and their effect on its words.
+//!
+//! Invariants:
+//! * The words handed in are those of a whole state; queries for moves do not change them.
+//! * Moves come in a fixed order: by sending process, then edge, select values, partners, branches. Nothing depends on hashes.
+//! * Clock guards are not decided here: each move carries the constraints under which it is possible.
+//!
+//! Cost: proportional to the edges that leave the current locations; no allocation once the buffers have grown.
+
+use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
+use crate::ir::{Edge, FunctionId, Guard, Network, Update, Urgency};
+
+use super::moves::{MoveRef, Moves, Part};
+
+/// The edges that leave a location, sorted by what they wait for.
+#[derive(Debug, Default)]
+struct LocationTable {
+    internal: Vec<u32>,
+    sends: Vec<u32>,
+    /// Receiving edges with the channels they may listen to: first, count, edge.
+    receives: Vec<(u32, u32, u32)>,
+    urgency: Option<Urgency>,
+}
+
+impl LocationTable {
+    fn is_committed(&self) -> bool {
+        self.urgency == Some(Urgency::Committed)
+    }
+}
+
+/// One enabled edge instance: a process, an edge, its select values and its clock constraints.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    process: u32,
+    edge: u32,
+    select: u32,
+    constraints: (u32, u32),
+}
+
+/// Computes moves and their effects. Holds the buffers, so one per thread.
+pub struct Stepper<'a> {
+    network: &'a Network,
+    executor: &'a dyn Executor,
+    tables: Vec<Vec<LocationTable>>,
+    /// By channel: the processes that may receive on it.
+    receivers: Vec<Vec<u32>>,
+    /// Whether any channel is urgent.
+    has_urgent_channels: bool,
+    constraints: Vec<EmittedConstraint>,
+    assignments: Vec<EmittedAssignment>,
+    arguments: Vec<i32>,
+    candidates: Vec<Candidate>,
+    chosen: Vec<Choice>,
+    parts: Vec<Part>,
+}
+
+/// What a process does in a broadcast that is being put together.
+#[derive(Clone, Copy, Debug)]
+enum Choice {
+    /// It takes part by this candidate.
+    Takes(u32),
+    /// It abstains: none of these clock-guarded candidates holds.
+    Abstains(u32, u32),
+}
+
+impl<'a> Stepper<'a> {
+    /// A stepper for a network, running its code by `executor`.
+    pub fn new(network: &'a Network, executor: &'a dyn Executor) -> Stepper<'a> {
+        let tables = network.processes.iter().map(|process| {
+            process.locations.iter().map(|location| {
+                let mut table = LocationTable {
+                    urgency: Some(location.urgency),
+                    ..LocationTable::default()
+                };
+                for edge in &location.edges {
+                    match process.edges[edge.0 as usize].sync {
+                        None => table.internal.push(edge.0),
+                        Some(sync) if sync.send => table.sends.push(edge.0),
+                        Some(sync) => table.receives.push((sync.channel.0, sync.count, edge.0)),
+                    }
+                }
+                table
+            })
+        });
+        Stepper {
+            network,
+            executor,
+            tables: tables.map(Iterator::collect).collect(),
+            receivers: receivers(network),
+            has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
+            constraints: Vec::new(),
+            assignments: Vec::new(),
+            arguments: Vec::new(),
+            candidates: Vec::new(),
+            chosen: Vec::new(),
+            parts: Vec::new(),
+        }
+    }
+
+    /// The network.
+    pub fn network(&self) -> &'a Network {
+        self.network
+    }
+
+    /// Whether some process is in a committed location.
+    pub fn is_committed(&self, words: &[i32]) -> bool {
+        self.tables
+            .iter()
+            .zip(words)
+            .any(|(tables, &location)| tables[location as usize].is_committed())
+    }
+
+    /// Whether some process is in an urgent or committed location.
+    pub fn is_urgent(&self, words: &[i32]) -> bool {
+        self.tables
+            .iter()
+            .zip(words)
+            .any(|(tables, &location)| tables[location as usize].urgency != Some(Urgency::Normal))
+    }
+
+    /// Whether time may pass as far as locations and urgent channels say. `moves` are the moves of the state.
+    ///
+    /// Synchronisations on urgent channels whose guards have clocks do not count here (the front end warns of them).
+    pub fn may_delay(&self, words: &[i32], moves: &Moves) -> bool {
+        if self.is_urgent(words) {
+            return false;
+        }
+        !self.has_urgent_channels
+            || !moves
+                .iter()
+                .any(|one| one.constraints.is_empty() && self.is_on_urgent_channel(one))
+    }
+
+    /// Whether the move synchronises on an urgent channel.
+    fn is_on_urgent_channel(&self, one: MoveRef<'_>) -> bool {
+        let edge = self.edge(one.parts[0]);
+        edge.sync
+            .is_some_and(|sync| self.network.channels[sync.channel.0 as usize].urgent)
+    }
+
+    /// The edge of a part.
+    pub fn edge(&self, part: Part) -> &'a Edge {
+        &self.network.processes[part.process as usize].edges[part.edge as usize]
+    }
+
+    /// All moves of the state, as far as the words decide, into `out`.
+    pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), RunTimeError> {
+        out.clear();
+        let committed = self.is_committed(words);
+        for process in 0..self.tables.len() {
+            let location = words[process] as usize;
+            let own = self.tables[process][location].is_committed();
+            if own || !committed {
+                for index in 0..self.tables[process][location].internal.len() {
+                    let edge = self.tables[process][location].internal[index];
+                    self.internal_moves(process as u32, edge, words, out)?;
+                }
+            }
+            for index in 0..self.tables[process][location].sends.len() {
+                let edge = self.tables[process][location].sends[index];
+                self.synchronisations(process as u32, edge, committed && !own, words, out)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn internal_moves(
+        &mut self,
+        process: u32,
+        edge: u32,
+        words: &mut [i32],
+        out: &mut Moves,
+    ) -> Result<(), RunTimeError> {
+        self.candidates.clear();
+        self.constraints.clear();
+        self.enabled_instances(process, edge, words, None)?;
+        for index in 0..self.candidates.len() {
+            self.chosen.clear();
+            self.chosen.push(Choice::Takes(index as u32));
+            self.emit(out);
+        }
+        Ok(())
+    }
+
+    /// The moves in which `edge` of `process` sends. `needs_committed`: another process must leave a committed location.
+    fn synchronisations(
+        &mut self,
+        process: u32,
+        edge: u32,
+        needs_committed: bool,
+        words: &mut [i32],
+        out: &mut Moves,
+    ) -> Result<(), RunTimeError> {
+        let (network, executor) = (self.network, self.executor);
+        let definition = &network.processes[process as usize].edges[edge as usize];
+        let Some(sync) = definition.sync else {
+            return Ok(());
+        };
+        for select in 0..select_count(definition) {
+            self.candidates.clear();
+            self.constraints.clear();
+            if !self.enabled_instance(process, edge, select, words)? {
+                continue;
+            }
+            let offset = match sync.index {
+                Some(function) => {
+                    select_values(definition, select, &mut self.arguments);
+                    self.call(executor, function, words)? as u32
+                }
+                None => 0,
+            };
+            let channel = sync.channel.0 + offset;
+            if network.channels[channel as usize].broadcast {
+                self.broadcast(process, channel, needs_committed, words, out)?;
+            } else {
+                self.handshakes(process, channel, needs_committed, words, out)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Pairs the candidate 0 with every enabled receiver on a binary channel.
+    fn handshakes(
+        &mut self,
+        sender: u32,
+        channel: u32,
+        needs_committed: bool,
+        words: &mut [i32],
+        out: &mut Moves,
+    ) -> Result<(), RunTimeError> {
+        for index in 0..self.receivers[channel as usize].len() {
+            let receiver = self.receivers[channel as usize][index];
+            if receiver == sender
+                || (needs_committed && !self.is_process_committed(receiver, words))
+            {
+                continue;
+            }
+            let first = self.candidates.len();
+            self.enabled_receives(receiver, channel, words)?;
+            for candidate in first..self.candidates.len() {
+                self.chosen.clear();
+                self.chosen
+                    .extend([Choice::Takes(0), Choice::Takes(candidate as u32)]);
+                self.emit(out);
+            }
+        }
+        Ok(())
+    }
+
+    /// Joins the candidate 0 with one enabled receiving edge of every process that has one.
+    fn broadcast(
+        &mut self,
+        sender: u32,
+        channel: u32,
+        needs_committed: bool,
+        words: &mut [i32],
+        out: &mut Moves,
+    ) -> Result<(), RunTimeError> {
+        let mut groups: Vec<(usize, usize)> = Vec::new();
+        let mut has_committed = !needs_committed;
+        for index in 0..self.receivers[channel as usize].len() {
+            let receiver = self.receivers[channel as usize][index];
+            if receiver == sender {
+                continue;
+            }
+            let first = self.candidates.len();
+            self.enabled_receives(receiver, channel, words)?;
+            if self.candidates.len() > first {
+                has_committed |= self.is_process_committed(receiver, words);
+                groups.push((first, self.candidates.len()));
+            }
+        }
+        if !has_committed {
+            return Ok(());
+        }
+        self.chosen.clear();
+        self.chosen.push(Choice::Takes(0));
+        self.combine(&groups, needs_committed, words, out);
+        Ok(())
+    }
+
+    /// Emits every combination of the receivers' alternatives.
+    fn combine(
+        &mut self,
+        groups: &[(usize, usize)],
+        needs_committed: bool,
+        words: &[i32],
+        out: &mut Moves,
+    ) {
+        let Some((&(first, last), rest)) = groups.split_first() else {
+            if !needs_committed || self.has_committed_choice(words) {
+                self.emit(out);
+            }
+            return;
+        };
+        for candidate in first..last {
+            self.chosen.push(Choice::Takes(candidate as u32));
+            self.combine(rest, needs_committed, words, out);
+            self.chosen.pop();
+        }
+        let guarded = |candidate: &Candidate| candidate.constraints.0 < candidate.constraints.1;
+        if self.candidates[first..last].iter().all(guarded) {
+            self.chosen
+                .push(Choice::Abstains(first as u32, last as u32));
+            self.combine(rest, needs_committed, words, out);
+            self.chosen.pop();
+        }
+    }
+
+    fn has_committed_choice(&self, words: &[i32]) -> bool {
+        self.chosen.iter().any(|choice| match *choice {
+            Choice::Takes(index) => {
+                self.is_process_committed(self.candidates[index as usize].process, words)
+            }
+            Choice::Abstains(..) => false,
+        })
+    }
+
+    fn is_process_committed(&self, process: u32, words: &[i32]) -> bool {
+        self.tables[process as usize][words[process as usize] as usize].is_committed()
+    }
+
+    /// Adds every enabled receiving instance of a process on a channel to the candidates.
+    fn enabled_receives(
+        &mut self,
+        process: u32,
+        channel: u32,
+        words: &mut [i32],
+    ) -> Result<(), RunTimeError> {
+        let location = words[process as usize] as usize;
+        for index in 0..self.tables[process as usize][location].receives.len() {
+            let (first, count, edge) = self.tables[process as usize][location].receives[index];
+            if (first..first + count).contains(&channel) {
+                self.enabled_instances(process, edge, words, Some(channel))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds every enabled instance of an edge to the candidates; of a receiving edge, those that listen to `channel`.
+    fn enabled_instances(
+        &mut self,
+        process: u32,
+        edge: u32,
+        words: &mut [i32],
+        channel: Option<u32>,
+    ) -> Result<(), RunTimeError> {
+        let (network, executor) = (self.network, self.executor);
+        let definition = &network.processes[process as usize].edges[edge as usize];
+        for select in 0..select_count(definition) {
+            if let (Some(channel), Some(sync)) = (channel, definition.sync)
+                && let Some(function) = sync.index
+            {
+                select_values(definition, select, &mut self.arguments);
+                if sync.channel.0 + self.call(executor, function, words)? as u32 != channel {
+                    continue;
+                }
+            }
+            self.enabled_instance(process, edge, select, words)?;
+        }
+        Ok(())
+    }
+
+    /// Adds one instance to the candidates if the words allow it.
+    fn enabled_instance(
+        &mut self,
+        process: u32,
+        edge: u32,
+        select: u32,
+        words: &mut [i32],
+    ) -> Result<bool, RunTimeError> {
+        let network = self.network;
+        let definition = &network.processes[process as usize].edges[edge as usize];
+        let first = self.constraints.len() as u32;
+        if definition.guard.function.is_some() {
+            select_values(definition, select, &mut self.arguments);
+        }
+        if !self.guard(&definition.guard, words)? {
+            return Ok(false);
+        }
+        let constraints = (first, self.constraints.len() as u32);
+        self.candidates.push(Candidate {
+            process,
+            edge,
+            select,
+            constraints,
+        });
+        Ok(true)
+    }
+
+    /// Evaluates a guard with the arguments in the buffer; its clock constraints are appended to the buffer.
+    fn guard(&mut self, guard: &Guard, words: &mut [i32]) -> Result<bool, RunTimeError> {
+        let first = self.constraints.len();
+        if let Some(function) = guard.function
+            && self.call(self.executor, function, words)? == 0
+        {
+            self.constraints.truncate(first);
+            return Ok(false);
+        }
+        self.constraints
+            .extend(guard.fixed.iter().map(|fixed| EmittedConstraint {
+                left: fixed.left,
+                right: fixed.right,
+                bound: fixed.bound,
+                strict: fixed.strict,
+            }));
+        Ok(true)
+    }
+
+    fn call(
+        &mut self,
+        executor: &dyn Executor,
+        function: FunctionId,
+        words: &mut [i32],
+    ) -> Result<i32, RunTimeError> {
+        let mut context = Context {
+            state: words,
+            constraints: &mut self.constraints,
+            assignments: &mut self.assignments,
+        };
+        executor.call(function, &self.arguments, &mut context)
+    }
+
+    /// Emits the chosen combination, once for each combination of branches.
+    fn emit(&mut self, out: &mut Moves) {
+        let network = self.network;
+        self.parts.clear();
+        let mut controllable = true;
+        for choice in &self.chosen {
+            if let Choice::Takes(index) = *choice {
+                let Candidate {
+                    process,
+                    edge,
+                    select,
+                    ..
+                } = self.candidates[index as usize];
+                controllable &=
+                    network.processes[process as usize].edges[edge as usize].controllable;
+                self.parts.push(Part {
+                    process,
+                    edge,
+                    branch: 0,
+                    select,
+                });
+            }
+        }
+        loop {
+            let taken = self.chosen.iter().filter_map(|choice| match *choice {
+                Choice::Takes(index) => Some(self.constraints_of(index)),
+                Choice::Abstains(..) => None,
+            });
+            let excluded = self.chosen.iter().flat_map(|choice| match *choice {
+                Choice::Takes(_) => 0..0,
+                Choice::Abstains(first, last) => first..last,
+            });
+            out.push(
+                &self.parts,
+                taken,
+                excluded.map(|index| self.constraints_of(index)),
+                controllable,
+            );
+            if !next_branches(network, &mut self.parts) {
+                return;
+            }
+        }
+    }
+
+    fn constraints_of(&self, candidate: u32) -> &[EmittedConstraint] {
+        let (first, last) = self.candidates[candidate as usize].constraints;
+        &self.constraints[first as usize..last as usize]
+    }
+
+    /// Takes the move: changes locations and variables. The clock assignments, in order, are in the result.
+    pub fn fire(
+        &mut self,
+        parts: &[Part],
+        words: &mut [i32],
+    ) -> Result<&[EmittedAssignment], RunTimeError> {
+        let network = self.network;
+        self.assignments.clear();
+        self.arguments.clear();
+        if let Some(update) = &network.before_update {
+            self.update(update, words)?;
+        }
+        for &part in parts {
+            let edge = self.edge(part);
+            let branch = &edge.branches[part.branch as usize];
+            if edge.update.function.is_some() || branch.update.function.is_some() {
+                select_values(edge, part.select, &mut self.arguments);
+            }
+            self.update(&edge.update, words)?;
+            self.update(&branch.update, words)?;
+        }
+        for &part in parts {
+            let branch = &self.edge(part).branches[part.branch as usize];
+            words[part.process as usize] = branch.target.0 as i32;
+        }
+        if let Some(update) = &network.after_update {
+            self.arguments.clear();
+            self.update(update, words)?;
+        }
+        Ok(&self.assignments)
+    }
+
+    fn update(&mut self, update: &Update, words: &mut [i32]) -> Result<(), RunTimeError> {
+        if let Some(function) = update.function {
+            self.call(self.executor, function, words)?;
+        }
+        let fixed = update.fixed.iter();
+        self.assignments
+            .extend(fixed.map(|&(target, value)| EmittedAssignment {
+                target,
+                source: crate::ir::ClockId(0),
+                value,
+            }));
+        Ok(())
+    }
+
+    /// Evaluates all invariants: `None` if the words break one, else the clock constraints that must hold.
+    pub fn invariants(
+        &mut self,
+        words: &mut [i32],
+    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+        let network = self.network;
+        self.constraints.clear();
+        self.arguments.clear();
+        for (index, process) in network.processes.iter().enumerate() {
+            let invariant = &process.locations[words[index] as usize].invariant;
+            if !invariant.is_trivial() && !self.guard(invariant, words)? {
+                return Ok(None);
+            }
+        }
+        Ok(Some(&self.constraints))
+    }
+
+    /// Runs a function of a query on the state.
+    pub fn evaluate(
+        &mut self,
+        function: FunctionId,
+        words: &mut [i32],
+    ) -> Result<i32, RunTimeError> {
+        self.arguments.clear();
+        self.call(self.executor, function, words)
+    }
+}
+
+/// By channel: the processes with an edge that may receive on it, ascending.
+fn receivers(network: &Network) -> Vec<Vec<u32>> {
+    let mut receivers = vec![Vec::new(); network.channels.len()];
+    for (index, process) in network.processes.iter().enumerate() {
+        for sync in process
+            .edges
+            .iter()
+            .filter_map(|edge| edge.sync)
+            .filter(|sync| !sync.send)
+        {
+            for channel in sync.channel.0..sync.channel.0 + sync.count {
+                let list: &mut Vec<u32> = &mut receivers[channel as usize];
+                if list.last() != Some(&(index as u32)) {
+                    list.push(index as u32);
+                }
+            }
+        }
+    }
+    receivers
+}
+
+/// How many combinations of select values an edge has.
+pub fn select_count(edge: &Edge) -> u32 {
+    edge.select
+        .iter()
+        .map(|select| (select.high - select.low + 1) as u32)
+        .product()
+}
+
+/// The select values of a combination.
+pub fn select_values(edge: &Edge, mut combination: u32, values: &mut Vec<i32>) {
+    values.clear();
+    values.resize(edge.select.len(), 0);
+    for (value, select) in values.iter_mut().zip(&edge.select).rev() {
+        let size = (select.high - select.low + 1) as u32;
+        *value = select.low + (combination % size) as i32;
+        combination /= size;
+    }
+}
+
+/// Goes to the next combination of branches, the last part fastest; false after the last one.
+fn next_branches(network: &Network, parts: &mut [Part]) -> bool {
+    for part in parts.iter_mut().rev() {
+        let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+        if part.branch as usize + 1 < edge.branches.len() {
+            part.branch += 1;
+            return true;
+        }
+        part.branch = 0;
+    }
+    false
+}
