@@ -3,6 +3,16 @@
 //! Neither knows the solver, zones or queries. Clock constraints and assignments that code emits are collected in the
 //! context for whoever called.
 
+pub(crate) mod arithmetic;
+pub(crate) mod math;
+
+mod rounds;
+
+mod interpreter;
+
+pub use interpreter::Interpreter;
+pub use rounds::ROUND_LIMIT;
+
 use crate::ir::{ClockId, FunctionId, RunTimeErrorKind, SiteId};
 
 /// What a call reads and writes beside its arguments.

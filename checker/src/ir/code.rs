@@ -9,6 +9,10 @@
 //!   platform's C library, in the interpreter and in compiled code alike, so that the two agree bit for bit.
 //! * Functions never call themselves, directly or indirectly.
 
+/// The greatest absolute value of a clock bound and of a value that a clock is set to; beyond it is a
+/// [`RunTimeErrorKind::ClockValue`]. The limit of zones, whose operations add several bounds before they check.
+pub const CLOCK_LIMIT: i32 = (1 << 27) - 1;
+
 /// Index of a function in [`super::Network::functions`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FunctionId(pub u32);
@@ -170,7 +174,7 @@ pub enum Instruction {
     LoadDouble { target: Register, address: Address },
     /// Writes an integer.
     StoreInteger { address: Address, source: Register },
-    /// Writes a double into two words.
+    /// Writes a double into two words. Every NaN is written as the same one, so that equal states have equal words.
     StoreDouble { address: Address, source: Register },
     /// Copies words; the two ranges are the same or disjoint.
     CopyWords {
@@ -209,6 +213,10 @@ pub enum Instruction {
         left: Register,
         right: Register,
     },
+    /// One more round of a loop; an error of kind [`RunTimeErrorKind::StepLimit`] if the rounds of the whole call from
+    /// outside exceed the limit. Engines put one into every cycle that has none, at the first site that they find there;
+    /// the front end may put one at the head of a loop to name a better site.
+    CountRound { site: SiteId },
     /// Calls a function.
     Call {
         target: Option<Register>,
@@ -362,6 +370,43 @@ pub enum MathFunction {
     IsNormal,
     SignBit,
     IsUnordered,
+}
+
+impl MathFunction {
+    /// The types of the parameters.
+    pub fn parameters(self) -> &'static [RegisterType] {
+        use RegisterType::{Double, Integer};
+        match self {
+            MathFunction::Abs => &[Integer],
+            MathFunction::Fmod
+            | MathFunction::Fmax
+            | MathFunction::Fmin
+            | MathFunction::Fdim
+            | MathFunction::Pow
+            | MathFunction::Hypot
+            | MathFunction::Atan2
+            | MathFunction::Nextafter
+            | MathFunction::Copysign => &[Double, Double],
+            MathFunction::Ldexp => &[Double, Integer],
+            MathFunction::Fma => &[Double, Double, Double],
+            _ => &[Double],
+        }
+    }
+
+    /// The type of the result.
+    pub fn result(self) -> RegisterType {
+        match self {
+            MathFunction::Abs
+            | MathFunction::Ilogb
+            | MathFunction::IsFinite
+            | MathFunction::IsInfinite
+            | MathFunction::IsNan
+            | MathFunction::IsNormal
+            | MathFunction::SignBit
+            | MathFunction::IsUnordered => RegisterType::Integer,
+            _ => RegisterType::Double,
+        }
+    }
 }
 
 /// What can go wrong while a model runs.

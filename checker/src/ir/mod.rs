@@ -17,6 +17,7 @@
 //! clocks flattened. Channels are flattened likewise and count from 0.
 
 mod code;
+mod print;
 
 pub use code::*;
 

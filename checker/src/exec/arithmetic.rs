@@ -1,0 +1,129 @@
+//! What the operators mean, on plain values: the one definition that interpretation, constant folding and the tests of
+//! compiled code go back to.
+//!
+//! Invariant: nothing here panics or wraps silently; whatever has no result is a [`RunTimeErrorKind`].
+
+use crate::ir::{DoubleOperator, IntegerOperator, Relation, RunTimeErrorKind};
+
+/// `left operator right`, or why there is no such integer.
+pub(crate) fn integer(
+    operator: IntegerOperator,
+    left: i32,
+    right: i32,
+) -> Result<i32, RunTimeErrorKind> {
+    let overflow = RunTimeErrorKind::Overflow;
+    match operator {
+        IntegerOperator::Add => left.checked_add(right).ok_or(overflow),
+        IntegerOperator::Subtract => left.checked_sub(right).ok_or(overflow),
+        IntegerOperator::Multiply => left.checked_mul(right).ok_or(overflow),
+        IntegerOperator::Divide | IntegerOperator::Remainder if right == 0 => {
+            Err(RunTimeErrorKind::DivisionByZero)
+        }
+        IntegerOperator::Divide => left.checked_div(right).ok_or(overflow),
+        IntegerOperator::Remainder => Ok(left.wrapping_rem(right)),
+        IntegerOperator::Power => power(left, right),
+        IntegerOperator::ShiftLeft => Ok(left << shift_distance(right)?),
+        IntegerOperator::ShiftRight => Ok(left >> shift_distance(right)?),
+        IntegerOperator::And => Ok(left & right),
+        IntegerOperator::Or => Ok(left | right),
+        IntegerOperator::Xor => Ok(left ^ right),
+        IntegerOperator::Minimum => Ok(left.min(right)),
+        IntegerOperator::Maximum => Ok(left.max(right)),
+    }
+}
+
+/// `base ** exponent`; `0 ** 0` is 1.
+pub(crate) fn power(base: i32, exponent: i32) -> Result<i32, RunTimeErrorKind> {
+    let exponent = u32::try_from(exponent).map_err(|_| RunTimeErrorKind::NegativeExponent)?;
+    base.checked_pow(exponent).ok_or(RunTimeErrorKind::Overflow)
+}
+
+fn shift_distance(bits: i32) -> Result<u32, RunTimeErrorKind> {
+    u32::try_from(bits)
+        .ok()
+        .filter(|&bits| bits < 32)
+        .ok_or(RunTimeErrorKind::ShiftDistance)
+}
+
+/// Whether two integers stand in a relation.
+pub(crate) fn integers_relate(relation: Relation, left: i32, right: i32) -> bool {
+    match relation {
+        Relation::Less => left < right,
+        Relation::LessEqual => left <= right,
+        Relation::Greater => left > right,
+        Relation::GreaterEqual => left >= right,
+        Relation::Equal => left == right,
+        Relation::NotEqual => left != right,
+    }
+}
+
+/// Whether two doubles stand in a relation; a NaN is unequal to everything and in no order.
+#[expect(clippy::float_cmp, reason = "the language compares exactly")]
+pub(crate) fn doubles_relate(relation: Relation, left: f64, right: f64) -> bool {
+    match relation {
+        Relation::Less => left < right,
+        Relation::LessEqual => left <= right,
+        Relation::Greater => left > right,
+        Relation::GreaterEqual => left >= right,
+        Relation::Equal => left == right,
+        Relation::NotEqual => left != right,
+    }
+}
+
+/// `left operator right` on doubles. The sign and payload of a NaN are of no meaning, see [`canonical`].
+pub(crate) fn double(operator: DoubleOperator, left: f64, right: f64) -> f64 {
+    match operator {
+        DoubleOperator::Add => left + right,
+        DoubleOperator::Subtract => left - right,
+        DoubleOperator::Multiply => left * right,
+        DoubleOperator::Divide => left / right,
+        DoubleOperator::Minimum if left < right => left,
+        DoubleOperator::Maximum if left > right => left,
+        DoubleOperator::Minimum | DoubleOperator::Maximum => right,
+    }
+}
+
+/// The double truncated towards zero, if it is a number and the result fits.
+pub(crate) fn truncate(value: f64) -> Result<i32, RunTimeErrorKind> {
+    // Both comparisons are false for a NaN.
+    if value > -2_147_483_649.0 && value < 2_147_483_648.0 {
+        Ok(value as i32)
+    } else {
+        Err(RunTimeErrorKind::NotAnInteger)
+    }
+}
+
+/// The value, with one NaN for all: the IEEE leaves sign and payload of a NaN open, processors and compilers differ in
+/// them, and they must not leak into states.
+pub(crate) fn canonical(value: f64) -> f64 {
+    if value.is_nan() { f64::NAN } else { value }
+}
+
+/// The words of a double, low word first.
+pub(crate) fn double_words(value: f64) -> [i32; 2] {
+    let bits = canonical(value).to_bits();
+    [bits as i32, (bits >> 32) as i32]
+}
+
+/// The double that two words hold, low word first.
+pub(crate) fn double_of_words(low: i32, high: i32) -> f64 {
+    f64::from_bits(u64::from(low as u32) | u64::from(high as u32) << 32)
+}
+
+/// `(index - first) * stride` if the index lies inside.
+///
+/// The subtraction wraps: integers modulo 2^32 are told apart by 32 bits, so exactly the `length` valid indices have an
+/// unsigned difference below `length`.
+pub(crate) fn scale_index(
+    index: i32,
+    first: i32,
+    length: u32,
+    stride: u32,
+) -> Result<i32, RunTimeErrorKind> {
+    let position = index.wrapping_sub(first) as u32;
+    if position < length {
+        Ok(position.wrapping_mul(stride) as i32)
+    } else {
+        Err(RunTimeErrorKind::IndexOutOfBounds)
+    }
+}

@@ -1,0 +1,119 @@
+//! Makes sure that every run ends: counts rounds of loops, and calls of functions that call others.
+//!
+//! Invariant: after [`count_rounds`] every cycle of blocks contains a [`Instruction::CountRound`], and so does the first
+//! block of every function that calls another, for a few dozen functions that call each other twice run as long as any
+//! loop. All engines run the counted code, so that they stop at the same round.
+
+use crate::ir::{BlockId, Function, Instruction, SiteId, Terminator};
+
+/// How many rounds a call from outside may take.
+pub const ROUND_LIMIT: u64 = 100_000_000;
+
+/// Puts the missing counts into a function.
+pub(crate) fn count_rounds(function: &mut Function) {
+    for head in uncounted_cycle_heads(function) {
+        let site = nearest_site(function, head);
+        count_at(function, head, site);
+    }
+    let calls = function
+        .blocks
+        .iter()
+        .any(|block| block.instructions.iter().any(is_call));
+    if calls && !function.blocks[0].instructions.iter().any(is_count) {
+        let site = nearest_site(function, 0);
+        count_at(function, 0, site);
+    }
+}
+
+fn is_call(instruction: &Instruction) -> bool {
+    matches!(instruction, Instruction::Call { .. })
+}
+
+fn is_count(instruction: &Instruction) -> bool {
+    matches!(instruction, Instruction::CountRound { .. })
+}
+
+fn count_at(function: &mut Function, block: usize, site: SiteId) {
+    function.blocks[block]
+        .instructions
+        .insert(0, Instruction::CountRound { site });
+}
+
+/// Where the edges end that close a cycle without a count, in a depth-first walk over blocks without a count.
+fn uncounted_cycle_heads(function: &Function) -> Vec<usize> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Visit {
+        New,
+        Open,
+        Done,
+    }
+    let counted = |block: usize| function.blocks[block].instructions.iter().any(is_count);
+    let mut visits = vec![Visit::New; function.blocks.len()];
+    let mut heads = Vec::new();
+    for root in 0..function.blocks.len() {
+        if visits[root] != Visit::New || counted(root) {
+            continue;
+        }
+        visits[root] = Visit::Open;
+        let mut path = vec![(root, 0)];
+        while let Some((block, next)) = path.last_mut() {
+            let successor = successors(function.blocks[*block].terminator).nth(*next);
+            *next += 1;
+            let Some(BlockId(successor)) = successor else {
+                visits[*block] = Visit::Done;
+                path.pop();
+                continue;
+            };
+            let successor = successor as usize;
+            match visits[successor] {
+                Visit::Open => heads.push(successor),
+                Visit::New if !counted(successor) => {
+                    visits[successor] = Visit::Open;
+                    path.push((successor, 0));
+                }
+                Visit::New | Visit::Done => {}
+            }
+        }
+    }
+    heads.sort_unstable();
+    heads.dedup();
+    heads
+}
+
+/// The blocks that a terminator leads to.
+pub(crate) fn successors(terminator: Terminator) -> impl Iterator<Item = BlockId> {
+    let (first, second) = match terminator {
+        Terminator::Jump(target) => (Some(target), None),
+        Terminator::Branch(_, then, otherwise) => (Some(then), Some(otherwise)),
+        Terminator::Return(_) | Terminator::Fail(..) => (None, None),
+    };
+    first.into_iter().chain(second)
+}
+
+/// The first site at or after a block, else the first of the function; blocks stand in the order of the text.
+fn nearest_site(function: &Function, block: usize) -> SiteId {
+    let (before, after) = function.blocks.split_at(block);
+    after
+        .iter()
+        .chain(before)
+        .flat_map(|block| &block.instructions)
+        .find_map(site_of)
+        .unwrap_or(SiteId(0))
+}
+
+/// Where the instruction reports its errors, if it can have any.
+pub(crate) fn site_of(instruction: &Instruction) -> Option<SiteId> {
+    match *instruction {
+        Instruction::Arithmetic { site, .. }
+        | Instruction::DoubleToInteger { site, .. }
+        | Instruction::Math { site, .. }
+        | Instruction::CheckRange { site, .. }
+        | Instruction::ScaleIndex { site, .. }
+        | Instruction::CountRound { site }
+        | Instruction::Constrain { site, .. }
+        | Instruction::SetClock { site, .. }
+        | Instruction::CopyClock { site, .. }
+        | Instruction::Require { site, .. } => Some(site),
+        _ => None,
+    }
+}
