@@ -1,0 +1,41 @@
+"""From a scene to the UPPAAL model of the paper, and to its queries.
+
+`render` writes the whole XML document, `render_queries` the same queries as a ``.q`` file. Both
+depend on the scene alone: the same scene gives the same text, byte for byte.
+
+The templates are in ``templates/``: they hold the language, the automata and the arithmetic. Every
+number is made in `ntagen.render.values`. templates/README.md lists where the model differs from the
+paper.
+"""
+
+from __future__ import annotations
+
+from ntagen.render.queries import model_queries, render_queries
+from ntagen.render.templates import environment
+from ntagen.render.values import model_values
+from ntagen.scene import Scene
+
+__all__ = ["render", "render_queries"]
+
+
+def render(scene: Scene, source: str | None = None) -> str:
+    """The timed-game model of a scene as UPPAAL's XML.
+
+    Args:
+        scene: What is known of the task.
+        source: Where the scene was read from, for the comment at the top of the declaration.
+
+    Returns:
+        The XML document; its queries are those of `render_queries`.
+
+    Raises:
+        InputError: A value of the scene does not fit the model's numbers.
+    """
+    values = model_values(scene)
+    templates = environment()
+    declaration = templates.get_template("uppaal/declarations.c.jinja").render(
+        model=values, source=None if source is None else " ".join(source.split())
+    )
+    return templates.get_template("model.xml.jinja").render(
+        model=values, declaration=declaration, queries=model_queries(scene)
+    )

@@ -1,0 +1,71 @@
+"""The queries of a model: the two of the paper, then those of the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from ntagen.errors import InputError
+from ntagen.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """A query as it stands in the files.
+
+    Attributes:
+        name: What `ntagen check --query` calls it.
+        formula: Its text in UPPAAL's language.
+        comment: The name in the first line, then, if any, what the query asks.
+    """
+
+    name: str
+    formula: str
+    comment: str
+
+
+PAPER_QUERIES: Final = (
+    Query(
+        "PathExists",
+        "E<> Checker.Final_TR_Reached",
+        "PathExists\nIs there any path to the final target?",
+    ),
+    Query(
+        "ReachFinalTR",
+        "strategy ReachFinalTR = control: A<> Checker.Final_TR_Reached",
+        "ReachFinalTR\nIs there a strategy that reaches it, whatever the tissue does?",
+    ),
+)
+"""The queries of section 2 of the paper; its second one carries its name, the first one got one
+here."""
+
+
+def model_queries(scene: Scene) -> tuple[Query, ...]:
+    """The queries of a scene's model, in order.
+
+    A game query (``control: …``) of the scene defines a strategy of its own name. A query of the
+    scene that repeats one of the paper's is left out.
+
+    Raises:
+        InputError: Two different queries have the same name.
+    """
+    queries = {query.name: query for query in PAPER_QUERIES}
+    for named in scene.queries:
+        text = " ".join(named.text.split())
+        formula = f"strategy {named.name} = {text}" if text.startswith("control") else text
+        query = queries.setdefault(named.name, Query(named.name, formula, named.name))
+        if query.formula != formula:
+            raise InputError(
+                f"there are two different queries with the name {named.name}\n"
+                f"help: rename the one that says `{text}`"
+            )
+    return tuple(queries.values())
+
+
+def render_queries(scene: Scene) -> str:
+    """The queries of a scene's model as a ``.q`` file: a comment and one line each."""
+    blocks = []
+    for query in model_queries(scene):
+        comment = "\n".join(f"// {line}" for line in query.comment.splitlines())
+        blocks.append(f"{comment}\n{query.formula}\n")
+    return "\n".join(blocks)

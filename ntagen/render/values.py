@@ -1,0 +1,199 @@
+"""What the templates are given: a scene's numbers in the model's frame and units.
+
+The templates hold the language and the arithmetic, this module every decision about a number:
+
+* **Frame**: the whole scene is turned so that insertion runs along -y (`ntagen.render.frame`).
+* **Units**: lengths, and components of directions, become integers (`ntagen.render.fixed_point`).
+* **Time**: the model's unit of time is 1 s if the step is a whole number of seconds, otherwise the
+  step itself (and `dt` is 1). So `dt` is an integer, as in the paper, and the insertion of one push
+  is not rounded twice.
+* **Start pose**: the columns of the base matrix are heading, bevel x heading and bevel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ntagen.errors import InputError
+from ntagen.render.fixed_point import LARGEST_UNITS, c_literal, fixed_point
+from ntagen.render.frame import Matrix, cross, model_frame, turned
+from ntagen.scene import Region, Scene, Vector
+from ntagen.units import deg_from_rad
+
+MIN_ACTIONS = 10
+"""Entries of the log in the paper (`MAX_ACT_COUNT`); more are made only if more rolls are
+allowed."""
+
+WHOLE_TOLERANCE = 1e-9
+"""How far a number that went through floating point may lie from the whole number that was
+meant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One row of an initialiser, and what it is."""
+
+    text: str
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Spheres:
+    """The regions of one kind. Without any, `centers` and `radii` hold one row of zeros."""
+
+    count: int
+    centers: tuple[Row, ...]
+    radii: tuple[Row, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ModelValues:
+    """All that the templates may use; lengths are texts in units of ``1 / scale`` mm."""
+
+    name: str
+    frame_note: str
+    time_unit: str
+    scale: int
+    dt: int
+    velocity: str
+    min_progress: str
+    max_rolls: int
+    max_actions: int
+    angles: tuple[int, ...]
+    tip_position: str
+    base_matrix: str
+    circle_radius: str
+    targets: Spheres
+    criticals: Spheres
+    detections: Spheres
+    swept: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Writer:
+    """Turns values of one scene into the declaration's texts."""
+
+    scale: int
+    frame: Matrix
+
+    def number(self, value: float, what: str) -> str:
+        return c_literal(fixed_point(value, self.scale, what), self.scale)
+
+    def vector(self, value: Vector, what: str) -> str:
+        parts = (self.number(part, what) for part in turned(self.frame, value))
+        return "{" + ", ".join(parts) + "}"
+
+    def matrix(self, columns: Sequence[Vector], what: str) -> str:
+        in_frame = [turned(self.frame, column) for column in columns]
+        rows = (
+            "{" + ", ".join(self.number(column[i], what) for column in in_frame) + "}"
+            for i in range(3)
+        )
+        return "{" + ", ".join(rows) + "}"
+
+    def spheres(self, regions: Sequence[Region]) -> Spheres:
+        if not regions:
+            return Spheres(0, (Row("{0, 0, 0}", ""),), (Row("0", ""),))
+        centers = tuple(
+            Row(self.vector(r.center_mm, f"the centre of {r.name}"), _one_line(r.name))
+            for r in regions
+        )
+        radii = tuple(
+            Row(self.number(r.radius_mm, f"the radius of {r.name}"), _one_line(r.name))
+            for r in regions
+        )
+        return Spheres(len(regions), centers, radii)
+
+
+def model_values(scene: Scene) -> ModelValues:
+    """The values of a scene for the templates.
+
+    Raises:
+        InputError: A value does not fit the model's numbers, or the model would not move.
+    """
+    if not scene.targets:
+        raise InputError("the scene has no target\nhelp: add a line such as `target T1 sphere …`")
+    scale = scene.resolution_per_mm
+    frame = model_frame(scene.axis)
+    writer = _Writer(scale, frame)
+    needle, limits = scene.needle, scene.limits
+    tip = needle.tip
+    dt, velocity_mm, time_unit = _time(limits.step_s, needle.speed_mm_per_s)
+    _check_motion(scale, dt, velocity_mm, needle.radius_mm)
+    return ModelValues(
+        name=_one_line(scene.name),
+        frame_note="" if _is_identity(frame) else "The scene was turned so that this is so.",
+        time_unit=time_unit,
+        scale=scale,
+        dt=dt,
+        velocity=writer.number(velocity_mm, "the insertion per unit of time"),
+        min_progress=writer.number(limits.min_roll_distance_mm, "the distance between rolls"),
+        max_rolls=limits.max_rolls,
+        max_actions=max(MIN_ACTIONS, 2 * limits.max_rolls + 2),
+        angles=tuple(_whole_degrees(angle) for angle in limits.roll_angles_rad),
+        tip_position=writer.vector(tip.position_mm, "the tip's position"),
+        base_matrix=writer.matrix(
+            (tip.heading, cross(tip.bevel, tip.heading), tip.bevel), "the tip's direction"
+        ),
+        circle_radius=writer.number(needle.radius_mm, "the radius of the motion circle"),
+        targets=writer.spheres(scene.targets),
+        criticals=writer.spheres(scene.criticals),
+        detections=writer.spheres(scene.detections),
+        swept=scene.safety == "swept",
+    )
+
+
+def _time(step_s: float, speed_mm_per_s: float) -> tuple[int, float, str]:
+    """The step in units of time, the insertion in mm per unit of time, and the unit in words."""
+    whole = round(step_s)
+    if whole >= 1 and abs(step_s - whole) <= WHOLE_TOLERANCE * whole:
+        return whole, speed_mm_per_s, "1 s"
+    return 1, speed_mm_per_s * step_s, f"one push: {step_s:g} s"
+
+
+def _check_motion(scale: int, dt: int, velocity_mm: float, radius_mm: float) -> None:
+    """Refuses a step that the model's numbers cannot hold.
+
+    A push turns the tip by ``insertion / radius``, cut to units. If that leaves nothing, the tip
+    would stand still while the needle is inserted for ever.
+
+    Raises:
+        InputError: The radius or the angle of one step is less than one unit, or a step is too
+        long.
+    """
+    radius = fixed_point(radius_mm, scale, "the radius of the motion circle")
+    insertion = dt * fixed_point(velocity_mm, scale, "the insertion per unit of time")
+    if insertion > LARGEST_UNITS:
+        raise InputError("one step is too long for the model\nhelp: make `step` shorter")
+    if radius < 1 or insertion * scale < radius:
+        raise InputError(
+            f"a step of {insertion / scale:g} mm on a circle of radius {radius_mm:g} mm turns the "
+            f"tip by less than one unit of the model (1/{scale} rad)\n"
+            "help: make `step` longer or `resolution` finer"
+        )
+
+
+def _whole_degrees(angle_rad: float) -> int:
+    """An angle as the whole number of degrees that the model wants.
+
+    Raises:
+        InputError: It is no whole number of degrees.
+    """
+    angle_deg = deg_from_rad(angle_rad)
+    whole = round(angle_deg)
+    if abs(angle_deg - whole) > WHOLE_TOLERANCE * 360.0:
+        raise InputError(
+            f"a roll of {angle_deg:g} deg is not a whole number of degrees\n"
+            "help: the model chooses among whole degrees"
+        )
+    return whole
+
+
+def _is_identity(frame: Matrix) -> bool:
+    return frame == ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def _one_line(text: str) -> str:
+    """A name as it may stand in a line comment."""
+    return " ".join(text.split())
