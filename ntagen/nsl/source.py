@@ -1,0 +1,67 @@
+"""Source text and places in it.
+
+A `Source` is one file as it was read; a `Span` is a stretch of its characters. Lines and columns
+are counted from 1, columns in characters (a tab is one), and are worked out only when a diagnostic
+is shown.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from functools import cached_property
+
+MAX_SOURCE_BYTES = 4 * 1024 * 1024
+"""Larger files are refused: 10,000 regions written one a line take about 0.6 MB."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The text of one file, and the path by which the user knows it."""
+
+    path: str
+    text: str = field(repr=False)
+
+    @cached_property
+    def _line_starts(self) -> list[int]:
+        """Offsets at which lines begin; a line ends with a line feed and nothing else."""
+        starts = [0]
+        starts.extend(index + 1 for index, character in enumerate(self.text) if character == "\n")
+        return starts
+
+    def position(self, offset: int) -> tuple[int, int]:
+        """Line and column of a character, both from 1."""
+        line = bisect_right(self._line_starts, offset)
+        return line, offset - self._line_starts[line - 1] + 1
+
+    def line(self, number: int) -> str:
+        """The text of a line, without its end."""
+        start = self._line_starts[number - 1]
+        end = self.text.find("\n", start)
+        return self.text[start : len(self.text) if end < 0 else end].rstrip("\r")
+
+    def span(self, start: int, end: int) -> Span:
+        """The characters from `start` up to, and without, `end`."""
+        return Span(self, start, end)
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A stretch of a source: offsets of its first character and of the one behind its last."""
+
+    source: Source = field(repr=False)
+    start: int
+    end: int
+
+    @property
+    def text(self) -> str:
+        """The characters themselves."""
+        return self.source.text[self.start : self.end]
+
+    def to(self, other: Span) -> Span:
+        """From the beginning of this one to the end of the other."""
+        return Span(self.source, self.start, other.end)
+
+    def behind(self) -> Span:
+        """The empty place just behind this one."""
+        return Span(self.source, self.end, self.end)

@@ -1,0 +1,265 @@
+"""The typed tree of an environment file: what is written where, without its meaning.
+
+Every node carries the `Span` it was read from. Names are not resolved, units not applied, and
+nothing is checked here but the form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ntagen.nsl.source import Source, Span
+from ntagen.scene import RegionKind
+
+# ------------------------------------------------------------------------------------ expressions
+
+
+@dataclass(frozen=True, slots=True)
+class Identifier:
+    """A name where it is written."""
+
+    span: Span
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number without its unit."""
+
+    span: Span
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A constant, a loop's variable or a direction that is used."""
+
+    span: Span
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A function applied to arguments."""
+
+    span: Span
+    function: Identifier
+    arguments: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """Two or more components in parentheses; only three make sense."""
+
+    span: Span
+    components: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """An expression with a unit behind it."""
+
+    span: Span
+    operand: Expression
+    unit: Identifier
+
+
+@dataclass(frozen=True, slots=True)
+class Signed:
+    """An expression with signs before it, taken together."""
+
+    span: Span
+    operand: Expression
+    is_negative: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """Operands joined by operators of one rank, from left to right: ``a - b + c``."""
+
+    span: Span
+    first: Expression
+    rest: tuple[tuple[Literal["+", "-", "*", "/"], Expression], ...]
+
+
+Expression = Number | Name | Call | Vector | Measured | Signed | Chain
+
+# ------------------------------------------------------------------------------------- statements
+
+
+@dataclass(frozen=True, slots=True)
+class RegionName:
+    """A region's name with its indices: ``Ring[i]``."""
+
+    span: Span
+    identifier: Identifier
+    indices: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """``sphere (0, -50, 0) mm radius 10 mm``."""
+
+    span: Span
+    center: Expression
+    radius: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """``around C1 margin 3 mm``."""
+
+    span: Span
+    region: RegionName
+    margin: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A target, critical or detection region."""
+
+    span: Span
+    keyword: RegionKind
+    name: RegionName
+    shape: Sphere | Around
+
+
+@dataclass(frozen=True, slots=True)
+class Let:
+    """``let depth = 50 mm``."""
+
+    span: Span
+    name: Identifier
+    value: Expression
+    keyword: Literal["let"] = "let"
+
+
+@dataclass(frozen=True, slots=True)
+class Include:
+    """``include "needle.nsl"``; the path is as written, without the quotes."""
+
+    span: Span
+    path: Identifier
+    keyword: Literal["include"] = "include"
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """``query Reach = E<> Checker.Final_TR_Reached``."""
+
+    span: Span
+    name: Identifier
+    text: str
+    keyword: Literal["query"] = "query"
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A property with one value: ``speed 1 mm/s``."""
+
+    span: Span
+    keyword: Literal["tip", "heading", "bevel", "radius", "speed", "step"]
+    value: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Roll:
+    """``roll by 90, 180 deg at most 2 times``; the limits as often as they are written."""
+
+    span: Span
+    angles: tuple[Expression, ...]
+    at_most: tuple[Expression, ...]
+    at_least: tuple[Expression, ...]
+    keyword: Literal["roll"] = "roll"
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A property whose value is one of a few words: ``safety swept``."""
+
+    span: Span
+    keyword: Literal["tissue", "safety"]
+    word: Identifier
+
+
+@dataclass(frozen=True, slots=True)
+class Resolution:
+    """``resolution 1000 per mm``."""
+
+    span: Span
+    count: Expression
+    unit: Identifier
+    keyword: Literal["resolution"] = "resolution"
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """``needle { … }`` or ``motion { … }``; the span is that of the word."""
+
+    span: Span
+    keyword: Literal["needle", "motion"]
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """``for i in 0..7 { … }``; the span is that of the line before the brace."""
+
+    span: Span
+    variable: Identifier
+    first: Expression
+    last: Expression
+    body: tuple[Statement, ...]
+    keyword: Literal["for"] = "for"
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """``environment paper { … }``; the span is that of the line before the brace."""
+
+    span: Span
+    name: Identifier
+    body: tuple[Statement, ...]
+    keyword: Literal["environment"] = "environment"
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A statement with a mistake in its form, which is reported already.
+
+    Attributes:
+        span: Its words.
+        keyword: What it begins with, so that nobody complains that it is missing.
+        name: The name that it would have declared, if that much could be read.
+        body: The statements in its braces, which are checked all the same.
+    """
+
+    span: Span
+    keyword: str
+    name: str | None = None
+    body: tuple[Statement, ...] = ()
+
+
+Statement = (
+    Region
+    | Let
+    | Include
+    | Query
+    | Setting
+    | Roll
+    | Choice
+    | Resolution
+    | Section
+    | Loop
+    | Environment
+    | Broken
+)
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """All statements of one file, in the order written."""
+
+    source: Source
+    statements: tuple[Statement, ...]
