@@ -1,0 +1,550 @@
+"""The draft to a scene, with every rule that the values must obey.
+
+Each rule reports and goes on; the scene is made if none of them found an error.
+
+Sources: the model's declaration (paper, appendix), which computes in 32-bit integers scaled by the
+resolution, checks regions at the ends of steps, and counts touching a region as being in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, Literal, cast
+
+from ntagen.nsl.diagnostics import Reporter, did_you_mean
+from ntagen.nsl.resolve import Draft, DraftRegion, Placed
+from ntagen.nsl.source import Span
+from ntagen.scene import Limits, NamedQuery, Needle, Pose, Region, RegionKind, Scene, Vector
+from ntagen.units import deg_from_rad, rad_from_deg
+
+DEFAULT_TIP_MM: Final[Vector] = (0.0, 0.0, 0.0)
+DEFAULT_HEADING: Final[Vector] = (0.0, -1.0, 0.0)
+DEFAULT_BEVEL: Final[Vector] = (0.0, 0.0, 1.0)
+DEFAULT_STEP_S: Final = 2.0
+DEFAULT_ROLLS_DEG: Final = (90.0, 180.0, 270.0)
+DEFAULT_MAX_ROLLS: Final = 2
+DEFAULT_ROLL_DISTANCE_MM: Final = 2.0
+DEFAULT_RESOLUTION_PER_MM: Final = 1000
+"""What holds where the file says nothing: the values of the paper's declaration."""
+
+INT32_MAX: Final = 2**31 - 1
+MAX_ROLLS: Final = 100
+_RIGHT_ANGLE_TOLERANCE: Final = 1e-6
+"""Cosine between heading and bevel that still counts as a right angle: rounding of written decimals
+is larger only when it should be corrected."""
+
+
+def build(draft: Draft, reporter: Reporter) -> Scene | None:
+    """The scene that the draft describes, or None after an error, of which the reporter knows."""
+    return _Builder(draft, reporter).scene()
+
+
+@dataclass(frozen=True, slots=True)
+class _Sphere:
+    """A region that is known completely, with its places in the file."""
+
+    region: Region
+    draft: DraftRegion
+
+
+class _Builder:
+    """Applies the rules to one draft."""
+
+    def __init__(self, draft: Draft, reporter: Reporter) -> None:
+        self._draft = draft
+        self._reporter = reporter
+        self._report = reporter.report
+
+    def scene(self) -> Scene | None:
+        """The scene, or None after an error."""
+        draft = self._draft
+        self._require_statements()
+        tip = self._pose()
+        needle = self._needle(tip)
+        limits = self._limits()
+        resolution = self._resolution()
+        spheres = self._spheres()
+        if tip is not None:
+            self._check_regions(tip, spheres)
+        if resolution is not None:
+            self._check_range(resolution, tip, needle, limits, spheres)
+        if needle is not None and limits is not None and resolution is not None:
+            self._check_step(needle, limits, resolution, spheres)
+        if self._reporter.has_errors or needle is None or limits is None or resolution is None:
+            return None
+        safety = cast('Literal["sampled", "swept"]', draft.choices.get("safety", "sampled"))
+        return Scene(
+            name=draft.name,
+            needle=needle,
+            axis=needle.tip.heading,
+            limits=limits,
+            targets=_of_kind(spheres, "target"),
+            criticals=_of_kind(spheres, "critical"),
+            detections=_of_kind(spheres, "detection"),
+            resolution_per_mm=resolution,
+            safety=safety,
+            queries=tuple(
+                NamedQuery(name, query.value or "") for name, query in draft.queries.items()
+            ),
+        )
+
+    # ------------------------------------------------------------------------------ what must be
+
+    def _require_statements(self) -> None:
+        """Every environment has a needle with radius and speed, and a target."""
+        draft = self._draft
+        if draft.has_gaps and not {"needle", "target"} <= draft.seen.keys():
+            return  # What is missing may be what could not be read.
+        if "needle" not in draft.seen:
+            self._report(
+                "needle-missing",
+                draft.span,
+                f"`{draft.name}` has no needle",
+                hint="add `needle { radius 30 mm speed 1 mm/s }`",
+            )
+        else:
+            for keyword, value in (("radius", "30 mm"), ("speed", "1 mm/s")):
+                if keyword not in draft.seen:
+                    self._report(
+                        "setting-missing",
+                        draft.seen["needle"],
+                        f"the needle has no {keyword}",
+                        hint=f"add for example `{keyword} {value}`",
+                    )
+        if "target" not in draft.seen:
+            self._report(
+                "target-missing",
+                draft.span,
+                f"`{draft.name}` has no target",
+                hint="add for example `target T1 sphere (0, -50, 0) mm radius 10 mm`",
+            )
+
+    # --------------------------------------------------------------------------- needle, motion
+
+    def _pose(self) -> Pose | None:
+        """The tip's pose, with heading and bevel of length 1."""
+        tip = self._draft.vectors.get("tip")
+        position = DEFAULT_TIP_MM if tip is None else tip.value
+        heading = self._direction("heading", DEFAULT_HEADING)
+        bevel = self._direction("bevel", DEFAULT_BEVEL)
+        if position is None or heading is None or bevel is None:
+            return None
+        cosine = _dot(heading, bevel)
+        if abs(cosine) > _RIGHT_ANGLE_TOLERANCE:
+            self._report_skew(heading, bevel, cosine)
+            return None
+        # The rest of the skew, below the tolerance, goes into the bevel.
+        bevel = _unit(_minus(bevel, _times(cosine, heading)))
+        return Pose(position, heading, bevel)
+
+    def _direction(self, keyword: str, default: Vector) -> Vector | None:
+        """A direction of length 1."""
+        placed = self._draft.vectors.get(keyword)
+        if placed is None:
+            return default if keyword not in self._draft.seen else None
+        if placed.value is None:
+            return None
+        if max(map(abs, placed.value)) == 0.0:
+            self._report(
+                "direction-zero",
+                placed.span,
+                f"the {keyword} has no direction",
+                hint=f"write for example `{keyword} {'-y' if keyword == 'heading' else '+z'}`",
+            )
+            return None
+        return _unit(placed.value)
+
+    def _report_skew(self, heading: Vector, bevel: Vector, cosine: float) -> None:
+        """Reports a bevel that is not at right angles to the heading, with the nearest that is."""
+        placed = self._draft.vectors.get("bevel") or self._draft.vectors["heading"]
+        angle = deg_from_rad(math.acos(max(-1.0, min(1.0, cosine))))
+        rest = _minus(bevel, _times(cosine, heading))
+        if math.hypot(*rest) < 1e-3:
+            axes = ("x", "y", "z")
+            smallest = min(range(3), key=lambda axis: abs(heading[axis]))
+            hint = f"write for example `bevel +{axes[smallest]}`" if 0.0 in heading else None
+        else:
+            hint = f"write `bevel ({', '.join(f'{_rounded(c):g}' for c in _unit(rest))})`"
+        self._report(
+            "bevel-not-perpendicular",
+            placed.span,
+            f"heading and bevel must be at right angles, but the angle is {angle:.4g} deg",
+            hint=hint,
+        )
+
+    def _positive(self, keyword: str, kind: str, role: str) -> float | None:
+        """A property of the needle or its motion that is greater than 0."""
+        placed = self._draft.numbers.get(keyword)
+        if placed is None or placed.value is None:
+            return None
+        if placed.value <= 0.0:
+            self._report(kind, placed.span, f"{role} must be greater than 0")
+            return None
+        return placed.value
+
+    def _needle(self, tip: Pose | None) -> Needle | None:
+        """The needle, if all of it is right."""
+        radius = self._positive("radius", "radius-not-positive", "the radius of the motion circle")
+        speed = self._positive("speed", "speed-not-positive", "the insertion speed")
+        if tip is None or radius is None or speed is None:
+            return None
+        return Needle(tip, radius, speed)
+
+    def _limits(self) -> Limits | None:
+        """What the controller may do, if all of it is right."""
+        draft = self._draft
+        step = (
+            DEFAULT_STEP_S
+            if "step" not in draft.seen
+            else self._positive("step", "step-not-positive", "the step")
+        )
+        angles = self._roll_angles()
+        count = DEFAULT_MAX_ROLLS if draft.max_rolls is None else draft.max_rolls.value
+        distance = (
+            DEFAULT_ROLL_DISTANCE_MM if draft.roll_distance is None else draft.roll_distance.value
+        )
+        if draft.max_rolls is not None and count is not None and not 0 <= count <= MAX_ROLLS:
+            self._report(
+                "roll-count-out-of-range",
+                draft.max_rolls.span,
+                f"the number of rolls must be from 0 to {MAX_ROLLS}, but this is {count}",
+            )
+        if draft.roll_distance is not None and distance is not None and distance < 0.0:
+            self._report(
+                "distance-negative",
+                draft.roll_distance.span,
+                "the distance between rolls cannot be negative",
+            )
+        if step is None or angles is None or count is None or distance is None:
+            return None
+        return Limits(step, angles, count, distance)
+
+    def _roll_angles(self) -> tuple[float, ...] | None:
+        """The rolls in rad, exactly those of whole degrees."""
+        if "roll" not in self._draft.seen:
+            return tuple(map(rad_from_deg, DEFAULT_ROLLS_DEG))
+        found: dict[int, Span] = {}
+        for placed in self._draft.angles:
+            degrees = self._whole_degrees(placed)
+            if degrees is None:
+                continue
+            if degrees in found:
+                self._report(
+                    "roll-repeated", placed.span, f"the roll by {degrees} deg is written twice"
+                )
+            found.setdefault(degrees, placed.span)
+        return tuple(rad_from_deg(float(degrees)) for degrees in found) or None
+
+    def _whole_degrees(self, placed: Placed[float]) -> int | None:
+        """A roll in degrees."""
+        if placed.value is None:
+            return None
+        degrees = deg_from_rad(placed.value)
+        if not 0.0 < degrees < 360.0:
+            wrapped = degrees % 360.0
+            self._report(
+                "roll-out-of-range",
+                placed.span,
+                f"a roll must be more than 0 and less than 360 deg, but this is {degrees:g} deg",
+                hint=f"write {wrapped:g} deg" if 0.0 < wrapped < 360.0 else "remove it",
+            )
+            return None
+        if abs(degrees - round(degrees)) > 1e-9:
+            self._report(
+                "roll-not-whole-degrees",
+                placed.span,
+                f"a roll must be a whole number of degrees, but this is {degrees:.6g} deg",
+                hint=f"write {max(1, min(359, round(degrees)))} deg",
+            )
+            return None
+        return round(degrees)
+
+    def _resolution(self) -> int | None:
+        """Fixed-point units in a mm."""
+        placed = self._draft.resolution
+        if placed is None:
+            return None if "resolution" in self._draft.seen else DEFAULT_RESOLUTION_PER_MM
+        if placed.value is None:
+            return None
+        rounded = round(placed.value)
+        if rounded < 1 or abs(placed.value - rounded) > 1e-9 * rounded:
+            self._report(
+                "resolution-not-whole",
+                placed.span,
+                f"the resolution must be a whole number per mm, at least 1,"
+                f" but this is {placed.value:g} per mm",
+                hint=f"write `{max(1, rounded)} per mm`",
+            )
+            return None
+        return rounded
+
+    # ------------------------------------------------------------------------------------ regions
+
+    def _spheres(self) -> list[_Sphere]:
+        """All regions of which everything is right, in the order written."""
+        spheres = []
+        for draft in self._draft.regions.values():
+            region = self._around(draft) if draft.around is not None else self._sphere(draft)
+            if region is not None:
+                spheres.append(_Sphere(region, draft))
+        return spheres
+
+    def _sphere(self, draft: DraftRegion) -> Region | None:
+        """A region with its own geometry."""
+        radius = draft.radius.value
+        if radius is not None and radius <= 0.0:
+            self._report(
+                "radius-not-positive",
+                draft.radius.span,
+                f"the radius of `{draft.name}` must be greater than 0",
+            )
+            return None
+        if radius is None or draft.center is None or draft.center.value is None:
+            return None
+        return Region(draft.name, draft.kind, draft.center.value, radius)
+
+    def _around(self, draft: DraftRegion) -> Region | None:
+        """A detection region around a critical one."""
+        margin = draft.margin.value
+        if margin is not None and margin < 0.0:
+            self._report(
+                "margin-negative",
+                draft.margin.span,
+                f"the margin of `{draft.name}` cannot be negative",
+            )
+            margin = None
+        elif margin == 0.0:
+            self._report(
+                "margin-zero",
+                draft.margin.span,
+                f"the margin of `{draft.name}` is 0: nearness is never noticed before contact",
+                hint="write for example `margin 3 mm`",
+            )
+        inner = self._critical_inside(draft)
+        if inner is None or inner.center is None or inner.center.value is None or margin is None:
+            return None
+        radius = inner.radius.value
+        if radius is None or radius <= 0.0:
+            return None
+        return Region(draft.name, draft.kind, inner.center.value, radius + margin, inner.name)
+
+    def _critical_inside(self, draft: DraftRegion) -> DraftRegion | None:
+        """The critical region that a detection region is written around."""
+        around = draft.around
+        if around is None or around.value is None:
+            return None
+        name = around.value
+        inner = self._draft.regions.get(name)
+        if inner is None:
+            if name.split("[")[0] not in self._draft.broken_names:
+                criticals = [r.name for r in self._draft.regions.values() if r.kind == "critical"]
+                self._report(
+                    "unknown-region",
+                    around.span,
+                    f"there is no critical region `{name}`",
+                    hint=did_you_mean(name, criticals)
+                    or "give the detection region a sphere of its own",
+                )
+            return None
+        if inner.kind != "critical":
+            self._report(
+                "region-not-critical",
+                around.span,
+                f"`{name}` is a {inner.kind} region, not a critical one",
+                hint="detection regions lie around critical regions",
+            )
+            return None
+        return inner
+
+    # -------------------------------------------------------------------------------------- rules
+
+    def _check_regions(self, tip: Pose, spheres: list[_Sphere]) -> None:
+        """Where regions lie, seen from the tip and from each other."""
+        targets = [sphere for sphere in spheres if sphere.region.kind == "target"]
+        others = [sphere for sphere in spheres if sphere.region.kind != "target"]
+        for target in targets:
+            self._check_reachable(tip, target)
+            for other in others:
+                self._check_overlap(target, other)
+        for other in others:
+            self._check_start(tip, other)
+
+    def _check_reachable(self, tip: Pose, target: _Sphere) -> None:
+        """A target must not lie behind the tip, and should not hold it."""
+        region, span = target.region, _place_of(target)
+        offset = _minus(region.center_mm, tip.position_mm)
+        ahead = _dot(offset, tip.heading)
+        if ahead + region.radius_mm < 0.0:
+            self._report(
+                "target-behind-needle",
+                span,
+                f"`{region.name}` lies {-ahead - region.radius_mm:.3g} mm behind the needle's tip",
+                hint="move it along the heading, or turn the heading round",
+            )
+        elif math.hypot(*offset) <= region.radius_mm:
+            self._report(
+                "tip-in-target",
+                span,
+                f"the tip lies in `{region.name}` already: there is nothing to steer",
+            )
+
+    def _check_overlap(self, target: _Sphere, other: _Sphere) -> None:
+        """A target must not lie in a critical region, and should not touch one."""
+        inner, outer = target.region, other.region
+        distance = math.dist(inner.center_mm, outer.center_mm)
+        if distance >= inner.radius_mm + outer.radius_mm:
+            return
+        notes = (f"the {outer.kind} region is at {_where(_place_of(other))}",)
+        if distance + inner.radius_mm <= outer.radius_mm:
+            self._report(
+                "target-in-critical",
+                _place_of(target),
+                f"`{inner.name}` lies inside the {outer.kind} region `{outer.name}`",
+                hint="move one of the two, or make the target larger",
+                notes=notes,
+            )
+        elif outer.kind == "critical" or distance <= outer.radius_mm:
+            what = "its centre lies in" if distance <= outer.radius_mm else "it overlaps"
+            self._report(
+                "target-overlaps",
+                _place_of(target),
+                f"`{inner.name}` is not free: {what} the {outer.kind} region `{outer.name}`",
+                notes=notes,
+            )
+
+    def _check_start(self, tip: Pose, other: _Sphere) -> None:
+        """The tip must not start in a critical region, and should not in a detection region."""
+        region = other.region
+        if math.dist(tip.position_mm, region.center_mm) > region.radius_mm:
+            return
+        self._report(
+            "tip-in-critical" if region.kind == "critical" else "tip-in-detection",
+            _place_of(other),
+            f"the needle's tip lies in the {region.kind} region `{region.name}`",
+            hint="move the tip or the region",
+        )
+
+    def _check_step(
+        self, needle: Needle, limits: Limits, resolution: int, spheres: list[_Sphere]
+    ) -> None:
+        """One push must bend the needle, and should not jump over a region."""
+        placed = self._draft.numbers.get("step")
+        span = self._draft.span if placed is None else placed.span
+        advance = needle.speed_mm_per_s * limits.step_s
+        if int(advance * resolution) == 0 or int(advance / needle.radius_mm * resolution) == 0:
+            self._report(
+                "step-too-short",
+                span,
+                f"a push of {advance:g} mm vanishes at a resolution of {resolution} per mm",
+                hint="make the step longer or the resolution finer",
+            )
+        smallest = min(spheres, key=lambda s: s.region.radius_mm, default=None)
+        if smallest is not None and advance > 2.0 * smallest.region.radius_mm:
+            self._report(
+                "step-too-long",
+                span,
+                f"a push of {advance:g} mm can jump over `{smallest.region.name}`,"
+                f" which is {2.0 * smallest.region.radius_mm:g} mm wide",
+                hint="make the step shorter",
+                notes=("regions are checked at the ends of pushes only",),
+            )
+
+    def _check_range(
+        self,
+        resolution: int,
+        tip: Pose | None,
+        needle: Needle | None,
+        limits: Limits | None,
+        spheres: list[_Sphere],
+    ) -> None:
+        """Every length of the model must fit into 32 bits at its resolution."""
+        largest_mm = INT32_MAX / resolution
+        for what, length_mm, span in self._lengths(tip, needle, limits, spheres):
+            if length_mm > largest_mm:
+                self._report(
+                    "value-out-of-range",
+                    span,
+                    f"{what} does not fit: at {resolution} per mm the model reaches"
+                    f" {largest_mm:.6g} mm",
+                    hint="make it smaller, or the resolution coarser",
+                )
+
+    def _lengths(
+        self,
+        tip: Pose | None,
+        needle: Needle | None,
+        limits: Limits | None,
+        spheres: list[_Sphere],
+    ) -> Iterator[tuple[str, float, Span]]:
+        """The lengths that the model holds, with what they are and where they come from."""
+        draft = self._draft
+        if tip is not None and "tip" in draft.vectors:
+            yield "the tip's position", max(map(abs, tip.position_mm)), draft.vectors["tip"].span
+        if needle is not None:
+            # The centre of the motion circle lies one radius away from the tip.
+            reach = needle.radius_mm + max(map(abs, needle.tip.position_mm))
+            yield "the motion circle", reach, draft.numbers["radius"].span
+        if needle is not None and limits is not None:
+            span = draft.numbers["step" if "step" in draft.numbers else "speed"].span
+            yield "a push", needle.speed_mm_per_s * limits.step_s, span
+        if limits is not None and draft.roll_distance is not None:
+            yield (
+                "the distance between rolls",
+                limits.min_roll_distance_mm,
+                draft.roll_distance.span,
+            )
+        start = DEFAULT_TIP_MM if tip is None else tip.position_mm
+        for sphere in spheres:
+            region = sphere.region
+            # The model also holds the distance from the tip to the centre.
+            reach = max(math.dist(start, region.center_mm), *map(abs, region.center_mm))
+            yield f"`{region.name}`", reach + region.radius_mm, _place_of(sphere)
+
+
+def _of_kind(spheres: list[_Sphere], kind: RegionKind) -> tuple[Region, ...]:
+    """The regions of one kind, in their order."""
+    return tuple(sphere.region for sphere in spheres if sphere.region.kind == kind)
+
+
+def _place_of(sphere: _Sphere) -> Span:
+    """Where a region's place in space is written."""
+    center = sphere.draft.center
+    return sphere.draft.name_span if center is None else center.span
+
+
+def _where(span: Span) -> str:
+    """A place as it is named in a note."""
+    line, column = span.source.position(span.start)
+    return f"{span.source.path}:{line}:{column}"
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    """The scalar product."""
+    return math.fsum(p * q for p, q in zip(a, b, strict=True))
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    """The difference."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _times(factor: float, a: Vector) -> Vector:
+    """The multiple."""
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+def _unit(a: Vector) -> Vector:
+    """The vector of length 1 in the same direction; exact for directions along an axis."""
+    # Scaling first keeps the squares of very large and very small components in range.
+    largest = max(map(abs, a))
+    scaled = (a[0] / largest, a[1] / largest, a[2] / largest)
+    length = math.hypot(*scaled)
+    # Adding 0.0 turns a negative zero into a positive one.
+    return scaled[0] / length + 0.0, scaled[1] / length + 0.0, scaled[2] / length + 0.0
+
+
+def _rounded(component: float) -> float:
+    """A component as it is proposed in a hint, without a negative zero."""
+    return round(component, 6) + 0.0

@@ -1,0 +1,70 @@
+"""Files to text: the only place of the language that touches the disk."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ntagen.nsl.diagnostics import Reporter
+from ntagen.nsl.source import MAX_SOURCE_BYTES, Source, Span
+
+
+def read_source(path: str, reporter: Reporter, included_at: Span | None = None) -> Source | None:
+    """The text of a file.
+
+    Args:
+        path: The file.
+        reporter: Where it is said why a file cannot be read.
+        included_at: The path in the include statement, which is then the place of that diagnostic.
+
+    Returns:
+        The text, or None if there is none.
+    """
+
+    def report(name: str, message: str, hint: str | None = None) -> None:
+        if included_at is None:
+            reporter.report_file(name, path, message, hint=hint)
+        else:
+            reporter.report(name, included_at, f"cannot include `{path}`: {message}", hint=hint)
+
+    try:
+        if Path(path).is_dir():
+            report("file-unreadable", "it is a folder", "name a file in it")
+            return None
+        with Path(path).open("rb") as file:
+            data = file.read(MAX_SOURCE_BYTES + 1)
+    except FileNotFoundError:
+        report("file-missing", "there is no such file", _nearby(path))
+        return None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        report("file-unreadable", f"the file cannot be read: {reason.lower()}")
+        return None
+    if len(data) > MAX_SOURCE_BYTES:
+        report("file-too-large", f"the file has more than {MAX_SOURCE_BYTES // 2**20} MiB")
+        return None
+    if b"\0" in data:
+        report("file-not-text", "the file is not text", "an environment is a text file in UTF-8")
+        return None
+    try:
+        return Source(path, data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        report(
+            "file-not-utf-8",
+            f"byte 0x{data[error.start]:02x} in line {line} is not UTF-8",
+            "save the file in the encoding UTF-8",
+        )
+        return None
+
+
+def _nearby(path: str) -> str | None:
+    """A hint with the file that was most likely meant."""
+    from ntagen.nsl.diagnostics import did_you_mean
+
+    parent, name = os.path.split(path)
+    try:
+        names = sorted(entry for entry in os.listdir(parent or ".") if entry.endswith(".nsl"))
+    except (OSError, ValueError):
+        return None
+    return did_you_mean(name, names)

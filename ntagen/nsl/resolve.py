@@ -1,0 +1,508 @@
+"""The tree to a draft of the scene: includes read, loops unrolled, names and units resolved.
+
+A `Draft` holds what the file says, each value with the place where it stands; a value with a
+mistake is None, and the mistake is reported. Whether the values make sense together is not asked
+here but in `ntagen.nsl.build`.
+
+Cost: one step for each statement and each round of a loop; rounds are limited by `MAX_ROUNDS`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final, Generic, TypeVar
+
+from ntagen.nsl import tree
+from ntagen.nsl.diagnostics import Reporter, did_you_mean
+from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Evaluator, Scope
+from ntagen.nsl.parser import ALLOWED, MAX_DEPTH, BlockKind, parse
+from ntagen.nsl.quantity import (
+    ANGLE,
+    LENGTH,
+    NUMBER,
+    SPEED,
+    TIME,
+    Quantity,
+    is_unit,
+    scalar,
+)
+from ntagen.nsl.reading import read_source
+from ntagen.nsl.source import Source, Span
+from ntagen.scene import RegionKind, Vector
+
+MAX_ROUNDS: Final = 10_000
+"""Rounds that all loops of an environment may make together."""
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Placed(Generic[T]):
+    """A value and where it is written; None is a value with a mistake."""
+
+    value: T | None
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class DraftRegion:
+    """A region: a sphere, or what it takes to make one around another region."""
+
+    kind: RegionKind
+    name: str
+    name_span: Span
+    center: Placed[Vector] | None
+    radius: Placed[float]
+    around: Placed[str] | None = None
+
+    @property
+    def margin(self) -> Placed[float]:
+        """The margin of a region that lies around another; it stands in the radius' place."""
+        return self.radius
+
+
+@dataclass
+class Draft:
+    """What a file says of an environment."""
+
+    span: Span
+    name: str
+    seen: dict[str, Span] = field(default_factory=dict)
+    vectors: dict[str, Placed[Vector]] = field(default_factory=dict)
+    numbers: dict[str, Placed[float]] = field(default_factory=dict)
+    angles: list[Placed[float]] = field(default_factory=list)
+    max_rolls: Placed[int] | None = None
+    roll_distance: Placed[float] | None = None
+    choices: dict[str, str] = field(default_factory=dict)
+    resolution: Placed[float] | None = None
+    regions: dict[str, DraftRegion] = field(default_factory=dict)
+    broken_names: set[str] = field(default_factory=set)
+    queries: dict[str, Placed[str]] = field(default_factory=dict)
+    has_gaps: bool = False
+
+
+_NUMBERS: Final = {
+    "radius": (LENGTH, "the radius of the motion circle"),
+    "speed": (SPEED, "the insertion speed"),
+    "step": (TIME, "the step"),
+}
+_VECTORS: Final = {
+    "tip": (LENGTH, "the tip's position"),
+    "heading": (NUMBER, "the heading"),
+    "bevel": (NUMBER, "the bevel"),
+}
+CHOICES: Final = {"tissue": ("static",), "safety": ("sampled", "swept")}
+"""The words that a choice allows, the default first."""
+
+_ONCE: Final = frozenset({"needle", "motion", "roll", "resolution", *_NUMBERS, *_VECTORS, *CHOICES})
+
+
+def resolve(source: Source, reporter: Reporter) -> Draft | None:
+    """What the file says; None if it has no environment. Mistakes go to the reporter."""
+    return _Resolver(reporter).file(source)
+
+
+class _Resolver:
+    """Walks through the statements of a file and those it includes."""
+
+    def __init__(self, reporter: Reporter) -> None:
+        self._reporter = reporter
+        self._evaluator = Evaluator(reporter)
+        self._draft: Draft | None = None
+        self._open_files: list[str] = []
+        self._included: set[str] = set()
+        self._rounds = 0
+        self._loop_depth = 0
+        self._has_broken_environment = False
+
+    def file(self, source: Source) -> Draft | None:
+        """The draft of the whole file."""
+        file = parse(source, self._reporter)
+        self._open_files.append(os.path.realpath(source.path))
+        if not file.statements and not self._reporter.has_errors:
+            self._reporter.report_file(
+                "file-empty",
+                source.path,
+                "the file describes nothing",
+                hint="begin with `environment NAME { … }`",
+            )
+            return None
+        self._statements(file.statements, Scope(), "file")
+        if self._draft is None and not self._has_broken_environment:
+            self._reporter.report_file(
+                "environment-missing",
+                source.path,
+                "the file has no environment",
+                hint="begin with `environment NAME { … }`",
+            )
+        return self._draft
+
+    def _statements(
+        self, statements: Sequence[tree.Statement], scope: Scope, place: BlockKind
+    ) -> None:
+        """Goes through statements in their order."""
+        for statement in statements:
+            if isinstance(statement, tree.Broken):
+                self._broken(statement, scope)
+            elif statement.keyword not in ALLOWED[place]:
+                self._misplaced(statement, place)
+            else:
+                self._statement(statement, scope, place)
+
+    def _misplaced(self, statement: tree.Statement, place: BlockKind) -> None:
+        """Reports a statement of an included file that may not stand where the include does."""
+        where = "at the top of a file" if place == "file" else f"in `{place}`"
+        self._reporter.report(
+            "misplaced-statement",
+            statement.span,
+            f"`{statement.keyword}` may not be included {where}",
+            hint="move the include, or the statement",
+        )
+
+    def _broken(self, statement: tree.Broken, scope: Scope) -> None:
+        """Remembers what a statement with a mistake would have given, so that nobody misses it."""
+        if self._draft is not None:
+            self._draft.has_gaps = True
+            self._draft.seen.setdefault(statement.keyword, statement.span)
+        if statement.name is None:
+            if statement.keyword == "environment":
+                self._has_broken_environment = True
+        elif statement.keyword == "let":
+            scope.define(statement.name, statement.span, None)
+        elif statement.keyword == "environment":
+            self._has_broken_environment = True
+        elif self._draft is not None:
+            self._draft.broken_names.add(statement.name)
+
+    def _statement(self, statement: tree.Statement, scope: Scope, place: BlockKind) -> None:
+        """One statement that may stand where it stands."""
+        if self._is_repeated(statement):
+            return
+        match statement:
+            case tree.Let():
+                self._let(statement, scope)
+            case tree.Include():
+                self._include(statement, scope, place)
+            case tree.Environment():
+                self._environment(statement, scope)
+            case tree.Section(keyword=keyword, body=body):
+                self._statements(body, scope, keyword)
+            case tree.Loop():
+                self._loop(statement, scope)
+            case _ if self._draft is not None:
+                self._content(statement, scope, self._draft)
+
+    def _content(self, statement: tree.Statement, scope: Scope, draft: Draft) -> None:
+        """A statement that says something of the environment itself."""
+        match statement:
+            case tree.Region():
+                self._region(statement, scope, draft)
+            case tree.Query():
+                self._query(statement, draft)
+            case tree.Setting():
+                self._setting(statement, scope, draft)
+            case tree.Roll():
+                self._roll(statement, scope, draft)
+            case tree.Choice():
+                self._choice(statement, draft)
+            case tree.Resolution():
+                self._resolution(statement, scope, draft)
+
+    def _is_repeated(self, statement: tree.Statement) -> bool:
+        """Whether a statement that may be written once comes a second time; reports it if so."""
+        if self._draft is None or statement.keyword not in _ONCE:
+            return False
+        first = self._draft.seen.setdefault(statement.keyword, statement.span)
+        if first is statement.span:
+            return False
+        self._reporter.report(
+            "statement-repeated",
+            statement.span,
+            f"`{statement.keyword}` is written a second time",
+            hint="remove one of the two",
+            notes=(f"the first is at {_place(first)}",),
+        )
+        return True
+
+    # ------------------------------------------------------------------------------- composition
+
+    def _environment(self, statement: tree.Environment, scope: Scope) -> None:
+        """The environment itself; a second one is reported and left out."""
+        if self._draft is not None:
+            self._reporter.report(
+                "environment-repeated",
+                statement.span,
+                f"`{statement.name.text}` is the second environment of this file",
+                hint="write one file for each; share what they have in common with `include`",
+                notes=(f"the first is at {_place(self._draft.span)}",),
+            )
+            return
+        self._draft = Draft(statement.name.span, statement.name.text)
+        self._statements(statement.body, Scope(scope), "environment")
+
+    def _include(self, statement: tree.Include, scope: Scope, place: BlockKind) -> None:
+        """The statements of another file, once, as though they stood here."""
+        span = statement.path.span
+        source_path = span.source.path
+        path = os.path.join(os.path.dirname(source_path), statement.path.text)
+        key = os.path.realpath(path)
+        if key in self._open_files:
+            chain = [os.path.basename(p) for p in self._open_files[self._open_files.index(key) :]]
+            self._reporter.report(
+                "include-cycle",
+                span,
+                f"`{path}` includes itself",
+                notes=(" includes ".join([*chain, chain[0]]),),
+                hint="move what both need into a third file",
+            )
+            return
+        if key in self._included:
+            return
+        if len(self._open_files) > MAX_DEPTH:
+            self._reporter.report(
+                "nesting-too-deep", span, f"includes are nested deeper than {MAX_DEPTH}"
+            )
+            return
+        self._included.add(key)
+        source = read_source(path, self._reporter, included_at=span)
+        if source is None:
+            if self._draft is not None:
+                self._draft.has_gaps = True
+            return
+        self._reporter.enter(path)
+        self._open_files.append(key)
+        file = parse(source, self._reporter, kind=None)
+        self._statements(file.statements, scope, place)
+        self._open_files.pop()
+
+    def _loop(self, statement: tree.Loop, scope: Scope) -> None:
+        """The body once for each number from the first to the last."""
+        first = self._evaluator.whole(statement.first, scope, "the first number of a loop")
+        last = self._evaluator.whole(statement.last, scope, "the last number of a loop")
+        is_free = self._is_name_free(statement.variable, scope)
+        if first is not None and last is not None and first > last:
+            self._reporter.report(
+                "loop-empty",
+                statement.first.span.to(statement.last.span),
+                f"the loop makes no round: {first} is greater than {last}",
+                hint=f"write {last}..{first}",
+            )
+            return
+        if first is None or last is None or not is_free:
+            # One round without a value shows the other mistakes of the body.
+            first, last = 0, 0
+            value: Quantity | None = None
+        else:
+            value = scalar(float(first))
+        rounds = last - first + 1
+        if self._rounds + rounds > MAX_ROUNDS:
+            self._reporter.report(
+                "loop-too-long",
+                statement.first.span.to(statement.last.span),
+                f"with this loop there are more than {MAX_ROUNDS} rounds",
+                hint="lay out fewer regions, or larger ones",
+            )
+            if self._draft is not None:
+                self._draft.has_gaps = True
+            rounds = 1
+        self._rounds += rounds
+        self._loop_depth += 1
+        for number in range(first, first + rounds):
+            inner = Scope(scope)
+            inner.define(
+                statement.variable.text,
+                statement.variable.span,
+                value and scalar(float(number)),
+            )
+            self._statements(statement.body, inner, "for")
+        self._loop_depth -= 1
+
+    # ------------------------------------------------------------------------------------- names
+
+    def _let(self, statement: tree.Let, scope: Scope) -> None:
+        """A constant."""
+        value = self._evaluator.evaluate(statement.value, scope)
+        if self._is_name_free(statement.name, scope):
+            scope.define(statement.name.text, statement.name.span, value)
+
+    def _is_name_free(self, name: tree.Identifier, scope: Scope) -> bool:
+        """Whether a constant or a loop's variable may have a name; reports it if not."""
+        text = name.text
+        home = scope.find(text)
+        if text in CONSTANTS or text in FUNCTIONS or is_unit(text):
+            what = "a unit" if is_unit(text) else "always defined"
+            self._reporter.report(
+                "reserved-name",
+                name.span,
+                f"`{text}` is {what} and cannot be defined",
+                hint=f"choose another name, for example `my_{text}`",
+            )
+            return False
+        if home is not None:
+            self._reporter.report(
+                "duplicate-name",
+                name.span,
+                f"`{text}` is defined already",
+                hint="choose another name",
+                notes=(f"the first definition is at {_place(home.spans[text])}",),
+            )
+            return False
+        return True
+
+    def _region_name(self, name: tree.RegionName, scope: Scope) -> str | None:
+        """A region's name with the values of its indices: ``Ring[3]``."""
+        text = name.identifier.text
+        for index in name.indices:
+            number = self._evaluator.whole(index, scope, "an index")
+            if number is None:
+                return None
+            text += f"[{number}]"
+        return text
+
+    # ----------------------------------------------------------------------------------- content
+
+    def _region(self, statement: tree.Region, scope: Scope, draft: Draft) -> None:
+        """A region, whether or not all of it is right."""
+        name = self._region_name(statement.name, scope)
+        region = self._shape(statement, name or "", scope)
+        draft.seen.setdefault(statement.keyword, statement.span)
+        if name is None or region is None:
+            draft.has_gaps = True
+            draft.broken_names.add(statement.name.identifier.text)
+            return
+        if self._loop_depth and not statement.name.indices:
+            self._reporter.report(
+                "name-without-index",
+                statement.name.span,
+                f"`{name}` is made once for each round of the loop and needs an index",
+                hint=f"write for example `{name}[i]`, with the variable of your loop",
+            )
+            return
+        first = draft.regions.setdefault(name, region)
+        if first is not region:
+            self._reporter.report(
+                "duplicate-name",
+                statement.name.span,
+                f"there is a region `{name}` already",
+                hint="choose another name"
+                + (" or another index" if statement.name.indices else ""),
+                notes=(f"the first is at {_place(first.name_span)}",),
+            )
+
+    def _shape(self, statement: tree.Region, name: str, scope: Scope) -> DraftRegion | None:
+        """A region with its sphere, or with what it lies around."""
+        keyword, span, shape = statement.keyword, statement.name.span, statement.shape
+        if isinstance(shape, tree.Sphere):
+            role = f"the radius of `{name}`"
+            center = self._evaluator.vector(shape.center, scope, LENGTH, f"the centre of `{name}`")
+            radius = self._evaluator.number(shape.radius, scope, LENGTH, role)
+            return DraftRegion(
+                keyword,
+                name,
+                span,
+                Placed(center, shape.center.span),
+                Placed(radius, shape.radius.span),
+            )
+        around = self._region_name(shape.region, scope)
+        margin = self._evaluator.number(shape.margin, scope, LENGTH, f"the margin of `{name}`")
+        if keyword != "detection":
+            self._reporter.report(
+                "around-misused",
+                shape.span,
+                f"a {keyword} region is not written with `around`",
+                hint="give it a sphere, or make it a `detection` region",
+            )
+            return None
+        return DraftRegion(
+            keyword,
+            name,
+            span,
+            None,
+            Placed(margin, shape.margin.span),
+            Placed(around, shape.region.span),
+        )
+
+    def _query(self, statement: tree.Query, draft: Draft) -> None:
+        """A named query; its text is looked at by the checker, not here."""
+        name = statement.name
+        first = draft.queries.setdefault(name.text, Placed(statement.text, name.span))
+        if first.span is not name.span:
+            self._reporter.report(
+                "duplicate-name",
+                name.span,
+                f"there is a query `{name.text}` already",
+                hint="choose another name",
+                notes=(f"the first is at {_place(first.span)}",),
+            )
+
+    def _setting(self, statement: tree.Setting, scope: Scope, draft: Draft) -> None:
+        """A property of the needle or of its motion."""
+        span = statement.value.span
+        if statement.keyword in _VECTORS:
+            dimension, role = _VECTORS[statement.keyword]
+            vector = self._evaluator.vector(statement.value, scope, dimension, role)
+            draft.vectors[statement.keyword] = Placed(vector, span)
+        else:
+            dimension, role = _NUMBERS[statement.keyword]
+            number = self._evaluator.number(statement.value, scope, dimension, role)
+            draft.numbers[statement.keyword] = Placed(number, span)
+
+    def _roll(self, statement: tree.Roll, scope: Scope, draft: Draft) -> None:
+        """The rolls that may be chosen, and their limits."""
+        angles = self._evaluator.list_of(statement.angles, scope, ANGLE, "a roll")
+        draft.angles = [
+            Placed(angle, expression.span)
+            for angle, expression in zip(angles, statement.angles, strict=True)
+        ]
+        for limits, words in ((statement.at_most, "at most"), (statement.at_least, "at least")):
+            for repeated in limits[1:]:
+                self._reporter.report(
+                    "statement-repeated",
+                    repeated.span,
+                    f"`{words}` is written a second time",
+                    hint="remove one of the two",
+                )
+        for limit in statement.at_most[:1]:
+            count = self._evaluator.whole(limit, scope, "the number of rolls")
+            draft.max_rolls = Placed(count, limit.span)
+        for limit in statement.at_least[:1]:
+            distance = self._evaluator.number(limit, scope, LENGTH, "the distance between rolls")
+            draft.roll_distance = Placed(distance, limit.span)
+
+    def _choice(self, statement: tree.Choice, draft: Draft) -> None:
+        """A property that is one of a few words."""
+        word, known = statement.word.text, CHOICES[statement.keyword]
+        if word in known:
+            draft.choices[statement.keyword] = word
+            return
+        self._reporter.report(
+            "unknown-choice",
+            statement.word.span,
+            f"there is no {statement.keyword} `{word}`",
+            hint=did_you_mean(word, known) or f"write {' or '.join(f'`{w}`' for w in known)}",
+        )
+        draft.has_gaps = True
+
+    def _resolution(self, statement: tree.Resolution, scope: Scope, draft: Draft) -> None:
+        """The fixed-point scale, as units per mm."""
+        count = self._evaluator.number(statement.count, scope, NUMBER, "the resolution")
+        unit = self._evaluator.unit(statement.unit)
+        value: float | None = None
+        if unit is not None and unit[1] != LENGTH:
+            self._reporter.report(
+                "wrong-dimension",
+                statement.unit.span,
+                f"the resolution is per length, but this is {unit[1]}",
+                hint="write for example `resolution 1000 per mm`",
+            )
+        elif unit is not None and count is not None:
+            value = count / unit[0]
+        draft.resolution = Placed(value, statement.count.span.to(statement.unit.span))
+
+
+def _place(span: Span) -> str:
+    """A place as it is named in a note."""
+    line, column = span.source.position(span.start)
+    return f"{span.source.path}:{line}:{column}"
