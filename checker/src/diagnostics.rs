@@ -50,8 +50,11 @@ pub struct Source {
     pub text: String,
     /// Pairs (byte of `text`, byte of the file), ascending; between two entries both advance together.
     pub offsets: Vec<(u32, u32)>,
-    /// The file's byte offsets at which its lines start; the first is 0. Empty: the text is the file.
+    /// The file's byte offsets at which lines start, from the line that the text begins in to the one that it ends
+    /// in. Empty: the text is the file.
     pub line_starts: Vec<u32>,
+    /// How many lines of the file come before the first one of `line_starts`.
+    pub first_line: u32,
 }
 
 /// Line and column of a place in a file, both counted from 1; columns count characters.
@@ -63,6 +66,19 @@ pub struct Position {
     pub column: u32,
 }
 
+impl Source {
+    /// The byte of the file that a byte of the text comes from.
+    fn file_offset(&self, text_offset: u32) -> u32 {
+        let index = self
+            .offsets
+            .partition_point(|&(text, _)| text <= text_offset);
+        match index.checked_sub(1).map(|i| self.offsets[i]) {
+            Some((text, file)) => file + (text_offset - text),
+            None => text_offset,
+        }
+    }
+}
+
 /// All sources of one load.
 #[derive(Clone, Debug, Default)]
 pub struct SourceMap {
@@ -71,6 +87,9 @@ pub struct SourceMap {
 
 impl SourceMap {
     /// Adds a source and returns its index.
+    ///
+    /// # Panics
+    /// At the 2^32nd source, which no memory holds.
     pub fn add(&mut self, source: Source) -> SourceId {
         self.sources.push(source);
         SourceId(u32::try_from(self.sources.len() - 1).expect("fewer than 2^32 sources"))
@@ -87,20 +106,30 @@ impl SourceMap {
         if source.line_starts.is_empty() {
             return position_in_text(&source.text, span.start);
         }
-        let index = source
-            .offsets
-            .partition_point(|&(text, _)| text <= span.start);
-        let offset = match index.checked_sub(1).map(|i| source.offsets[i]) {
-            Some((text, file)) => file + (span.start - text),
-            None => span.start,
-        };
+        let offset = source.file_offset(span.start);
         let line = source
             .line_starts
             .partition_point(|&start| start <= offset)
             .max(1);
+        let line_start = source.line_starts[line - 1];
+        // Only bytes of the file that belong to the text can be told to be the rest of a character.
+        let first = source.text.floor_char_boundary(span.start as usize);
+        let rest_bytes = source.text[..first]
+            .bytes()
+            .enumerate()
+            .rev()
+            .take_while(|&(index, _)| {
+                u32::try_from(index).is_ok_and(|index| source.file_offset(index) >= line_start)
+            })
+            .filter(|&(_, byte)| byte & 0xc0 == 0x80)
+            .count();
+        let column = (offset - line_start.min(offset) + 1)
+            .saturating_sub(u32::try_from(rest_bytes).unwrap_or(u32::MAX));
         Position {
-            line: u32::try_from(line).unwrap_or(u32::MAX),
-            column: offset - source.line_starts[line - 1] + 1,
+            line: u32::try_from(line)
+                .unwrap_or(u32::MAX)
+                .saturating_add(source.first_line),
+            column,
         }
     }
 

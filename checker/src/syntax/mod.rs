@@ -1,5 +1,114 @@
 //! From text to syntax trees: lexer, parser, and the readers of the file formats.
 //!
-//! Parsing never fails and never panics: it returns a tree and a list of diagnostics. It knows no types.
+//! Parsing never fails and never panics: it returns a tree and a list of diagnostics. It knows no types and resolves no
+//! names; the locations that an edge refers to are text like everything else.
+//!
+//! Source: the UPPAAL language reference, and the behaviour of utap where the reference is silent. Where we differ:
+//! * Names of built-in functions may be declared (warning); words of the query language may name locations (warning).
+//! * The order of the parts of a textual process and of an XML template is free; `for` may leave parts out.
+//! * Comments in a label do not cut it off; a label that holds only comments counts as absent.
+//! * The old syntax is recognised by constructs that only it has; no switch is needed.
+//!
+//! Cost: linear in the text, apart from one token of lookahead more here and there.
 
 pub mod ast;
+pub mod codes;
+
+mod lexer;
+
+mod keywords;
+
+mod parser;
+
+mod expressions;
+
+mod types;
+
+mod declarations;
+
+mod statements;
+
+mod processes;
+
+mod queries;
+
+mod encoding;
+
+mod q_file;
+
+mod xml_text;
+
+mod xml;
+
+mod xta;
+
+mod prelude;
+
+mod print;
+
+use crate::diagnostics::{Diagnostic, Source, SourceMap, Span};
+
+pub use prelude::prelude;
+pub use print::{print_expr, print_type};
+pub use queries::{add_query_text, parse_query};
+
+/// After this many mistakes the rest of a text is left unread.
+const MOST_MISTAKES: usize = 100;
+
+/// A model as read: the tree is complete where no diagnostic says otherwise.
+pub struct Parsed {
+    /// The tree.
+    pub document: ast::Document,
+    /// What is wrong, in the order of reading.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Reads a model. The format is found from the content: XML begins with `<`; everything else is a textual model, in
+/// the old syntax if it uses what only that one has.
+pub fn read_model(path: &str, bytes: &[u8], sources: &mut SourceMap) -> Parsed {
+    let mut diagnostics = Vec::new();
+    let document = match encoding::decode_model(path, bytes, sources, &mut diagnostics) {
+        Some(text) if text.trim_start().starts_with('<') => {
+            xml::read(path, &text, sources, &mut diagnostics)
+        }
+        Some(text) => xta::read(path, text, sources, &mut diagnostics),
+        None => ast::Document::default(),
+    };
+    diagnostics.dedup();
+    Parsed {
+        document,
+        diagnostics,
+    }
+}
+
+/// Splits a `.q` file into the texts of its queries.
+pub fn read_queries(
+    path: &str,
+    bytes: &[u8],
+    sources: &mut SourceMap,
+) -> (Vec<ast::QueryText>, Vec<Diagnostic>) {
+    let mut diagnostics = Vec::new();
+    let queries = match encoding::decode(path, bytes, sources, &mut diagnostics) {
+        Some(text) => {
+            let span = add_file(path, text, sources);
+            q_file::split(span, sources, &mut diagnostics)
+        }
+        None => Vec::new(),
+    };
+    (queries, diagnostics)
+}
+
+/// Adds a whole file as one source and returns the span of all of it.
+fn add_file(path: &str, text: String, sources: &mut SourceMap) -> Span {
+    let end = lexer::to_u32(text.len());
+    let source = sources.add(Source {
+        path: path.to_owned(),
+        text,
+        ..Source::default()
+    });
+    Span {
+        source,
+        start: 0,
+        end,
+    }
+}

@@ -1,0 +1,252 @@
+//! Declarations: types, variables, functions, priorities, hooks; what is recognised and not supported is recorded.
+
+use super::ast::{Block, Declaration, Expr, Function, Initialiser, Name, TypeExpr, Variable};
+use super::lexer::TokenKind;
+use super::parser::{Dialect, Parser};
+
+impl Parser<'_> {
+    /// The declarations of a template, to the end of the text or a word that begins the next part of a process.
+    pub(super) fn local_declarations(&mut self) -> Vec<Declaration> {
+        let mut declarations = Vec::new();
+        while !self.at_end() && !self.at(TokenKind::RightBrace) && !self.at_process_part() {
+            self.declaration(&mut declarations);
+        }
+        declarations
+    }
+
+    fn at_process_part(&self) -> bool {
+        matches!(
+            self.word(),
+            "state" | "branchpoint" | "commit" | "init" | "trans"
+        ) || (self.at_word("urgent") && !matches!(self.word_at(1), "chan" | "broadcast" | "clock"))
+    }
+
+    /// Reads one declaration, or reports and recovers; it consumes at least one token.
+    pub(super) fn declaration(&mut self, declarations: &mut Vec<Declaration>) {
+        let before = self.progress();
+        match self.word() {
+            "typedef" if self.dialect == Dialect::New => self.typedef(declarations),
+            "before_update" | "after_update" if self.dialect == Dialect::New => {
+                self.update_hook(declarations);
+            }
+            "import" if self.dialect == Dialect::New => self.import(),
+            "dynamic" if self.dialect == Dialect::New => self.dynamic_template(),
+            "chan" if self.word_at(1) == "priority" => self.channel_priority(declarations),
+            "const" if self.at_old_constant() => self.old_constants(declarations),
+            _ if self.at_type_word() || self.is_name_at(0) => {
+                self.variables_or_function(declarations);
+            }
+            _ if self.eat(TokenKind::Semicolon) => {
+                // utap's grammar has no empty declaration, but `};` behind a function is a common slip.
+            }
+            _ => {
+                self.expected("a declaration");
+                self.recover();
+            }
+        }
+        if self.progress() == before {
+            self.bump();
+        }
+    }
+
+    fn typedef(&mut self, declarations: &mut Vec<Declaration>) {
+        let before = self.progress();
+        self.bump();
+        let ty = self.type_expr();
+        self.declarators("the name of the type", |_, name, dimensions| {
+            declarations.push(Declaration::Typedef {
+                ty: ty.clone(),
+                name,
+                dimensions,
+            });
+        });
+        self.end_of_declaration("after the type definition", before);
+    }
+
+    fn update_hook(&mut self, declarations: &mut Vec<Declaration>) {
+        let span = self.here();
+        let is_before = self.at_word("before_update");
+        self.bump();
+        self.expect(TokenKind::LeftBrace, "before the updates");
+        let updates = if self.at(TokenKind::RightBrace) {
+            Vec::new()
+        } else {
+            self.expression_list()
+        };
+        self.closing(TokenKind::RightBrace, "after the updates");
+        declarations.push(if is_before {
+            Declaration::BeforeUpdate(updates, span)
+        } else {
+            Declaration::AfterUpdate(updates, span)
+        });
+    }
+
+    /// `chan priority a, b[0] < default;`
+    fn channel_priority(&mut self, declarations: &mut Vec<Declaration>) {
+        let before = self.progress();
+        let start = self.here();
+        self.bump();
+        self.bump();
+        let mut levels = vec![vec![self.channel_of_priority()]];
+        loop {
+            if self.eat(TokenKind::Comma) {
+                let channel = self.channel_of_priority();
+                if let Some(level) = levels.last_mut() {
+                    level.push(channel);
+                }
+            } else if self.eat(TokenKind::Less) {
+                levels.push(vec![self.channel_of_priority()]);
+            } else {
+                break;
+            }
+        }
+        let span = self.since(start);
+        declarations.push(Declaration::ChannelPriority { levels, span });
+        self.end_of_declaration("after the priorities", before);
+    }
+
+    fn channel_of_priority(&mut self) -> Option<Expr> {
+        if self.eat_word("default") {
+            return None;
+        }
+        // Above the comparisons, because `<` separates the levels.
+        Some(self.expression_at(super::expressions::level::POSTFIX))
+    }
+
+    /// `dynamic T(parameters);`
+    fn dynamic_template(&mut self) {
+        let before = self.progress();
+        self.bump();
+        let name = self.name("the name of the template");
+        self.parameter_list();
+        self.unsupported.push(Name {
+            text: format!("dynamic template `{}`", name.text),
+            span: name.span,
+        });
+        self.end_of_declaration("after the declaration", before);
+    }
+
+    /// `import "library" { … };`
+    fn import(&mut self) {
+        let before = self.progress();
+        let span = self.here();
+        self.bump();
+        self.expect(TokenKind::String, "with the name of the library");
+        if self.eat(TokenKind::LeftBrace) {
+            self.skip_to(&[TokenKind::RightBrace]);
+            self.expect(TokenKind::RightBrace, "after the imported functions");
+        } else {
+            self.skip_to(&[TokenKind::Semicolon]);
+        }
+        self.unsupported.push(Name {
+            text: "external functions (`import`)".to_owned(),
+            span,
+        });
+        self.end_of_declaration("after the import", before);
+    }
+
+    /// `const n 3`: a name that is not followed by another one cannot be a type.
+    fn at_old_constant(&self) -> bool {
+        self.is_name_at(1)
+            && match self.peek(2).kind {
+                TokenKind::Int | TokenKind::LeftBrace | TokenKind::Minus | TokenKind::Comma => true,
+                TokenKind::LeftBracket | TokenKind::Word => self.dialect == Dialect::Old,
+                _ => false,
+            }
+    }
+
+    fn old_constants(&mut self, declarations: &mut Vec<Declaration>) {
+        let before = self.progress();
+        let ty = self.old_constant_type();
+        self.declarators("the name of a constant", |parser, name, dimensions| {
+            parser.eat(TokenKind::Assign);
+            let initialiser = Some(parser.initialiser());
+            declarations.push(Declaration::Variable(Variable {
+                ty: ty.clone(),
+                name,
+                dimensions,
+                initialiser,
+            }));
+        });
+        self.end_of_declaration("after the constants", before);
+    }
+
+    fn variables_or_function(&mut self, declarations: &mut Vec<Declaration>) {
+        let before = self.progress();
+        let ty = self.type_expr();
+        let is_function =
+            self.kind() == TokenKind::Word && self.peek(1).kind == TokenKind::LeftParenthesis;
+        if is_function && self.dialect == Dialect::New {
+            let function = self.function(ty);
+            declarations.push(Declaration::Function(function));
+            return;
+        }
+        self.variables(&ty, declarations);
+        self.end_of_declaration("after the declaration", before);
+    }
+
+    fn function(&mut self, return_type: TypeExpr) -> Function {
+        let name = self.declared_name("the name of the function");
+        let parameters = self.parameter_list();
+        let body = if self.at(TokenKind::LeftBrace) {
+            self.block()
+        } else {
+            self.expected("`{` before the body of the function");
+            self.recover();
+            Block {
+                declarations: Vec::new(),
+                statements: Vec::new(),
+                span: name.span,
+            }
+        };
+        Function {
+            return_type,
+            name,
+            parameters,
+            body,
+        }
+    }
+
+    fn variables(&mut self, ty: &TypeExpr, declarations: &mut Vec<Declaration>) {
+        self.declarators("the name of a variable", |parser, name, dimensions| {
+            let assigned = parser.eat(TokenKind::Assign) || parser.eat(TokenKind::ColonAssign);
+            let initialiser = assigned.then(|| parser.initialiser());
+            declarations.push(Declaration::Variable(Variable {
+                ty: ty.clone(),
+                name,
+                dimensions,
+                initialiser,
+            }));
+        });
+    }
+
+    fn initialiser(&mut self) -> Initialiser {
+        if !self.at(TokenKind::LeftBrace) {
+            return Initialiser::Expr(self.expression());
+        }
+        match self.nested(Parser::initialiser_list) {
+            Some(list) => list,
+            None => Initialiser::Expr(self.error_expr()),
+        }
+    }
+
+    fn initialiser_list(&mut self) -> Initialiser {
+        let start = self.here();
+        self.bump();
+        let mut items = Vec::new();
+        loop {
+            let named = self.is_name_at(0) && self.peek(1).kind == TokenKind::Colon;
+            let name = named.then(|| {
+                let name = self.name("the name of a field");
+                self.bump();
+                name
+            });
+            items.push((name, self.initialiser()));
+            if !self.eat(TokenKind::Comma) {
+                break;
+            }
+        }
+        self.closing(TokenKind::RightBrace, "after the values");
+        Initialiser::List(items, self.since(start))
+    }
+}

@@ -1,0 +1,483 @@
+//! The parts of textual models: process definitions, instantiations, the system line, and what may follow it.
+
+use super::ast::{
+    BinaryOp, Branchpoint, Declaration, Document, Edge, Expr, ExprKind, Location, Name, QueryText,
+    Sync, System, SystemItem, Template, TypeExpr,
+};
+use super::codes;
+use super::expressions::join_all;
+use super::lexer::TokenKind;
+use super::parser::{Dialect, Parser};
+use crate::diagnostics::{Diagnostic, SourceMap, Span};
+
+/// Which part of a model a text is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// The `<declaration>` of an XML file.
+    Declarations,
+    /// The `<instantiation>` of an XML file.
+    Instantiations,
+    /// The `<system>` of an XML file.
+    System,
+    /// A whole textual model.
+    Whole,
+}
+
+impl Parser<'_> {
+    /// Everything that stands outside templates; the spans of queries are returned.
+    pub(super) fn model(&mut self, part: Part, document: &mut Document) -> Vec<Span> {
+        let mut queries = Vec::new();
+        let mut has_system = false;
+        while !self.at_end() {
+            let before = self.progress();
+            match self.word() {
+                "process" => self.process_definition(document),
+                "system" => {
+                    self.system_line(&mut document.system);
+                    has_system = true;
+                }
+                "progress" if has_system => self.progress_measures(&mut document.system),
+                "gantt" if has_system => self.gantt(),
+                "query" if has_system => queries.extend(self.query_block()),
+                _ if self.at_instantiation() => self.instantiation(&mut document.system),
+                _ => self.declaration_of(part, document),
+            }
+            if self.progress() == before {
+                self.bump();
+            }
+        }
+        document.unsupported.append(&mut self.unsupported);
+        if !has_system && matches!(part, Part::System | Part::Whole) {
+            let end = self.here();
+            self.report(
+                Diagnostic::new(codes::MISSING_SYSTEM, end, "no `system` line")
+                    .help("name the processes of the system, for example `system P, Q;`"),
+            );
+        }
+        queries
+    }
+
+    fn declaration_of(&mut self, part: Part, document: &mut Document) {
+        let mut declarations = Vec::new();
+        self.declaration(&mut declarations);
+        // In a textual model, declarations are global as long as a process may follow that uses them.
+        let is_global = match part {
+            Part::Declarations => true,
+            Part::Whole => document.system.items.is_empty(),
+            Part::Instantiations | Part::System => false,
+        };
+        if is_global {
+            document.declarations.append(&mut declarations);
+        } else {
+            let items = declarations.into_iter().map(SystemItem::Declaration);
+            document.system.items.extend(items);
+        }
+    }
+
+    /// `P = …` or `P(…) = …`: a name that no second one follows, as in a declaration.
+    fn at_instantiation(&self) -> bool {
+        self.is_name_at(0)
+            && matches!(
+                self.peek(1).kind,
+                TokenKind::Assign | TokenKind::ColonAssign | TokenKind::LeftParenthesis
+            )
+    }
+
+    /// `P(parameters) = T(arguments);`
+    fn instantiation(&mut self, system: &mut System) {
+        let before = self.progress();
+        let name = self.declared_name("the name of the process");
+        let parameters = if self.at(TokenKind::LeftParenthesis) {
+            self.parameter_list()
+        } else {
+            Vec::new()
+        };
+        if !self.eat(TokenKind::ColonAssign) {
+            self.expect(TokenKind::Assign, "after the name of the process");
+        }
+        let template = self.name("the name of a template");
+        let arguments = if self.at(TokenKind::LeftParenthesis) {
+            self.arguments()
+        } else {
+            self.expected("`(` before the arguments");
+            Vec::new()
+        };
+        system.items.push(SystemItem::Instantiation {
+            name,
+            parameters,
+            template,
+            arguments,
+        });
+        self.end_of_declaration("after the instantiation", before);
+    }
+
+    /// `system A, B < C;`
+    fn system_line(&mut self, system: &mut System) {
+        let before = self.progress();
+        self.bump();
+        if system.processes.is_empty() {
+            system.processes.push(Vec::new());
+        }
+        loop {
+            let name = self.name("the name of a process");
+            if !name.text.is_empty()
+                && let Some(level) = system.processes.last_mut()
+            {
+                level.push(name);
+            }
+            if self.eat(TokenKind::Less) {
+                system.processes.push(Vec::new());
+            } else if !self.eat(TokenKind::Comma) {
+                break;
+            }
+        }
+        self.end_of_declaration("after the system line", before);
+    }
+
+    fn progress_measures(&mut self, system: &mut System) {
+        self.bump();
+        self.expect(TokenKind::LeftBrace, "after `progress`");
+        while !self.at_end() && !self.at(TokenKind::RightBrace) {
+            let before = self.progress();
+            system.progress.push(self.expression());
+            if self.eat(TokenKind::Colon) {
+                system.progress.push(self.expression());
+            }
+            self.end_of_declaration("after the progress measure", before);
+        }
+        self.closing(TokenKind::RightBrace, "after the progress measures");
+    }
+
+    /// `gantt { … }`: only drawn by the editor, so it is skipped.
+    fn gantt(&mut self) {
+        self.bump();
+        self.expect(TokenKind::LeftBrace, "after `gantt`");
+        self.skip_to(&[TokenKind::RightBrace]);
+        self.expect(TokenKind::RightBrace, "after the chart");
+    }
+
+    /// `query { … }`: the span of the formula.
+    fn query_block(&mut self) -> Option<Span> {
+        self.bump();
+        self.expect(TokenKind::LeftBrace, "after `query`");
+        let start = self.here();
+        self.skip_to(&[TokenKind::RightBrace]);
+        let is_empty = self.here().start == start.start;
+        let span = self.since(start);
+        self.expect(TokenKind::RightBrace, "after the query");
+        (!is_empty).then_some(span)
+    }
+
+    /// `process Name(parameters) { … }`
+    fn process_definition(&mut self, document: &mut Document) {
+        let start = self.here();
+        self.bump();
+        let name = self.declared_name("the name of the process");
+        let parameters = if self.at(TokenKind::LeftParenthesis) || self.dialect == Dialect::New {
+            self.parameter_list()
+        } else {
+            Vec::new()
+        };
+        if !self.expect(TokenKind::LeftBrace, "before the body of the process") {
+            self.recover();
+            return;
+        }
+        keep_declarations_global(document);
+        let mut template = Template {
+            name,
+            parameters,
+            declarations: self.local_declarations(),
+            locations: Vec::new(),
+            branchpoints: Vec::new(),
+            initial: None,
+            edges: Vec::new(),
+        };
+        while !self.at_end() && !self.at(TokenKind::RightBrace) {
+            let before = self.progress();
+            self.process_part(&mut template);
+            if self.progress() == before {
+                self.bump();
+            }
+        }
+        self.expect(TokenKind::RightBrace, "at the end of the process");
+        if template.initial.is_none() {
+            let message = format!("process `{}` has no initial location", template.name.text);
+            self.report(
+                Diagnostic::new(codes::MISSING_INITIAL_LOCATION, start, message)
+                    .help("add `init L;` after the states"),
+            );
+        }
+        document.templates.push(template);
+    }
+
+    fn process_part(&mut self, template: &mut Template) {
+        let before = self.progress();
+        match self.word() {
+            "state" => self.states(template),
+            "branchpoint" => self.branchpoints(template),
+            "commit" => self.mark(template, |location| &mut location.committed),
+            "urgent" => self.mark(template, |location| &mut location.urgent),
+            "init" => {
+                self.bump();
+                template.initial = Some(self.name("the name of the initial location"));
+            }
+            "trans" => self.transitions(template),
+            _ => {
+                let mut late: Vec<Declaration> = Vec::new();
+                self.expected("`state`, `init`, `trans` or the end of the process");
+                self.declaration(&mut late);
+                template.declarations.append(&mut late);
+                return;
+            }
+        }
+        self.end_of_declaration("at the end of this part of the process", before);
+    }
+
+    /// `state A{invariant; rate}, B;`
+    fn states(&mut self, template: &mut Template) {
+        self.bump();
+        loop {
+            let name = self.name("the name of a location");
+            let mut location = Location {
+                id: name.text.clone(),
+                span: name.span,
+                name: Some(name),
+                invariant: None,
+                exponential_rate: None,
+                urgent: false,
+                committed: false,
+                position: None,
+            };
+            if self.eat(TokenKind::LeftBrace) {
+                if !self.at(TokenKind::Semicolon) {
+                    location.invariant = Some(self.condition_list());
+                }
+                if self.eat(TokenKind::Semicolon) {
+                    location.exponential_rate = Some(self.exponential_rate());
+                }
+                self.closing(TokenKind::RightBrace, "after the invariant");
+            }
+            if !location.id.is_empty() {
+                template.locations.push(location);
+            }
+            if !self.eat(TokenKind::Comma) {
+                return;
+            }
+        }
+    }
+
+    /// `a` or `a : b`, the rate a/b.
+    pub(super) fn exponential_rate(&mut self) -> Expr {
+        let start = self.here();
+        let rate = self.expression();
+        if !self.eat(TokenKind::Colon) {
+            return rate;
+        }
+        let divisor = self.expression();
+        let kind = ExprKind::Binary(BinaryOp::Divide, Box::new(rate), Box::new(divisor));
+        let span = self.since(start);
+        Expr { kind, span }
+    }
+
+    /// A guard or invariant; the old syntax has a list, all of which must hold.
+    pub(super) fn condition_list(&mut self) -> Expr {
+        let start = self.here();
+        let mut conditions = vec![self.expression()];
+        while self.dialect == Dialect::Old && self.eat(TokenKind::Comma) {
+            conditions.push(self.expression());
+        }
+        let mut joined = match join_all(BinaryOp::And, conditions) {
+            Some(expr) => expr,
+            None => self.error_expr(),
+        };
+        joined.span = self.since(start);
+        joined
+    }
+
+    fn branchpoints(&mut self, template: &mut Template) {
+        self.bump();
+        loop {
+            let name = self.name("the name of a branch point");
+            template.branchpoints.push(Branchpoint {
+                id: name.text,
+                position: None,
+                span: name.span,
+            });
+            if !self.eat(TokenKind::Comma) {
+                return;
+            }
+        }
+    }
+
+    /// `commit A, B` and `urgent A, B`
+    fn mark(&mut self, template: &mut Template, flag: fn(&mut Location) -> &mut bool) {
+        self.bump();
+        loop {
+            let name = self.name("the name of a location");
+            let found = template.locations.iter_mut().find(|l| l.id == name.text);
+            match found {
+                Some(location) => {
+                    *flag(location) = true;
+                    if location.urgent && location.committed {
+                        let message =
+                            format!("location `{}` is both urgent and committed", name.text);
+                        self.error(codes::URGENT_AND_COMMITTED, name.span, message);
+                    }
+                }
+                None if name.text.is_empty() => {}
+                None => {
+                    let message = format!("`{}` is no location of this process", name.text);
+                    self.error(codes::UNKNOWN_LOCATION, name.span, message);
+                }
+            }
+            if !self.eat(TokenKind::Comma) {
+                return;
+            }
+        }
+    }
+
+    fn transitions(&mut self, template: &mut Template) {
+        self.bump();
+        let mut source: Option<Name> = None;
+        loop {
+            let start = self.here();
+            let reused = matches!(
+                self.kind(),
+                TokenKind::Arrow | TokenKind::UncontrollableArrow
+            );
+            let from = match (&source, reused) {
+                (Some(source), true) => source.clone(),
+                _ => self.name("the location that the edge leaves"),
+            };
+            if let Some(edge) = self.transition(start, from.clone()) {
+                template.edges.push(edge);
+            }
+            source = Some(from);
+            if !self.eat(TokenKind::Comma) {
+                return;
+            }
+        }
+    }
+
+    /// `-> B { … }`
+    fn transition(&mut self, start: Span, source: Name) -> Option<Edge> {
+        let controllable = !self.at(TokenKind::UncontrollableArrow);
+        if !self.eat(TokenKind::Arrow) && !self.eat(TokenKind::UncontrollableArrow) {
+            self.expected("`->` or `-u->` after the location");
+            return None;
+        }
+        let target = self.name("the location that the edge enters");
+        let mut edge = Edge {
+            source,
+            target,
+            select: Vec::new(),
+            guard: None,
+            sync: None,
+            update: Vec::new(),
+            probability: None,
+            controllable,
+            nails: Vec::new(),
+            span: start,
+        };
+        if self.expect(TokenKind::LeftBrace, "before the labels of the edge") {
+            while !self.at_end() && !self.at(TokenKind::RightBrace) {
+                let before = self.progress();
+                self.edge_label(&mut edge);
+                self.end_of_declaration("after the label", before);
+            }
+            self.expect(TokenKind::RightBrace, "after the labels of the edge");
+        }
+        edge.span = self.since(start);
+        Some(edge)
+    }
+
+    fn edge_label(&mut self, edge: &mut Edge) {
+        match self.word() {
+            "select" => {
+                self.bump();
+                edge.select = self.select_list();
+            }
+            "guard" => {
+                self.bump();
+                edge.guard = Some(self.condition_list());
+            }
+            "sync" => {
+                self.bump();
+                edge.sync = Some(self.synchronisation());
+            }
+            "assign" => {
+                self.bump();
+                edge.update = self.expression_list();
+            }
+            "probability" => {
+                self.bump();
+                edge.probability = Some(self.expression());
+            }
+            _ => self.expected("`select`, `guard`, `sync`, `assign` or `probability`"),
+        }
+    }
+
+    /// `i : T, j : U`
+    pub(super) fn select_list(&mut self) -> Vec<(Name, TypeExpr)> {
+        let mut bindings = Vec::new();
+        loop {
+            let name = self.declared_name("the name of a selected value");
+            if !self.expect(TokenKind::Colon, "between the name and its type") {
+                return bindings;
+            }
+            bindings.push((name, self.type_expr()));
+            if !self.eat(TokenKind::Comma) {
+                return bindings;
+            }
+        }
+    }
+
+    /// `c!` or `c?`
+    pub(super) fn synchronisation(&mut self) -> Sync {
+        let start = self.here();
+        let channel = self.expression();
+        let send = self.at(TokenKind::Exclamation);
+        if send || self.at(TokenKind::Question) {
+            self.bump();
+        } else if self.at_end() || self.at(TokenKind::Semicolon) {
+            let message = "this synchronisation has no direction";
+            self.report(
+                Diagnostic::new(codes::MISSING_DIRECTION, channel.span, message)
+                    .help("write `!` behind the channel to send, `?` to receive"),
+            );
+        } else {
+            self.expected("`!` or `?` after the channel");
+        }
+        let span = self.since(start);
+        Sync {
+            channel,
+            send,
+            span,
+        }
+    }
+}
+
+/// Declarations between instantiations are visible to this process, so they are global.
+fn keep_declarations_global(document: &mut Document) {
+    let mut kept = Vec::new();
+    for item in document.system.items.drain(..) {
+        match item {
+            SystemItem::Declaration(declaration) => document.declarations.push(declaration),
+            instantiation @ SystemItem::Instantiation { .. } => kept.push(instantiation),
+        }
+    }
+    document.system.items = kept;
+}
+
+/// The query texts of the formulas that stand at `spans`.
+pub(super) fn query_texts(spans: &[Span], sources: &SourceMap) -> Vec<QueryText> {
+    spans
+        .iter()
+        .map(|&span| QueryText {
+            span,
+            text: super::q_file::collapsed(sources.text(span)),
+            comment: String::new(),
+            expect: None,
+        })
+        .collect()
+}

@@ -1,0 +1,405 @@
+//! The query language: path formulas, extrema, games, strategies; statistical and learning queries by name only.
+
+use super::ast::{Control, Expr, ExprKind, Extremum, Name, Objective, Query, QueryKind};
+use super::codes;
+use super::expressions::{join_all, level};
+use super::lexer::TokenKind;
+use super::parser::{Dialect, Parser};
+use crate::diagnostics::{Diagnostic, Source, SourceMap, Span};
+
+/// Parses the query formula that stands at `span`; there is no tree if anything was wrong.
+pub fn parse_query(span: Span, sources: &SourceMap) -> (Option<Query>, Vec<Diagnostic>) {
+    let mut diagnostics = Vec::new();
+    let mut parser = Parser::new(span, sources, Dialect::Query, &mut diagnostics);
+    let mut query = parser.query();
+    let unsupported = std::mem::take(&mut parser.unsupported);
+    if let Some(first) = unsupported.into_iter().next() {
+        query.kind = QueryKind::Unsupported(first);
+    }
+    let rejected = diagnostics.iter().any(Diagnostic::is_error);
+    ((!rejected).then_some(query), diagnostics)
+}
+
+/// Adds a query given as bare text as a source of its own and returns its span.
+pub fn add_query_text(text: &str, sources: &mut SourceMap) -> Span {
+    let source = sources.add(Source {
+        place: "query".to_owned(),
+        text: text.to_owned(),
+        ..Source::default()
+    });
+    Span {
+        source,
+        start: 0,
+        end: super::lexer::to_u32(text.len()),
+    }
+}
+
+impl Parser<'_> {
+    fn query(&mut self) -> Query {
+        let span = self.here();
+        if self.at_end() {
+            self.error(codes::EMPTY_QUERY, span, "this query is empty");
+        }
+        let strategy = self.strategy_name();
+        let formula = self.here();
+        let kind = self.query_kind();
+        if strategy.is_some() && !yields_strategy(&kind) {
+            let formula = self.since(formula);
+            self.report(
+                Diagnostic::new(codes::NOT_A_STRATEGY, formula, "this query yields no strategy").help(
+                    "`strategy S =` wants `control: …`, `loadStrategy(…)`, `minE`, `maxE`, `minPr` or `maxPr`",
+                ),
+            );
+        }
+        let under = self.under();
+        if matches!(kind, QueryKind::Unsupported(_)) {
+            while !self.at_end() {
+                self.bump();
+            }
+        }
+        self.expect_end("of the query");
+        Query {
+            strategy,
+            kind,
+            under,
+            span: self.since(span),
+        }
+    }
+
+    /// `strategy S =`
+    fn strategy_name(&mut self) -> Option<Name> {
+        if !self.eat_word("strategy") {
+            return None;
+        }
+        let name = self.name("the name of the strategy");
+        if !self.eat(TokenKind::ColonAssign) {
+            self.expect(TokenKind::Assign, "after the name of the strategy");
+        }
+        Some(name)
+    }
+
+    /// `under S`
+    fn under(&mut self) -> Option<Name> {
+        self.eat_word("under")
+            .then(|| self.name("the name of a strategy"))
+    }
+
+    fn query_kind(&mut self) -> QueryKind {
+        match self.kind() {
+            TokenKind::ExistsFinally if self.word_at(1) == "control" => {
+                self.bump();
+                self.control(true, None)
+            }
+            TokenKind::LeftBrace => self.observed_control(),
+            TokenKind::AlwaysFinally
+            | TokenKind::AlwaysGlobally
+            | TokenKind::ExistsFinally
+            | TokenKind::ExistsGlobally => self.path_formula(),
+            _ => self.word_query(),
+        }
+    }
+
+    fn path_formula(&mut self) -> QueryKind {
+        let quantifier = self.bump().kind;
+        let operand = self.expression();
+        match quantifier {
+            TokenKind::AlwaysFinally => QueryKind::Eventually(operand),
+            TokenKind::AlwaysGlobally => QueryKind::Invariantly(operand),
+            TokenKind::ExistsGlobally => QueryKind::PotentiallyAlways(operand),
+            _ => QueryKind::Reachable(operand),
+        }
+    }
+
+    fn word_query(&mut self) -> QueryKind {
+        let next = self.peek(1).kind;
+        let is_prefix = matches!(next, TokenKind::Colon | TokenKind::LeftBrace);
+        match self.word() {
+            "control" => self.control(false, None),
+            "control_t" => self.time_optimal_control(),
+            "sup" if is_prefix => self.extremum(Extremum::Sup),
+            "inf" if is_prefix => self.extremum(Extremum::Inf),
+            "bounds" if is_prefix => self.extremum(Extremum::Bounds),
+            "saveStrategy" => self.save_strategy(),
+            "loadStrategy" => self.load_strategy(),
+            "acontrol" if is_prefix => self.unsupported_query("acontrol (approximate control)"),
+            "minE" | "maxE" | "minPr" | "maxPr" => self.unsupported_query("learning"),
+            "Pr" | "Pmax" | "simulate" => self.unsupported_query("statistical model checking"),
+            "sat" => self.unsupported_query("live sequence chart scenario"),
+            "E" if next == TokenKind::LeftBracket && self.at_expected_value() => {
+                self.unsupported_query("statistical model checking")
+            }
+            "A" if next == TokenKind::LeftBracket => self.until_or_leads_to(),
+            _ => self.leads_to(),
+        }
+    }
+
+    /// The rest up to `under` is not read.
+    fn unsupported_query(&mut self, kind: &str) -> QueryKind {
+        let start = self.here();
+        while !self.at_end() && !self.at_word("under") {
+            self.bump();
+        }
+        QueryKind::Unsupported(Name {
+            text: kind.to_owned(),
+            span: self.since(start),
+        })
+    }
+
+    /// `E[<=10](max: x)`, and not an array named `E`: a bound stands in the brackets, and `(name:` follows them.
+    fn at_expected_value(&self) -> bool {
+        let mut depth = 0_u32;
+        for distance in 1.. {
+            match self.peek(distance).kind {
+                TokenKind::LeftBracket => depth += 1,
+                TokenKind::RightBracket => depth -= 1,
+                TokenKind::End => return false,
+                _ => {}
+            }
+            if depth == 0 {
+                return self.peek(distance + 1).kind == TokenKind::LeftParenthesis
+                    && self.peek(distance + 2).kind == TokenKind::Word
+                    && self.peek(distance + 3).kind == TokenKind::Colon;
+            }
+        }
+        false
+    }
+
+    fn until_or_leads_to(&mut self) -> QueryKind {
+        let start = self.here();
+        let checkpoint = self.checkpoint();
+        if self.until().is_some() && self.is_clean_since(&checkpoint) {
+            return QueryKind::Unsupported(Name {
+                text: "`A[p U q]` outside `control:`".to_owned(),
+                span: self.since(start),
+            });
+        }
+        self.rewind(&checkpoint);
+        self.leads_to()
+    }
+
+    fn leads_to(&mut self) -> QueryKind {
+        let left = self.expression();
+        if self.eat(TokenKind::LeadsTo) {
+            return QueryKind::LeadsTo(left, self.expression());
+        }
+        if self.at_blank_path_quantifier(&left) {
+            let span = self.here();
+            self.report(
+                Diagnostic::new(
+                    codes::UNEXPECTED_TOKEN,
+                    span,
+                    "a path quantifier is one word",
+                )
+                .help("write `A[]`, `A<>`, `E[]`, `E<>` without blanks"),
+            );
+        } else if self.at_end() || self.at_word("under") {
+            let message = "this query has no path quantifier";
+            self.report(
+                Diagnostic::new(codes::MISSING_PATH_QUANTIFIER, left.span, message).help(
+                    "write `E<> p` for \"p can be reached\" or `A[] p` for \"p always holds\"",
+                ),
+            );
+        } else {
+            self.expected("an operator, `-->` or the end of the query");
+        }
+        QueryKind::Reachable(left)
+    }
+
+    /// `E <> p` and `A [] p`
+    fn at_blank_path_quantifier(&self, left: &Expr) -> bool {
+        matches!(&left.kind, ExprKind::Name(name) if name == "A" || name == "E")
+            && matches!(self.kind(), TokenKind::Diamond | TokenKind::Box)
+    }
+
+    /// `sup{predicate}: items`
+    fn extremum(&mut self, extremum: Extremum) -> QueryKind {
+        self.bump();
+        let predicate = self.eat(TokenKind::LeftBrace).then(|| {
+            let predicate = self.expression();
+            self.closing(TokenKind::RightBrace, "after the predicate");
+            predicate
+        });
+        self.expect(TokenKind::Colon, "before what is measured");
+        QueryKind::Extremum {
+            extremum,
+            predicate,
+            items: self.expression_list(),
+        }
+    }
+
+    /// `{a, b} control: …`
+    fn observed_control(&mut self) -> QueryKind {
+        self.bump();
+        let observations = if self.at(TokenKind::RightBrace) {
+            Vec::new()
+        } else {
+            self.expression_list()
+        };
+        self.closing(TokenKind::RightBrace, "after the observations");
+        if !self.at_word("control") {
+            self.expected("`control:` after the observations");
+        }
+        self.control(false, Some(observations))
+    }
+
+    /// `control: objective`
+    fn control(&mut self, cooperative: bool, observations: Option<Vec<Expr>>) -> QueryKind {
+        self.eat_word("control");
+        self.expect(TokenKind::Colon, "after `control`");
+        QueryKind::Control(Control {
+            objective: self.objective(),
+            cooperative,
+            time_optimal: None,
+            observations,
+        })
+    }
+
+    /// `control_t*(u, g): objective`
+    fn time_optimal_control(&mut self) -> QueryKind {
+        self.bump();
+        self.expect(TokenKind::Star, "after `control_t`");
+        let mut bounds = (None, None);
+        if self.eat(TokenKind::LeftParenthesis) {
+            bounds.0 = Some(self.expression());
+            if self.eat(TokenKind::Comma) {
+                bounds.1 = Some(self.expression());
+            }
+            self.closing(TokenKind::RightParenthesis, "after the bounds");
+        }
+        self.expect(TokenKind::Colon, "before the objective");
+        QueryKind::Control(Control {
+            objective: self.objective(),
+            cooperative: false,
+            time_optimal: Some(bounds),
+            observations: None,
+        })
+    }
+
+    fn objective(&mut self) -> Objective {
+        match self.kind() {
+            TokenKind::AlwaysFinally => {
+                self.bump();
+                Objective::Reach(self.expression())
+            }
+            TokenKind::AlwaysGlobally => {
+                self.bump();
+                match self.buchi() {
+                    Some(buchi) => buchi,
+                    None => Objective::Safe(self.expression()),
+                }
+            }
+            TokenKind::Word if self.at_word("A") && self.peek(1).kind == TokenKind::LeftBracket => {
+                match self.until() {
+                    Some(until) => until,
+                    None => Objective::Reach(self.error_expr()),
+                }
+            }
+            _ => self.invalid_objective(),
+        }
+    }
+
+    fn invalid_objective(&mut self) -> Objective {
+        let span = self.here();
+        self.report(
+            Diagnostic::new(codes::INVALID_OBJECTIVE, span, "this is no objective of a game").help(
+                "write `A<> p`, `A[] p`, `A[ p U q ]`, `A[ p W q ]` or `A[] (p && A<> q)` after `control:`",
+            ),
+        );
+        while !self.at_end() && !self.at_word("under") {
+            self.bump();
+        }
+        Objective::Reach(self.error_expr())
+    }
+
+    /// `A[ p U q ]` and `A[ p W q ]`; `None` was reported.
+    fn until(&mut self) -> Option<Objective> {
+        self.bump();
+        self.bump();
+        let hold = self.expression();
+        let weak = self.at_word("W");
+        if !weak && !self.at_word("U") {
+            self.expected("`U` or `W` inside `A[ … ]`");
+            return None;
+        }
+        self.bump();
+        let goal = self.expression();
+        self.closing(TokenKind::RightBracket, "after the goal");
+        Some(if weak {
+            Objective::WeakUntil(hold, goal)
+        } else {
+            Objective::Until(hold, goal)
+        })
+    }
+
+    /// `(p && A<> q)` behind `A[]`; without a trace if it is something else.
+    fn buchi(&mut self) -> Option<Objective> {
+        if !self.at(TokenKind::LeftParenthesis) {
+            return None;
+        }
+        let checkpoint = self.checkpoint();
+        self.bump();
+        let mut conjuncts = vec![self.expression_at(level::AND + 1)];
+        while self.at(TokenKind::AndAnd) || self.at_word("and") {
+            self.bump();
+            if self.eat(TokenKind::AlwaysFinally) {
+                let goal = self.expression();
+                self.closing(TokenKind::RightParenthesis, "after the goal");
+                let hold = join_all(super::ast::BinaryOp::And, conjuncts)?;
+                return Some(Objective::Buchi(hold, goal));
+            }
+            conjuncts.push(self.expression_at(level::AND + 1));
+        }
+        self.rewind(&checkpoint);
+        None
+    }
+
+    fn file_name(&mut self) -> String {
+        let token = self.token();
+        if self.expect(TokenKind::String, "with the name of a file") {
+            let text = self.text_of(token);
+            return text[1..text.len() - 1].to_owned();
+        }
+        String::new()
+    }
+
+    /// `saveStrategy("file", S)`
+    fn save_strategy(&mut self) -> QueryKind {
+        self.bump();
+        self.expect(TokenKind::LeftParenthesis, "after `saveStrategy`");
+        let file = self.file_name();
+        self.expect(TokenKind::Comma, "after the name of the file");
+        let strategy = self.name("the name of a strategy");
+        self.closing(TokenKind::RightParenthesis, "after the strategy");
+        QueryKind::SaveStrategy { file, strategy }
+    }
+
+    /// `loadStrategy {discrete} -> {continuous} ("file")`; the features only matter to learning.
+    fn load_strategy(&mut self) -> QueryKind {
+        self.bump();
+        if self.at(TokenKind::LeftBrace) {
+            self.features();
+            self.expect(TokenKind::Arrow, "between the features");
+            self.features();
+        }
+        self.expect(TokenKind::LeftParenthesis, "before the name of the file");
+        let file = self.file_name();
+        self.closing(TokenKind::RightParenthesis, "after the name of the file");
+        QueryKind::LoadStrategy { file }
+    }
+
+    fn features(&mut self) {
+        self.expect(TokenKind::LeftBrace, "before the features");
+        if !self.at(TokenKind::RightBrace) {
+            self.expression_list();
+        }
+        self.closing(TokenKind::RightBrace, "after the features");
+    }
+}
+
+fn yields_strategy(kind: &QueryKind) -> bool {
+    match kind {
+        QueryKind::Control(_) | QueryKind::LoadStrategy { .. } => true,
+        QueryKind::Unsupported(name) => !matches!(name.text.as_str(), "statistical model checking"),
+        _ => false,
+    }
+}

@@ -1,0 +1,188 @@
+//! The text of XML elements with the way back to the file: entities, character references, CDATA and line ends make the
+//! text that is parsed differ from the bytes of the file.
+
+use super::lexer::to_u32;
+use crate::diagnostics::{Source, SourceId, SourceMap, Span};
+use roxmltree::Node;
+
+/// The file that elements are read from.
+pub(super) struct XmlFile<'a> {
+    pub(super) path: &'a str,
+    pub(super) text: &'a str,
+    line_starts: Vec<u32>,
+}
+
+impl<'a> XmlFile<'a> {
+    pub(super) fn new(path: &'a str, text: &'a str) -> XmlFile<'a> {
+        let ends = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
+        let line_starts = std::iter::once(0)
+            .chain(ends.map(|(index, _)| to_u32(index + 1)))
+            .collect();
+        XmlFile {
+            path,
+            text,
+            line_starts,
+        }
+    }
+
+    /// Adds the text inside an element as a source; `place` says in words where it stands.
+    pub(super) fn add_text(&self, node: Node, place: String, sources: &mut SourceMap) -> Span {
+        let (start, end) = self.inner_range(node);
+        let raw = self.text.get(start..end).unwrap_or("");
+        let (text, offsets) = match decode(raw, start) {
+            Some(decoded) => decoded,
+            None => (all_text(node), vec![(0, to_u32(start))]),
+        };
+        self.add(text, offsets, start..end, place, sources)
+    }
+
+    /// Adds bytes of the file as they are.
+    pub(super) fn add_raw(
+        &self,
+        range: std::ops::Range<usize>,
+        place: String,
+        sources: &mut SourceMap,
+    ) -> Span {
+        let text = self.text.get(range.clone()).unwrap_or("").to_owned();
+        let offsets = vec![(0, to_u32(range.start))];
+        self.add(text, offsets, range, place, sources)
+    }
+
+    fn add(
+        &self,
+        text: String,
+        offsets: Vec<(u32, u32)>,
+        range: std::ops::Range<usize>,
+        place: String,
+        sources: &mut SourceMap,
+    ) -> Span {
+        let lines = &self.line_starts;
+        let first = lines.partition_point(|&line| line as usize <= range.start) - 1;
+        let last = lines.partition_point(|&line| line as usize <= range.end);
+        let end = to_u32(text.len());
+        let source: SourceId = sources.add(Source {
+            path: self.path.to_owned(),
+            place,
+            text,
+            offsets,
+            line_starts: lines[first..last].to_vec(),
+            first_line: to_u32(first),
+        });
+        Span {
+            source,
+            start: 0,
+            end,
+        }
+    }
+
+    /// The bytes between an element's tags; empty for `<a/>`.
+    fn inner_range(&self, node: Node) -> (usize, usize) {
+        let range = node.range();
+        let raw = self.text.get(range.clone()).unwrap_or("");
+        let start = end_of_tag(raw);
+        match raw.rfind("</") {
+            Some(end) if end >= start => (range.start + start, range.start + end),
+            _ => (range.start + start, range.start + start),
+        }
+    }
+}
+
+/// One past the `>` of the tag that a text begins with.
+pub(super) fn end_of_tag(raw: &str) -> usize {
+    let mut quote = None;
+    for (index, byte) in raw.bytes().enumerate() {
+        match (quote, byte) {
+            (None, b'>') => return index + 1,
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(open), close) if open == close => quote = None,
+            _ => {}
+        }
+    }
+    raw.len()
+}
+
+/// The text as roxmltree understands it, for elements that use entities of the file's own.
+fn all_text(node: Node) -> String {
+    node.children().filter_map(|child| child.text()).collect()
+}
+
+/// The decoded text and its offsets; `None` if it uses an entity that is not predefined.
+fn decode(raw: &str, file_start: usize) -> Option<(String, Vec<(u32, u32)>)> {
+    let mut text = String::with_capacity(raw.len());
+    let mut offsets = vec![(0, to_u32(file_start))];
+    let mut position = 0;
+    while position < raw.len() {
+        let rest = &raw[position..];
+        let plain = rest.find(['&', '<', '\r']).unwrap_or(rest.len());
+        text.push_str(&rest[..plain]);
+        position += plain;
+        let rest = &raw[position..];
+        if rest.is_empty() {
+            break;
+        }
+        position += special(rest, position, file_start, &mut text, &mut offsets)?;
+        offsets.push((to_u32(text.len()), to_u32(file_start + position)));
+    }
+    Some((text, offsets))
+}
+
+/// Decodes what a `&`, `<` or carriage return begins; returns its length in the file.
+fn special(
+    rest: &str,
+    position: usize,
+    file_start: usize,
+    text: &mut String,
+    offsets: &mut Vec<(u32, u32)>,
+) -> Option<usize> {
+    if rest.starts_with('\r') {
+        text.push('\n');
+        return Some(if rest.starts_with("\r\n") { 2 } else { 1 });
+    }
+    if let Some(cdata) = rest.strip_prefix("<![CDATA[") {
+        let length = cdata.find("]]>")?;
+        let start = position + "<![CDATA[".len();
+        offsets.push((to_u32(text.len()), to_u32(file_start + start)));
+        let mut lines = start;
+        for line in cdata[..length].split_inclusive("\r\n") {
+            lines += line.len();
+            match line.strip_suffix("\r\n") {
+                Some(line) => {
+                    text.push_str(line);
+                    text.push('\n');
+                    offsets.push((to_u32(text.len()), to_u32(file_start + lines)));
+                }
+                None => text.push_str(line),
+            }
+        }
+        return Some("<![CDATA[]]>".len() + length);
+    }
+    for (open, close) in [("<!--", "-->"), ("<?", "?>")] {
+        if rest.starts_with(open) {
+            return Some(rest.find(close)? + close.len());
+        }
+    }
+    if rest.starts_with('<') {
+        return Some(end_of_tag(rest));
+    }
+    let end = rest.find(';')?;
+    text.push(entity(&rest[1..end])?);
+    Some(end + 1)
+}
+
+fn entity(name: &str) -> Option<char> {
+    Some(match name {
+        "lt" => '<',
+        "gt" => '>',
+        "amp" => '&',
+        "quot" => '"',
+        "apos" => '\'',
+        _ => {
+            let digits = name.strip_prefix('#')?;
+            let code = match digits.strip_prefix('x') {
+                Some(hexadecimal) => u32::from_str_radix(hexadecimal, 16).ok()?,
+                None => digits.parse().ok()?,
+            };
+            char::from_u32(code)?
+        }
+    })
+}
