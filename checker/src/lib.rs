@@ -9,5 +9,6 @@ pub mod syntax;
 pub mod ir;
 
 pub mod exec;
+pub mod zones;
 
 pub mod network;

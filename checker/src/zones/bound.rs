@@ -1,0 +1,137 @@
+//! One bound on a difference of two clocks: `< c`, `<= c`, or none.
+//!
+//! Encoding: `2 * c + 1` for `<= c`, `2 * c` for `< c`, `i32::MAX` for none. The order of the encodings is the order of
+//! tightness: `< c` is below `<= c`, both are below every bound with a greater constant, and all are below infinity.
+//!
+//! The sum of two bounds (the bound on `x - z` that follows from those on `x - y` and `y - z`) adds the constants and is
+//! weak only if both are. In the encoding, for a fixed first bound `a`,
+//! `a + b = (a & !1) + (b & (a | !1))`: the rest of a row costs one `and` and one `add` per entry and no branch.
+//!
+//! Range: constants of a model lie within ±[`Bound::MAX_VALUE`]. Inside an operation on a zone sums of a few bounds
+//! occur; an `i32` has room for five bounds of the greatest size, which a path through a zone with one lower and one
+//! upper guard needs. Whoever lets bounds grow without extrapolation asks [`super::dbm::is_in_range`] once per step.
+
+use std::fmt;
+use std::ops::Add;
+
+/// A bound on a difference of clocks, `< c`, `<= c` or none; smaller is tighter.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
+pub struct Bound(pub(super) i32);
+
+impl Bound {
+    /// No bound.
+    pub const INFINITY: Bound = Bound(i32::MAX);
+    /// `<= 0`, the bound of a clock against itself.
+    pub const LE_ZERO: Bound = Bound(1);
+    /// `< 0`, which no clock satisfies against itself.
+    pub const LT_ZERO: Bound = Bound(0);
+    /// The greatest constant, and the negative of the least one, that a model may write.
+    pub const MAX_VALUE: i32 = (1 << 27) - 1;
+
+    /// The bound `< value`; none if the value lies beyond [`Bound::MAX_VALUE`].
+    pub const fn strict(value: i32) -> Option<Bound> {
+        if Bound::is_allowed(value) {
+            Some(Bound(2 * value))
+        } else {
+            None
+        }
+    }
+
+    /// The bound `<= value`; none if the value lies beyond [`Bound::MAX_VALUE`].
+    pub const fn weak(value: i32) -> Option<Bound> {
+        if Bound::is_allowed(value) {
+            Some(Bound(2 * value + 1))
+        } else {
+            None
+        }
+    }
+
+    /// Whether a model may use this constant.
+    pub const fn is_allowed(value: i32) -> bool {
+        -Bound::MAX_VALUE <= value && value <= Bound::MAX_VALUE
+    }
+
+    /// The constant; meaningless for infinity.
+    pub const fn value(self) -> i32 {
+        self.0 >> 1
+    }
+
+    /// Whether the constant itself is excluded. Infinity counts as weak.
+    pub const fn is_strict(self) -> bool {
+        self.0 & 1 == 0
+    }
+
+    /// Whether this is no bound at all.
+    pub const fn is_infinite(self) -> bool {
+        self.0 == i32::MAX
+    }
+
+    /// Whether this is a bound.
+    pub const fn is_finite(self) -> bool {
+        self.0 != i32::MAX
+    }
+
+    /// The bound of the complement, read from the other clock: `x - y <= c` fails where `y - x < -c` holds.
+    ///
+    /// Infinity has no complement; the result for it is meaningless.
+    #[must_use]
+    pub const fn negated(self) -> Bound {
+        Bound(1 - self.0)
+    }
+
+    /// The encoding, for storing and hashing.
+    pub const fn raw(self) -> i32 {
+        self.0
+    }
+
+    /// The bound with this encoding.
+    pub const fn from_raw(raw: i32) -> Bound {
+        Bound(raw)
+    }
+
+    /// This bound moved by a constant; infinity stays.
+    #[must_use]
+    pub const fn shifted(self, value: i32) -> Bound {
+        if self.is_infinite() {
+            self
+        } else {
+            Bound(self.0.saturating_add(2 * value))
+        }
+    }
+
+    /// `via + self` if that is tighter than `current`, else `current`; `via` is finite.
+    #[inline]
+    #[expect(
+        clippy::needless_bitwise_bool,
+        reason = "a branch would keep the loop from becoming vectors"
+    )]
+    pub(super) const fn relaxed(current: Bound, via: Bound, rest: Bound) -> Bound {
+        let sum = (via.0 & !1).wrapping_add(rest.0 & (via.0 | !1));
+        let is_tighter = (sum < current.0) & (rest.0 != i32::MAX);
+        if is_tighter { Bound(sum) } else { current }
+    }
+}
+
+/// The bound on `x - z` that follows from one on `x - y` and one on `y - z`; infinite if one of them is.
+impl Add for Bound {
+    type Output = Bound;
+
+    #[inline]
+    fn add(self, other: Bound) -> Bound {
+        if self.is_infinite() || other.is_infinite() {
+            return Bound::INFINITY;
+        }
+        Bound((self.0 & !1).saturating_add(other.0 & (self.0 | !1)))
+    }
+}
+
+impl fmt::Debug for Bound {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Bound::INFINITY => formatter.write_str("<inf"),
+            bound if bound.is_strict() => write!(formatter, "<{}", bound.value()),
+            bound => write!(formatter, "<={}", bound.value()),
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! What moves clocks: delay and its past, reset, assignment, freeing, and the way back of an update.
+//!
+//! The contract is that of [`super::dbm`]: closed, consistent, positive zones in and out. Each function writes the
+//! closed result directly; none needs to close again.
+//!
+//! *Stopped* clocks (stopwatches at rate 0) keep their value while the others run. The exact set after such a delay is
+//! in general not a zone; the functions with stopped clocks return the least zone that contains it, which UPPAAL does
+//! as well (its answers become "maybe"). Without stopped clocks they are exact.
+//!
+//! Source: Bengtsson and Yi 2004, section 4.2, algorithms `up`, `down`, `free`, `reset`, `copy`, `shift`; the
+//! stopped variants are derived here.
+//!
+//! Cost: O(n) for delay, freeing and resetting; O(n^2) for the past and for assignments that drop valuations.
+
+use super::dbm::{Constraint, constrain, is_empty, set_empty};
+use super::{Bound, ClockSet};
+
+/// One step of an update of clocks; a list of them is carried out in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Assignment {
+    /// `x_clock := value`; the value must be from 0 to [`Bound::MAX_VALUE`].
+    Value {
+        /// The clock that is set.
+        clock: usize,
+        /// Its new value.
+        value: i32,
+    },
+    /// `x_clock := x_source + increment`; the magnitude of the increment must be at most [`Bound::MAX_VALUE`].
+    Copy {
+        /// The clock that is set.
+        clock: usize,
+        /// The clock whose value is taken; may be the same.
+        source: usize,
+        /// What is added.
+        increment: i32,
+    },
+    /// `x_clock` gets any value from 0.
+    Free {
+        /// The clock that is freed.
+        clock: usize,
+    },
+}
+
+/// Lets any time pass: the zone becomes its future.
+pub fn up(zone: &mut [Bound], dimension: usize) {
+    zone.iter_mut()
+        .step_by(dimension)
+        .skip(1)
+        .for_each(|bound| *bound = Bound::INFINITY);
+}
+
+/// The least zone around the future of the zone when the clocks of `stopped` do not move.
+///
+/// Differences between two running or two stopped clocks stay, a running clock loses its bound from above against
+/// every stopped one and the reference, and the opposite bounds are reached without delay. If all clocks are stopped,
+/// nothing changes.
+pub fn up_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
+    let running = |clock: &usize| !stopped.contains(*clock);
+    for left in (1..dimension).filter(running) {
+        let row = &mut zone[left * dimension..(left + 1) * dimension];
+        row[0] = Bound::INFINITY;
+        stopped
+            .iter()
+            .take_while(|right| *right < dimension)
+            .for_each(|right| row[right] = Bound::INFINITY);
+    }
+}
+
+/// Lets time run backwards: the zone becomes its past, the valuations that reach it by some delay.
+///
+/// A lower bound of a clock is lost except for what keeps the other clocks from becoming negative first.
+pub fn down(zone: &mut [Bound], dimension: usize) {
+    let (lower_bounds, rows) = zone.split_at_mut(dimension);
+    lower_bounds.fill(Bound::LE_ZERO);
+    for row in rows.chunks_exact(dimension) {
+        for (lower, bound) in lower_bounds.iter_mut().zip(row) {
+            *lower = (*lower).min(*bound);
+        }
+    }
+    lower_bounds[0] = Bound::LE_ZERO;
+}
+
+/// The least zone around the past of the zone when the clocks of `stopped` do not move.
+///
+/// Only bounds `x_s - x_r` between a stopped clock or the reference `s` and a running clock `r` change. A delay `d` is
+/// limited by every running clock, so it behaves like a clock with `d - x_q <= 0` for all running `q`: let
+/// `delay(y) = min over q of (q, y)` be its closed bounds. The greatest `x_s - x_r + d` over the zone is a flow from
+/// `{s, d}` to `{r, 0}` along closed entries, hence the lesser of the two pairings
+/// `(s, r) + delay(0)` and `(s, 0) + delay(r)`.
+pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
+    let is_running = |clock: usize| clock != 0 && !stopped.contains(clock);
+    let column_least = |zone: &[Bound], column: usize| {
+        let running = (1..dimension).filter(|clock| is_running(*clock));
+        running
+            .map(|clock| zone[clock * dimension + column])
+            .min()
+            .unwrap_or(Bound::INFINITY)
+    };
+    let longest_delay = column_least(zone, 0);
+    for right in (1..dimension).filter(|clock| is_running(*clock)) {
+        let delay = column_least(zone, right);
+        for left in (0..dimension).filter(|clock| !is_running(*clock)) {
+            let crossed = zone[left * dimension] + delay;
+            let bound = &mut zone[left * dimension + right];
+            *bound = (*bound + longest_delay).min(crossed);
+        }
+    }
+}
+
+/// Forgets the value of a clock: it becomes anything from 0.
+pub fn free_clock(zone: &mut [Bound], dimension: usize, clock: usize) {
+    for row in zone.chunks_exact_mut(dimension) {
+        row[clock] = row[0];
+    }
+    let row = &mut zone[clock * dimension..(clock + 1) * dimension];
+    row.fill(Bound::INFINITY);
+    row[clock] = Bound::LE_ZERO;
+}
+
+/// Sets a clock to a value from 0 to [`Bound::MAX_VALUE`].
+pub fn reset(zone: &mut [Bound], dimension: usize, clock: usize, value: i32) {
+    let start = clock * dimension;
+    zone.copy_within(0..dimension, start);
+    if value == 0 {
+        for row in zone.chunks_exact_mut(dimension) {
+            row[clock] = row[0];
+        }
+        zone[start + clock] = Bound::LE_ZERO;
+        return;
+    }
+    zone[start..start + dimension]
+        .iter_mut()
+        .for_each(|bound| *bound = bound.shifted(value));
+    for row in zone.chunks_exact_mut(dimension) {
+        row[clock] = row[0].shifted(-value);
+    }
+    zone[start + clock] = Bound::LE_ZERO;
+}
+
+/// Sets a clock to the value of another (or its own) plus an increment; returns whether something is left.
+///
+/// Valuations that would make the clock negative are dropped: a caller to whom that is a mistake looks at the lower
+/// bound of `source` before.
+pub fn assign_clock(
+    zone: &mut [Bound],
+    dimension: usize,
+    clock: usize,
+    source: usize,
+    increment: i32,
+) -> bool {
+    if clock == source {
+        return shift(zone, dimension, clock, increment);
+    }
+    if !keep_from(zone, dimension, source, increment) {
+        return false;
+    }
+    zone.copy_within(
+        source * dimension..(source + 1) * dimension,
+        clock * dimension,
+    );
+    for bound in &mut zone[clock * dimension..(clock + 1) * dimension] {
+        *bound = bound.shifted(increment);
+    }
+    for row in zone.chunks_exact_mut(dimension) {
+        row[clock] = row[source].shifted(-increment);
+    }
+    zone[clock * dimension + clock] = Bound::LE_ZERO;
+    true
+}
+
+/// Adds an increment to a clock; returns whether something is left. Drops valuations as [`assign_clock`] does.
+pub fn shift(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32) -> bool {
+    if !keep_from(zone, dimension, clock, increment) {
+        return false;
+    }
+    for bound in &mut zone[clock * dimension..(clock + 1) * dimension] {
+        *bound = bound.shifted(increment);
+    }
+    for row in zone.chunks_exact_mut(dimension) {
+        row[clock] = row[clock].shifted(-increment);
+    }
+    zone[clock * dimension + clock] = Bound::LE_ZERO;
+    true
+}
+
+/// Drops the valuations in which `clock + increment` is negative; returns whether something is left.
+fn keep_from(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32) -> bool {
+    increment >= 0 || constrain(zone, dimension, 0, clock, Bound(2 * increment + 1))
+}
+
+/// Carries out the assignments in order; returns whether something is left.
+pub fn assign(zone: &mut [Bound], dimension: usize, assignments: &[Assignment]) -> bool {
+    assignments.iter().all(|assignment| {
+        match *assignment {
+            Assignment::Value { clock, value } => reset(zone, dimension, clock, value),
+            Assignment::Free { clock } => free_clock(zone, dimension, clock),
+            Assignment::Copy {
+                clock,
+                source,
+                increment,
+            } => {
+                return assign_clock(zone, dimension, clock, source, increment);
+            }
+        }
+        true
+    })
+}
+
+/// Replaces the zone by the valuations that satisfy the guard and are carried into the zone by the assignments;
+/// returns whether there are any.
+pub fn preimage(
+    zone: &mut [Bound],
+    dimension: usize,
+    guard: &[Constraint],
+    assignments: &[Assignment],
+) -> bool {
+    assignments
+        .iter()
+        .rev()
+        .all(|assignment| unassign(zone, dimension, assignment))
+        && super::dbm::constrain_all(zone, dimension, guard)
+}
+
+/// The preimage of one assignment: the values that the clock may have got, then any value that it had before.
+fn unassign(zone: &mut [Bound], dimension: usize, assignment: &Assignment) -> bool {
+    let (clock, source, increment) = match *assignment {
+        Assignment::Free { clock } => {
+            free_clock(zone, dimension, clock);
+            return true;
+        }
+        Assignment::Copy {
+            clock,
+            source,
+            increment,
+        } if clock == source => {
+            return shift(zone, dimension, clock, -increment);
+        }
+        Assignment::Copy {
+            clock,
+            source,
+            increment,
+        } => (clock, source, increment),
+        Assignment::Value { clock, value } => (clock, 0, value),
+    };
+    let is_reachable = constrain(zone, dimension, clock, source, Bound(2 * increment + 1))
+        && constrain(zone, dimension, source, clock, Bound(1 - 2 * increment));
+    if is_reachable {
+        free_clock(zone, dimension, clock);
+    }
+    is_reachable
+}
+
+/// Writes the zone without the clocks outside `kept` into `target`, whose dimension is one more than their number.
+///
+/// The clocks keep their order; the reference clock is always kept.
+pub fn project(zone: &[Bound], dimension: usize, kept: &ClockSet, target: &mut [Bound]) {
+    let is_kept = |clock: usize| clock == 0 || kept.contains(clock);
+    let rows = zone
+        .chunks_exact(dimension)
+        .enumerate()
+        .filter(|(left, _)| is_kept(*left));
+    let entries = rows.flat_map(|(_, row)| row.iter().enumerate());
+    let kept_entries = entries.filter(|(right, _)| is_kept(*right));
+    for (bound, (_, kept_bound)) in target.iter_mut().zip(kept_entries) {
+        *bound = *kept_bound;
+    }
+}
+
+/// The inverse of [`project`]: writes a zone over the clocks of `kept` into `target` of the given dimension, where all
+/// other clocks may have any value from 0.
+pub fn embed(zone: &[Bound], kept: &ClockSet, target: &mut [Bound], dimension: usize) {
+    let mut bounds = zone.iter();
+    let is_kept = |clock: usize| clock == 0 || kept.contains(clock);
+    for (left, row) in target.chunks_exact_mut(dimension).enumerate() {
+        if !is_kept(left) {
+            row.fill(Bound::INFINITY);
+            row[left] = Bound::LE_ZERO;
+            continue;
+        }
+        for right in 0..dimension {
+            // A clock that may be 0 leaves the bound of the difference at the upper bound.
+            row[right] = if is_kept(right) {
+                bounds.next().copied().unwrap_or(row[0])
+            } else {
+                row[0]
+            };
+        }
+    }
+    if is_empty(zone) {
+        set_empty(target);
+    }
+}

@@ -1,0 +1,356 @@
+//! Zones as difference bound matrices on slices.
+//!
+//! A zone of dimension n is a slice of n * n bounds, row by row: entry (i, j) at `i * n + j` bounds `x_i - x_j`, so row
+//! 0 holds the negated lower bounds and column 0 the upper bounds. The terms used in every contract:
+//!
+//! * *consistent*: no cycle of bounds sums to less than `<= 0`, so the zone contains a valuation;
+//! * *closed*: no entry is greater than the sum along a path, so every entry is the least upper bound of its difference;
+//!   the diagonal is `<= 0`. A closed matrix is unique for its set;
+//! * *positive*: row 0 is at most `<= 0`, so no clock is negative;
+//! * *empty*: entry (0, 0) is below `<= 0`, and no other entry means anything.
+//!
+//! Every public function takes zones that are closed, consistent and positive, and leaves them so, unless it says
+//! otherwise. A function that may empty a zone returns whether the zone still contains a valuation; an empty zone must
+//! not be used any further except with [`is_empty`]. Indices must be below the dimension, and slices must have the
+//! right length: both are contracts, checked by the bounds of the slices only.
+//!
+//! Source: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4. Where we differ:
+//! rows are relaxed as vectors of four entries, the last of which may overlap the one before it. That is sound because
+//! relaxing is idempotent, and it spares short rows the scalar rest.
+//!
+//! Cost: closing n^3 / 4 vector steps, one constraint n^2 / 4, all others at most that; no allocation anywhere.
+
+use std::cmp::Ordering;
+
+use super::{Bound, ClockSet};
+
+/// How two zones of the same dimension lie to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relation {
+    /// The same set.
+    Equal,
+    /// The first is a proper subset of the second.
+    Subset,
+    /// The first is a proper superset of the second.
+    Superset,
+    /// Neither contains the other.
+    Incomparable,
+}
+
+/// One bound on one difference: `x_left - x_right` is bounded by `bound`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Constraint {
+    /// The clock that is counted positively.
+    pub left: usize,
+    /// The clock that is counted negatively.
+    pub right: usize,
+    /// The bound on the difference.
+    pub bound: Bound,
+}
+
+impl Constraint {
+    /// The constraint that holds exactly where this one fails; the bound must be finite.
+    #[must_use]
+    pub fn negated(self) -> Constraint {
+        Constraint {
+            left: self.right,
+            right: self.left,
+            bound: self.bound.negated(),
+        }
+    }
+}
+
+/// Makes the zone that contains only the valuation in which every clock is 0.
+pub fn set_zero(zone: &mut [Bound]) {
+    zone.fill(Bound::LE_ZERO);
+}
+
+/// Makes the zone of all valuations without negative clocks.
+pub fn set_universe(zone: &mut [Bound], dimension: usize) {
+    zone.fill(Bound::INFINITY);
+    zone[..dimension].fill(Bound::LE_ZERO);
+    set_diagonal(zone, dimension);
+}
+
+/// Marks the zone as empty.
+pub fn set_empty(zone: &mut [Bound]) {
+    zone[0] = Bound::LT_ZERO;
+}
+
+/// Whether the zone is marked as empty; the only function that takes empty zones.
+#[inline]
+pub fn is_empty(zone: &[Bound]) -> bool {
+    zone[0] < Bound::LE_ZERO
+}
+
+/// Whether every bound is within the range of the constants of a model; see [`super::bound`].
+///
+/// Bounds can only leave that range by growing over many steps without extrapolation.
+pub fn is_in_range(zone: &[Bound]) -> bool {
+    const LIMIT: i32 = 2 * Bound::MAX_VALUE + 1;
+    zone.iter()
+        .all(|bound| bound.is_infinite() || (-LIMIT..=LIMIT).contains(&bound.0))
+}
+
+/// Closes any matrix with a diagonal of `<= 0` (Floyd–Warshall); returns whether it is consistent, else marks it empty.
+///
+/// The matrix need not be closed or consistent before. Positive if row 0 was at most `<= 0`.
+pub fn close(zone: &mut [Bound], dimension: usize) -> bool {
+    (0..dimension).all(|via| close_through(zone, dimension, via))
+}
+
+/// Closes a matrix that was closed before bounds between the clocks of `touched` were tightened.
+///
+/// Both clocks of every tightened entry must be in the set. Returns whether the zone is consistent.
+///
+/// Sound because in a closed matrix two old entries in a row are never better than one: a path needs to visit only ends
+/// of new entries on its way.
+pub fn close_touched(zone: &mut [Bound], dimension: usize, touched: &ClockSet) -> bool {
+    touched
+        .iter()
+        .all(|via| close_through(zone, dimension, via))
+}
+
+/// One step of Floyd–Warshall: admits paths through the clock `via`.
+#[inline]
+fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
+    let (before, rest) = zone.split_at_mut(via * dimension);
+    let (source, after) = rest.split_at_mut(dimension);
+    let mut is_consistent = true;
+    // Row numbers run from 0 in both halves; the diagonal of a row shows whether a negative cycle closed.
+    let first_after = via + 1;
+    for (row, target) in before.chunks_exact_mut(dimension).enumerate() {
+        relax_row(target, target[via], source);
+        is_consistent &= target[row] >= Bound::LE_ZERO;
+    }
+    for (row, target) in after.chunks_exact_mut(dimension).enumerate() {
+        relax_row(target, target[via], source);
+        is_consistent &= target[first_after + row] >= Bound::LE_ZERO;
+    }
+    if !is_consistent {
+        set_empty(zone);
+    }
+    is_consistent
+}
+
+/// Tightens every entry of `target` to the sum of `via` and the entry of `source`, where that is less.
+#[inline]
+pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
+    if via.is_infinite() {
+        return;
+    }
+    let length = target.len().min(source.len());
+    let (target, source) = (&mut target[..length], &source[..length]);
+    let Some(tail) = last_relaxed(target, via, source) else {
+        for (entry, rest) in target.iter_mut().zip(source) {
+            *entry = Bound::relaxed(*entry, via, *rest);
+        }
+        return;
+    };
+    let (targets, _) = target.as_chunks_mut::<4>();
+    let (sources, _) = source.as_chunks::<4>();
+    for (entries, rests) in targets.iter_mut().zip(sources) {
+        *entries = relaxed_four(*entries, via, *rests);
+    }
+    if let Some(entries) = target.last_chunk_mut::<4>() {
+        *entries = tail;
+    }
+}
+
+/// The last four entries after relaxing, computed before any other is written so that no load waits for a store that
+/// overlaps it; none if the row is shorter.
+#[inline]
+fn last_relaxed(target: &[Bound], via: Bound, source: &[Bound]) -> Option<[Bound; 4]> {
+    Some(relaxed_four(
+        *target.last_chunk::<4>()?,
+        via,
+        *source.last_chunk::<4>()?,
+    ))
+}
+
+#[inline]
+fn relaxed_four(entries: [Bound; 4], via: Bound, rests: [Bound; 4]) -> [Bound; 4] {
+    std::array::from_fn(|lane| Bound::relaxed(entries[lane], via, rests[lane]))
+}
+
+/// Intersects the zone with `x_left - x_right` bounded by `bound`; returns whether something is left.
+///
+/// Every tightened path uses the new bound once, so one pass over the rows closes the zone again; a row whose bound
+/// against `x_right` does not improve is passed over whole.
+pub fn constrain(
+    zone: &mut [Bound],
+    dimension: usize,
+    left: usize,
+    right: usize,
+    bound: Bound,
+) -> bool {
+    if bound >= zone[left * dimension + right] {
+        return true;
+    }
+    if zone[right * dimension + left] + bound < Bound::LE_ZERO {
+        set_empty(zone);
+        return false;
+    }
+    let (before, rest) = zone.split_at_mut(right * dimension);
+    let (source, after) = rest.split_at_mut(dimension);
+    for target in before
+        .chunks_exact_mut(dimension)
+        .chain(after.chunks_exact_mut(dimension))
+    {
+        let via = target[left] + bound;
+        if via < target[right] {
+            relax_row(target, via, source);
+        }
+    }
+    true
+}
+
+/// Intersects the zone with all constraints; returns whether something is left.
+pub fn constrain_all(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) -> bool {
+    constraints.iter().all(|constraint| {
+        constrain(
+            zone,
+            dimension,
+            constraint.left,
+            constraint.right,
+            constraint.bound,
+        )
+    })
+}
+
+/// Whether some valuation of the zone satisfies the constraint.
+#[inline]
+pub fn satisfies(zone: &[Bound], dimension: usize, constraint: &Constraint) -> bool {
+    zone[constraint.right * dimension + constraint.left] + constraint.bound >= Bound::LE_ZERO
+}
+
+/// Intersects the zone with another; returns whether something is left.
+pub fn intersect(zone: &mut [Bound], other: &[Bound], dimension: usize) -> bool {
+    let mut touched = ClockSet::EMPTY;
+    let rows = zone
+        .chunks_exact_mut(dimension)
+        .zip(other.chunks_exact(dimension));
+    for (left, (row, other_row)) in rows.enumerate() {
+        for (right, (bound, other_bound)) in row.iter_mut().zip(other_row).enumerate() {
+            if other_bound < bound {
+                *bound = *other_bound;
+                touched.insert(left);
+                touched.insert(right);
+            }
+        }
+    }
+    close_touched(zone, dimension, &touched)
+}
+
+/// Whether two zones certainly have no valuation in common: some difference is bounded apart.
+///
+/// Cheap and one-sided: disjoint zones can pass.
+pub fn are_apart(zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
+    (0..dimension).any(|left| {
+        let row = &zone[left * dimension..(left + 1) * dimension];
+        row.iter()
+            .enumerate()
+            .any(|(right, bound)| *bound + other[right * dimension + left] < Bound::LE_ZERO)
+    })
+}
+
+/// Replaces the zone by the least zone that contains both.
+pub fn hull(zone: &mut [Bound], other: &[Bound]) {
+    for (bound, other) in zone.iter_mut().zip(other) {
+        *bound = (*bound).max(*other);
+    }
+}
+
+/// Whether every valuation of `zone` is in `other`.
+#[inline]
+pub fn is_subset(zone: &[Bound], other: &[Bound]) -> bool {
+    // Blocks of sixteen are compared without a branch; most comparisons end in the first one.
+    let (blocks, rest) = zone.as_chunks::<16>();
+    let (other_blocks, other_rest) = other.as_chunks::<16>();
+    blocks
+        .iter()
+        .zip(other_blocks)
+        .all(|(block, other)| !exceeds(block, other))
+        && !exceeds(rest, other_rest)
+}
+
+/// Whether an entry of `zone` is greater than its counterpart.
+#[inline]
+#[expect(
+    clippy::needless_bitwise_bool,
+    reason = "a branch would keep the loop from becoming vectors"
+)]
+fn exceeds(zone: &[Bound], other: &[Bound]) -> bool {
+    zone.iter()
+        .zip(other)
+        .fold(false, |found, (bound, other)| found | (bound > other))
+}
+
+/// How the zones lie to each other.
+pub fn relation(zone: &[Bound], other: &[Bound]) -> Relation {
+    match (is_subset(zone, other), is_subset(other, zone)) {
+        (true, true) => Relation::Equal,
+        (true, false) => Relation::Subset,
+        (false, true) => Relation::Superset,
+        (false, false) => Relation::Incomparable,
+    }
+}
+
+/// Whether the zone contains the valuation in which clock i has the value `numerators[i] / denominator`.
+///
+/// `numerators[0]` must be 0 and the denominator positive.
+pub fn contains(zone: &[Bound], numerators: &[i64], denominator: i64) -> bool {
+    zone.chunks_exact(numerators.len())
+        .zip(numerators)
+        .all(|(row, left)| {
+            row.iter().zip(numerators).all(|(bound, right)| {
+                let limit = i64::from(bound.value()) * denominator;
+                bound.is_infinite()
+                    || match (left - right).cmp(&limit) {
+                        Ordering::Less => true,
+                        Ordering::Equal => !bound.is_strict(),
+                        Ordering::Greater => false,
+                    }
+            })
+        })
+}
+
+/// The bounds of a clock in the zone: its negated lower bound (on `0 - x`) and its upper bound (on `x - 0`).
+pub fn clock_bounds(zone: &[Bound], dimension: usize, clock: usize) -> (Bound, Bound) {
+    (zone[clock], zone[clock * dimension])
+}
+
+/// Whether the delay from some valuation of the zone within it is limited: some clock other than those stopped has an
+/// upper bound.
+pub fn is_delay_bounded(zone: &[Bound], dimension: usize, stopped: &ClockSet) -> bool {
+    let upper_bounds = zone
+        .chunks_exact(dimension)
+        .map(|row| row[0])
+        .enumerate()
+        .skip(1);
+    upper_bounds
+        .into_iter()
+        .any(|(clock, bound)| bound.is_finite() && !stopped.contains(clock))
+}
+
+/// A hash of the zone that depends on nothing but its bounds, so it is the same in every run.
+pub fn hash(zone: &[Bound]) -> u64 {
+    const MULTIPLIER: u64 = 0x9e37_79b9_7f4a_7c15; // 2^64 divided by the golden ratio, odd.
+    let fold = |state: u64, word: u64| (state.rotate_left(26) ^ word).wrapping_mul(MULTIPLIER);
+    let (pairs, rest) = zone.as_chunks::<2>();
+    let word = |bound: Bound| u64::from(bound.0.cast_unsigned());
+    let state = pairs.iter().fold(0, |state, [low, high]| {
+        fold(state, word(*low) | word(*high) << 32)
+    });
+    let state = rest
+        .iter()
+        .fold(state, |state, bound| fold(state, word(*bound)));
+    state ^ state >> 32
+}
+
+/// Sets the diagonal to `<= 0`.
+pub(super) fn set_diagonal(zone: &mut [Bound], dimension: usize) {
+    zone.iter_mut()
+        .step_by(dimension + 1)
+        .for_each(|bound| *bound = Bound::LE_ZERO);
+}

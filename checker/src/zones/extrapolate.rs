@@ -1,0 +1,270 @@
+//! Abstractions that make the zone graph finite by forgetting what no guard can tell apart.
+//!
+//! For each clock let L be the greatest constant that its guards and invariants compare from below (`x > c`, `x >= c`),
+//! U from above, M the greater of both; minus infinity where there is none. A closed zone with entries (i, j) and lower
+//! bounds `low(i)` (the negated entry (0, i)) is replaced by the closure of this matrix, old entries elsewhere:
+//!
+//! * `Extra_M`: infinite if `(i, j) > M(i)`; `< -M(j)` if `-(i, j) > M(j)`;
+//! * `Extra_LU`: infinite if `(i, j) > L(i)`; `< -U(j)` if `-(i, j) > U(j)`;
+//! * `Extra_M+`: infinite if `(i, j) > M(i)`, or `low(i) > M(i)`, or `low(j) > M(j)` and i is not 0; `< -M(j)` in row 0
+//!   if `low(j) > M(j)`;
+//! * `Extra_LU+`: infinite if `(i, j) > L(i)`, or `low(i) > L(i)`, or `low(j) > U(j)` and i is not 0; `< -U(j)` in row
+//!   0 if `low(j) > U(j)`.
+//!
+//! Zones stay positive: row 0 never exceeds `<= 0`. The diagonal stays. All four are sound and complete for reachability
+//! in automata that compare single clocks with constants; the later ones are coarser. None is sound where guards
+//! compare two clocks; [`split_by_differences`] is the variant for those.
+//!
+//! Source: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and Upper Bounds in Zone Based Abstractions of Timed
+//! Automata", TACAS 2004, definitions in section 4, closing after `Extra_LU+` (LU-Canonize) in section 5.
+//!
+//! Where we differ: closing passes over all rows in which nothing was forgotten. The new matrix lies above the old one,
+//! which was closed, so an entry that was kept cannot become tighter. This holds for all four.
+//!
+//! Cost: O(n^2) to forget, then n^2 / 4 vector steps for each row that lost something.
+
+use super::dbm::{self, Constraint, relax_row};
+use super::federation::Federation;
+use super::{Bound, ClockSet};
+
+/// The greatest constants that each clock is compared with, prepared for extrapolation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ceilings {
+    /// `<= L` of each clock: greater entries of its row are forgotten. Below every bound if there is no L.
+    rows: Box<[Bound]>,
+    /// `< -U` of each clock: lesser entries of its column are forgotten. Above every bound if there is no U.
+    columns: Box<[Bound]>,
+}
+
+impl Ceilings {
+    /// The ceilings of the clocks 0..n from the greatest constants of comparisons from below and from above.
+    ///
+    /// `None` stands for a clock without such comparisons, and so does a negative constant: clocks are not negative.
+    /// Constants beyond [`Bound::MAX_VALUE`] count as that. The entries of the reference clock are not looked at.
+    pub fn lower_upper(lower: &[Option<i32>], upper: &[Option<i32>]) -> Ceilings {
+        let usable = |constant: &Option<i32>| {
+            constant
+                .filter(|value| *value >= 0)
+                .map(|value| value.min(Bound::MAX_VALUE))
+        };
+        let row = |value: Option<i32>| value.map_or(Bound(i32::MIN), |value| Bound(2 * value + 1));
+        let column = |value: Option<i32>| value.map_or(Bound::INFINITY, |value| Bound(-2 * value));
+        let mut rows: Box<[Bound]> = lower.iter().map(|constant| row(usable(constant))).collect();
+        let mut columns: Box<[Bound]> = upper
+            .iter()
+            .map(|constant| column(usable(constant)))
+            .collect();
+        rows[0] = Bound::LE_ZERO;
+        columns[0] = Bound::LT_ZERO;
+        Ceilings { rows, columns }
+    }
+
+    /// The ceilings where comparisons from below and from above are not told apart.
+    pub fn maximal(constants: &[Option<i32>]) -> Ceilings {
+        Ceilings::lower_upper(constants, constants)
+    }
+
+    /// The ceilings of which each is the greater of both: sound where either was.
+    pub fn raise(&mut self, other: &Ceilings) {
+        for (row, other) in self.rows.iter_mut().zip(&other.rows) {
+            *row = (*row).max(*other);
+        }
+        for (column, other) in self.columns.iter_mut().zip(&other.columns) {
+            *column = (*column).min(*other);
+        }
+    }
+
+    /// The same with M, the greater of L and U, for both.
+    #[must_use]
+    pub fn to_maximal(&self) -> Ceilings {
+        let flipped = |bound: &Bound| Bound(1_i32.saturating_sub(bound.0));
+        let mut maximal = self.clone();
+        maximal.raise(&Ceilings {
+            rows: self
+                .columns
+                .iter()
+                .map(|column| {
+                    if column.is_infinite() {
+                        Bound(i32::MIN)
+                    } else {
+                        flipped(column)
+                    }
+                })
+                .collect(),
+            columns: self.rows.iter().map(flipped).collect(),
+        });
+        maximal
+    }
+
+    /// The clocks that are compared with anything; the others are not active.
+    pub fn compared(&self) -> ClockSet {
+        let is_compared =
+            |clock: &usize| self.rows[*clock].0 != i32::MIN || self.columns[*clock].is_finite();
+        (1..self.rows.len()).filter(is_compared).collect()
+    }
+
+    /// Whether the clock is certainly above L, given its entry in row 0.
+    #[inline]
+    fn is_above_lower(&self, clock: usize, entry: Bound) -> bool {
+        entry.0 < 1_i32.saturating_sub(self.rows[clock].0)
+    }
+
+    /// What row 0 becomes where a clock is certainly above U.
+    #[inline]
+    fn forgotten_lower_bound(column: Bound) -> Bound {
+        column.min(Bound::LE_ZERO)
+    }
+}
+
+/// Extrapolates by `Extra_LU+`; by `Extra_M+` if the ceilings are [`Ceilings::maximal`].
+///
+/// The forgetting leaves only these ways from one clock to another: through clocks that are neither certainly above L
+/// (their rows are infinite) nor certainly above U (only the reference clock still bounds them), and through the
+/// reference clock. Row 0 is final after forgetting, since the way over a clock above U was not better before its bound
+/// became weaker. So paths need to be admitted through those clocks and, last, through the reference clock.
+pub fn lu_plus(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
+    let (lower_bounds, rows) = zone.split_at_mut(dimension);
+    let columns = &ceilings.columns[..dimension];
+    let mut weakened = ClockSet::EMPTY;
+    let mut between = ClockSet::EMPTY;
+    for (row, clock) in rows.chunks_exact_mut(dimension).zip(1..) {
+        if ceilings.is_above_lower(clock, lower_bounds[clock]) {
+            row.fill(Bound::INFINITY);
+        } else {
+            row[clock] = Bound::INFINITY;
+            if forget_in_row(row, ceilings.rows[clock], lower_bounds, columns) {
+                weakened.insert(clock);
+            }
+            if lower_bounds[clock] >= columns[clock] {
+                between.insert(clock);
+            }
+        }
+        row[clock] = Bound::LE_ZERO;
+    }
+    for (lower, column) in lower_bounds.iter_mut().zip(columns).skip(1) {
+        if *lower < *column {
+            *lower = Ceilings::forgotten_lower_bound(*column);
+        }
+    }
+    if !weakened.is_empty() {
+        between
+            .iter()
+            .for_each(|via| relax_rows(zone, dimension, &weakened, via));
+        relax_rows(zone, dimension, &weakened, 0);
+    }
+}
+
+/// Makes the entries of a row infinite that exceed `limit` or whose clock is certainly above its U; returns whether
+/// that weakened one.
+#[inline]
+#[expect(
+    clippy::needless_bitwise_bool,
+    reason = "a branch would keep the loop from becoming vectors"
+)]
+fn forget_in_row(
+    row: &mut [Bound],
+    limit: Bound,
+    lower_bounds: &[Bound],
+    columns: &[Bound],
+) -> bool {
+    let mut is_weakened = false;
+    for ((bound, lower), column) in row.iter_mut().zip(lower_bounds).zip(columns) {
+        let is_forgotten = (*bound > limit) | (*lower < *column);
+        is_weakened |= is_forgotten & (bound.0 != i32::MAX);
+        *bound = if is_forgotten {
+            Bound::INFINITY
+        } else {
+            *bound
+        };
+    }
+    is_weakened
+}
+
+/// Admits paths through `via` into the given rows.
+#[inline]
+fn relax_rows(zone: &mut [Bound], dimension: usize, targets: &ClockSet, via: usize) {
+    let (before, rest) = zone.split_at_mut(via * dimension);
+    let (source, after) = rest.split_at_mut(dimension);
+    for target in targets.iter() {
+        let row = match target.cmp(&via) {
+            std::cmp::Ordering::Less => &mut before[target * dimension..][..dimension],
+            std::cmp::Ordering::Equal => continue,
+            std::cmp::Ordering::Greater => {
+                &mut after[(target - via - 1) * dimension..][..dimension]
+            }
+        };
+        relax_row(row, row[via], source);
+    }
+}
+
+/// Extrapolates by `Extra_LU`; by `Extra_M` if the ceilings are [`Ceilings::maximal`].
+pub fn lu(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
+    let columns = &ceilings.columns[..dimension];
+    let mut weakened = ClockSet::EMPTY;
+    for (clock, row) in zone.chunks_exact_mut(dimension).enumerate() {
+        row[clock] = Bound::INFINITY;
+        let mut is_weakened = false;
+        for (bound, column) in row.iter_mut().zip(columns) {
+            let is_above = bound.0 > ceilings.rows[clock].0;
+            let is_below = bound.0 < column.0;
+            // A clock without U keeps only what follows from the other bounds, a lower bound no more than `x >= 0`.
+            let below = if clock == 0 {
+                Ceilings::forgotten_lower_bound(*column)
+            } else {
+                *column
+            };
+            let new = if is_above && clock != 0 {
+                Bound::INFINITY
+            } else if is_below {
+                below
+            } else {
+                *bound
+            };
+            is_weakened |= new > *bound;
+            *bound = new;
+        }
+        row[clock] = Bound::LE_ZERO;
+        if is_weakened {
+            weakened.insert(clock);
+        }
+    }
+    if !weakened.is_empty() {
+        (0..dimension).for_each(|via| relax_rows(zone, dimension, &weakened, via));
+    }
+}
+
+/// Adds to `target` the zone cut along the given differences, each part extrapolated by `Extra_M` and kept on its sides.
+///
+/// For automata whose guards or invariants compare two clocks: `differences` are these comparisons. Every part lies
+/// wholly inside or outside each of them and stays there, so the parts can tell apart what the guards can.
+///
+/// Source: J. Bengtsson, W. Yi, "On Clock Difference Constraints and Termination in Reachability Analysis of Timed
+/// Automata", ICFEM 2003, section 4. Cost: up to 2^m parts for m differences.
+pub fn split_by_differences(
+    zone: &[Bound],
+    dimension: usize,
+    ceilings: &Ceilings,
+    differences: &[Constraint],
+    target: &mut Federation,
+) {
+    let maximal = ceilings.to_maximal();
+    let mut parts = vec![(zone.to_vec(), Vec::new())];
+    for difference in differences {
+        let sides = [*difference, difference.negated()];
+        let cut = |(part, kept): &(Vec<Bound>, Vec<Constraint>)| {
+            sides.map(|side| {
+                let (mut part, mut kept) = (part.clone(), kept.clone());
+                kept.push(side);
+                let is_left = dbm::constrain_all(&mut part, dimension, &[side]);
+                is_left.then_some((part, kept))
+            })
+        };
+        parts = parts.iter().flat_map(cut).flatten().collect();
+    }
+    for (mut part, kept) in parts {
+        lu(&mut part, dimension, &maximal);
+        if dbm::constrain_all(&mut part, dimension, &kept) {
+            target.add(&part);
+        }
+    }
+}

@@ -1,0 +1,425 @@
+//! Finite unions of zones.
+//!
+//! A federation keeps closed, consistent, positive zones of one dimension one after the other in a flat buffer. It may
+//! describe the same set in many ways; [`Federation::add`] and [`Federation::reduce`] keep the description short, and
+//! every answer about the set is exact.
+//!
+//! Subtraction is what all exactness rests on: `Z \ B` is cut out along the minimal constraints of `B`. For each of them,
+//! the part of the rest that violates it is a zone of the result, and the rest is intersected with it. The results are
+//! disjoint. Constraints that the rest satisfies anyway cut nothing and are passed over; among the others the one that
+//! the rest exceeds most goes first, so the first parts are large and the later cuts have little left to split.
+//!
+//! Source: A. David, J. Håkansson, K. G. Larsen, P. Pettersson, "Model Checking Timed Automata with Priorities Using DBM
+//! Subtraction", FORMATS 2006, sections 3 and 4.
+//!
+//! Cost: one zone minus another makes at most as many zones as the other has minimal constraints; the difference of
+//! federations is exponential in the worst case, and reduced after each step.
+
+use super::clocks::{self, Assignment};
+use super::dbm::{self, Constraint, Relation};
+use super::{Bound, ClockSet, minimal};
+
+/// A finite union of zones of the same dimension.
+#[derive(Clone, Debug)]
+pub struct Federation {
+    dimension: usize,
+    bounds: Vec<Bound>,
+}
+
+impl Federation {
+    /// The federation without valuations.
+    pub fn empty(dimension: usize) -> Federation {
+        Federation {
+            dimension,
+            bounds: Vec::new(),
+        }
+    }
+
+    /// The federation of one zone, which may be empty.
+    pub fn of_zone(dimension: usize, zone: &[Bound]) -> Federation {
+        let mut federation = Federation::empty(dimension);
+        federation.push(zone);
+        federation
+    }
+
+    /// The number of clocks, the reference clock included.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// The zones, none of them empty.
+    pub fn zones(&self) -> std::slice::ChunksExact<'_, Bound> {
+        self.bounds.chunks_exact(self.size())
+    }
+
+    /// The number of zones in this description of the set.
+    pub fn zone_count(&self) -> usize {
+        self.bounds.len() / self.size()
+    }
+
+    /// Whether there is no valuation in it.
+    pub fn is_empty(&self) -> bool {
+        self.bounds.is_empty()
+    }
+
+    /// Removes everything.
+    pub fn clear(&mut self) {
+        self.bounds.clear();
+    }
+
+    /// Adds a zone, which may be empty, without looking whether it was there.
+    pub fn push(&mut self, zone: &[Bound]) {
+        if !dbm::is_empty(zone) {
+            self.bounds.extend_from_slice(zone);
+        }
+    }
+
+    /// Adds a zone, which may be empty, unless one zone contains it; removes the zones that it contains.
+    ///
+    /// Returns whether the zone was not contained in a single zone.
+    pub fn add(&mut self, zone: &[Bound]) -> bool {
+        if dbm::is_empty(zone) || self.zones().any(|other| dbm::is_subset(zone, other)) {
+            return false;
+        }
+        self.retain(|other| !dbm::is_subset(other, zone));
+        self.bounds.extend_from_slice(zone);
+        true
+    }
+
+    /// Adds all zones of another federation as [`Federation::add`] does; returns whether one was new.
+    pub fn unite(&mut self, other: &Federation) -> bool {
+        other
+            .zones()
+            .fold(false, |is_new, zone| self.add(zone) | is_new)
+    }
+
+    /// Whether the valuation is in the federation; see [`dbm::contains`].
+    pub fn contains(&self, numerators: &[i64], denominator: i64) -> bool {
+        self.zones()
+            .any(|zone| dbm::contains(zone, numerators, denominator))
+    }
+
+    /// Intersects with one zone.
+    pub fn intersect_zone(&mut self, zone: &[Bound]) {
+        let dimension = self.dimension;
+        if dbm::is_empty(zone) {
+            self.clear();
+        }
+        self.update(|other| {
+            !dbm::are_apart(other, zone, dimension) && dbm::intersect(other, zone, dimension)
+        });
+    }
+
+    /// The valuations in both.
+    #[must_use]
+    pub fn intersection(&self, other: &Federation) -> Federation {
+        let mut result = Federation::empty(self.dimension);
+        for zone in other.zones() {
+            let mut part = self.clone();
+            part.intersect_zone(zone);
+            result.unite(&part);
+        }
+        result
+    }
+
+    /// Keeps the valuations that satisfy all constraints.
+    pub fn constrain_all(&mut self, constraints: &[Constraint]) {
+        let dimension = self.dimension;
+        self.update(|zone| dbm::constrain_all(zone, dimension, constraints));
+    }
+
+    /// Removes the valuations of a zone.
+    pub fn subtract_zone(&mut self, zone: &[Bound]) {
+        if dbm::is_empty(zone) || self.is_empty() {
+            return;
+        }
+        let mut result = Federation::empty(self.dimension);
+        let subtrahend = Subtrahend::new(zone, self.dimension);
+        for minuend in self.zones() {
+            subtrahend.subtract_from(minuend, &mut |part| {
+                result.push(part);
+                true
+            });
+        }
+        *self = result;
+    }
+
+    /// Removes the valuations of another federation.
+    pub fn subtract(&mut self, other: &Federation) {
+        for zone in other.zones() {
+            self.subtract_zone(zone);
+            self.remove_included();
+        }
+    }
+
+    /// Whether every valuation of the zone is in the federation; exact.
+    pub fn includes_zone(&self, zone: &[Bound]) -> bool {
+        dbm::is_empty(zone)
+            || self.zones().any(|other| dbm::is_subset(zone, other))
+            || is_covered(zone, &self.bounds, self.dimension)
+    }
+
+    /// Whether every valuation of this federation is in the other; exact.
+    pub fn is_subset(&self, other: &Federation) -> bool {
+        self.zones().all(|zone| other.includes_zone(zone))
+    }
+
+    /// Whether the two are the same set; exact.
+    pub fn is_same_set(&self, other: &Federation) -> bool {
+        self.is_subset(other) && other.is_subset(self)
+    }
+
+    /// How the two sets lie to each other; exact.
+    pub fn relation(&self, other: &Federation) -> Relation {
+        match (self.is_subset(other), other.is_subset(self)) {
+            (true, true) => Relation::Equal,
+            (true, false) => Relation::Subset,
+            (false, true) => Relation::Superset,
+            (false, false) => Relation::Incomparable,
+        }
+    }
+
+    /// Whether some valuation is in both.
+    pub fn intersects(&self, other: &Federation) -> bool {
+        let mut scratch = vec![Bound::LE_ZERO; self.size()];
+        let mut meets = |zone: &[Bound], other: &[Bound]| {
+            scratch.copy_from_slice(zone);
+            !dbm::are_apart(zone, other, self.dimension)
+                && dbm::intersect(&mut scratch, other, self.dimension)
+        };
+        self.zones()
+            .any(|zone| other.zones().any(|other| meets(zone, other)))
+    }
+
+    /// Lets any time pass while the clocks of `stopped` keep their values; see [`clocks::up_stopped`].
+    pub fn up(&mut self, stopped: &ClockSet) {
+        let dimension = self.dimension;
+        self.update(|zone| {
+            clocks::up_stopped(zone, dimension, stopped);
+            true
+        });
+    }
+
+    /// Lets time run backwards while the clocks of `stopped` keep their values; see [`clocks::down_stopped`].
+    pub fn down(&mut self, stopped: &ClockSet) {
+        let dimension = self.dimension;
+        self.update(|zone| {
+            if stopped.is_empty() {
+                clocks::down(zone, dimension);
+            } else {
+                clocks::down_stopped(zone, dimension, stopped);
+            }
+            true
+        });
+    }
+
+    /// Carries out the assignments in order.
+    pub fn assign(&mut self, assignments: &[Assignment]) {
+        let dimension = self.dimension;
+        self.update(|zone| clocks::assign(zone, dimension, assignments));
+    }
+
+    /// Replaces the federation by its preimage under a guard and assignments; see [`clocks::preimage`].
+    pub fn preimage(&mut self, guard: &[Constraint], assignments: &[Assignment]) {
+        let dimension = self.dimension;
+        self.update(|zone| clocks::preimage(zone, dimension, guard, assignments));
+    }
+
+    /// Removes every zone that a single other one contains. Quadratic in the number of zones.
+    pub fn remove_included(&mut self) {
+        let zones = std::mem::take(&mut self.bounds);
+        for zone in zones.chunks_exact(self.size()) {
+            self.add(zone);
+        }
+    }
+
+    /// Makes the description shorter: joins pairs of zones whose union is a zone, and removes zones that the rest
+    /// covers. The set stays the same.
+    pub fn reduce(&mut self) {
+        self.remove_included();
+        self.join_pairs();
+        self.remove_covered();
+    }
+
+    /// Replaces pairs of zones by their hull where that adds no valuation, until there is no such pair.
+    fn join_pairs(&mut self) {
+        let size = self.size();
+        let mut hull = vec![Bound::LE_ZERO; size];
+        let mut first = 0;
+        while first < self.zone_count() {
+            let joined = (first + 1..self.zone_count()).find(|second| {
+                let (zone, other) = (self.zone(first), self.zone(*second));
+                hull.copy_from_slice(zone);
+                dbm::hull(&mut hull, other);
+                is_hull_exact(&hull, zone, other, self.dimension)
+            });
+            if joined.is_some() {
+                // The hull may join with zones that were already looked at.
+                self.add(&hull);
+                first = 0;
+            } else {
+                first += 1;
+            }
+        }
+    }
+
+    /// Removes the zones that all others together cover.
+    fn remove_covered(&mut self) {
+        let size = self.size();
+        let mut index = 0;
+        while index < self.zone_count() && self.zone_count() > 1 {
+            let zone: Vec<Bound> = self
+                .bounds
+                .drain(index * size..(index + 1) * size)
+                .collect();
+            if !self.includes_zone(&zone) {
+                self.bounds.splice(index * size..index * size, zone);
+                index += 1;
+            }
+        }
+    }
+
+    /// The least zone that contains the federation, which must not be empty.
+    pub fn convex_hull(&self) -> Vec<Bound> {
+        let mut hull = self.zone(0).to_vec();
+        self.zones()
+            .skip(1)
+            .for_each(|zone| dbm::hull(&mut hull, zone));
+        hull
+    }
+
+    /// Adds the faces of `zone` in which an upper bound of an invariant is reached, so that time cannot pass.
+    ///
+    /// A strict bound is never reached and has no face; neither has the bound of a clock in `stopped`. Constraints
+    /// other than upper bounds of a clock do not stop time and are passed over.
+    pub fn add_upper_faces(
+        &mut self,
+        zone: &[Bound],
+        invariant: &[Constraint],
+        stopped: &ClockSet,
+    ) {
+        let dimension = self.dimension;
+        for &Constraint { left, right, bound } in invariant {
+            let is_upper = left != 0 && right == 0 && bound.is_finite();
+            if !is_upper || bound.is_strict() || stopped.contains(left) {
+                continue;
+            }
+            let mut face = zone.to_vec();
+            let lower = Constraint {
+                left: 0,
+                right: left,
+                bound: Bound(2 - bound.raw()),
+            };
+            let upper = Constraint { left, right, bound };
+            if dbm::constrain_all(&mut face, dimension, &[upper, lower]) {
+                self.add(&face);
+            }
+        }
+    }
+
+    /// The zone with this index.
+    pub fn zone(&self, index: usize) -> &[Bound] {
+        &self.bounds[index * self.size()..(index + 1) * self.size()]
+    }
+
+    /// The number of bounds of a zone.
+    fn size(&self) -> usize {
+        self.dimension * self.dimension
+    }
+
+    /// Keeps the zones for which the predicate holds, in their order.
+    fn retain(&mut self, is_kept: impl Fn(&[Bound]) -> bool) {
+        self.update(|zone| is_kept(zone));
+    }
+
+    /// Changes every zone in place and drops those for which the change returns false.
+    fn update(&mut self, mut change: impl FnMut(&mut [Bound]) -> bool) {
+        let size = self.size();
+        let mut kept = 0;
+        for start in (0..self.bounds.len()).step_by(size) {
+            if change(&mut self.bounds[start..start + size]) {
+                self.bounds.copy_within(start..start + size, kept);
+                kept += size;
+            }
+        }
+        self.bounds.truncate(kept);
+    }
+}
+
+/// A zone that is taken away from others: its minimal constraints are found once.
+struct Subtrahend<'a> {
+    zone: &'a [Bound],
+    dimension: usize,
+    constraints: Vec<Constraint>,
+}
+
+impl<'a> Subtrahend<'a> {
+    fn new(zone: &'a [Bound], dimension: usize) -> Subtrahend<'a> {
+        let mut constraints = Vec::new();
+        minimal::for_each_minimal(zone, dimension, |constraint| constraints.push(constraint));
+        Subtrahend {
+            zone,
+            dimension,
+            constraints,
+        }
+    }
+
+    /// Gives the parts of `minuend` outside the zone to `visit` until that returns false; returns whether it never did.
+    fn subtract_from(&self, minuend: &[Bound], visit: &mut impl FnMut(&[Bound]) -> bool) -> bool {
+        let dimension = self.dimension;
+        if dbm::are_apart(minuend, self.zone, dimension) {
+            return visit(minuend);
+        }
+        let mut rest = minuend.to_vec();
+        let mut part = minuend.to_vec();
+        while let Some(cut) = self.deepest_cut(&rest) {
+            let outside = cut.negated();
+            part.copy_from_slice(&rest);
+            let has_part = dbm::constrain(
+                &mut part,
+                dimension,
+                outside.left,
+                outside.right,
+                outside.bound,
+            );
+            if has_part && !visit(&part) {
+                return false;
+            }
+            if !dbm::constrain(&mut rest, dimension, cut.left, cut.right, cut.bound) {
+                break;
+            }
+        }
+        true
+    }
+
+    /// The constraint that the zone exceeds most; none if it satisfies all.
+    fn deepest_cut(&self, rest: &[Bound]) -> Option<Constraint> {
+        let excess = |constraint: &Constraint| {
+            let entry = rest[constraint.left * self.dimension + constraint.right];
+            i64::from(entry.raw()) - i64::from(constraint.bound.raw())
+        };
+        let cutting = self
+            .constraints
+            .iter()
+            .filter(|constraint| excess(constraint) > 0);
+        // Of equally deep cuts the first one, so that results do not depend on how a maximum is found.
+        cutting
+            .rev()
+            .max_by_key(|constraint| excess(constraint))
+            .copied()
+    }
+}
+
+/// Whether the zones, one after the other in `cover`, contain the whole zone.
+fn is_covered(zone: &[Bound], cover: &[Bound], dimension: usize) -> bool {
+    let Some((first, others)) = cover.split_at_checked(dimension * dimension) else {
+        return false;
+    };
+    Subtrahend::new(first, dimension)
+        .subtract_from(zone, &mut |part| is_covered(part, others, dimension))
+}
+
+/// Whether the hull of two zones contains nothing but them.
+fn is_hull_exact(hull: &[Bound], zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
+    Subtrahend::new(zone, dimension).subtract_from(hull, &mut |part| dbm::is_subset(part, other))
+}

@@ -1,0 +1,144 @@
+//! Zones stored by their fewest constraints.
+//!
+//! A closed matrix says most things twice. The minimal constraints are those that cannot be left out; closing them
+//! gives the matrix back. There are two sources of redundancy, and both have to be treated in the right order:
+//!
+//! * clocks at a fixed distance from each other (a cycle of bounds that sums to `<= 0`) fall into classes. Each class is
+//!   described by one cycle through its clocks in ascending order, and by its least clock to the outside;
+//! * between these representatives there is no such cycle, so all constraints that are the sum of two others can be
+//!   left out at once, and the result does not depend on the order.
+//!
+//! `x >= 0` holds in every zone; neither it nor what follows from it is stored, so the universe is stored as nothing.
+//!
+//! Source: K. G. Larsen, F. Larsson, P. Pettersson, W. Yi, "Efficient Verification of Real-Time Systems: Compact Data
+//! Structure and State-Space Reduction", RTSS 1997, section 3.
+//!
+//! Cost: reduction O(n^3), inclusion linear in the number of constraints, unpacking that of closing.
+
+use super::dbm::{self, Constraint};
+use super::{Bound, ClockSet};
+
+/// One constraint of a stored zone in eight bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct StoredConstraint {
+    left: u16,
+    right: u16,
+    bound: Bound,
+}
+
+impl From<Constraint> for StoredConstraint {
+    /// Packs a constraint; its clocks must be below [`ClockSet::CAPACITY`].
+    fn from(constraint: Constraint) -> StoredConstraint {
+        let pack = |clock: usize| u16::try_from(clock).expect("the capacity of a clock set fits");
+        StoredConstraint {
+            left: pack(constraint.left),
+            right: pack(constraint.right),
+            bound: constraint.bound,
+        }
+    }
+}
+
+impl From<StoredConstraint> for Constraint {
+    fn from(stored: StoredConstraint) -> Constraint {
+        Constraint {
+            left: stored.left.into(),
+            right: stored.right.into(),
+            bound: stored.bound,
+        }
+    }
+}
+
+/// Appends the minimal constraints of a zone that is not empty, row by row.
+pub fn append_minimal(zone: &[Bound], dimension: usize, target: &mut Vec<StoredConstraint>) {
+    for_each_minimal(zone, dimension, |constraint| target.push(constraint.into()));
+}
+
+/// Calls `visit` with the minimal constraints of a zone that is not empty, row by row.
+pub fn for_each_minimal(zone: &[Bound], dimension: usize, mut visit: impl FnMut(Constraint)) {
+    let representatives = representatives(zone, dimension);
+    for left in 0..dimension {
+        let row = &zone[left * dimension..(left + 1) * dimension];
+        let is_representative = representatives.contains(left);
+        let cycle_successor = cycle_successor(zone, dimension, left);
+        for (right, &bound) in row.iter().enumerate() {
+            let is_kept = cycle_successor == Some(right)
+                || is_representative
+                    && left != right
+                    && bound.is_finite()
+                    && representatives.contains(right)
+                    && !is_redundant(zone, dimension, &representatives, left, right);
+            let is_implied = left == 0 && is_implied_by_sign(zone, dimension, right);
+            if is_kept && !is_implied {
+                visit(Constraint { left, right, bound });
+            }
+        }
+    }
+}
+
+/// Whether the zone is a subset of the stored one; the zone must not be empty.
+#[inline]
+pub fn is_subset_of_stored(zone: &[Bound], dimension: usize, stored: &[StoredConstraint]) -> bool {
+    stored.iter().all(|constraint| {
+        let entry = usize::from(constraint.left) * dimension + usize::from(constraint.right);
+        zone[entry] <= constraint.bound
+    })
+}
+
+/// Writes the stored zone as a closed matrix.
+pub fn unpack(stored: &[StoredConstraint], zone: &mut [Bound], dimension: usize) {
+    dbm::set_universe(zone, dimension);
+    let mut touched = ClockSet::EMPTY;
+    for constraint in stored.iter().copied().map(Constraint::from) {
+        zone[constraint.left * dimension + constraint.right] = constraint.bound;
+        touched.insert(constraint.left);
+        touched.insert(constraint.right);
+    }
+    dbm::close_touched(zone, dimension, &touched);
+}
+
+/// Whether two different clocks have a fixed distance in the zone.
+fn are_tied(zone: &[Bound], dimension: usize, left: usize, right: usize) -> bool {
+    zone[left * dimension + right] + zone[right * dimension + left] == Bound::LE_ZERO
+}
+
+/// The least clock of each class of tied clocks.
+fn representatives(zone: &[Bound], dimension: usize) -> ClockSet {
+    let is_least =
+        |clock: &usize| (0..*clock).all(|other| !are_tied(zone, dimension, other, *clock));
+    (0..dimension).filter(is_least).collect()
+}
+
+/// The clock that follows in the cycle through the class of `clock`; none if it is alone.
+fn cycle_successor(zone: &[Bound], dimension: usize, clock: usize) -> Option<usize> {
+    let is_tied = |other: &usize| are_tied(zone, dimension, *other, clock);
+    (clock + 1..dimension)
+        .find(is_tied)
+        .or_else(|| (0..clock).find(is_tied))
+}
+
+/// Whether the lower bound of a clock follows from `x >= 0` for itself or for a clock that is tied to it.
+///
+/// Clocks tied to the reference clock have the cycle of their class through it, which must stay whole.
+fn is_implied_by_sign(zone: &[Bound], dimension: usize, clock: usize) -> bool {
+    let follows =
+        |tied: usize| zone[tied] == Bound::LE_ZERO && zone[tied * dimension + clock] <= zone[clock];
+    let is_free = !are_tied(zone, dimension, 0, clock);
+    zone[clock] == Bound::LE_ZERO
+        || is_free
+            && (1..dimension).any(|tied| are_tied(zone, dimension, tied, clock) && follows(tied))
+}
+
+/// Whether the entry is the sum of two others between representatives.
+fn is_redundant(
+    zone: &[Bound],
+    dimension: usize,
+    representatives: &ClockSet,
+    left: usize,
+    right: usize,
+) -> bool {
+    let bound = zone[left * dimension + right];
+    let mut others = representatives
+        .iter()
+        .filter(|via| *via != left && *via != right);
+    others.any(|via| zone[left * dimension + via] + zone[via * dimension + right] <= bound)
+}

@@ -1,0 +1,37 @@
+//! Sets of clock valuations: bounds, zones as difference bound matrices, federations, extrapolation.
+//!
+//! This room knows clocks by index and bounds, nothing of automata. Clock 0 is the reference clock, whose value is
+//! always 0; a zone of *dimension* n speaks about the n - 1 clocks 1..n. The modules stand in reading order:
+//!
+//! * [`bound`]: one bound `x - y < c` or `x - y <= c` in an `i32`;
+//! * [`clock_set`]: a set of clocks as a bit set;
+//! * [`dbm`]: zones on slices, so that callers keep them in arenas; the contract of a zone stands at its top;
+//! * [`clocks`]: what moves clocks: delay, reset, assignment, freeing, and the way back of an update;
+//! * [`zone`]: one zone that owns its matrix;
+//! * [`minimal`]: zones stored by their fewest constraints;
+//! * [`extrapolate`]: the abstractions that make the zone graph finite;
+//! * [`federation`]: finite unions of zones, with exact subtraction and inclusion;
+//! * [`past`]: the safe timed predecessors of timed games.
+//!
+//! Sources: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, for the operations on zones;
+//! the others are named where they are used.
+
+pub mod bound;
+pub mod clock_set;
+pub mod dbm;
+
+pub mod clocks;
+pub mod zone;
+
+pub mod minimal;
+
+pub mod extrapolate;
+
+pub mod federation;
+pub mod past;
+
+pub use bound::Bound;
+pub use clock_set::ClockSet;
+pub use dbm::Relation;
+pub use federation::Federation;
+pub use zone::Zone;
