@@ -10,6 +10,10 @@ paper.
 
 from __future__ import annotations
 
+from xml.sax.saxutils import escape
+
+from markupsafe import Markup
+
 from ntagen.render.queries import model_queries, render_queries
 from ntagen.render.templates import environment
 from ntagen.render.values import model_values
@@ -37,5 +41,5 @@ def render(scene: Scene, source: str | None = None) -> str:
         model=values, source=None if source is None else " ".join(source.split())
     )
     return templates.get_template("model.xml.jinja").render(
-        model=values, declaration=declaration, queries=model_queries(scene)
+        model=values, declaration=Markup(escape(declaration)), queries=model_queries(scene)
     )

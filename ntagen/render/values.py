@@ -12,6 +12,7 @@ The templates hold the language and the arithmetic, this module every decision a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -68,6 +69,7 @@ class ModelValues:
     criticals: Spheres
     detections: Spheres
     swept: bool
+    sweep_margin: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +122,8 @@ def model_values(scene: Scene) -> ModelValues:
     needle, limits = scene.needle, scene.limits
     tip = needle.tip
     dt, velocity_mm, time_unit = _time(limits.step_s, needle.speed_mm_per_s)
-    _check_motion(scale, dt, velocity_mm, needle.radius_mm)
+    swept = scene.safety == "swept"
+    _check_motion(scale, dt, velocity_mm, needle.radius_mm, swept)
     return ModelValues(
         name=_one_line(scene.name),
         frame_note="" if _is_identity(frame) else "The scene was turned so that this is so.",
@@ -140,7 +143,8 @@ def model_values(scene: Scene) -> ModelValues:
         targets=writer.spheres(scene.targets),
         criticals=writer.spheres(scene.criticals),
         detections=writer.spheres(scene.detections),
-        swept=scene.safety == "swept",
+        swept=swept,
+        sweep_margin=_sweep_margin(scale, needle.radius_mm),
     )
 
 
@@ -152,7 +156,7 @@ def _time(step_s: float, speed_mm_per_s: float) -> tuple[int, float, str]:
     return 1, speed_mm_per_s * step_s, f"one push: {step_s:g} s"
 
 
-def _check_motion(scale: int, dt: int, velocity_mm: float, radius_mm: float) -> None:
+def _check_motion(scale: int, dt: int, velocity_mm: float, radius_mm: float, swept: bool) -> None:
     """Refuses a step that the model's numbers cannot hold.
 
     A push turns the tip by ``insertion / radius``, cut to units. If that leaves nothing, the tip
@@ -172,6 +176,21 @@ def _check_motion(scale: int, dt: int, velocity_mm: float, radius_mm: float) -> 
             f"tip by less than one unit of the model (1/{scale} rad)\n"
             "help: make `step` longer or `resolution` finer"
         )
+    if swept and insertion >= math.pi * radius:
+        raise InputError(
+            "one step goes half around the motion circle, too far for `safety swept`\n"
+            "help: make `step` shorter"
+        )
+
+
+def _sweep_margin(scale: int, radius_mm: float) -> int:
+    """How much regions are enlarged for the swept check, in units.
+
+    The rounding of a position on the motion circle is less than 11 units of a direction, times the
+    radius, plus 2 units; templates/uppaal/sweep.c.jinja derives it.
+    """
+    radius = fixed_point(radius_mm, scale, "the radius of the motion circle")
+    return -(-11 * radius // scale) + 2
 
 
 def _whole_degrees(angle_rad: float) -> int:
