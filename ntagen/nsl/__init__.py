@@ -25,6 +25,7 @@ from ntagen.scene import Scene
 __all__ = [
     "Diagnostic",
     "SourceError",
+    "format_text",
     "load",
     "load_with_warnings",
     "loads",
@@ -64,6 +65,17 @@ def loads(text: str, path: str = "<text>") -> Scene:
 def loads_with_warnings(text: str, path: str = "<text>") -> tuple[Scene, tuple[Diagnostic, ...]]:
     """The scene that a text describes, and what is doubtful in it; as `loads`."""
     return _scene(Source(path, text), Reporter())
+
+
+def format_text(text: str, path: str = "<text>") -> str:
+    """The text in its canonical layout: comments kept, meaning unchanged, a second time the same.
+
+    Raises:
+        SourceError: The text has mistakes of form.
+    """
+    from ntagen.nsl.format import format_source
+
+    return format_source(Source(path, text))
 
 
 def _scene(source: Source, reporter: Reporter) -> tuple[Scene, tuple[Diagnostic, ...]]:

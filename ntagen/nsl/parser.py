@@ -68,12 +68,13 @@ _OTHER_WORDS: Final = frozenset(
 RESERVED: Final = KEYWORDS | _OTHER_WORDS
 """All words that cannot be names because of the grammar."""
 
-_BLOCKS: Final[dict[str, BlockKind]] = {
+BLOCKS: Final[dict[str, BlockKind]] = {
     "environment": "environment",
     "needle": "needle",
     "motion": "motion",
     "for": "for",
 }
+"""The statements that have braces."""
 _NAMING: Final = _REGIONS | {"environment", "let", "for"}
 
 
@@ -93,6 +94,7 @@ class Comment:
 
     text: str
     span: Span
+    line: int
 
 
 @functools.cache
@@ -118,7 +120,7 @@ def tokenise(source: Source) -> list[Token | Comment]:
         start = cast(int, token.start_pos)
         span = source.span(start, start + len(token))
         if token.type in ("LINE_COMMENT", "BLOCK_COMMENT"):
-            found.append(Comment(str(token).rstrip(), span))
+            found.append(Comment(str(token).rstrip(), span, cast(int, token.line)))
         elif token.type != "SPACE":
             found.append(Token(token.type, str(token), span, cast(int, token.line)))
     return found
@@ -197,23 +199,23 @@ class _Parser:
         """The statement that begins here, with its braces."""
         words = self._cut(kind)
         keyword = words[0].text
-        if keyword in KEYWORDS and kind is not None and keyword not in ALLOWED[kind]:
+        is_misplaced = keyword in KEYWORDS and kind is not None and keyword not in ALLOWED[kind]
+        if is_misplaced and kind is not None:
             self._report_misplaced(words[0], kind)
-            kind = None
         parsed = self._parse_words(words)
         body: tuple[tree.Statement, ...] = ()
         brace = self._peek()
         has_brace = brace is not None and brace.text == "{"
-        if keyword in _BLOCKS:
+        if keyword in BLOCKS:
             if has_brace:
-                body = tuple(self._braces(_BLOCKS[keyword], depth))
+                body = tuple(self._braces(BLOCKS[keyword], depth))
             else:
                 self._reporter.report(
                     "missing-brace", words[-1].span.behind(), f"`{{` is missing after `{keyword}`"
                 )
                 if self._missing_closing < 0:
                     self._missing_closing += 1
-                    body = tuple(self._block(_BLOCKS[keyword], depth + 1))
+                    body = tuple(self._block(BLOCKS[keyword], depth + 1))
                     self._close(words[-1])
         elif has_brace and brace is not None:
             if not isinstance(parsed, tree.Broken):
@@ -224,7 +226,7 @@ class _Parser:
                     hint="write its properties on one line",
                 )
             body = tuple(self._braces(None, depth))
-        if kind is None:
+        if is_misplaced:
             return tree.Broken(parsed.span, keyword, _declared_name(words))
         return _with_body(parsed, body)
 
@@ -277,7 +279,7 @@ class _Parser:
             previous = words[-1]
             if len(words) == 1 and first.text in _NAMING and self._is_name_reserved(first, token):
                 token = Token("NAME", token.text, token.span, token.line)
-            elif _begins_statement(token, kind) or (
+            elif begins_statement(token, kind) or (
                 parentheses <= 0 and _begins_unknown_statement(previous, token)
             ):
                 break
@@ -459,7 +461,7 @@ def _accepted(parser: lark.parsers.lalr_interactive_parser.InteractiveParser) ->
     return cast("set[str]", parser.accepts())  # type: ignore[no-untyped-call]
 
 
-def _begins_statement(token: Token, kind: BlockKind | None) -> bool:
+def begins_statement(token: Token, kind: BlockKind | None) -> bool:
     """Whether a token is a word that begins a statement; `radius` is one in a needle only."""
     if token.type == "QUERY":
         return True

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
-from ntagen.nsl.diagnostics import Reporter
+from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.source import MAX_SOURCE_BYTES, Source, Span
 
 
@@ -20,13 +21,7 @@ def read_source(path: str, reporter: Reporter, included_at: Span | None = None) 
     Returns:
         The text, or None if there is none.
     """
-
-    def report(name: str, message: str, hint: str | None = None) -> None:
-        if included_at is None:
-            reporter.report_file(name, path, message, hint=hint)
-        else:
-            reporter.report(name, included_at, f"cannot include `{path}`: {message}", hint=hint)
-
+    report = _Report(path, reporter, included_at)
     try:
         if Path(path).is_dir():
             report("file-unreadable", "it is a folder", "name a file in it")
@@ -40,6 +35,33 @@ def read_source(path: str, reporter: Reporter, included_at: Span | None = None) 
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         report("file-unreadable", f"the file cannot be read: {reason.lower()}")
         return None
+    return _decoded(path, data, report)
+
+
+def decode_source(path: str, data: bytes, reporter: Reporter) -> Source | None:
+    """The text of a file that was read already; `path` is what it is called."""
+    return _decoded(path, data, _Report(path, reporter, None))
+
+
+@dataclass(frozen=True, slots=True)
+class _Report:
+    """Reports why a file cannot be read, at the include that asked for it if there is one."""
+
+    path: str
+    reporter: Reporter
+    included_at: Span | None
+
+    def __call__(self, name: str, message: str, hint: str | None = None) -> None:
+        """Reports one defect."""
+        if self.included_at is None:
+            self.reporter.report_file(name, self.path, message, hint=hint)
+        else:
+            message = f"cannot include `{self.path}`: {message}"
+            self.reporter.report(name, self.included_at, message, hint=hint)
+
+
+def _decoded(path: str, data: bytes, report: _Report) -> Source | None:
+    """The text in some bytes, if they are text."""
     if len(data) > MAX_SOURCE_BYTES:
         report("file-too-large", f"the file has more than {MAX_SOURCE_BYTES // 2**20} MiB")
         return None
@@ -60,8 +82,6 @@ def read_source(path: str, reporter: Reporter, included_at: Span | None = None) 
 
 def _nearby(path: str) -> str | None:
     """A hint with the file that was most likely meant."""
-    from ntagen.nsl.diagnostics import did_you_mean
-
     parent, name = os.path.split(path)
     try:
         names = sorted(entry for entry in os.listdir(parent or ".") if entry.endswith(".nsl"))

@@ -1,0 +1,86 @@
+"""``ntagen fmt``: brings environment files into the canonical layout."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from ntagen.errors import InputError
+
+_STDIN = "-"
+
+
+@click.command(name="fmt")
+@click.argument("files", nargs=-1, required=True, metavar="ENV.nsl...")
+@click.option("--check", is_flag=True, help="Change nothing; exit with 1 if a file would change.")
+@click.pass_context
+def command(ctx: click.Context, files: tuple[str, ...], check: bool) -> None:
+    """Lay out environment files canonically, in place.
+
+    Comments stay and the meaning does not change. A file with mistakes of form is left as it is.
+    A single - reads standard input and writes to standard output.
+
+    \b
+    Example:
+      ntagen fmt examples/*.nsl
+      ntagen fmt --check env.nsl
+    """  # noqa: D301
+    from ntagen.nsl import Diagnostic, SourceError
+
+    changed: list[str] = []
+    mistakes: list[Diagnostic] = []
+    for name in files:
+        try:
+            before, after = _formatted(name)
+        except SourceError as error:
+            mistakes.extend(error.diagnostics)
+            continue
+        if before != after:
+            changed.append(name)
+        if name == _STDIN and not check:
+            click.echo(after, nl=False)
+        elif before != after and not check:
+            _write(name, after)
+    for name in changed:
+        if name != _STDIN or check:
+            click.echo(f"{'would reformat' if check else 'reformatted'} {name}", err=True)
+    if mistakes:
+        raise SourceError(mistakes)
+    if check and changed:
+        ctx.exit(1)
+
+
+def _formatted(name: str) -> tuple[str, str]:
+    """The text of a file before and after.
+
+    Raises:
+        SourceError: The file cannot be read, or has mistakes of form.
+    """
+    from ntagen.nsl import SourceError, format_text
+    from ntagen.nsl.diagnostics import Reporter
+    from ntagen.nsl.reading import decode_source, read_source
+    from ntagen.nsl.source import MAX_SOURCE_BYTES
+
+    reporter = Reporter()
+    if name == _STDIN:
+        data = sys.stdin.buffer.read(MAX_SOURCE_BYTES + 1)
+        source = decode_source("<stdin>", data, reporter)
+    else:
+        source = read_source(name, reporter)
+    if source is None:
+        raise SourceError(reporter.diagnostics)
+    return source.text, format_text(source.text, source.path)
+
+
+def _write(name: str, text: str) -> None:
+    """Replaces the text of a file.
+
+    Raises:
+        InputError: Writing it is not permitted or fails.
+    """
+    try:
+        Path(name).write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InputError(f"{name}: error: the file cannot be written: {error.strerror}") from error

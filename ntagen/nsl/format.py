@@ -1,0 +1,303 @@
+"""The canonical layout of environment files.
+
+* Two spaces of indentation for each brace; words of a clause one space apart, clauses two.
+* Statements that stand on one line stay on one line, those on several lines stay apart; a line
+  break within a statement goes. At most one empty line is kept, none inside a brace's edge.
+* Regions on neighbouring lines stand in columns; comments at the ends of neighbouring lines too.
+
+Only white space changes: the tokens and comments of the result are those of the text. Formatting
+the result changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import zip_longest
+from typing import Final
+
+from ntagen.nsl.diagnostics import Reporter, SourceError
+from ntagen.nsl.parser import BLOCKS, BlockKind, Comment, Token, begins_statement, parse, tokenise
+from ntagen.nsl.source import Source
+
+_INDENT: Final = "  "
+_CONTINUATION: Final = "      "
+_COMMENT_GAP: Final = 3
+_REGIONS: Final = ("target", "critical", "detection")
+
+_NONE_AFTER: Final = frozenset({"LPAR", "LSQB", "RANGE"})
+_NONE_BEFORE: Final = frozenset({"RPAR", "RSQB", "LSQB", "COMMA", "RANGE"})
+_OPERAND_ENDS: Final = frozenset({"NAME", "NUMBER", "RATIO", "RPAR", "RSQB"})
+_CLAUSES: Final = frozenset({"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT"})
+
+
+def format_source(source: Source) -> str:
+    """The text of a source in its canonical layout.
+
+    Raises:
+        SourceError: The text has mistakes of form; what it means is not looked at.
+    """
+    reporter = Reporter()
+    reporter.enter(source.path)
+    parse(source, reporter, kind=None)
+    if reporter.has_errors:
+        raise SourceError(reporter.diagnostics)
+    lines = _Layout().lines(tokenise(source))
+    return "".join(f"{text}\n" for text in _render(lines))
+
+
+@dataclass(slots=True)
+class _Line:
+    """A line of the result before it is aligned with its neighbours.
+
+    Attributes:
+        depth: How many braces it stands in.
+        cells: Its clauses; all of the line if it is not to be aligned.
+        comment: The comment at its end.
+        follows_gap: Whether an empty line comes before it.
+        is_region: Whether it is one region, so that its cells form columns with the lines around.
+        is_opening: Whether it ends in an opening brace.
+    """
+
+    depth: int
+    cells: list[str] = field(default_factory=list)
+    comment: str | None = None
+    follows_gap: bool = False
+    is_region: bool = False
+    is_opening: bool = False
+
+    @property
+    def is_single(self) -> bool:
+        """Whether it is one line in the text, too, and more than a closing brace."""
+        return self.cells != ["}"] and not any("\n" in cell for cell in self.cells)
+
+    def append(self, cells: Sequence[str]) -> None:
+        """Adds clauses; behind a region they make it a line that stands in no columns."""
+        if self.is_region and self.cells:
+            self.cells[:2] = [" ".join(self.cells[:2])]
+            self.is_region = False
+        self.cells.extend(cells)
+
+
+class _Layout:
+    """Puts tokens and comments on lines."""
+
+    def __init__(self) -> None:
+        self._lines: list[_Line] = []
+        self._blocks: list[BlockKind | None] = []
+        self._keyword = ""
+        self._statement: list[Token | Comment] = []
+        self._end_line = 0
+
+    def lines(self, items: Sequence[Token | Comment]) -> list[_Line]:
+        """The lines of a file."""
+        following = _following_tokens(items)
+        for item, token in zip(items, following, strict=True):
+            if isinstance(item, Comment):
+                self._comment(item, token)
+            else:
+                self._token(item)
+            self._end_line = item.line + item.text.count("\n")
+        self._end_statement()
+        return self._lines
+
+    def _block(self) -> BlockKind | None:
+        """The kind of the braces that are open."""
+        return self._blocks[-1] if self._blocks else None
+
+    def _token(self, token: Token) -> None:
+        """One token, on the line it belongs to."""
+        if token.type == "BRACE" and token.text == "{":
+            self._statement.append(token)
+            self._blocks.append(BLOCKS.get(self._keyword))
+            self._end_statement()
+            self._lines[-1].is_opening = True
+        elif token.type == "BRACE":
+            self._end_statement()
+            self._blocks.pop()
+            self._open_line(token).cells.append("}")
+            self._lines[-1].follows_gap = False
+        elif not self._statement or begins_statement(token, self._block()):
+            self._end_statement()
+            if token.line > self._end_line or not self._can_continue():
+                self._open_line(token)
+            self._keyword = token.text.split()[0]
+            self._statement.append(token)
+        else:
+            self._statement.append(token)
+
+    def _comment(self, comment: Comment, following: Token | None) -> None:
+        """One comment: within a statement, at the end of a line or on lines of its own."""
+        is_inside = (
+            bool(self._statement)
+            and following is not None
+            and following.text != "}"
+            and not begins_statement(following, self._block())
+        )
+        if is_inside:
+            self._statement.append(comment)
+            return
+        is_line_shared = comment.line == self._end_line and bool(self._lines)
+        is_followed = following is not None and following.line == comment.line
+        self._end_statement()
+        line = self._lines[-1] if self._lines else None
+        if line is None or not is_line_shared or line.comment is not None:
+            self._open_line(comment).cells.append(comment.text)
+        elif is_followed and comment.text.startswith("/*") and self._can_continue():
+            line.append([comment.text])
+        else:
+            line.comment = comment.text
+
+    def _can_continue(self) -> bool:
+        """Whether another statement may stand on the line that is open."""
+        if not self._lines or self._lines[-1].comment is not None:
+            return False
+        cells = self._lines[-1].cells
+        return bool(cells) and not (cells[-1].endswith(("{", "}")) or cells[0].startswith("/"))
+
+    def _open_line(self, item: Token | Comment) -> _Line:
+        """A new line; empty lines before it become one, or none at the edge of a brace."""
+        is_first = not self._lines or self._lines[-1].is_opening
+        line = _Line(len(self._blocks))
+        line.follows_gap = item.line > self._end_line + 1 and not is_first
+        self._lines.append(line)
+        return line
+
+    def _end_statement(self) -> None:
+        """Writes the statement that is being collected on the line that is open."""
+        if not self._statement:
+            return
+        line = self._lines[-1]
+        cells = list(_cells(self._statement))
+        is_region = self._keyword in _REGIONS
+        if is_region and not line.cells:
+            line.is_region = True
+        elif is_region:
+            cells = [" ".join(cells[:2]), *cells[2:]]
+        line.append(cells)
+        self._statement = []
+
+
+def _following_tokens(items: Sequence[Token | Comment]) -> list[Token | None]:
+    """For each item the first token behind it."""
+    following: list[Token | None] = []
+    token: Token | None = None
+    for item in reversed(items):
+        following.append(token)
+        if isinstance(item, Token):
+            token = item
+    return following[::-1]
+
+
+def _cells(items: Sequence[Token | Comment]) -> Iterator[str]:
+    """The clauses of a statement; those of a region begin with its kind and its name."""
+    cell = ""
+    previous: Token | Comment | None = None
+    last_token: Token | None = None
+    is_prefix = False
+    for item in items:
+        if _begins_clause(previous, item):
+            yield cell
+            cell = ""
+        elif previous is not None and not is_prefix:
+            cell += _space(previous, item)
+        cell += _text(item)
+        is_prefix = _is_prefix(last_token, item)
+        previous = item
+        last_token = item if isinstance(item, Token) else last_token
+    yield cell
+
+
+def _begins_clause(previous: Token | Comment | None, item: Token | Comment) -> bool:
+    """Whether a new clause begins between two neighbours of a statement."""
+    return (
+        isinstance(item, Token)
+        and isinstance(previous, Token)
+        and (item.type in _CLAUSES or previous.type == "REGION_KIND")
+    )
+
+
+def _is_prefix(last_token: Token | None, item: Token | Comment) -> bool:
+    """Whether an item is a sign that belongs to what follows, not an operator."""
+    if isinstance(item, Comment) or item.type != "SIGN":
+        return False
+    return last_token is None or last_token.type not in _OPERAND_ENDS
+
+
+def _space(previous: Token | Comment, item: Token | Comment) -> str:
+    """The white space between two neighbours of a clause."""
+    if isinstance(previous, Comment):
+        return "\n" + _CONTINUATION if previous.text.startswith("//") else " "
+    if isinstance(item, Comment):
+        return " "
+    is_call = item.type == "LPAR" and previous.type == "NAME"
+    is_tight = previous.type in _NONE_AFTER or item.type in _NONE_BEFORE
+    return "" if is_call or is_tight else " "
+
+
+def _text(item: Token | Comment) -> str:
+    """A token or comment as it is written."""
+    if isinstance(item, Token) and item.type == "RATIO":
+        return "".join(item.text.split())
+    if isinstance(item, Token) and item.type == "QUERY":
+        head, _, text = item.text.partition("=")
+        return f"query {head.removeprefix('query').strip()} = {text.strip()}"
+    return item.text
+
+
+def _render(lines: Sequence[_Line]) -> Iterator[str]:
+    """The text of the lines, aligned."""
+    bodies = [
+        body for group in _runs(lines, lambda line: line.is_region) for body in _bodies(group)
+    ]
+    position = 0
+    for group in _runs(lines, lambda line: line.comment is not None and line.is_single):
+        texts = bodies[position : position + len(group)]
+        position += len(group)
+        column = max(map(len, texts)) + _COMMENT_GAP
+        for line, text in zip(group, texts, strict=True):
+            if line.follows_gap:
+                yield ""
+            if line.comment is None:
+                yield text
+            elif line.is_single:
+                yield f"{text:<{column}}{line.comment}"
+            else:
+                yield f"{text}{' ' * _COMMENT_GAP}{line.comment}"
+
+
+def _runs(lines: Sequence[_Line], is_member: Callable[[_Line], bool]) -> Iterator[list[_Line]]:
+    """Neighbouring lines that are aligned together; a line that is not to be aligned is alone."""
+    run: list[_Line] = []
+    for line in lines:
+        if run and not (
+            is_member(run[-1])
+            and is_member(line)
+            and run[-1].depth == line.depth
+            and not line.follows_gap
+        ):
+            yield run
+            run = []
+        run.append(line)
+    if run:
+        yield run
+
+
+def _bodies(lines: Sequence[_Line]) -> Iterator[str]:
+    """Lines without their comments; the clauses of several regions stand in columns."""
+    aligned = [line for line in lines if line.is_region and line.is_single]
+    columns = zip_longest(*(line.cells[:-1] for line in aligned), fillvalue="")
+    widths = [max(map(len, column)) for column in columns]
+    for line in lines:
+        cells = line.cells
+        if line in aligned:
+            padded = zip(cells[:-1], widths, strict=False)
+            cells = [*(f"{cell:<{width}}" for cell, width in padded), cells[-1]]
+        yield _INDENT * line.depth + _joined(cells, is_region=line.is_region)
+
+
+def _joined(cells: Sequence[str], *, is_region: bool) -> str:
+    """The clauses of a line; a region's kind stands one space before its name."""
+    if is_region and len(cells) > 1:
+        return f"{cells[0]} {'  '.join(cells[1:])}"
+    return "  ".join(cells)
