@@ -42,7 +42,7 @@ def fixed_point(value: float, resolution: int, what: str) -> int:
         largest = LARGEST_UNITS / resolution
         raise InputError(
             f"{what} is {value:g}, too large for a model with {resolution} units per mm\n"
-            f"help: lower the resolution, or keep values within {largest:g}"
+            f"hint: lower the resolution, or keep values within {largest:g}"
         )
     return units
 

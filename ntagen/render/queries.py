@@ -57,7 +57,7 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
         if query.formula != formula:
             raise InputError(
                 f"there are two different queries with the name {named.name}\n"
-                f"help: rename the one that says `{text}`"
+                f"hint: rename the one that says `{text}`"
             )
     return tuple(queries.values())
 

@@ -115,7 +115,7 @@ def model_values(scene: Scene) -> ModelValues:
         InputError: A value does not fit the model's numbers, or the model would not move.
     """
     if not scene.targets:
-        raise InputError("the scene has no target\nhelp: add a line such as `target T1 sphere …`")
+        raise InputError("the scene has no target\nhint: add a line such as `target T1 sphere …`")
     scale = scene.resolution_per_mm
     frame = model_frame(scene.axis)
     writer = _Writer(scale, frame)
@@ -169,17 +169,17 @@ def _check_motion(scale: int, dt: int, velocity_mm: float, radius_mm: float, swe
     radius = fixed_point(radius_mm, scale, "the radius of the motion circle")
     insertion = dt * fixed_point(velocity_mm, scale, "the insertion per unit of time")
     if insertion > LARGEST_UNITS:
-        raise InputError("one step is too long for the model\nhelp: make `step` shorter")
+        raise InputError("one step is too long for the model\nhint: make `step` shorter")
     if radius < 1 or insertion * scale < radius:
         raise InputError(
             f"a step of {insertion / scale:g} mm on a circle of radius {radius_mm:g} mm turns the "
             f"tip by less than one unit of the model (1/{scale} rad)\n"
-            "help: make `step` longer or `resolution` finer"
+            "hint: make `step` longer or `resolution` finer"
         )
     if swept and insertion >= math.pi * radius:
         raise InputError(
             "one step goes half around the motion circle, too far for `safety swept`\n"
-            "help: make `step` shorter"
+            "hint: make `step` shorter"
         )
 
 
@@ -204,7 +204,7 @@ def _whole_degrees(angle_rad: float) -> int:
     if abs(angle_deg - whole) > WHOLE_TOLERANCE * 360.0:
         raise InputError(
             f"a roll of {angle_deg:g} deg is not a whole number of degrees\n"
-            "help: the model chooses among whole degrees"
+            "hint: the model chooses among whole degrees"
         )
     return whole
 

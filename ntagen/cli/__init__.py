@@ -1,0 +1,203 @@
+"""The command line: one module a command, and the only place that prints or exits.
+
+A command is ``ntagen/cli/NAME.py`` with a click command called ``command``. Its module is imported
+when it is run, not before, so that ``ntagen --help`` does not wait for libraries. What a command
+returns is the exit code (nothing means 0); what it raises is turned into one message here.
+
+Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied, 2 the input or the
+command line is wrong, 3 stopped by a limit, 4 run-time error in the model, 5 device fault,
+70 internal error, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import importlib.util
+import os
+import re
+import sys
+from collections.abc import Sequence
+from typing import Final
+
+import click
+
+from ntagen.errors import InputError, NtagenError
+
+__all__ = ["main"]
+
+COMMANDS: Final = {
+    "compile": "Turn an environment into a UPPAAL model and its queries.",
+    "check": "Answer the queries of a model or an environment.",
+    "plot": "Draw a scene, its plans or a run.",
+    "drive": "Steer a needle to the target and log the run.",
+    "replay": "Run the decisions of a logged run again.",
+    "fmt": "Format environment files.",
+}
+"""The commands in the order of the help, with what the help says of them."""
+
+INTERNAL_ERROR: Final = 70
+INTERRUPTED: Final = 130
+
+DEBUG_VARIABLE: Final = "NTAGEN_DEBUG"
+"""Set to anything but 0, it lets an error print where in the program it came from."""
+
+
+class _CommandTable(click.Group):
+    """The commands of `COMMANDS`, each imported when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return [name for name in COMMANDS if importlib.util.find_spec(_module(name))]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        command: click.Command = importlib.import_module(_module(cmd_name)).command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name]) for name in self.list_commands(ctx)])
+
+
+def _module(command: str) -> str:
+    """The module of a command."""
+    return f"ntagen.cli.{command}"
+
+
+def _show_version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
+    if wanted and not ctx.resilient_parsing:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            number = version("ntagen")
+        except PackageNotFoundError:
+            number = "(not installed)"
+        click.echo(f"ntagen {number}")
+        ctx.exit()
+
+
+@click.group(cls=_CommandTable, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_version,
+    help="Show the version and exit.",
+)
+def _ntagen() -> None:
+    """From the description of a needle-steering task to a verified strategy, and to the needle.
+
+    \b
+    Examples:
+      ntagen compile examples/paper.nsl -o demo
+      ntagen check examples/paper.nsl
+      ntagen check model.xml --query "E<> Gate.Open" --trace -
+      ntagen drive examples/paper.nsl --seed 1 --log run.mcap
+
+    `ntagen COMMAND --help` tells more about a command.
+    """  # noqa: D301  click wants the control character
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command line and reports what went wrong, if anything, on standard error.
+
+    Args:
+        arguments: The words after the program's name; by default those it was started with.
+
+    Returns:
+        The exit code.
+    """
+    try:
+        code = _run(list(sys.argv[1:] if arguments is None else arguments))
+        sys.stdout.flush()
+    except SystemExit:
+        raise
+    except BaseException as error:  # also KeyboardInterrupt and panics of the engine
+        code = _report(error)
+    return code
+
+
+def _run(arguments: list[str]) -> int:
+    """Runs a command line; returns its exit code and lets errors pass."""
+    completion = os.environ.get("_NTAGEN_COMPLETE")
+    if completion:
+        from click.shell_completion import shell_complete
+
+        return shell_complete(_ntagen, {}, "ntagen", "_NTAGEN_COMPLETE", completion)
+    try:
+        with _ntagen.make_context("ntagen", arguments) as context:
+            result = _ntagen.invoke(context)
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    return result if isinstance(result, int) else 0
+
+
+def _report(error: BaseException) -> int:
+    """Says what went wrong, in a message for the user; returns the exit code."""
+    if os.environ.get(DEBUG_VARIABLE, "0") not in ("", "0"):
+        import traceback
+
+        _say("".join(traceback.format_exception(error)).rstrip())
+    match error:
+        case click.ClickException():
+            with contextlib.suppress(OSError):
+                error.show()
+            return InputError.exit_code
+        case NtagenError():
+            _say(_with_severity(str(error)))
+            return error.exit_code
+        case KeyboardInterrupt() | EOFError() | click.Abort():
+            _say("interrupted")
+            return INTERRUPTED
+        case BrokenPipeError():
+            _abandon_output()
+            _say("error: the reader of the output has gone away")
+            return InputError.exit_code
+        case OSError():
+            _abandon_output()
+            _say(_with_severity(_describe(error)))
+            return InputError.exit_code
+        case ImportError():
+            _say(f"error: ntagen is not installed completely: {error}\nhint: run `make setup`")
+            return INTERNAL_ERROR
+        case _:
+            _say(_internal(error))
+            return INTERNAL_ERROR
+
+
+def _with_severity(message: str) -> str:
+    """A message that says that it is an error, unless its first line says so already."""
+    first_line = message.partition("\n")[0]
+    return message if re.search(r"\berror\b", first_line) else f"error: {message}"
+
+
+def _describe(error: OSError) -> str:
+    """What the operating system said, and about which file."""
+    reason = (error.strerror or str(error) or type(error).__name__).lower()
+    return f"{os.fsdecode(error.filename)}: {reason}" if error.filename else reason
+
+
+def _internal(error: BaseException) -> str:
+    """The message about a mistake of our own."""
+    name = type(error).__name__
+    said = " ".join(str(error).split())
+    return (
+        f"internal error: {name}: {said}\n"
+        "This is a mistake in ntagen, not in your input. Please report it together with the\n"
+        f"command line, the input and what is printed when you set {DEBUG_VARIABLE}=1."
+    )
+
+
+def _say(message: str) -> None:
+    """Prints to standard error, if there is still somebody to read it."""
+    # A file name may hold bytes that are no text; they are shown as escapes.
+    with contextlib.suppress(OSError):
+        click.echo(message.encode(errors="backslashreplace").decode(), err=True)
+
+
+def _abandon_output() -> None:
+    """Lets the rest of the standard output go nowhere, so that the interpreter's exit is quiet."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
