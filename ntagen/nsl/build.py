@@ -391,7 +391,10 @@ class _Builder:
             )
 
     def _check_overlap(self, target: _Sphere, other: _Sphere) -> None:
-        """A target must not lie in a critical region, and should not touch one."""
+        """A target must not lie in a critical region, and its centre should not.
+
+        Regions that reach into a target are no mistake: a vessel at the surface of a tumour does.
+        """
         inner, outer = target.region, other.region
         distance = math.dist(inner.center_mm, outer.center_mm)
         if distance >= inner.radius_mm + outer.radius_mm:
@@ -405,12 +408,12 @@ class _Builder:
                 hint="move one of the two, or make the target larger",
                 notes=notes,
             )
-        elif outer.kind == "critical" or distance <= outer.radius_mm:
-            what = "its centre lies in" if distance <= outer.radius_mm else "it overlaps"
+        elif distance <= outer.radius_mm:
             self._report(
                 "target-overlaps",
                 _place_of(target),
-                f"`{inner.name}` is not free: {what} the {outer.kind} region `{outer.name}`",
+                f"the centre of `{inner.name}` lies in the {outer.kind} region `{outer.name}`",
+                hint="only the rest of the target can be reached",
                 notes=notes,
             )
 

@@ -117,7 +117,7 @@ KINDS: Final = _kinds(
     ("N074", "step-too-short", "error", "At this resolution a step would not bend the needle."),
     ("N075", "step-too-long", "warning", "Regions are checked at the ends of steps only."),
     ("N076", "target-in-critical", "error", "No point of the target may be reached."),
-    ("N077", "target-overlaps", "warning", "A part of the target must not be reached."),
+    ("N077", "target-overlaps", "warning", "The middle of the target must not be reached."),
     ("N078", "target-behind-needle", "error", "The needle moves along its heading, never back."),
     ("N079", "tip-in-critical", "error", "The needle would start in a critical region."),
     ("N080", "tip-in-detection", "warning", "Detection counts as critical: there is no plan."),
