@@ -41,6 +41,27 @@ impl Interpreter {
         self.constants.clear();
         self.constants.extend_from_slice(constants);
     }
+
+    /// Calls a function and counts the executed instructions.
+    pub(super) fn measure(
+        &self,
+        function: FunctionId,
+        arguments: &[i32],
+        context: &mut Context<'_>,
+    ) -> (Result<i32, RunTimeError>, u64) {
+        MACHINE.with_borrow_mut(|machine| {
+            machine.reset();
+            let mut run = Run {
+                program: self,
+                machine,
+                context,
+                rounds: 0,
+                instructions: 0,
+            };
+            let result = run.call(function, arguments);
+            (result, run.instructions)
+        })
+    }
 }
 
 impl Executor for Interpreter {
@@ -50,16 +71,7 @@ impl Executor for Interpreter {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
-        MACHINE.with_borrow_mut(|machine| {
-            machine.reset();
-            Run {
-                program: self,
-                machine,
-                context,
-                rounds: 0,
-            }
-            .call(function, arguments)
-        })
+        self.measure(function, arguments, context).0
     }
 }
 
@@ -155,7 +167,10 @@ struct Run<'run, 'context> {
     program: &'run Interpreter,
     machine: &'run mut Machine,
     context: &'run mut Context<'context>,
+    /// The rounds of loops so far.
     rounds: u64,
+    /// The instructions so far.
+    instructions: u64,
 }
 
 impl<'run> Run<'run, '_> {
@@ -172,6 +187,7 @@ impl<'run> Run<'run, '_> {
             let block = self.block(active);
             if let Some(instruction) = block.instructions.get(active.next) {
                 active.next += 1;
+                self.instructions += 1;
                 if let Instruction::Call {
                     function,
                     arguments,

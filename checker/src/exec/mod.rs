@@ -10,7 +10,12 @@ mod rounds;
 
 mod interpreter;
 
+#[cfg(feature = "jit")]
+mod jit;
+
 pub use interpreter::Interpreter;
+#[cfg(feature = "jit")]
+pub use jit::{Jit, JitError};
 pub use rounds::ROUND_LIMIT;
 
 use crate::ir::{ClockId, FunctionId, RunTimeErrorKind, SiteId};

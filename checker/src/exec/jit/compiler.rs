@@ -1,0 +1,302 @@
+//! Owns the compiled code and makes more of it on demand.
+//!
+//! Functions are compiled together with everything they call that is not compiled yet. Calls go to absolute addresses, since
+//! code that is compiled late may lie anywhere. The memory of the code is freed with the compiler.
+//!
+//! Cost: some 10 to 50 µs, and then about 1 µs an instruction.
+
+use std::mem::ManuallyDrop;
+
+use cranelift_codegen::isa::CallConv;
+use cranelift_codegen::settings::{self, Configurable};
+use cranelift_codegen::{Context, ir};
+use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
+use cranelift_jit::{JITBuilder, JITModule};
+use cranelift_module::{FuncId, Module, default_libcall_names};
+
+use crate::ir::{Function, FunctionId, Instruction};
+
+use super::JitError;
+use super::translate::{entry_signature, native_signature, translate, translate_entry};
+
+/// Larger functions are interpreted: compiling them would take longer than most runs.
+const MAX_INSTRUCTIONS: usize = 20_000;
+/// Chains of functions that may need more native stack than this are interpreted. Half of a small thread's stack.
+const MAX_STACK_BYTES: usize = 1 << 20;
+/// Chains of functions that need larger frames than this are interpreted.
+const MAX_FRAME_WORDS: usize = 1 << 26;
+
+/// A compiled function as it is called from outside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NativeEntry {
+    /// Its address; the signature is that of an entry if the function has parameters, else its own.
+    pub(super) code: *const u8,
+    /// How many words of frame it needs, with those of all that it calls.
+    pub(super) frame_words: usize,
+}
+
+/// What a function needs with all that it calls.
+#[derive(Clone, Copy, Debug, Default)]
+struct Needs {
+    frame_words: usize,
+    stack_bytes: usize,
+    /// The largest number of instructions of one function.
+    instructions: usize,
+}
+
+/// The compiler.
+pub(super) struct Compiler {
+    /// Taken out only to free its memory.
+    module: ManuallyDrop<JITModule>,
+    convention: CallConv,
+    context: Context,
+    builder_context: FunctionBuilderContext,
+    functions: Vec<Function>,
+    /// What each function needs; filled on demand.
+    needs: Vec<Option<Needs>>,
+    /// The declaration of each function; filled on demand. Whatever is declared is compiled.
+    declared: Vec<Option<FuncId>>,
+}
+
+impl Compiler {
+    pub(super) fn new() -> Result<Compiler, JitError> {
+        if cfg!(target_endian = "big") {
+            // Doubles lie in memory with the low word first.
+            return Err(JitError("the processor stores the high word first".into()));
+        }
+        let mut flags = settings::builder();
+        let verify = if cfg!(debug_assertions) {
+            "true"
+        } else {
+            "false"
+        };
+        for (name, value) in [
+            ("opt_level", "speed"),
+            ("enable_verifier", verify),
+            ("is_pic", "false"),
+            ("use_colocated_libcalls", "false"),
+        ] {
+            flags.set(name, value).map_err(JitError::new)?;
+        }
+        let isa = cranelift_native::builder()
+            .map_err(JitError::new)?
+            .finish(settings::Flags::new(flags))
+            .map_err(JitError::new)?;
+        let convention = isa.default_call_conv();
+        let module = JITModule::new(JITBuilder::with_isa(isa, default_libcall_names()));
+        Ok(Compiler {
+            context: module.make_context(),
+            module: ManuallyDrop::new(module),
+            convention,
+            builder_context: FunctionBuilderContext::new(),
+            functions: Vec::new(),
+            needs: Vec::new(),
+            declared: Vec::new(),
+        })
+    }
+
+    /// Takes over functions that follow those already known.
+    pub(super) fn append(&mut self, functions: Vec<Function>) {
+        self.functions.extend(functions);
+        self.needs.resize(self.functions.len(), None);
+        self.declared.resize(self.functions.len(), None);
+    }
+
+    /// Compiles a function and all that it calls; `None` if it is too large for that.
+    pub(super) fn compile(
+        &mut self,
+        function: FunctionId,
+    ) -> Result<Option<NativeEntry>, JitError> {
+        let needs = self.needs_of(function);
+        if needs.instructions > MAX_INSTRUCTIONS
+            || needs.stack_bytes > MAX_STACK_BYTES
+            || needs.frame_words > MAX_FRAME_WORDS
+        {
+            return Ok(None);
+        }
+        for index in self.uncompiled_below(function) {
+            self.define(index)?;
+        }
+        let index = function.0 as usize;
+        let mut entry = self.declare(index)?;
+        if self.functions[index].parameters > 0 {
+            entry = self.define_entry(entry, self.functions[index].parameters)?;
+        }
+        self.module.finalize_definitions().map_err(JitError::new)?;
+        Ok(Some(NativeEntry {
+            code: self.module.get_finalized_function(entry),
+            frame_words: needs.frame_words,
+        }))
+    }
+
+    /// The needs of a function, by the needs of what it calls; functions do not call themselves.
+    fn needs_of(&mut self, FunctionId(root): FunctionId) -> Needs {
+        let mut pending = vec![root as usize];
+        while let Some(&index) = pending.last() {
+            let before = pending.len();
+            let mut most = Needs::default();
+            for callee in callees(&self.functions[index]) {
+                match self.needs[callee] {
+                    None => pending.push(callee),
+                    Some(needs) => most = most.or(needs),
+                }
+            }
+            if pending.len() == before {
+                self.needs[index] = Some(most.below(&self.functions[index]));
+                pending.pop();
+            }
+        }
+        self.needs[root as usize].expect("the root was among the pending")
+    }
+
+    /// The function and all that it calls, as far as they are not compiled.
+    fn uncompiled_below(&self, FunctionId(root): FunctionId) -> Vec<usize> {
+        let mut found = vec![false; self.functions.len()];
+        let mut pending = vec![root as usize];
+        let mut order = Vec::new();
+        while let Some(index) = pending.pop() {
+            if self.declared[index].is_none() && !std::mem::replace(&mut found[index], true) {
+                order.push(index);
+                pending.extend(callees(&self.functions[index]));
+            }
+        }
+        order
+    }
+
+    fn declare(&mut self, index: usize) -> Result<FuncId, JitError> {
+        declare(
+            &mut self.module,
+            &mut self.declared,
+            &self.functions,
+            self.convention,
+            index,
+        )
+    }
+
+    fn define(&mut self, index: usize) -> Result<(), JitError> {
+        let id = self.declare(index)?;
+        let function = &self.functions[index];
+        self.context.func.signature = native_signature(function, self.convention);
+        self.context.func.name = ir::UserFuncName::user(0, id.as_u32());
+        let builder = FunctionBuilder::new(&mut self.context.func, &mut self.builder_context);
+        let config = self.module.target_config();
+        let mut failure = None;
+        let mut import = |FunctionId(callee): FunctionId, native: &mut ir::Function| {
+            let declared = declare(
+                &mut self.module,
+                &mut self.declared,
+                &self.functions,
+                self.convention,
+                callee as usize,
+            );
+            let callee = declared.unwrap_or_else(|error| {
+                failure = Some(error);
+                id
+            });
+            import_far(&mut self.module, callee, native)
+        };
+        translate(builder, function, &mut import, config);
+        if let Some(error) = failure {
+            return Err(error);
+        }
+        self.finish(id)
+    }
+
+    fn define_entry(&mut self, function: FuncId, parameters: u32) -> Result<FuncId, JitError> {
+        let signature = entry_signature(self.convention);
+        let id = self
+            .module
+            .declare_anonymous_function(&signature)
+            .map_err(JitError::new)?;
+        self.context.func.signature = signature;
+        self.context.func.name = ir::UserFuncName::user(0, id.as_u32());
+        let callee = import_far(&mut self.module, function, &mut self.context.func);
+        let builder = FunctionBuilder::new(&mut self.context.func, &mut self.builder_context);
+        translate_entry(builder, callee, parameters, self.module.target_config());
+        self.finish(id)?;
+        Ok(id)
+    }
+
+    fn finish(&mut self, id: FuncId) -> Result<(), JitError> {
+        let defined = self.module.define_function(id, &mut self.context);
+        self.module.clear_context(&mut self.context);
+        defined.map_err(JitError::new)
+    }
+}
+
+impl Drop for Compiler {
+    #[expect(
+        unsafe_code,
+        reason = "the module leaves freeing its memory to its owner"
+    )]
+    fn drop(&mut self) {
+        // SAFETY: the module is taken out only here. Its code runs only in calls that borrow the owner of this compiler, and
+        // none can be left when that is dropped.
+        unsafe { ManuallyDrop::take(&mut self.module).free_memory() }
+    }
+}
+
+impl Needs {
+    /// The greater needs of two functions of which one runs at a time.
+    fn or(self, other: Needs) -> Needs {
+        Needs {
+            frame_words: self.frame_words.max(other.frame_words),
+            stack_bytes: self.stack_bytes.max(other.stack_bytes),
+            instructions: self.instructions.max(other.instructions),
+        }
+    }
+
+    /// The needs of a function, given the greatest of what it calls.
+    fn below(self, function: &Function) -> Needs {
+        let instructions = function
+            .blocks
+            .iter()
+            .map(|block| block.instructions.len() + 1)
+            .sum::<usize>();
+        // Every register and every instruction may need a place of its own on the native stack.
+        let stack_bytes = 512 + 16 * (instructions + function.registers.len());
+        Needs {
+            frame_words: self
+                .frame_words
+                .saturating_add(function.frame_words as usize),
+            stack_bytes: self.stack_bytes.saturating_add(stack_bytes),
+            instructions: self.instructions.max(instructions),
+        }
+    }
+}
+
+fn callees(function: &Function) -> impl Iterator<Item = usize> {
+    function
+        .blocks
+        .iter()
+        .flat_map(|block| &block.instructions)
+        .filter_map(|instruction| match instruction {
+            Instruction::Call { function, .. } => Some(function.0 as usize),
+            _ => None,
+        })
+}
+
+fn declare(
+    module: &mut JITModule,
+    declared: &mut [Option<FuncId>],
+    functions: &[Function],
+    convention: CallConv,
+    index: usize,
+) -> Result<FuncId, JitError> {
+    if let Some(id) = declared[index] {
+        return Ok(id);
+    }
+    let signature = native_signature(&functions[index], convention);
+    let id = module
+        .declare_anonymous_function(&signature)
+        .map_err(JitError::new)?;
+    declared[index] = Some(id);
+    Ok(id)
+}
+
+/// Refers to a function that may lie anywhere.
+fn import_far(module: &mut JITModule, id: FuncId, native: &mut ir::Function) -> ir::FuncRef {
+    let reference = module.declare_func_in_func(id, native);
+    native.dfg.ext_funcs[reference].colocated = false;
+    reference
+}

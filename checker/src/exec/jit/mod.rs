@@ -1,0 +1,230 @@
+//! Native code by Cranelift: the fast engine.
+//!
+//! A function is interpreted until it has run for a while, and then compiled with all that it calls. A model with thousands
+//! of small guards pays for the few that matter, and a model that is solved at once for none. As interpreted and compiled
+//! code agree in everything, it makes no difference to results when this happens.
+//!
+//! Invariants
+//! * Compiled code is never moved or freed before the engine is dropped; queries that come later only add to it.
+//! * `unsafe` is confined to this module: calling compiled code, what compiled code calls back, and freeing it.
+//! * The code that is compiled is trusted as the interpreter trusts it not: registers have the types that instructions
+//!   say, indices were checked ([`crate::ir::Instruction::ScaleIndex`]), and functions do not call themselves.
+
+mod compiler;
+mod runtime;
+mod translate;
+
+use std::cell::RefCell;
+use std::fmt;
+use std::ptr;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
+
+use crate::ir::{Function, FunctionId};
+
+use super::rounds::count_rounds;
+use super::{Context, Executor, Interpreter, RunTimeError};
+
+use compiler::Compiler;
+use runtime::{NativeContext, result_of_status};
+
+/// After so many interpreted instructions a function is compiled. They take about as long as compiling a small one.
+const HOT_INSTRUCTIONS: u64 = 20_000;
+/// The heat of a function that is not to be compiled.
+const NEVER: u64 = u64::MAX;
+
+/// Why there is no native code.
+#[derive(Clone, Debug)]
+pub struct JitError(String);
+
+impl JitError {
+    fn new(cause: impl fmt::Display) -> JitError {
+        JitError(cause.to_string())
+    }
+}
+
+impl fmt::Display for JitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cannot generate native code: {}", self.0)
+    }
+}
+
+impl std::error::Error for JitError {}
+
+/// Runs functions natively once they are worth compiling.
+pub struct Jit {
+    interpreter: Interpreter,
+    entries: Vec<Entry>,
+    constants: Vec<i32>,
+    compiler: Mutex<Compiler>,
+}
+
+/// What is known of a function.
+#[derive(Debug, Default)]
+struct Entry {
+    /// Its native code; null as long as there is none.
+    code: AtomicPtr<u8>,
+    /// How many words of frame the native code needs. Written before `code`.
+    frame_words: AtomicUsize,
+    /// How many instructions its calls have taken in the interpreter, or [`NEVER`].
+    heat: AtomicU64,
+}
+
+impl Jit {
+    /// An engine that compiles a function once it has run for a while.
+    pub fn new(functions: &[Function], constants: &[i32]) -> Result<Jit, JitError> {
+        let mut jit = Jit {
+            interpreter: Interpreter::default(),
+            entries: Vec::new(),
+            constants: Vec::new(),
+            compiler: Mutex::new(Compiler::new()?),
+        };
+        jit.extend(functions, constants);
+        Ok(jit)
+    }
+
+    /// An engine that has compiled everything that can be called from outside.
+    pub fn compile(functions: &[Function], constants: &[i32]) -> Result<Jit, JitError> {
+        let jit = Jit::new(functions, constants)?;
+        for index in 0..functions.len() as u32 {
+            jit.compile_function(FunctionId(index))?;
+        }
+        Ok(jit)
+    }
+
+    /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
+    /// What is compiled stays so.
+    pub fn extend(&mut self, functions: &[Function], constants: &[i32]) {
+        let known = self.entries.len();
+        let mut added = functions[known..].to_vec();
+        added.iter_mut().for_each(count_rounds);
+        self.entries.resize_with(functions.len(), Entry::default);
+        self.compiler
+            .get_mut()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+            .append(added);
+        self.interpreter.extend(functions, constants);
+        self.constants = constants.to_vec();
+    }
+
+    /// Compiles a function now, whether it is worth it or not.
+    pub fn compile_function(&self, function: FunctionId) -> Result<(), JitError> {
+        let entry = &self.entries[function.0 as usize];
+        let mut compiler = self
+            .compiler
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        if !entry.code.load(Ordering::Acquire).is_null() {
+            return Ok(());
+        }
+        let compiled = compiler.compile(function);
+        if let Ok(Some(native)) = compiled {
+            entry
+                .frame_words
+                .store(native.frame_words, Ordering::Relaxed);
+            entry.code.store(native.code.cast_mut(), Ordering::Release);
+        } else {
+            entry.heat.store(NEVER, Ordering::Relaxed);
+        }
+        compiled.map(|_| ())
+    }
+
+    /// Interprets a call, and compiles the function if it has become hot.
+    fn call_cold(
+        &self,
+        function: FunctionId,
+        arguments: &[i32],
+        context: &mut Context<'_>,
+    ) -> Result<i32, RunTimeError> {
+        let entry = &self.entries[function.0 as usize];
+        let (result, instructions) = self.interpreter.measure(function, arguments, context);
+        let heat = entry.heat.load(Ordering::Relaxed);
+        if heat == NEVER {
+            return result;
+        }
+        let heat = heat + instructions;
+        entry.heat.store(heat, Ordering::Relaxed);
+        if heat > HOT_INSTRUCTIONS {
+            // A function that cannot be compiled goes on being interpreted, which gives the same results.
+            let _ = self.compile_function(function);
+        }
+        result
+    }
+}
+
+impl fmt::Debug for Jit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Jit")
+            .field("entries", &self.entries)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Executor for Jit {
+    fn call(
+        &self,
+        function: FunctionId,
+        arguments: &[i32],
+        context: &mut Context<'_>,
+    ) -> Result<i32, RunTimeError> {
+        let entry = &self.entries[function.0 as usize];
+        let code = entry.code.load(Ordering::Acquire);
+        if code.is_null() {
+            return self.call_cold(function, arguments, context);
+        }
+        let frame_words = entry.frame_words.load(Ordering::Relaxed);
+        if frame_words == 0 {
+            let frame = ptr::dangling_mut();
+            return call_native(code, frame, &self.constants, arguments, context);
+        }
+        FRAMES.with_borrow_mut(|frames| {
+            if frames.len() < frame_words {
+                frames.resize(frame_words, 0);
+            }
+            call_native(
+                code,
+                frames.as_mut_ptr(),
+                &self.constants,
+                arguments,
+                context,
+            )
+        })
+    }
+}
+
+thread_local! {
+    /// The frames of the functions that this thread runs; kept between calls.
+    static FRAMES: RefCell<Vec<i32>> = RefCell::default();
+}
+
+/// Code of a function without parameters.
+type Plain = unsafe extern "C" fn(*mut NativeContext<'_>, *mut i32, *mut i32) -> i64;
+/// The entry of a function with parameters.
+type WithArguments =
+    unsafe extern "C" fn(*mut NativeContext<'_>, *mut i32, *mut i32, *const i32) -> i64;
+
+#[expect(unsafe_code, reason = "compiled code is called by its address")]
+fn call_native(
+    code: *mut u8,
+    frame: *mut i32,
+    constants: &[i32],
+    arguments: &[i32],
+    context: &mut Context<'_>,
+) -> Result<i32, RunTimeError> {
+    let (mut native, state) = NativeContext::new(constants, context);
+    let state = state.as_mut_ptr();
+    // SAFETY: `code` was made by the compiler of the engine that is borrowed for this call, for a function with as many
+    // parameters as there are arguments (a precondition of `Executor::call`), with the signature of an entry if there are
+    // any and its own if not. The context lives on this stack, the frame is as long as the compiler said that the function
+    // and all that it calls need, and the state has the words of the layout that the code was made for.
+    let status = unsafe {
+        if arguments.is_empty() {
+            let code = std::mem::transmute::<*mut u8, Plain>(code);
+            code(&raw mut native, state, frame)
+        } else {
+            let code = std::mem::transmute::<*mut u8, WithArguments>(code);
+            code(&raw mut native, state, frame, arguments.as_ptr())
+        }
+    };
+    result_of_status(status)
+}

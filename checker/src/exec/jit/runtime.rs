@@ -1,0 +1,145 @@
+//! What compiled code and the engine share: the context that every compiled function gets, how it says what went wrong, and
+//! the functions that it calls back.
+//!
+//! The status of a call is 64 bits: negative for a run-time error (its kind and site in the lower bits), else the integer
+//! that the function returned, or 0. A double or an address is returned beside the status.
+
+use crate::exec::{
+    Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, RunTimeError, arithmetic, math,
+};
+use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
+
+/// The first argument of every compiled function. Compiled code reads and writes `rounds_left` and reads `constants`.
+#[derive(Debug)]
+#[repr(C)]
+pub(super) struct NativeContext<'call> {
+    /// How many rounds of loops this call may still take.
+    pub(super) rounds_left: u64,
+    /// The constant memory.
+    pub(super) constants: *const i32,
+    constraints: &'call mut Vec<EmittedConstraint>,
+    assignments: &'call mut Vec<EmittedAssignment>,
+}
+
+impl<'call> NativeContext<'call> {
+    /// The context of a call, and the state's words, which go beside it.
+    pub(super) fn new(
+        constants: &[i32],
+        context: &'call mut Context<'_>,
+    ) -> (NativeContext<'call>, &'call mut [i32]) {
+        let native = NativeContext {
+            rounds_left: ROUND_LIMIT,
+            constants: constants.as_ptr(),
+            constraints: context.constraints,
+            assignments: context.assignments,
+        };
+        (native, context.state)
+    }
+}
+
+const KINDS: [RunTimeErrorKind; 10] = [
+    RunTimeErrorKind::Overflow,
+    RunTimeErrorKind::DivisionByZero,
+    RunTimeErrorKind::ShiftDistance,
+    RunTimeErrorKind::NegativeExponent,
+    RunTimeErrorKind::OutOfRange,
+    RunTimeErrorKind::IndexOutOfBounds,
+    RunTimeErrorKind::NotAnInteger,
+    RunTimeErrorKind::ClockValue,
+    RunTimeErrorKind::AssertionFailed,
+    RunTimeErrorKind::StepLimit,
+];
+
+/// The status of a failed call.
+pub(super) fn failure_status(kind: RunTimeErrorKind, SiteId(site): SiteId) -> i64 {
+    let index = KINDS.iter().position(|&known| known == kind);
+    let index = index.expect("the table lists every kind") as i64;
+    i64::MIN | index << 32 | i64::from(site)
+}
+
+/// The result of a call by its status.
+pub(super) fn result_of_status(status: i64) -> Result<i32, RunTimeError> {
+    if status >= 0 {
+        return Ok(status as i32);
+    }
+    Err(RunTimeError {
+        kind: KINDS[(status >> 32 & 0xff) as usize],
+        site: SiteId(status as u32),
+    })
+}
+
+/// What a called-back function gives where there is no result.
+const NO_RESULT: i64 = -1;
+
+/// `base ** exponent` as an unsigned word; negative if there is none.
+pub(super) extern "C" fn power(base: i32, exponent: i32) -> i64 {
+    arithmetic::power(base, exponent).map_or(NO_RESULT, |power| i64::from(power as u32))
+}
+
+/// The binary exponent as an unsigned word; negative if there is none.
+pub(super) extern "C" fn ilogb(value: f64) -> i64 {
+    math::ilogb(value).map_or(NO_RESULT, |exponent| i64::from(exponent as u32))
+}
+
+/// Emits a clock constraint.
+pub(super) extern "C" fn emit_constraint(
+    context: &mut NativeContext<'_>,
+    left: u32,
+    right: u32,
+    bound: i32,
+    strict: i32,
+) {
+    context.constraints.push(EmittedConstraint {
+        left: ClockId(left),
+        right: ClockId(right),
+        bound,
+        strict: strict != 0,
+    });
+}
+
+/// Emits a clock assignment.
+pub(super) extern "C" fn emit_assignment(
+    context: &mut NativeContext<'_>,
+    target: u32,
+    source: u32,
+    value: i32,
+) {
+    context.assignments.push(EmittedAssignment {
+        target: ClockId(target),
+        source: ClockId(source),
+        value,
+    });
+}
+
+/// Sets words to 0.
+#[expect(unsafe_code, reason = "compiled code passes raw addresses")]
+pub(super) unsafe extern "C" fn zero_words(target: *mut i32, words: u64) {
+    // SAFETY: compiled code passes the frame of a function, which has so many words.
+    unsafe { target.write_bytes(0, words as usize) }
+}
+
+/// Copies words between ranges that are the same or disjoint.
+#[expect(unsafe_code, reason = "compiled code passes raw addresses")]
+pub(super) unsafe extern "C" fn copy_words(target: *mut i32, source: *const i32, words: u64) {
+    // SAFETY: compiled code passes places of arrays or structs of so many words, whose indices were checked; `copy` allows
+    // the two to be the same.
+    unsafe { target.copy_from(source, words as usize) }
+}
+
+/// Whether two ranges of words are the same: 0 or 1.
+#[expect(unsafe_code, reason = "compiled code passes raw addresses")]
+pub(super) unsafe extern "C" fn equal_words(
+    left: *const i32,
+    right: *const i32,
+    words: u64,
+) -> i32 {
+    // SAFETY: compiled code passes places of arrays or structs of so many words, whose indices were checked, and nothing
+    // writes during the comparison.
+    let (left, right) = unsafe {
+        (
+            std::slice::from_raw_parts(left, words as usize),
+            std::slice::from_raw_parts(right, words as usize),
+        )
+    };
+    (left == right).into()
+}
