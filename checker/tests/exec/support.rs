@@ -25,10 +25,17 @@ pub(crate) fn engines(
     functions: &[Function],
     constants: &[i32],
 ) -> Vec<(&'static str, Box<dyn Executor>)> {
-    vec![(
-        "interpreter",
-        Box::new(Interpreter::new(functions, constants)),
-    )]
+    let interpreter = Interpreter::new(functions, constants);
+    vec![
+        ("interpreter", Box::new(interpreter)),
+        #[cfg(feature = "jit")]
+        ("compiled code", Box::new(compiled(functions, constants))),
+    ]
+}
+
+#[cfg(feature = "jit")]
+fn compiled(functions: &[Function], constants: &[i32]) -> checker::exec::Jit {
+    checker::exec::Jit::compile(functions, constants).expect("the host is supported")
 }
 
 /// Calls a function on one engine.

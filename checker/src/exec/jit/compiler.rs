@@ -14,7 +14,7 @@ use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Module, default_libcall_names};
 
-use crate::ir::{Function, FunctionId, Instruction};
+use crate::ir::{Function, FunctionId, Instruction, RegisterType};
 
 use super::JitError;
 use super::translate::{entry_signature, native_signature, translate, translate_entry};
@@ -102,13 +102,14 @@ impl Compiler {
         self.declared.resize(self.functions.len(), None);
     }
 
-    /// Compiles a function and all that it calls; `None` if it is too large for that.
+    /// Compiles a function that can be called from outside and all that it calls; `None` if it is none or too large.
     pub(super) fn compile(
         &mut self,
         function: FunctionId,
     ) -> Result<Option<NativeEntry>, JitError> {
         let needs = self.needs_of(function);
-        if needs.instructions > MAX_INSTRUCTIONS
+        if !is_callable(&self.functions[function.0 as usize])
+            || needs.instructions > MAX_INSTRUCTIONS
             || needs.stack_bytes > MAX_STACK_BYTES
             || needs.frame_words > MAX_FRAME_WORDS
         {
@@ -263,6 +264,13 @@ impl Needs {
             instructions: self.instructions.max(instructions),
         }
     }
+}
+
+/// Whether a function takes only integers and returns an integer or nothing.
+fn is_callable(function: &Function) -> bool {
+    let parameters = &function.registers[..function.parameters as usize];
+    let is_integer = |&kind: &RegisterType| kind == RegisterType::Integer;
+    parameters.iter().all(is_integer) && function.result.iter().all(is_integer)
 }
 
 fn callees(function: &Function) -> impl Iterator<Item = usize> {
