@@ -1,0 +1,120 @@
+"""The path that the needle has cut into the tissue: arcs, the rolls between them, and the way back.
+
+The path is what the shaft lies in. A push adds to its end, a pull takes the tip back along it, and
+a roll turns the shaft. A pull does not undo a roll: the shaft keeps its angle, and so the bevel at
+a place passed for the second time differs from the first by the rolls that were made beyond it
+(`Path.pull`). Whoever wants to move on in the old channel rolls back (`ntagen.drive.controller`
+does).
+
+A path is an immutable value; every operation gives a new one. Lengths along it are insertion depths
+in mm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ntagen.needle.kinematics import Arc, Nearest, roll
+from ntagen.scene import Pose, Vector
+
+_NOTHING_MM = 1e-12
+"""Arcs shorter than this are rounding errors of sums of lengths."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """One arc of a path, and the roll by which it was entered from the one before.
+
+    Attributes:
+        arc: The arc.
+        roll_before_rad: The roll made just before it, at the end of the stretch before (or at the
+            entry).
+    """
+
+    arc: Arc
+    roll_before_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """The pierced path and the pose of the tip at its end.
+
+    Attributes:
+        entry: The pose at depth 0, before any roll.
+        stretches: The arcs in the order in which they were cut.
+        pending_roll_rad: Rolls made at the end of the path since the last push.
+    """
+
+    entry: Pose
+    stretches: tuple[Stretch, ...] = ()
+    pending_roll_rad: float = 0.0
+
+    @property
+    def depth_mm(self) -> float:
+        """How much needle is inserted."""
+        return sum(stretch.arc.length_mm for stretch in self.stretches)
+
+    @property
+    def tip(self) -> Pose:
+        """The pose of the tip."""
+        end = self.stretches[-1].arc.end if self.stretches else self.entry
+        return roll(end, self.pending_roll_rad) if self.pending_roll_rad else end
+
+    @property
+    def arcs(self) -> tuple[Arc, ...]:
+        """The arcs without the rolls between them."""
+        return tuple(stretch.arc for stretch in self.stretches)
+
+    def push(self, radius_mm: float, length_mm: float) -> Path:
+        """The path after a push; one that goes on along the last arc lengthens it."""
+        if length_mm <= 0.0:
+            return self
+        last = self.stretches[-1] if self.stretches else None
+        if last and last.arc.radius_mm == radius_mm and self.pending_roll_rad == 0.0:
+            longer = replace(last.arc, length_mm=last.arc.length_mm + length_mm)
+            return replace(self, stretches=(*self.stretches[:-1], replace(last, arc=longer)))
+        added = Stretch(Arc(self.tip, radius_mm, length_mm), self.pending_roll_rad)
+        return Path(self.entry, (*self.stretches, added))
+
+    def roll(self, angle_rad: float) -> Path:
+        """The path after a roll at its end."""
+        return replace(self, pending_roll_rad=self.pending_roll_rad + angle_rad)
+
+    def pull(self, length_mm: float) -> Path:
+        """The path after the tip went back along it; a pull beyond the entry ends at the entry."""
+        kept, pending_rad, left_mm = list(self.stretches), self.pending_roll_rad, length_mm
+        while kept and left_mm > 0.0:
+            last = kept.pop()
+            rest_mm = last.arc.length_mm - left_mm
+            left_mm -= last.arc.length_mm
+            if rest_mm > _NOTHING_MM:
+                kept.append(replace(last, arc=last.arc.upto(rest_mm)))
+                break
+            # The roll before this stretch stays in the shaft although its place is passed.
+            pending_rad += last.roll_before_rad
+        return Path(self.entry, tuple(kept), pending_rad)
+
+    def nearest_to(self, point_mm: Vector) -> Nearest:
+        """The smallest distance of the path to a point, and the depth at which it is taken."""
+        return nearest_on(self.arcs, self.entry.position_mm, point_mm)
+
+
+def nearest_on(arcs: tuple[Arc, ...], entry_mm: Vector, point_mm: Vector) -> Nearest:
+    """The smallest distance of a chain of arcs to a point; of the entry alone if there are none."""
+    best = Arc(Pose(entry_mm, (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), 1.0, 0.0).nearest_to(point_mm)
+    start_mm = 0.0
+    for arc in arcs:
+        nearest = arc.nearest_to(point_mm)
+        if nearest.distance_mm < best.distance_mm:
+            best = Nearest(nearest.distance_mm, start_mm + nearest.at_mm)
+        start_mm += arc.length_mm
+    return best
+
+
+def sample_poses(arcs: tuple[Arc, ...], spacing_mm: float) -> list[Pose]:
+    """Poses along a chain of arcs, at most `spacing_mm` apart, every arc's both ends among them."""
+    poses: list[Pose] = []
+    for arc in arcs:
+        count = max(1, round(arc.length_mm / spacing_mm + 0.5))
+        poses += [arc.pose_at(arc.length_mm * i / count) for i in range(count + 1)]
+    return poses

@@ -1,0 +1,1 @@
+"""Plans: strategies as pushes and rolls, certified against the continuous arc, and ranked."""

@@ -1,0 +1,106 @@
+"""A plan: the concrete sequence of pushes and rolls that steers the needle, without any frame.
+
+A plan is a value. Pushes that follow each other are one push, and no push is empty, so that two
+plans that move the needle in the same way are equal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ntagen.needle.kinematics import Arc, push, roll
+from ntagen.scene import Needle, Pose
+from ntagen.units import deg_from_rad
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """Insertion by a length along the motion circle."""
+
+    length_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Roll:
+    """Rotation about the shaft, right-handed about the heading."""
+
+    angle_rad: float
+
+
+Action = Push | Roll
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A sequence of actions; make it with `Plan.of`, which merges pushes.
+
+    Attributes:
+        actions: The actions in order.
+    """
+
+    actions: tuple[Action, ...]
+
+    @staticmethod
+    def of(actions: Iterable[Action]) -> Plan:
+        """The plan of these actions with neighbouring pushes merged and empty ones left out.
+
+        Raises:
+            ValueError: A push is negative, or a number is not finite.
+        """
+        merged: list[Action] = []
+        for action in actions:
+            _require_possible(action)
+            if isinstance(action, Push) and merged and isinstance(merged[-1], Push):
+                merged[-1] = Push(merged[-1].length_mm + action.length_mm)
+            elif isinstance(action, Roll) or action.length_mm > 0.0:
+                merged.append(action)
+        return Plan(tuple(merged))
+
+    @property
+    def length_mm(self) -> float:
+        """How far the plan inserts the needle."""
+        return sum(action.length_mm for action in self.actions if isinstance(action, Push))
+
+    @property
+    def roll_count(self) -> int:
+        """How many rolls it holds."""
+        return sum(1 for action in self.actions if isinstance(action, Roll))
+
+    def arcs(self, needle: Needle) -> tuple[Arc, ...]:
+        """The arcs that the tip of this needle draws when it follows the plan exactly."""
+        arcs: list[Arc] = []
+        pose = needle.tip
+        for action in self.actions:
+            if isinstance(action, Roll):
+                pose = roll(pose, action.angle_rad)
+            else:
+                arcs.append(Arc(pose, needle.radius_mm, action.length_mm))
+                pose = arcs[-1].end
+        return tuple(arcs)
+
+    def end(self, needle: Needle) -> Pose:
+        """The pose of this needle's tip after the plan."""
+        pose = needle.tip
+        for action in self.actions:
+            if isinstance(action, Roll):
+                pose = roll(pose, action.angle_rad)
+            else:
+                pose = push(pose, needle.radius_mm, action.length_mm)
+        return pose
+
+    def __str__(self) -> str:
+        return ", ".join(_text(action) for action in self.actions) or "nothing to do"
+
+
+def _require_possible(action: Action) -> None:
+    number = action.length_mm if isinstance(action, Push) else action.angle_rad
+    if not math.isfinite(number) or (isinstance(action, Push) and number < 0.0):
+        raise ValueError(f"no needle can do {action}")
+
+
+def _text(action: Action) -> str:
+    if isinstance(action, Push):
+        return f"push {action.length_mm:g} mm"
+    return f"roll {deg_from_rad(action.angle_rad):.4g} deg"

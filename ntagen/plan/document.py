@@ -1,0 +1,100 @@
+"""Plans as JSON: a versioned document that other programs can read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+from ntagen.errors import InputError
+from ntagen.plan.actions import Action, Plan, Push, Roll
+from ntagen.plan.certify import Certificate
+from ntagen.plan.rank import DEFAULT_RANKING, Candidate
+from ntagen.scene import Scene
+from ntagen.units import deg_from_rad, rad_from_deg
+
+FORMAT: Final = "ntagen-plans"
+VERSION: Final = 1
+
+
+def document(
+    scene: Scene, candidates: Sequence[Candidate], ranking: Sequence[str] = DEFAULT_RANKING
+) -> dict[str, Any]:
+    """The plans of a scene, best first, with their certificates; in mm and degrees."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "scene": scene.name,
+        "ranking": list(ranking),
+        "plans": [
+            {
+                "rank": place,
+                "actions": plan_to_json(candidate.plan),
+                "certificate": _certificate(candidate.certificate),
+            }
+            for place, candidate in enumerate(candidates, start=1)
+        ],
+    }
+
+
+def plan_to_json(plan: Plan) -> list[dict[str, float]]:
+    """The actions as objects ``{"push_mm": …}`` and ``{"roll_deg": …}``."""
+    return [_action_to_json(action) for action in plan.actions]
+
+
+def plan_from_json(actions: object) -> Plan:
+    """The plan of such objects.
+
+    Raises:
+        InputError: The text is no plan.
+    """
+    if not isinstance(actions, list):
+        raise InputError("a plan is a list of actions")
+    try:
+        return Plan.of(_action_from_json(action) for action in actions)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+
+
+def _action_to_json(action: Action) -> dict[str, float]:
+    if isinstance(action, Push):
+        return {"push_mm": action.length_mm}
+    return {"roll_deg": round(deg_from_rad(action.angle_rad), 9)}
+
+
+def _action_from_json(action: object) -> Action:
+    match action:
+        case {"push_mm": float() | int() as length_mm}:
+            return Push(float(length_mm))
+        case {"roll_deg": float() | int() as angle_deg}:
+            return Roll(rad_from_deg(float(angle_deg)))
+        case _:
+            raise InputError(f"unknown action {action!r}\nhelp: push_mm and roll_deg are known")
+
+
+def _certificate(certificate: Certificate) -> dict[str, Any]:
+    return {
+        "length_mm": certificate.length_mm,
+        "rolls": certificate.roll_count,
+        "end_mm": list(certificate.end_mm),
+        "end_distance_mm": certificate.end_distance_mm,
+        "critical_clearance_mm": _finite(certificate.critical_clearance_mm),
+        "clearances": [
+            {
+                "region": c.region,
+                "kind": c.kind,
+                "distance_mm": c.distance_mm,
+                "at_mm": c.at_mm,
+            }
+            for c in certificate.clearances
+        ],
+        "targets": [
+            {"region": a.region, "entered_at_mm": a.entered_at_mm, "depth_mm": a.depth_mm}
+            for a in certificate.arrivals
+        ],
+    }
+
+
+def _finite(number: float) -> float | None:
+    """The number, or None where there is nothing to be far from: JSON has no infinity."""
+    return number if math.isfinite(number) else None
