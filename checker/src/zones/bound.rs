@@ -100,16 +100,15 @@ impl Bound {
         }
     }
 
-    /// `via + self` if that is tighter than `current`, else `current`; `via` is finite.
+    /// The lesser of `current` and `via + rest`; `via` must be finite.
+    ///
+    /// Both conditions are one mask, since vectors without a select would otherwise blend twice.
     #[inline]
-    #[expect(
-        clippy::needless_bitwise_bool,
-        reason = "a branch would keep the loop from becoming vectors"
-    )]
     pub(super) const fn relaxed(current: Bound, via: Bound, rest: Bound) -> Bound {
         let sum = (via.0 & !1).wrapping_add(rest.0 & (via.0 | !1));
-        let is_tighter = (sum < current.0) & (rest.0 != i32::MAX);
-        if is_tighter { Bound(sum) } else { current }
+        let is_tighter = -((sum < current.0) as i32);
+        let is_finite = -((rest.0 != i32::MAX) as i32);
+        Bound(current.0 ^ ((current.0 ^ sum) & is_tighter & is_finite))
     }
 }
 

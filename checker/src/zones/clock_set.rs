@@ -73,10 +73,12 @@ impl ClockSet {
     }
 
     /// The clocks in ascending order.
-    pub fn iter(&self) -> impl Iterator<Item = usize> + use<> {
-        let words = self.words;
-        (0..ClockSet::WORDS)
-            .flat_map(move |index| Ones(words[index]).map(move |bit| 64 * index + bit))
+    #[inline]
+    pub fn iter(&self) -> Clocks {
+        Clocks {
+            words: self.words,
+            index: 0,
+        }
     }
 }
 
@@ -90,15 +92,37 @@ impl FromIterator<usize> for ClockSet {
     }
 }
 
-/// The positions of the ones in a word, ascending.
-struct Ones(u64);
+impl IntoIterator for &ClockSet {
+    type Item = usize;
+    type IntoIter = Clocks;
 
-impl Iterator for Ones {
+    #[inline]
+    fn into_iter(self) -> Clocks {
+        self.iter()
+    }
+}
+
+/// The clocks of a set in ascending order.
+#[derive(Clone, Debug)]
+pub struct Clocks {
+    /// What is left of each word; the words before `index` are used up.
+    words: [u64; ClockSet::WORDS],
+    index: usize,
+}
+
+impl Iterator for Clocks {
     type Item = usize;
 
+    #[inline]
     fn next(&mut self) -> Option<usize> {
-        let bit = self.0.trailing_zeros() as usize;
-        self.0 &= self.0.wrapping_sub(1);
-        (bit < 64).then_some(bit)
+        loop {
+            let word = self.words.get_mut(self.index)?;
+            if *word != 0 {
+                let bit = word.trailing_zeros() as usize;
+                *word &= *word - 1;
+                return Some(64 * self.index + bit);
+            }
+            self.index += 1;
+        }
     }
 }

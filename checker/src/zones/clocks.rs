@@ -12,7 +12,7 @@
 //!
 //! Cost: O(n) for delay, freeing and resetting; O(n^2) for the past and for assignments that drop valuations.
 
-use super::dbm::{Constraint, constrain, is_empty, set_empty};
+use super::dbm::{Constraint, constrain, for_small_dimension, is_empty, rows, rows_mut, set_empty};
 use super::{Bound, ClockSet};
 
 /// One step of an update of clocks; a list of them is carried out in order.
@@ -70,9 +70,19 @@ pub fn up_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
 ///
 /// A lower bound of a clock is lost except for what keeps the other clocks from becoming negative first.
 pub fn down(zone: &mut [Bound], dimension: usize) {
-    let (lower_bounds, rows) = zone.split_at_mut(dimension);
+    for_small_dimension!(dimension, lower_to_columns(zone));
+}
+
+/// Sets row 0 to the least entry of each column, not above `<= 0`.
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
+fn lower_to_columns(zone: &mut [Bound], dimension: usize) {
+    let (lower_bounds, others) = zone.split_at_mut(dimension);
     lower_bounds.fill(Bound::LE_ZERO);
-    for row in rows.chunks_exact(dimension) {
+    for row in rows(others, dimension) {
         for (lower, bound) in lower_bounds.iter_mut().zip(row) {
             *lower = (*lower).min(*bound);
         }
@@ -109,7 +119,7 @@ pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
 
 /// Forgets the value of a clock: it becomes anything from 0.
 pub fn free_clock(zone: &mut [Bound], dimension: usize, clock: usize) {
-    for row in zone.chunks_exact_mut(dimension) {
+    for row in rows_mut(zone, dimension) {
         row[clock] = row[0];
     }
     let row = &mut zone[clock * dimension..(clock + 1) * dimension];
@@ -122,7 +132,7 @@ pub fn reset(zone: &mut [Bound], dimension: usize, clock: usize, value: i32) {
     let start = clock * dimension;
     zone.copy_within(0..dimension, start);
     if value == 0 {
-        for row in zone.chunks_exact_mut(dimension) {
+        for row in rows_mut(zone, dimension) {
             row[clock] = row[0];
         }
         zone[start + clock] = Bound::LE_ZERO;
@@ -131,7 +141,7 @@ pub fn reset(zone: &mut [Bound], dimension: usize, clock: usize, value: i32) {
     zone[start..start + dimension]
         .iter_mut()
         .for_each(|bound| *bound = bound.shifted(value));
-    for row in zone.chunks_exact_mut(dimension) {
+    for row in rows_mut(zone, dimension) {
         row[clock] = row[0].shifted(-value);
     }
     zone[start + clock] = Bound::LE_ZERO;
@@ -161,7 +171,7 @@ pub fn assign_clock(
     for bound in &mut zone[clock * dimension..(clock + 1) * dimension] {
         *bound = bound.shifted(increment);
     }
-    for row in zone.chunks_exact_mut(dimension) {
+    for row in rows_mut(zone, dimension) {
         row[clock] = row[source].shifted(-increment);
     }
     zone[clock * dimension + clock] = Bound::LE_ZERO;
@@ -176,7 +186,7 @@ pub fn shift(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32)
     for bound in &mut zone[clock * dimension..(clock + 1) * dimension] {
         *bound = bound.shifted(increment);
     }
-    for row in zone.chunks_exact_mut(dimension) {
+    for row in rows_mut(zone, dimension) {
         row[clock] = row[clock].shifted(-increment);
     }
     zone[clock * dimension + clock] = Bound::LE_ZERO;

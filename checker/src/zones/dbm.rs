@@ -24,6 +24,25 @@ use std::cmp::Ordering;
 
 use super::{Bound, ClockSet};
 
+/// Calls a function with the dimension as its last argument, which is a constant where it is small.
+///
+/// Small zones are the common ones, and their rows then unroll into a few vectors.
+macro_rules! for_small_dimension {
+    ($dimension:expr, $function:ident($($argument:expr),*)) => {
+        match $dimension {
+            2 => $function($($argument,)* 2),
+            3 => $function($($argument,)* 3),
+            4 => $function($($argument,)* 4),
+            5 => $function($($argument,)* 5),
+            6 => $function($($argument,)* 6),
+            7 => $function($($argument,)* 7),
+            8 => $function($($argument,)* 8),
+            dimension => $function($($argument,)* dimension),
+        }
+    };
+}
+pub(super) use for_small_dimension;
+
 /// How two zones of the same dimension lie to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Relation {
@@ -96,6 +115,15 @@ pub fn is_in_range(zone: &[Bound]) -> bool {
 ///
 /// The matrix need not be closed or consistent before. Positive if row 0 was at most `<= 0`.
 pub fn close(zone: &mut [Bound], dimension: usize) -> bool {
+    for_small_dimension!(dimension, close_all(zone))
+}
+
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
+fn close_all(zone: &mut [Bound], dimension: usize) -> bool {
     (0..dimension).all(|via| close_through(zone, dimension, via))
 }
 
@@ -112,20 +140,23 @@ pub fn close_touched(zone: &mut [Bound], dimension: usize, touched: &ClockSet) -
 }
 
 /// One step of Floyd–Warshall: admits paths through the clock `via`.
-#[inline]
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
 fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
     let (before, rest) = zone.split_at_mut(via * dimension);
     let (source, after) = rest.split_at_mut(dimension);
     let mut is_consistent = true;
-    // Row numbers run from 0 in both halves; the diagonal of a row shows whether a negative cycle closed.
-    let first_after = via + 1;
-    for (row, target) in before.chunks_exact_mut(dimension).enumerate() {
+    // The diagonal shows whether a negative cycle closed; the row of `via` itself has not changed.
+    for (clock, target) in rows_mut(before, dimension).enumerate() {
         relax_row(target, target[via], source);
-        is_consistent &= target[row] >= Bound::LE_ZERO;
+        is_consistent &= target[clock] >= Bound::LE_ZERO;
     }
-    for (row, target) in after.chunks_exact_mut(dimension).enumerate() {
+    for (clock, target) in (via + 1..).zip(rows_mut(after, dimension)) {
         relax_row(target, target[via], source);
-        is_consistent &= target[first_after + row] >= Bound::LE_ZERO;
+        is_consistent &= target[clock] >= Bound::LE_ZERO;
     }
     if !is_consistent {
         set_empty(zone);
@@ -133,8 +164,45 @@ fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
     is_consistent
 }
 
+/// The rows of a matrix: as `chunks_exact_mut`, without its division, which is a good part of an operation.
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
+pub(super) fn rows_mut(
+    matrix: &mut [Bound],
+    dimension: usize,
+) -> impl Iterator<Item = &mut [Bound]> {
+    let mut rest = matrix;
+    std::iter::from_fn(move || {
+        let (row, others) = std::mem::take(&mut rest).split_at_mut_checked(dimension)?;
+        rest = others;
+        Some(row)
+    })
+}
+
+/// The rows of a matrix that is only read; see [`rows_mut`].
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
+pub(super) fn rows(matrix: &[Bound], dimension: usize) -> impl Iterator<Item = &[Bound]> {
+    let mut rest = matrix;
+    std::iter::from_fn(move || {
+        let (row, others) = rest.split_at_checked(dimension)?;
+        rest = others;
+        Some(row)
+    })
+}
+
 /// Tightens every entry of `target` to the sum of `via` and the entry of `source`, where that is less.
-#[inline]
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
 pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
     if via.is_infinite() {
         return;
@@ -152,14 +220,20 @@ pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
     for (entries, rests) in targets.iter_mut().zip(sources) {
         *entries = relaxed_four(*entries, via, *rests);
     }
-    if let Some(entries) = target.last_chunk_mut::<4>() {
+    if !length.is_multiple_of(4)
+        && let Some(entries) = target.last_chunk_mut::<4>()
+    {
         *entries = tail;
     }
 }
 
 /// The last four entries after relaxing, computed before any other is written so that no load waits for a store that
 /// overlaps it; none if the row is shorter.
-#[inline]
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
 fn last_relaxed(target: &[Bound], via: Bound, source: &[Bound]) -> Option<[Bound; 4]> {
     Some(relaxed_four(
         *target.last_chunk::<4>()?,
@@ -168,7 +242,11 @@ fn last_relaxed(target: &[Bound], via: Bound, source: &[Bound]) -> Option<[Bound
     ))
 }
 
-#[inline]
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
 fn relaxed_four(entries: [Bound; 4], via: Bound, rests: [Bound; 4]) -> [Bound; 4] {
     std::array::from_fn(|lane| Bound::relaxed(entries[lane], via, rests[lane]))
 }
@@ -191,18 +269,26 @@ pub fn constrain(
         set_empty(zone);
         return false;
     }
+    for_small_dimension!(dimension, tighten(zone, left, right, bound));
+    true
+}
+
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
+fn tighten(zone: &mut [Bound], left: usize, right: usize, bound: Bound, dimension: usize) {
     let (before, rest) = zone.split_at_mut(right * dimension);
     let (source, after) = rest.split_at_mut(dimension);
-    for target in before
-        .chunks_exact_mut(dimension)
-        .chain(after.chunks_exact_mut(dimension))
-    {
+    let relax = |target: &mut [Bound]| {
         let via = target[left] + bound;
         if via < target[right] {
             relax_row(target, via, source);
         }
-    }
-    true
+    };
+    rows_mut(before, dimension).for_each(relax);
+    rows_mut(after, dimension).for_each(relax);
 }
 
 /// Intersects the zone with all constraints; returns whether something is left.
@@ -226,10 +312,12 @@ pub fn satisfies(zone: &[Bound], dimension: usize, constraint: &Constraint) -> b
 
 /// Intersects the zone with another; returns whether something is left.
 pub fn intersect(zone: &mut [Bound], other: &[Bound], dimension: usize) -> bool {
+    if are_apart(zone, other, dimension) {
+        set_empty(zone);
+        return false;
+    }
     let mut touched = ClockSet::EMPTY;
-    let rows = zone
-        .chunks_exact_mut(dimension)
-        .zip(other.chunks_exact(dimension));
+    let rows = rows_mut(zone, dimension).zip(other.chunks_exact(dimension));
     for (left, (row, other_row)) in rows.enumerate() {
         for (right, (bound, other_bound)) in row.iter_mut().zip(other_row).enumerate() {
             if other_bound < bound {
@@ -334,18 +422,34 @@ pub fn is_delay_bounded(zone: &[Bound], dimension: usize, stopped: &ClockSet) ->
 }
 
 /// A hash of the zone that depends on nothing but its bounds, so it is the same in every run.
+///
+/// Two lanes take two bounds each on either side of a multiplication, whose halves are folded into one word.
 pub fn hash(zone: &[Bound]) -> u64 {
-    const MULTIPLIER: u64 = 0x9e37_79b9_7f4a_7c15; // 2^64 divided by the golden ratio, odd.
-    let fold = |state: u64, word: u64| (state.rotate_left(26) ^ word).wrapping_mul(MULTIPLIER);
-    let (pairs, rest) = zone.as_chunks::<2>();
-    let word = |bound: Bound| u64::from(bound.0.cast_unsigned());
-    let state = pairs.iter().fold(0, |state, [low, high]| {
-        fold(state, word(*low) | word(*high) << 32)
-    });
-    let state = rest
-        .iter()
-        .fold(state, |state, bound| fold(state, word(*bound)));
-    state ^ state >> 32
+    const MULTIPLIERS: [u64; 2] = [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03]; // Odd, bits evenly mixed.
+    let word = |low: Bound, high: Bound| {
+        u64::from(low.0.cast_unsigned()) | u64::from(high.0.cast_unsigned()) << 32
+    };
+    let mut lanes = [zone.len() as u64, 1];
+    let mut absorb = |block: &[Bound; 8]| {
+        for (lane, ([a, b, c, d], multiplier)) in lanes
+            .iter_mut()
+            .zip(block.as_chunks::<4>().0.iter().zip(MULTIPLIERS))
+        {
+            *lane = folded_product(*lane ^ word(*a, *b), multiplier ^ word(*c, *d));
+        }
+    };
+    let (blocks, rest) = zone.as_chunks::<8>();
+    blocks.iter().for_each(&mut absorb);
+    let mut last = [Bound::LE_ZERO; 8];
+    last[..rest.len()].copy_from_slice(rest);
+    absorb(&last);
+    folded_product(lanes[0] ^ MULTIPLIERS[1], lanes[1] ^ MULTIPLIERS[0])
+}
+
+/// The two halves of a product on top of each other.
+fn folded_product(left: u64, right: u64) -> u64 {
+    let (low, high) = left.carrying_mul(right, 0);
+    low ^ high
 }
 
 /// Sets the diagonal to `<= 0`.

@@ -23,7 +23,9 @@
 //!
 //! Cost: O(n^2) to forget, then n^2 / 4 vector steps for each row that lost something.
 
-use super::dbm::{self, Constraint, relax_row};
+use std::cmp::Ordering;
+
+use super::dbm::{self, Constraint, for_small_dimension, relax_row, rows_mut};
 use super::federation::Federation;
 use super::{Bound, ClockSet};
 
@@ -123,14 +125,42 @@ impl Ceilings {
 /// reference clock. Row 0 is final after forgetting, since the way over a clock above U was not better before its bound
 /// became weaker. So paths need to be admitted through those clocks and, last, through the reference clock.
 pub fn lu_plus(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
+    for_small_dimension!(dimension, forget_and_close(zone, ceilings));
+}
+
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
+fn forget_and_close(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
+    let (weakened, between) = forget_plus(zone, ceilings, dimension);
+    if weakened.is_empty() {
+        return;
+    }
+    for via in &between {
+        relax_rows(zone, dimension, &weakened, via);
+    }
+    relax_rows(zone, dimension, &weakened, 0);
+}
+
+/// Writes the matrix of `Extra_LU+`, not closed; returns the clocks whose rows lost a bound that closing may restore,
+/// and the clocks that are neither certainly above L nor certainly above U.
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
+fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (ClockSet, ClockSet) {
     let (lower_bounds, rows) = zone.split_at_mut(dimension);
     let columns = &ceilings.columns[..dimension];
     let mut weakened = ClockSet::EMPTY;
     let mut between = ClockSet::EMPTY;
-    for (row, clock) in rows.chunks_exact_mut(dimension).zip(1..) {
+    for (clock, row) in (1..dimension).zip(rows_mut(rows, dimension)) {
         if ceilings.is_above_lower(clock, lower_bounds[clock]) {
             row.fill(Bound::INFINITY);
         } else {
+            // The diagonal must not count as weakened.
             row[clock] = Bound::INFINITY;
             if forget_in_row(row, ceilings.rows[clock], lower_bounds, columns) {
                 weakened.insert(clock);
@@ -146,52 +176,48 @@ pub fn lu_plus(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
             *lower = Ceilings::forgotten_lower_bound(*column);
         }
     }
-    if !weakened.is_empty() {
-        between
-            .iter()
-            .for_each(|via| relax_rows(zone, dimension, &weakened, via));
-        relax_rows(zone, dimension, &weakened, 0);
-    }
+    (weakened, between)
 }
 
 /// Makes the entries of a row infinite that exceed `limit` or whose clock is certainly above its U; returns whether
 /// that weakened one.
-#[inline]
 #[expect(
-    clippy::needless_bitwise_bool,
-    reason = "a branch would keep the loop from becoming vectors"
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
 )]
+#[inline(always)]
 fn forget_in_row(
     row: &mut [Bound],
     limit: Bound,
     lower_bounds: &[Bound],
     columns: &[Bound],
 ) -> bool {
-    let mut is_weakened = false;
+    let mut changes = 0;
     for ((bound, lower), column) in row.iter_mut().zip(lower_bounds).zip(columns) {
-        let is_forgotten = (*bound > limit) | (*lower < *column);
-        is_weakened |= is_forgotten & (bound.0 != i32::MAX);
-        *bound = if is_forgotten {
-            Bound::INFINITY
-        } else {
-            *bound
-        };
+        let is_above = -i32::from(*bound > limit);
+        let is_cut = -i32::from(*lower < *column);
+        let is_forgotten = is_above | is_cut;
+        let new = Bound(bound.0 & !is_forgotten | Bound::INFINITY.0 & is_forgotten);
+        changes |= new.0 ^ bound.0;
+        *bound = new;
     }
-    is_weakened
+    changes != 0
 }
 
 /// Admits paths through `via` into the given rows.
-#[inline]
+#[expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+#[inline(always)]
 fn relax_rows(zone: &mut [Bound], dimension: usize, targets: &ClockSet, via: usize) {
     let (before, rest) = zone.split_at_mut(via * dimension);
     let (source, after) = rest.split_at_mut(dimension);
-    for target in targets.iter() {
-        let row = match target.cmp(&via) {
-            std::cmp::Ordering::Less => &mut before[target * dimension..][..dimension],
-            std::cmp::Ordering::Equal => continue,
-            std::cmp::Ordering::Greater => {
-                &mut after[(target - via - 1) * dimension..][..dimension]
-            }
+    for clock in targets {
+        let row = match clock.cmp(&via) {
+            Ordering::Less => &mut before[clock * dimension..][..dimension],
+            Ordering::Equal => continue,
+            Ordering::Greater => &mut after[(clock - via - 1) * dimension..][..dimension],
         };
         relax_row(row, row[via], source);
     }

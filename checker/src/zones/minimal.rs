@@ -15,7 +15,7 @@
 //!
 //! Cost: reduction O(n^3), inclusion linear in the number of constraints, unpacking that of closing.
 
-use super::dbm::{self, Constraint};
+use super::dbm::{self, Constraint, relax_row, rows};
 use super::{Bound, ClockSet};
 
 /// One constraint of a stored zone in eight bytes.
@@ -56,22 +56,53 @@ pub fn append_minimal(zone: &[Bound], dimension: usize, target: &mut Vec<StoredC
 /// Calls `visit` with the minimal constraints of a zone that is not empty, row by row.
 pub fn for_each_minimal(zone: &[Bound], dimension: usize, mut visit: impl FnMut(Constraint)) {
     let representatives = representatives(zone, dimension);
-    for left in 0..dimension {
-        let row = &zone[left * dimension..(left + 1) * dimension];
+    let has_ties = representatives.len() < dimension;
+    let mut detours = [Bound::INFINITY; ClockSet::CAPACITY];
+    let detours = &mut detours[..dimension];
+    for (left, row) in rows(zone, dimension).enumerate() {
         let is_representative = representatives.contains(left);
-        let cycle_successor = cycle_successor(zone, dimension, left);
-        for (right, &bound) in row.iter().enumerate() {
-            let is_kept = cycle_successor == Some(right)
-                || is_representative
-                    && left != right
-                    && bound.is_finite()
-                    && representatives.contains(right)
-                    && !is_redundant(zone, dimension, &representatives, left, right);
-            let is_implied = left == 0 && is_implied_by_sign(zone, dimension, right);
-            if is_kept && !is_implied {
+        let successor = if has_ties {
+            cycle_successor(zone, dimension, left)
+        } else {
+            None
+        };
+        if is_representative {
+            find_detours(zone, dimension, &representatives, left, detours);
+        }
+        for (right, (&bound, &detour)) in row.iter().zip(&*detours).enumerate() {
+            // An infinite bound is never below its detour.
+            let is_needed = is_representative
+                && bound < detour
+                && left != right
+                && representatives.contains(right);
+            if (is_needed || successor == Some(right))
+                && (left != 0 || !is_implied_by_sign(zone, dimension, right))
+            {
                 visit(Constraint { left, right, bound });
             }
         }
+    }
+}
+
+/// Writes for every clock the least sum of two bounds from `left` to it over a third representative.
+fn find_detours(
+    zone: &[Bound],
+    dimension: usize,
+    representatives: &ClockSet,
+    left: usize,
+    detours: &mut [Bound],
+) {
+    detours.fill(Bound::INFINITY);
+    let row = &zone[left * dimension..(left + 1) * dimension];
+    for via in representatives.iter().filter(|via| *via != left) {
+        // To `via` itself this would be no detour.
+        let kept = detours[via];
+        relax_row(
+            detours,
+            row[via],
+            &zone[via * dimension..(via + 1) * dimension],
+        );
+        detours[via] = kept;
     }
 }
 
@@ -97,8 +128,13 @@ pub fn unpack(stored: &[StoredConstraint], zone: &mut [Bound], dimension: usize)
 }
 
 /// Whether two different clocks have a fixed distance in the zone.
+#[inline]
 fn are_tied(zone: &[Bound], dimension: usize, left: usize, right: usize) -> bool {
-    zone[left * dimension + right] + zone[right * dimension + left] == Bound::LE_ZERO
+    let (forth, back) = (
+        zone[left * dimension + right],
+        zone[right * dimension + left],
+    );
+    forth.is_finite() && !forth.is_strict() && back == Bound(2 - forth.raw())
 }
 
 /// The least clock of each class of tied clocks.
@@ -126,19 +162,4 @@ fn is_implied_by_sign(zone: &[Bound], dimension: usize, clock: usize) -> bool {
     zone[clock] == Bound::LE_ZERO
         || is_free
             && (1..dimension).any(|tied| are_tied(zone, dimension, tied, clock) && follows(tied))
-}
-
-/// Whether the entry is the sum of two others between representatives.
-fn is_redundant(
-    zone: &[Bound],
-    dimension: usize,
-    representatives: &ClockSet,
-    left: usize,
-    right: usize,
-) -> bool {
-    let bound = zone[left * dimension + right];
-    let mut others = representatives
-        .iter()
-        .filter(|via| *via != left && *via != right);
-    others.any(|via| zone[left * dimension + via] + zone[via * dimension + right] <= bound)
 }
