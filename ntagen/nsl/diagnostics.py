@@ -244,16 +244,16 @@ class Reporter:
         return any(d.severity == "error" for _, d in self._found.values())
 
 
-def suggest(word: str, candidates: Iterable[str]) -> str | None:
+def suggest(word: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | None:
     """The candidate that `word` most likely was meant to be, if one is near enough."""
     lowered = {candidate.lower(): candidate for candidate in candidates}
-    near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=cutoff)
     return lowered[near[0]] if near else None
 
 
-def did_you_mean(word: str, candidates: Iterable[str]) -> str | None:
+def did_you_mean(word: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | None:
     """A hint with the nearest candidate, if there is one."""
-    near = suggest(word, candidates)
+    near = suggest(word, candidates, cutoff)
     return None if near is None else f"did you mean `{near}`?"
 
 

@@ -133,7 +133,7 @@ class Evaluator:
                 "not-whole",
                 expression.span,
                 f"{role} must be a whole number, but this is {value:g}",
-                hint=f"write {rounded}",
+                hint=f"write {rounded}" if isinstance(expression, tree.Number) else None,
             )
             return None
         return rounded
@@ -167,12 +167,16 @@ class Evaluator:
                 hint=f"write `{_shortened(expression.span.text)} {unit}`",
             )
         else:
-            example = f"write for example `{_example(dimension)}`"
+            hint = f"write for example `{_example(dimension)}`"
+            if dimension == NUMBER:
+                hint = "leave the unit out"
+            elif value.dimension == NUMBER / dimension:
+                hint = "a unit belongs to the value right before it: write `(…) unit`"
             self._report(
                 "wrong-dimension",
                 expression.span,
                 f"{role} is {dimension}, but this is {value.dimension}",
-                hint="leave the unit out" if dimension == NUMBER else example,
+                hint=hint,
             )
         return False
 
@@ -218,7 +222,7 @@ class Evaluator:
             return home.values[name]
         hint = did_you_mean(name, [*scope.names(), *CONSTANTS])
         if is_unit(name) or name in ALIASES:
-            hint = f"a unit stands behind a number: `1 {ALIASES.get(name, name)}`"
+            hint = f"the unit is written behind a number: `1 {ALIASES.get(name, name)}`"
         elif name in FUNCTIONS:
             hint = f"a function has its argument in parentheses: `{name}(…)`"
         self._report(

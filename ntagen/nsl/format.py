@@ -17,13 +17,21 @@ from itertools import zip_longest
 from typing import Final
 
 from ntagen.nsl.diagnostics import Reporter, SourceError
-from ntagen.nsl.parser import BLOCKS, BlockKind, Comment, Token, begins_statement, parse, tokenise
+from ntagen.nsl.parser import parse
 from ntagen.nsl.source import Source
+from ntagen.nsl.tokens import (
+    BLOCKS,
+    REGIONS,
+    BlockKind,
+    Comment,
+    Token,
+    begins_statement,
+    tokenise,
+)
 
 _INDENT: Final = "  "
 _CONTINUATION: Final = "      "
 _COMMENT_GAP: Final = 3
-_REGIONS: Final = ("target", "critical", "detection")
 
 _NONE_AFTER: Final = frozenset({"LPAR", "LSQB", "RANGE"})
 _NONE_BEFORE: Final = frozenset({"RPAR", "RSQB", "LSQB", "COMMA", "RANGE"})
@@ -169,7 +177,7 @@ class _Layout:
             return
         line = self._lines[-1]
         cells = list(_cells(self._statement))
-        is_region = self._keyword in _REGIONS
+        is_region = self._keyword in REGIONS
         if is_region and not line.cells:
             line.is_region = True
         elif is_region:
@@ -288,11 +296,14 @@ def _bodies(lines: Sequence[_Line]) -> Iterator[str]:
     aligned = [line for line in lines if line.is_region and line.is_single]
     columns = zip_longest(*(line.cells[:-1] for line in aligned), fillvalue="")
     widths = [max(map(len, column)) for column in columns]
+    if len({line.cells[2].partition(" ")[0] for line in aligned}) > 1:
+        # Spheres and what lies around them are too different in length to share a column.
+        del widths[2:]
     for line in lines:
         cells = line.cells
         if line in aligned:
-            padded = zip(cells[:-1], widths, strict=False)
-            cells = [*(f"{cell:<{width}}" for cell, width in padded), cells[-1]]
+            padded = [f"{cell:<{width}}" for cell, width in zip(cells[:-1], widths, strict=False)]
+            cells = [*padded, *cells[len(padded) :]]
         yield _INDENT * line.depth + _joined(cells, is_region=line.is_region)
 
 

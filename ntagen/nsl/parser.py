@@ -18,112 +18,36 @@ whoever walks it may recurse.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from importlib import resources
-from typing import TYPE_CHECKING, Final, Literal, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, cast
 
 from ntagen.nsl import tree
+from ntagen.nsl.convert import TreeBuilder
 from ntagen.nsl.diagnostics import Reporter, did_you_mean, suggest
 from ntagen.nsl.quantity import is_unit
-from ntagen.nsl.source import Source, Span
+from ntagen.nsl.source import Source
+from ntagen.nsl.tokens import (
+    ALLOWED,
+    BLOCKS,
+    KEYWORDS,
+    NAMING,
+    REGIONS,
+    RESERVED,
+    STRAY,
+    BlockKind,
+    Token,
+    begins_statement,
+    grammar,
+    tokenise,
+)
+from ntagen.nsl.wording import FORMS, STRAY_HINTS, TERMINAL_WORDS, describe, quoted, visible
 
 if TYPE_CHECKING:
     import lark
 
 MAX_DEPTH: Final = 40
 """How deep parentheses may be nested in an expression, and braces in a file."""
-
-BlockKind = Literal["file", "environment", "needle", "motion", "for"]
-
-_REGIONS: Final = frozenset({"target", "critical", "detection"})
-_NEEDLE_ITEMS: Final = frozenset({"tip", "heading", "bevel", "radius", "speed"})
-_MOTION_ITEMS: Final = frozenset({"step", "roll"})
-_BODY_ITEMS: Final = _REGIONS | {
-    "tissue",
-    "resolution",
-    "safety",
-    "query",
-    "needle",
-    "motion",
-    "for",
-}
-
-ALLOWED: Final[dict[BlockKind, frozenset[str]]] = {
-    "file": frozenset({"let", "include", "environment"}),
-    "environment": _BODY_ITEMS | {"let", "include"},
-    "needle": _NEEDLE_ITEMS,
-    "motion": _MOTION_ITEMS,
-    "for": _REGIONS | {"let", "for"},
-}
-"""Which statements may stand where."""
-
-KEYWORDS: Final = frozenset().union(*ALLOWED.values())
-"""The words that begin a statement."""
-
-_OTHER_WORDS: Final = frozenset(
-    {"sphere", "around", "margin", "by", "at", "most", "least", "times", "apart", "per", "in"}
-)
-RESERVED: Final = KEYWORDS | _OTHER_WORDS
-"""All words that cannot be names because of the grammar."""
-
-BLOCKS: Final[dict[str, BlockKind]] = {
-    "environment": "environment",
-    "needle": "needle",
-    "motion": "motion",
-    "for": "for",
-}
-"""The statements that have braces."""
-_NAMING: Final = _REGIONS | {"environment", "let", "for"}
-
-
-@dataclass(frozen=True, slots=True)
-class Token:
-    """A token: its terminal in the grammar, its text and its place."""
-
-    type: str
-    text: str
-    span: Span
-    line: int
-
-
-@dataclass(frozen=True, slots=True)
-class Comment:
-    """A comment, with its slashes."""
-
-    text: str
-    span: Span
-    line: int
-
-
-@functools.cache
-def _grammar() -> lark.Lark:
-    """The parser of single statements; lark is imported when the first file is read."""
-    import lark
-
-    text = resources.files("ntagen.nsl").joinpath("grammar.lark").read_text("utf-8")
-    return lark.Lark(
-        text,
-        parser="lalr",
-        lexer="basic",
-        start=["statement", "outside"],
-        propagate_positions=True,
-        maybe_placeholders=False,
-    )
-
-
-def tokenise(source: Source) -> list[Token | Comment]:
-    """Every token and comment of a source; together with white space they are all of its text."""
-    found: list[Token | Comment] = []
-    for token in _grammar().lex(source.text, dont_ignore=True):
-        start = cast(int, token.start_pos)
-        span = source.span(start, start + len(token))
-        if token.type in ("LINE_COMMENT", "BLOCK_COMMENT"):
-            found.append(Comment(str(token).rstrip(), span, cast(int, token.line)))
-        elif token.type != "SPACE":
-            found.append(Token(token.type, str(token), span, cast(int, token.line)))
-    return found
 
 
 def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -> tree.File:
@@ -147,9 +71,9 @@ class _Parser:
     def __init__(self, source: Source, tokens: list[Token], reporter: Reporter) -> None:
         self._source = source
         self._reporter = reporter
-        self._stray = [t.span.start for t in tokens if t.type in _STRAY]
-        self._report_stray([t for t in tokens if t.type in _STRAY])
-        self._tokens = [t for t in tokens if t.type not in _STRAY]
+        self._stray = [t for t in tokens if t.type in STRAY]
+        self._report_stray()
+        self._tokens = [t for t in tokens if t.type not in STRAY]
         self._is_cut_short = any(t.type == "UNCLOSED_COMMENT" for t in tokens)
         self._index = 0
         texts = [t.text for t in self._tokens if t.type == "BRACE"]
@@ -203,32 +127,44 @@ class _Parser:
         if is_misplaced and kind is not None:
             self._report_misplaced(words[0], kind)
         parsed = self._parse_words(words)
-        body: tuple[tree.Statement, ...] = ()
-        brace = self._peek()
-        has_brace = brace is not None and brace.text == "{"
         if keyword in BLOCKS:
-            if has_brace:
-                body = tuple(self._braces(BLOCKS[keyword], depth))
-            else:
-                self._reporter.report(
-                    "missing-brace", words[-1].span.behind(), f"`{{` is missing after `{keyword}`"
-                )
-                if self._missing_closing < 0:
-                    self._missing_closing += 1
-                    body = tuple(self._block(BLOCKS[keyword], depth + 1))
-                    self._close(words[-1])
-        elif has_brace and brace is not None:
-            if not isinstance(parsed, tree.Broken):
-                self._reporter.report(
-                    "missing-brace",
-                    brace.span,
-                    f"`{keyword}` has no braces",
-                    hint="write its properties on one line",
-                )
-            body = tuple(self._braces(None, depth))
+            body = tuple(self._body(words, depth))
+        else:
+            body = tuple(self._superfluous_braces(words, depth, isinstance(parsed, tree.Broken)))
         if is_misplaced:
             return tree.Broken(parsed.span, keyword, _declared_name(words))
         return _with_body(parsed, body)
+
+    def _body(self, words: Sequence[Token], depth: int) -> Iterator[tree.Statement]:
+        """What stands in the braces of a statement that has some."""
+        keyword, brace = words[0].text, self._peek()
+        if brace is not None and brace.text == "{":
+            yield from self._braces(BLOCKS[keyword], depth)
+            return
+        self._reporter.report(
+            "missing-brace", words[-1].span.behind(), f"`{{` is missing after `{keyword}`"
+        )
+        if self._missing_closing < 0:
+            # There is a closing brace too many, so that only the opening one was forgotten.
+            self._missing_closing += 1
+            yield from self._block(BLOCKS[keyword], depth + 1)
+            self._close(words[-1])
+
+    def _superfluous_braces(
+        self, words: Sequence[Token], depth: int, is_reported: bool
+    ) -> Iterator[tree.Statement]:
+        """What stands in braces behind a statement that has none."""
+        brace = self._peek()
+        if brace is None or brace.text != "{" or brace.line > words[-1].line:
+            return
+        if not is_reported:
+            self._reporter.report(
+                "missing-brace",
+                brace.span,
+                f"`{words[0].text}` has no braces",
+                hint="write its properties on one line",
+            )
+        yield from self._braces(None, depth)
 
     def _braces(self, kind: BlockKind | None, depth: int) -> Iterator[tree.Statement]:
         """The statements in the braces that begin here."""
@@ -274,13 +210,19 @@ class _Parser:
         first = self._as_keyword(self._tokens[self._index], kind)
         self._index += 1
         words = [first]
+        # The words of a needle begin behind its brace, even if that was forgotten; and the radius
+        # of a sphere is no statement, even in a needle.
+        if first.text in ("needle", "motion"):
+            kind = BLOCKS[first.text]
+        elif first.text in REGIONS:
+            kind = None
         parentheses = 0
         while (token := self._peek()) is not None and token.type != "BRACE":
             previous = words[-1]
-            if len(words) == 1 and first.text in _NAMING and self._is_name_reserved(first, token):
+            if len(words) == 1 and first.text in NAMING and self._is_name_reserved(first, token):
                 token = Token("NAME", token.text, token.span, token.line)
             elif begins_statement(token, kind) or (
-                parentheses <= 0 and _begins_unknown_statement(previous, token)
+                parentheses <= 0 and self._begins_unknown_statement(previous, token)
             ):
                 break
             parentheses += {"LPAR": 1, "RPAR": -1}.get(token.type, 0)
@@ -298,17 +240,32 @@ class _Parser:
         self._reporter.report(
             "unknown-keyword",
             token.span,
-            f"no statement begins with {_quoted(token)}",
+            f"no statement begins with {quoted(token)}",
             hint=f"did you mean `{meant}`?" if meant else f"here may stand {words}",
         )
         if meant is None or meant == "query":
             return token
-        terminal = "REGION_KIND" if meant in _REGIONS else meant.upper()
+        terminal = "REGION_KIND" if meant in REGIONS else meant.upper()
         return Token(terminal, meant, token.span, token.line)
+
+    def _begins_unknown_statement(self, previous: Token, token: Token) -> bool:
+        """Whether a name that begins a line can only be a misspelt keyword.
+
+        It can if a whole value stands before it, or if what follows would not go on with a value.
+        """
+        if token.type != "NAME" or token.line <= previous.line or is_unit(token.text):
+            return False
+        following = self._peek(1)
+        return previous.type in _VALUE_ENDS or (
+            following is not None
+            and following.line == token.line
+            and following.type in ("NAME", "NUMBER")
+            and not is_unit(following.text)
+        )
 
     def _is_name_reserved(self, first: Token, token: Token) -> bool:
         """Whether a reserved word stands where a name must; reports it if so."""
-        if token.text not in RESERVED or token.line != first.line:
+        if token.text not in RESERVED - {"sphere", "around", "in"} or token.line != first.line:
             return False
         self._reporter.report(
             "reserved-name",
@@ -318,9 +275,10 @@ class _Parser:
         )
         return True
 
-    def _peek(self) -> Token | None:
-        """The token that comes next."""
-        return self._tokens[self._index] if self._index < len(self._tokens) else None
+    def _peek(self, distance: int = 0) -> Token | None:
+        """The token that comes next, or one behind it."""
+        index = self._index + distance
+        return self._tokens[index] if index < len(self._tokens) else None
 
     # ----------------------------------------------------------------------------- one statement
 
@@ -333,15 +291,15 @@ class _Parser:
         if words[0].text not in KEYWORDS or self._is_too_deep(words):
             return broken
         parsed = self._parse_with_grammar(words)
-        if parsed is None:
+        if parsed is None or self._has_gap(words):
             return broken
-        return _TreeBuilder(self._source).statement(parsed, span)
+        return TreeBuilder(self._source).statement(parsed, span)
 
     def _parse_with_grammar(self, words: Sequence[Token]) -> lark.Tree[lark.Token] | None:
         """What the grammar makes of the tokens; None if it refuses one, which is then reported."""
         import lark
 
-        parser = _grammar().parse_interactive("", start="statement")
+        parser = grammar().parse_interactive("", start="statement")
         last: lark.Token | None = None
         for word in words:
             last = lark.Token(
@@ -392,11 +350,20 @@ class _Parser:
                 return True
         return False
 
+    def _has_gap(self, words: Sequence[Token]) -> bool:
+        """Whether something that is no token was left out of a statement, or off its last word."""
+        start, end = words[0].span.start, words[-1].span.end
+        return any(
+            start < stray.span.start < end
+            or (stray.span.start == end and stray.text not in _SEPARATORS)
+            for stray in self._stray
+        )
+
     # ---------------------------------------------------------------------------------- reporting
 
-    def _report_stray(self, tokens: Sequence[Token]) -> None:
+    def _report_stray(self) -> None:
         """Reports what is no token of the language."""
-        for token in tokens:
+        for token in self._stray:
             if token.type == "UNCLOSED_COMMENT":
                 self._reporter.report(
                     "unclosed-comment",
@@ -415,8 +382,8 @@ class _Parser:
                 self._reporter.report(
                     "stray-character",
                     token.span,
-                    f"unexpected character {_visible(token.text)}",
-                    hint=_STRAY_HINTS.get(token.text),
+                    f"unexpected character {visible(token.text[0])}",
+                    hint=STRAY_HINTS.get(token.text[0]),
                 )
 
     def _report_misplaced(self, word: Token, kind: BlockKind) -> None:
@@ -438,49 +405,37 @@ class _Parser:
         self, words: Sequence[Token], found: Token | None, accepts: Iterable[str]
     ) -> None:
         """Reports the first token of a statement that the grammar refuses; None is the end."""
-        start, end = words[0].span.start, words[-1].span.end
-        if any(start <= stray <= end for stray in self._stray):
+        following = self._peek() if found is None else found
+        start = words[0].span.start
+        end = following.span.start if following else len(self._source.text)
+        if any(start < stray.span.start < end for stray in self._stray):
             return  # What is left out because it is no token explains the gap.
-        expected = _describe(set(accepts))
-        at_end = self._peek()
-        what = _quoted(found) if found else "the end" if at_end is None else _quoted(at_end)
-        span = found.span if found else words[-1].span.behind()
-        near = (
-            {_TERMINAL_WORDS.get(t, t.lower()) for t in accepts} if isinstance(accepts, set) else ()
-        )
+        expected = describe(set(accepts))
+        what = "the end" if following is None else quoted(following)
+        words_near = [TERMINAL_WORDS.get(terminal, terminal.lower()) for terminal in accepts]
+        hint = did_you_mean(found.text, words_near) if found else None
         self._reporter.report(
             "unexpected-word",
-            span,
-            f"expected {expected}, found {what}" if found else f"expected {expected} before {what}",
-            hint=(did_you_mean(found.text, near) if found else None) or _FORMS.get(words[0].text),
+            found.span if found else words[-1].span.behind(),
+            f"expected {expected}{', found' if found else ' before'} {what}",
+            hint=hint or FORMS.get(words[0].text),
         )
 
 
-def _accepted(parser: lark.parsers.lalr_interactive_parser.InteractiveParser) -> set[str]:
+def _accepted(parser: lark.parsers.lalr_interactive_parser.InteractiveParser) -> list[str]:
     """The terminals that a parser would take next."""
-    return cast("set[str]", parser.accepts())  # type: ignore[no-untyped-call]
+    return sorted(cast("set[str]", parser.accepts()))  # type: ignore[no-untyped-call]
 
 
-def begins_statement(token: Token, kind: BlockKind | None) -> bool:
-    """Whether a token is a word that begins a statement; `radius` is one in a needle only."""
-    if token.type == "QUERY":
-        return True
-    return token.text in KEYWORDS and (token.text != "radius" or kind == "needle")
-
-
-def _begins_unknown_statement(previous: Token, token: Token) -> bool:
-    """Whether a name that begins a line after a whole value can only be a misspelt keyword."""
-    return (
-        token.type == "NAME"
-        and token.line > previous.line
-        and previous.type in ("NAME", "NUMBER", "RATIO", "RPAR", "RSQB", "STRING", "TIMES", "APART")
-        and not is_unit(token.text)
-    )
+_VALUE_ENDS: Final = frozenset(
+    {"NAME", "NUMBER", "RATIO", "RPAR", "RSQB", "STRING", "TIMES", "APART"}
+)
+_SEPARATORS: Final = frozenset({";", ","})
 
 
 def _declared_name(words: Sequence[Token]) -> str | None:
     """The name that a statement declares, if that much of it is right."""
-    if len(words) > 1 and words[0].text in _NAMING and words[1].type == "NAME":
+    if len(words) > 1 and words[0].text in NAMING and words[1].type == "NAME":
         return words[1].text
     return None
 
@@ -490,236 +445,3 @@ def _with_body(parsed: tree.Statement, body: tuple[tree.Statement, ...]) -> tree
     if isinstance(parsed, tree.Section | tree.Loop | tree.Environment | tree.Broken):
         return replace(parsed, body=body)
     return parsed
-
-
-_STRAY: Final = frozenset({"STRAY", "UNCLOSED_STRING", "UNCLOSED_COMMENT"})
-
-_STRAY_HINTS: Final = {
-    ";": "statements need no separator",
-    "#": "comments begin with `//`",
-    ".": "write a digit on both sides of a decimal point",
-    "°": "write `deg`",
-    "µ": "write `um`",
-    "μ": "write `um`",
-    "\N{MINUS SIGN}": "write the hyphen `-`",
-    "\N{EN DASH}": "write the hyphen `-`",
-    "\N{MULTIPLICATION SIGN}": "write `*`",
-    "·": "write `*`",
-    "^": "write a product, for example `r * r`",
-    "'": 'write `"`',
-    "“": 'write `"`',
-    "”": 'write `"`',
-    "\ufeff": "the file has a byte order mark inside its text: delete it",
-}
-
-_FORMS: Final = {
-    "environment": "write `environment NAME { … }`",
-    "needle": "write `needle { … }`",
-    "motion": "write `motion { … }`",
-    "for": "write for example `for i in 0..7 { … }`",
-    "let": "write for example `let depth = 50 mm`",
-    "include": 'write for example `include "needle.nsl"`',
-    "target": "write for example `target T1 sphere (0, -50, 0) mm radius 10 mm`",
-    "critical": "write for example `critical C1 sphere (0, -25, 0) mm radius 2 mm`",
-    "detection": "write for example `detection D1 around C1 margin 3 mm`",
-    "tip": "write for example `tip (0, 0, 0) mm`",
-    "heading": "write for example `heading -y` or `heading (0, -1, 0)`",
-    "bevel": "write for example `bevel +z` or `bevel (0, 0, 1)`",
-    "radius": "write for example `radius 30 mm`",
-    "speed": "write for example `speed 1 mm/s`",
-    "step": "write for example `step 2 s`",
-    "roll": "write for example `roll by 90, 180 deg at most 2 times at least 2 mm apart`",
-    "tissue": "write `tissue static`",
-    "resolution": "write for example `resolution 1000 per mm`",
-    "safety": "write `safety sampled` or `safety swept`",
-}
-
-_TERMINAL_WORDS: Final = {
-    "LPAR": "(",
-    "RPAR": ")",
-    "LSQB": "[",
-    "RSQB": "]",
-    "COMMA": ",",
-    "EQUAL": "=",
-    "RANGE": "..",
-    "STRING": "a path in quotes",
-    "NAME": "a name",
-    "RATIO": "a unit",
-}
-_VALUE_TERMINALS: Final = frozenset({"NUMBER", "NAME", "LPAR", "SIGN"})
-_OPERATORS: Final = frozenset({"SIGN", "SCALE", "RATIO"})
-
-
-def _describe(terminals: set[str]) -> str:
-    """The terminals that may stand at a place, in words: ``a value``, `` `margin` or a unit``."""
-    rest = set(terminals)
-    words: list[str] = []
-    if rest >= _VALUE_TERMINALS:
-        rest -= _VALUE_TERMINALS
-        words.append("a value")
-    elif "SCALE" in rest:
-        # Behind a value nearly anything may go on; what must come is the useful part.
-        if "RATIO" in rest:
-            rest -= {"NAME"}
-            words.append("a unit")
-        rest -= _OPERATORS
-    rest.discard("$END")
-    words = (
-        sorted(
-            _TERMINAL_WORDS[t]
-            if " " in _TERMINAL_WORDS.get(t, "")
-            else f"`{_TERMINAL_WORDS.get(t, t.lower())}`"
-            for t in rest
-        )
-        + words
-    )
-    return "the end of the statement" if not words else _either(words)
-
-
-def _either(words: Sequence[str]) -> str:
-    """Alternatives as a list: ``a, b or c``."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
-
-
-def _quoted(token: Token) -> str:
-    """A token as it is named in a message."""
-    text = token.text if len(token.text) <= 30 else token.text[:27] + "..."
-    return f"`{text}`"
-
-
-def _visible(character: str) -> str:
-    """A character as it is named in a message, also one that cannot be seen."""
-    return f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
-
-
-class _TreeBuilder:
-    """Turns lark's trees into ours."""
-
-    def __init__(self, source: Source) -> None:
-        self._source = source
-
-    def statement(self, node: lark.Tree[lark.Token], span: Span) -> tree.Statement:
-        """A statement of any kind."""
-        keyword = node.data
-        parts = node.children
-        match keyword:
-            case "environment":
-                return tree.Environment(span, self._identifier(parts[0]), ())
-            case "needle" | "motion":
-                return tree.Section(span, keyword, ())
-            case "loop":
-                return tree.Loop(
-                    span,
-                    self._identifier(parts[0]),
-                    self.expression(parts[1]),
-                    self.expression(parts[3]),
-                    (),
-                )
-            case "let":
-                return tree.Let(span, self._identifier(parts[0]), self.expression(parts[1]))
-            case "include":
-                path = self._identifier(parts[0])
-                return tree.Include(span, tree.Identifier(path.span, path.text[1:-1]))
-            case "region":
-                return self._region(node, span)
-            case "roll":
-                return self._roll(parts, span)
-            case "tissue" | "safety":
-                return tree.Choice(span, keyword, self._identifier(parts[0]))
-            case "resolution":
-                return tree.Resolution(span, self.expression(parts[0]), self._identifier(parts[1]))
-            case "tip" | "heading" | "bevel" | "radius" | "speed" | "step":
-                return tree.Setting(span, keyword, self.expression(parts[0]))
-        raise AssertionError(f"the grammar has a statement that the tree has not: {keyword}")
-
-    def _region(self, node: lark.Tree[lark.Token], span: Span) -> tree.Region:
-        """A region with its shape."""
-        kind, name, shape = node.children
-        keyword = cast("Literal['target', 'critical', 'detection']", str(kind))
-        shape = cast("lark.Tree[lark.Token]", shape)
-        first, second = shape.children
-        shape_span = self._span(shape)
-        return tree.Region(
-            span,
-            keyword,
-            self._region_name(name),
-            tree.Sphere(shape_span, self.expression(first), self.expression(second))
-            if shape.data == "sphere"
-            else tree.Around(shape_span, self._region_name(first), self.expression(second)),
-        )
-
-    def _region_name(self, node: object) -> tree.RegionName:
-        """A name with its indices."""
-        node = cast("lark.Tree[lark.Token]", node)
-        name, *indices = node.children
-        return tree.RegionName(
-            self._span(node), self._identifier(name), tuple(map(self.expression, indices))
-        )
-
-    def _roll(self, parts: Sequence[object], span: Span) -> tree.Roll:
-        """Angles and limits, told apart by their nodes."""
-        nodes = [cast("lark.Tree[lark.Token]", part) for part in parts]
-        limits: dict[str, list[tree.Expression]] = {"at_most": [], "at_least": []}
-        angles: list[tree.Expression] = []
-        for node in nodes:
-            if node.data in limits:
-                limits[node.data].append(self.expression(node.children[0]))
-            else:
-                angles.append(self.expression(node))
-        return tree.Roll(span, tuple(angles), tuple(limits["at_most"]), tuple(limits["at_least"]))
-
-    def expression(self, node: object) -> tree.Expression:
-        """An expression; levels of the grammar that add nothing vanish."""
-        node = cast("lark.Tree[lark.Token]", node)
-        children = node.children
-        span = self._span(node)
-        match node.data:
-            case "sum" | "product":
-                return self._chain(children, span)
-            case "signed":
-                *signs, last = children
-                operand = self.expression(last)
-                return (
-                    tree.Signed(span, operand, sum(sign == "-" for sign in signs) % 2 == 1)
-                    if signs
-                    else operand
-                )
-            case "quantity":
-                operand = self.expression(children[0])
-                if len(children) == 1:
-                    return operand
-                unit = cast("lark.Tree[lark.Token]", children[1]).children[0]
-                return tree.Measured(span, operand, self._identifier(unit))
-            case "number":
-                return tree.Number(span, float(cast(str, children[0])))
-            case "name":
-                return tree.Name(span, str(children[0]))
-            case "call":
-                function, *arguments = children
-                return tree.Call(
-                    span, self._identifier(function), tuple(map(self.expression, arguments))
-                )
-            case "vector":
-                return tree.Vector(span, tuple(map(self.expression, children)))
-            case "parenthesised":
-                return self.expression(children[0])
-        raise AssertionError(f"the grammar has an expression that the tree has not: {node.data}")
-
-    def _chain(self, children: Sequence[object], span: Span) -> tree.Expression:
-        """Operands and the operators between them."""
-        first = self.expression(children[0])
-        rest = tuple(
-            (cast("Literal['+', '-', '*', '/']", str(operator)), self.expression(operand))
-            for operator, operand in zip(children[1::2], children[2::2], strict=True)
-        )
-        return tree.Chain(span, first, rest) if rest else first
-
-    def _identifier(self, token: object) -> tree.Identifier:
-        """A token as a name with its place."""
-        token = cast("lark.Token", token)
-        start = cast(int, token.start_pos)
-        return tree.Identifier(self._source.span(start, start + len(token)), str(token))
-
-    def _span(self, node: lark.Tree[lark.Token]) -> Span:
-        """The place of a node."""
-        return self._source.span(node.meta.start_pos, node.meta.end_pos)

@@ -87,4 +87,4 @@ def _nearby(path: str) -> str | None:
         names = sorted(entry for entry in os.listdir(parent or ".") if entry.endswith(".nsl"))
     except (OSError, ValueError):
         return None
-    return did_you_mean(name, names)
+    return did_you_mean(name, names, cutoff=0.75)

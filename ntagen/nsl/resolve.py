@@ -17,7 +17,7 @@ from typing import Final, Generic, TypeVar
 from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Evaluator, Scope
-from ntagen.nsl.parser import ALLOWED, MAX_DEPTH, BlockKind, parse
+from ntagen.nsl.parser import MAX_DEPTH, parse
 from ntagen.nsl.quantity import (
     ANGLE,
     LENGTH,
@@ -30,6 +30,7 @@ from ntagen.nsl.quantity import (
 )
 from ntagen.nsl.reading import read_source
 from ntagen.nsl.source import Source, Span
+from ntagen.nsl.tokens import ALLOWED, BlockKind
 from ntagen.scene import RegionKind, Vector
 
 MAX_ROUNDS: Final = 10_000
@@ -301,7 +302,7 @@ class _Resolver:
             self._reporter.report(
                 "loop-too-long",
                 statement.first.span.to(statement.last.span),
-                f"with this loop there are more than {MAX_ROUNDS} rounds",
+                f"with this loop there are more than {MAX_ROUNDS:,} rounds",
                 hint="lay out fewer regions, or larger ones",
             )
             if self._draft is not None:
@@ -332,11 +333,13 @@ class _Resolver:
         text = name.text
         home = scope.find(text)
         if text in CONSTANTS or text in FUNCTIONS or is_unit(text):
-            what = "a unit" if is_unit(text) else "always defined"
+            what = (
+                "a unit" if is_unit(text) else "a function" if text in FUNCTIONS else "a constant"
+            )
             self._reporter.report(
                 "reserved-name",
                 name.span,
-                f"`{text}` is {what} and cannot be defined",
+                f"`{text}` is {what} of the language and cannot be defined",
                 hint=f"choose another name, for example `my_{text}`",
             )
             return False

@@ -1,0 +1,145 @@
+"""The trees of lark to ours (`ntagen.nsl.tree`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, cast
+
+from ntagen.nsl import tree
+from ntagen.nsl.source import Source, Span
+
+if TYPE_CHECKING:
+    import lark
+
+
+class TreeBuilder:
+    """Turns lark's trees into ours."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+
+    def statement(self, node: lark.Tree[lark.Token], span: Span) -> tree.Statement:
+        """A statement of any kind."""
+        keyword = node.data
+        parts = node.children
+        match keyword:
+            case "environment":
+                return tree.Environment(span, self._identifier(parts[0]), ())
+            case "needle" | "motion":
+                return tree.Section(span, keyword, ())
+            case "loop":
+                return tree.Loop(
+                    span,
+                    self._identifier(parts[0]),
+                    self.expression(parts[1]),
+                    self.expression(parts[3]),
+                    (),
+                )
+            case "let":
+                return tree.Let(span, self._identifier(parts[0]), self.expression(parts[1]))
+            case "include":
+                path = self._identifier(parts[0])
+                return tree.Include(span, tree.Identifier(path.span, path.text[1:-1]))
+            case "region":
+                return self._region(node, span)
+            case "roll":
+                return self._roll(parts, span)
+            case "tissue" | "safety":
+                return tree.Choice(span, keyword, self._identifier(parts[0]))
+            case "resolution":
+                return tree.Resolution(span, self.expression(parts[0]), self._identifier(parts[1]))
+            case "tip" | "heading" | "bevel" | "radius" | "speed" | "step":
+                return tree.Setting(span, keyword, self.expression(parts[0]))
+        raise AssertionError(f"the grammar has a statement that the tree has not: {keyword}")
+
+    def _region(self, node: lark.Tree[lark.Token], span: Span) -> tree.Region:
+        """A region with its shape."""
+        kind, name, shape = node.children
+        keyword = cast("Literal['target', 'critical', 'detection']", str(kind))
+        shape = cast("lark.Tree[lark.Token]", shape)
+        first, second = shape.children
+        shape_span = self._span(shape)
+        return tree.Region(
+            span,
+            keyword,
+            self._region_name(name),
+            tree.Sphere(shape_span, self.expression(first), self.expression(second))
+            if shape.data == "sphere"
+            else tree.Around(shape_span, self._region_name(first), self.expression(second)),
+        )
+
+    def _region_name(self, node: object) -> tree.RegionName:
+        """A name with its indices."""
+        node = cast("lark.Tree[lark.Token]", node)
+        name, *indices = node.children
+        return tree.RegionName(
+            self._span(node), self._identifier(name), tuple(map(self.expression, indices))
+        )
+
+    def _roll(self, parts: Sequence[object], span: Span) -> tree.Roll:
+        """Angles and limits, told apart by their nodes."""
+        nodes = [cast("lark.Tree[lark.Token]", part) for part in parts]
+        limits: dict[str, list[tree.Expression]] = {"at_most": [], "at_least": []}
+        angles: list[tree.Expression] = []
+        for node in nodes:
+            if node.data in limits:
+                limits[node.data].append(self.expression(node.children[0]))
+            else:
+                angles.append(self.expression(node))
+        return tree.Roll(span, tuple(angles), tuple(limits["at_most"]), tuple(limits["at_least"]))
+
+    def expression(self, node: object) -> tree.Expression:
+        """An expression; levels of the grammar that add nothing vanish."""
+        node = cast("lark.Tree[lark.Token]", node)
+        children = node.children
+        span = self._span(node)
+        match node.data:
+            case "sum" | "product":
+                return self._chain(children, span)
+            case "signed":
+                *signs, last = children
+                operand = self.expression(last)
+                return (
+                    tree.Signed(span, operand, sum(sign == "-" for sign in signs) % 2 == 1)
+                    if signs
+                    else operand
+                )
+            case "quantity":
+                operand = self.expression(children[0])
+                if len(children) == 1:
+                    return operand
+                unit = cast("lark.Tree[lark.Token]", children[1]).children[0]
+                return tree.Measured(span, operand, self._identifier(unit))
+            case "number":
+                return tree.Number(span, float(cast(str, children[0])))
+            case "name":
+                return tree.Name(span, str(children[0]))
+            case "call":
+                function, *arguments = children
+                return tree.Call(
+                    span, self._identifier(function), tuple(map(self.expression, arguments))
+                )
+            case "vector":
+                return tree.Vector(span, tuple(map(self.expression, children)))
+            case "parenthesised":
+                return self.expression(children[0])
+        raise AssertionError(f"the grammar has an expression that the tree has not: {node.data}")
+
+    def _chain(self, children: Sequence[object], span: Span) -> tree.Expression:
+        """Operands and the operators between them."""
+        first = self.expression(children[0])
+        rest = tuple(
+            (cast("Literal['+', '-', '*', '/']", str(operator)), self.expression(operand))
+            for operator, operand in zip(children[1::2], children[2::2], strict=True)
+        )
+        return tree.Chain(span, first, rest) if rest else first
+
+    def _identifier(self, token: object) -> tree.Identifier:
+        """A token as a name with its place."""
+        token = cast("lark.Token", token)
+        start = cast(int, token.start_pos)
+        return tree.Identifier(self._source.span(start, start + len(token)), str(token))
+
+    def _span(self, node: lark.Tree[lark.Token]) -> Span:
+        """The place of a node."""
+        return self._source.span(node.meta.start_pos, node.meta.end_pos)

@@ -1,0 +1,122 @@
+"""The words of the language: tokens, comments, and the keywords that begin a statement.
+
+The terminals are those of `grammar.lark`; lark is imported when the first text is read, not before.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING, Final, Literal, cast
+
+from ntagen.nsl.source import Source, Span
+
+if TYPE_CHECKING:
+    import lark
+
+BlockKind = Literal["file", "environment", "needle", "motion", "for"]
+"""Where a statement stands: at the top of a file or in somebody's braces."""
+
+REGIONS: Final = frozenset({"target", "critical", "detection"})
+_NEEDLE_ITEMS: Final = frozenset({"tip", "heading", "bevel", "radius", "speed"})
+_MOTION_ITEMS: Final = frozenset({"step", "roll"})
+_BODY_ITEMS: Final = REGIONS | {
+    "tissue",
+    "resolution",
+    "safety",
+    "query",
+    "needle",
+    "motion",
+    "for",
+}
+
+ALLOWED: Final[dict[BlockKind, frozenset[str]]] = {
+    "file": frozenset({"let", "include", "environment"}),
+    "environment": _BODY_ITEMS | {"let", "include"},
+    "needle": _NEEDLE_ITEMS,
+    "motion": _MOTION_ITEMS,
+    "for": REGIONS | {"let", "for"},
+}
+"""Which statements may stand where."""
+
+KEYWORDS: Final = frozenset().union(*ALLOWED.values())
+"""The words that begin a statement."""
+
+_OTHER_WORDS: Final = frozenset(
+    {"sphere", "around", "margin", "by", "at", "most", "least", "times", "apart", "per", "in"}
+)
+RESERVED: Final = KEYWORDS | _OTHER_WORDS
+"""All words that cannot be names because of the grammar."""
+
+BLOCKS: Final[dict[str, BlockKind]] = {
+    "environment": "environment",
+    "needle": "needle",
+    "motion": "motion",
+    "for": "for",
+}
+"""The statements that have braces."""
+
+NAMING: Final = REGIONS | {"environment", "let", "for"}
+"""The statements that declare a name, right behind the keyword."""
+
+STRAY: Final = frozenset({"STRAY", "HASH", "UNCLOSED_STRING", "UNCLOSED_COMMENT"})
+"""Terminals of what is no word of the language."""
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A token: its terminal in the grammar, its text and its place."""
+
+    type: str
+    text: str
+    span: Span
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Comment:
+    """A comment, with its slashes."""
+
+    text: str
+    span: Span
+    line: int
+
+
+@functools.cache
+def grammar() -> lark.Lark:
+    """The parser of single statements; lark is imported when the first file is read."""
+    import lark
+
+    text = resources.files("ntagen.nsl").joinpath("grammar.lark").read_text("utf-8")
+    return lark.Lark(
+        text,
+        parser="lalr",
+        lexer="basic",
+        start=["statement", "outside"],
+        propagate_positions=True,
+        maybe_placeholders=False,
+    )
+
+
+def tokenise(source: Source) -> list[Token | Comment]:
+    """Every token and comment of a source; together with white space they are all of its text."""
+    found: list[Token | Comment] = []
+    for token in grammar().lex(source.text, dont_ignore=True):
+        start = cast(int, token.start_pos)
+        span = source.span(start, start + len(token))
+        if token.type in ("LINE_COMMENT", "BLOCK_COMMENT"):
+            found.append(Comment(str(token).rstrip(), span, cast(int, token.line)))
+        elif token.type != "SPACE":
+            found.append(Token(token.type, str(token), span, cast(int, token.line)))
+    return found
+
+
+def begins_statement(token: Token, kind: BlockKind | None) -> bool:
+    """Whether a token is a word that begins a statement in a block; None is any but a needle.
+
+    `radius` is one in a needle only: elsewhere it is a clause of a sphere.
+    """
+    if token.type == "QUERY":
+        return True
+    return token.text in KEYWORDS and (token.text != "radius" or kind == "needle")

@@ -1,0 +1,105 @@
+"""How mistakes of form are put into words: what was expected, what was found, what to write."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from ntagen.nsl.tokens import Token
+
+STRAY_HINTS: Final = {
+    ";": "statements need no separator",
+    "#": "comments begin with `//`",
+    ".": "write a digit on both sides of a decimal point",
+    "°": "write `deg`",
+    "µ": "write `um`",
+    "μ": "write `um`",
+    "\N{MINUS SIGN}": "write the hyphen `-`",
+    "\N{EN DASH}": "write the hyphen `-`",
+    "\N{MULTIPLICATION SIGN}": "write `*`",
+    "·": "write `*`",
+    "^": "write a product, for example `r * r`",
+    "'": 'write `"`',
+    "“": 'write `"`',
+    "”": 'write `"`',
+    "\ufeff": "the file has a byte order mark inside its text: delete it",
+}
+
+FORMS: Final = {
+    "environment": "write `environment NAME { … }`",
+    "needle": "write `needle { … }`",
+    "motion": "write `motion { … }`",
+    "for": "write for example `for i in 0..7 { … }`",
+    "let": "write for example `let depth = 50 mm`",
+    "include": 'write for example `include "needle.nsl"`',
+    "target": "write for example `target T1 sphere (0, -50, 0) mm radius 10 mm`",
+    "critical": "write for example `critical C1 sphere (0, -25, 0) mm radius 2 mm`",
+    "detection": "write for example `detection D1 around C1 margin 3 mm`",
+    "tip": "write for example `tip (0, 0, 0) mm`",
+    "heading": "write for example `heading -y` or `heading (0, -1, 0)`",
+    "bevel": "write for example `bevel +z` or `bevel (0, 0, 1)`",
+    "radius": "write for example `radius 30 mm`",
+    "speed": "write for example `speed 1 mm/s`",
+    "step": "write for example `step 2 s`",
+    "roll": "write for example `roll by 90, 180 deg at most 2 times at least 2 mm apart`",
+    "tissue": "write `tissue static`",
+    "resolution": "write for example `resolution 1000 per mm`",
+    "safety": "write `safety sampled` or `safety swept`",
+}
+
+TERMINAL_WORDS: Final = {
+    "LPAR": "(",
+    "RPAR": ")",
+    "LSQB": "[",
+    "RSQB": "]",
+    "COMMA": ",",
+    "EQUAL": "=",
+    "RANGE": "..",
+    "STRING": "a path in quotes",
+    "NAME": "a name",
+    "RATIO": "a unit",
+}
+_VALUE_TERMINALS: Final = frozenset({"NUMBER", "NAME", "LPAR", "SIGN"})
+_OPERATORS: Final = frozenset({"SIGN", "SCALE", "RATIO"})
+
+
+def describe(terminals: set[str]) -> str:
+    """The terminals that may stand at a place, in words: ``a value``, `` `margin` or a unit``."""
+    rest = set(terminals)
+    words: list[str] = []
+    if rest >= _VALUE_TERMINALS:
+        rest -= _VALUE_TERMINALS
+        words.append("a value")
+    elif "SCALE" in rest:
+        # Behind a value nearly anything may go on; what must come is the useful part.
+        if "RATIO" in rest:
+            rest -= {"NAME"}
+            words.append("a unit")
+        rest -= _OPERATORS
+    rest.discard("$END")
+    words = (
+        sorted(
+            TERMINAL_WORDS[t]
+            if " " in TERMINAL_WORDS.get(t, "")
+            else f"`{TERMINAL_WORDS.get(t, t.lower())}`"
+            for t in rest
+        )
+        + words
+    )
+    return "the end of the statement" if not words else _either(words)
+
+
+def _either(words: Sequence[str]) -> str:
+    """Alternatives as a list: ``a, b or c``."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
+
+
+def quoted(token: Token) -> str:
+    """A token as it is named in a message."""
+    text = token.text if len(token.text) <= 30 else token.text[:27] + "..."
+    return f"`{text}`"
+
+
+def visible(character: str) -> str:
+    """A character as it is named in a message, also one that cannot be seen."""
+    return f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
