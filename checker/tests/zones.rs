@@ -521,6 +521,34 @@ proptest! {
     }
 
     #[test]
+    fn delays_lead_from_a_point_into_the_zone(
+        (zone, stopped) in dimensions().prop_flat_map(|dimension| (zones(dimension), clock_sets(dimension))),
+        seed: u64,
+    ) {
+        let unit = denominator(zone.dimension());
+        for point in points(zone.dimension(), seed).iter().take(SAMPLE) {
+            let range = clocks::delays_into(zone.bounds(), point, unit, &stopped);
+            let is_in_range = |delay: i64| range.is_some_and(|range| {
+                let is_late_enough = delay > range.least || delay == range.least && range.includes_least;
+                let is_early_enough = range.greatest.is_none_or(|greatest| {
+                    delay < greatest || delay == greatest && range.includes_greatest
+                });
+                is_late_enough && is_early_enough
+            });
+            for delay in delays(zone.dimension()).take(100) {
+                assert_eq!(is_in_range(delay), contains(&zone, &delayed(point, delay, &stopped)));
+            }
+        }
+    }
+
+    #[test]
+    fn least_point_is_in_the_zone(zone in (2..=9_usize).prop_flat_map(zones)) {
+        let dimension = zone.dimension();
+        let point = dbm::least_point(zone.bounds(), dimension);
+        assert!(zone.contains(&point, denominator(dimension) / 2), "{point:?} is not in {zone:?}");
+    }
+
+    #[test]
     fn assignment_carries_points_over(
         (zone, assignment) in dimensions().prop_flat_map(|dimension| (zones(dimension), assignments(dimension))),
         seed: u64,
@@ -752,6 +780,7 @@ proptest! {
                 .any(|later| federation_contains(&good, &later))
         });
         let still = past::predecessors_without_delay(&good, &bad);
+        assert!(past::predecessors(&good, &bad, &ClockSet::all(good.dimension())).is_same_set(&still));
         check_federation(&still, seed, |point| {
             federation_contains(&good, point) && !federation_contains(&bad, point)
         });

@@ -117,6 +117,78 @@ pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
     }
 }
 
+/// The delays that lead from one valuation into a zone: an interval, in fractions of the valuation's denominator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Delays {
+    /// The infimum, at least 0.
+    pub least: i64,
+    /// Whether the infimum itself leads into the zone.
+    pub includes_least: bool,
+    /// The supremum; none if the delays are unbounded.
+    pub greatest: Option<i64>,
+    /// Whether the supremum itself leads into the zone.
+    pub includes_greatest: bool,
+}
+
+/// The delays that lead from the valuation into the zone while the clocks of `stopped` keep their values; none if no
+/// delay does. The valuation is given as in [`super::dbm::contains`].
+pub fn delays_into(
+    zone: &[Bound],
+    numerators: &[i64],
+    denominator: i64,
+    stopped: &ClockSet,
+) -> Option<Delays> {
+    let is_running = |clock: usize| clock != 0 && !stopped.contains(clock);
+    let mut delays = Delays {
+        least: 0,
+        includes_least: true,
+        greatest: None,
+        includes_greatest: false,
+    };
+    for (left, row) in rows(zone, numerators.len()).enumerate() {
+        for (right, bound) in row
+            .iter()
+            .enumerate()
+            .filter(|(_, bound)| bound.is_finite())
+        {
+            // The difference may still grow by this much.
+            let slack =
+                i64::from(bound.value()) * denominator - (numerators[left] - numerators[right]);
+            let is_weak = !bound.is_strict();
+            match (is_running(left), is_running(right)) {
+                (true, false) => delays.limit(slack, is_weak),
+                (false, true) => delays.postpone(-slack, is_weak),
+                _ if slack < 0 || slack == 0 && !is_weak => return None,
+                _ => {}
+            }
+        }
+    }
+    delays.is_possible().then_some(delays)
+}
+
+impl Delays {
+    fn limit(&mut self, delay: i64, is_included: bool) {
+        let is_tighter = self
+            .greatest
+            .is_none_or(|greatest| (delay, is_included) < (greatest, self.includes_greatest));
+        if is_tighter {
+            (self.greatest, self.includes_greatest) = (Some(delay), is_included);
+        }
+    }
+
+    fn postpone(&mut self, delay: i64, is_included: bool) {
+        if (delay, !is_included) > (self.least, !self.includes_least) {
+            (self.least, self.includes_least) = (delay, is_included);
+        }
+    }
+
+    fn is_possible(&self) -> bool {
+        let is_point = self.includes_least && self.includes_greatest;
+        self.greatest
+            .is_none_or(|greatest| self.least < greatest || self.least == greatest && is_point)
+    }
+}
+
 /// Forgets the value of a clock: it becomes anything from 0.
 pub fn free_clock(zone: &mut [Bound], dimension: usize, clock: usize) {
     for row in rows_mut(zone, dimension) {

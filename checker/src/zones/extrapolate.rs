@@ -39,26 +39,58 @@ pub struct Ceilings {
 }
 
 impl Ceilings {
+    /// The ceilings of clocks that nothing is compared with.
+    pub fn none(dimension: usize) -> Ceilings {
+        let mut ceilings = Ceilings {
+            rows: vec![Bound(i32::MIN); dimension].into(),
+            columns: vec![Bound::INFINITY; dimension].into(),
+        };
+        ceilings.clear();
+        ceilings
+    }
+
     /// The ceilings of the clocks 0..n from the greatest constants of comparisons from below and from above.
     ///
-    /// `None` stands for a clock without such comparisons, and so does a negative constant: clocks are not negative.
-    /// Constants beyond [`Bound::MAX_VALUE`] count as that. The entries of the reference clock are not looked at.
+    /// `None` stands for a clock without such comparisons. The entries of the reference clock are not looked at.
     pub fn lower_upper(lower: &[Option<i32>], upper: &[Option<i32>]) -> Ceilings {
-        let usable = |constant: &Option<i32>| {
-            constant
-                .filter(|value| *value >= 0)
-                .map(|value| value.min(Bound::MAX_VALUE))
-        };
-        let row = |value: Option<i32>| value.map_or(Bound(i32::MIN), |value| Bound(2 * value + 1));
-        let column = |value: Option<i32>| value.map_or(Bound::INFINITY, |value| Bound(-2 * value));
-        let mut rows: Box<[Bound]> = lower.iter().map(|constant| row(usable(constant))).collect();
-        let mut columns: Box<[Bound]> = upper
-            .iter()
-            .map(|constant| column(usable(constant)))
-            .collect();
-        rows[0] = Bound::LE_ZERO;
-        columns[0] = Bound::LT_ZERO;
-        Ceilings { rows, columns }
+        let mut ceilings = Ceilings::none(lower.len());
+        for (clock, (lower, upper)) in lower.iter().zip(upper).enumerate().skip(1) {
+            if let Some(constant) = *lower {
+                ceilings.admit_lower(clock, constant);
+            }
+            if let Some(constant) = *upper {
+                ceilings.admit_upper(clock, constant);
+            }
+        }
+        ceilings
+    }
+
+    /// Forgets all comparisons.
+    pub fn clear(&mut self) {
+        self.rows.fill(Bound(i32::MIN));
+        self.columns.fill(Bound::INFINITY);
+        self.rows[0] = Bound::LE_ZERO;
+        self.columns[0] = Bound::LT_ZERO;
+    }
+
+    /// Takes a comparison of the clock from below, `x > constant` or `x >= constant`, into account.
+    ///
+    /// A negative constant changes nothing, since clocks are not negative; one beyond [`Bound::MAX_VALUE`] counts as
+    /// that.
+    pub fn admit_lower(&mut self, clock: usize, constant: i32) {
+        if constant >= 0 {
+            let row = Bound(2 * constant.min(Bound::MAX_VALUE) + 1);
+            self.rows[clock] = self.rows[clock].max(row);
+        }
+    }
+
+    /// Takes a comparison of the clock from above, `x < constant` or `x <= constant`, into account; as
+    /// [`Ceilings::admit_lower`].
+    pub fn admit_upper(&mut self, clock: usize, constant: i32) {
+        if constant >= 0 {
+            let column = Bound(-2 * constant.min(Bound::MAX_VALUE));
+            self.columns[clock] = self.columns[clock].min(column);
+        }
     }
 
     /// The ceilings where comparisons from below and from above are not told apart.

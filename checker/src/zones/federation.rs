@@ -242,24 +242,23 @@ impl Federation {
     }
 
     /// Replaces pairs of zones by their hull where that adds no valuation, until there is no such pair.
+    ///
+    /// Zones enter one by one; one that joins with another enters again as their hull.
     fn join_pairs(&mut self) {
         let size = self.size();
-        let mut hull = vec![Bound::LE_ZERO; size];
-        let mut first = 0;
-        while first < self.zone_count() {
-            let joined = (first + 1..self.zone_count()).find(|second| {
-                let (zone, other) = (self.zone(first), self.zone(*second));
-                hull.copy_from_slice(zone);
-                dbm::hull(&mut hull, other);
-                is_hull_exact(&hull, zone, other, self.dimension)
-            });
-            if joined.is_some() {
-                // The hull may join with zones that were already looked at.
-                self.add(&hull);
-                first = 0;
-            } else {
-                first += 1;
+        let zones = std::mem::take(&mut self.bounds);
+        let mut entering = vec![Bound::LE_ZERO; size];
+        let mut hull = entering.clone();
+        for zone in zones.chunks_exact(size) {
+            entering.copy_from_slice(zone);
+            while let Some(index) = self
+                .zones()
+                .position(|other| join(&mut hull, &entering, other, self.dimension))
+            {
+                self.bounds.drain(index * size..(index + 1) * size);
+                entering.copy_from_slice(&hull);
             }
+            self.add(&entering);
         }
     }
 
@@ -412,14 +411,37 @@ impl<'a> Subtrahend<'a> {
 
 /// Whether the zones, one after the other in `cover`, contain the whole zone.
 fn is_covered(zone: &[Bound], cover: &[Bound], dimension: usize) -> bool {
-    let Some((first, others)) = cover.split_at_checked(dimension * dimension) else {
-        return false;
-    };
-    Subtrahend::new(first, dimension)
-        .subtract_from(zone, &mut |part| is_covered(part, others, dimension))
+    let mut cover = cover;
+    while let Some((first, others)) = cover.split_at_checked(dimension * dimension) {
+        if dbm::is_subset(zone, first) {
+            return true;
+        }
+        if !dbm::are_apart(zone, first, dimension) {
+            let mut is_part_covered = |part: &[Bound]| is_covered(part, others, dimension);
+            return Subtrahend::new(first, dimension).subtract_from(zone, &mut is_part_covered);
+        }
+        cover = others;
+    }
+    false
 }
 
-/// Whether the hull of two zones contains nothing but them.
-fn is_hull_exact(hull: &[Bound], zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
+/// Writes the hull of two zones; returns whether it contains nothing but them.
+fn join(hull: &mut [Bound], zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
+    if has_gap(zone, other, dimension) {
+        return false;
+    }
+    hull.copy_from_slice(zone);
+    dbm::hull(hull, other);
     Subtrahend::new(zone, dimension).subtract_from(hull, &mut |part| dbm::is_subset(part, other))
+}
+
+/// Whether there is room between two zones: some difference has values that lie beyond the one and before the other.
+fn has_gap(zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
+    let lies_apart =
+        |bound: &Bound, opposite: Bound| bound.is_finite() && opposite < bound.negated();
+    dbm::rows(zone, dimension).enumerate().any(|(left, row)| {
+        row.iter()
+            .enumerate()
+            .any(|(right, bound)| lies_apart(bound, other[right * dimension + left]))
+    })
 }
