@@ -1,0 +1,1 @@
+"""The tests of ntagen; README.md says how to run, add and bless them."""
