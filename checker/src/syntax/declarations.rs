@@ -1,15 +1,28 @@
 //! Declarations: types, variables, functions, priorities, hooks; what is recognised and not supported is recorded.
 
 use super::ast::{Block, Declaration, Expr, Function, Initialiser, Name, TypeExpr, Variable};
+use super::codes;
 use super::lexer::TokenKind;
 use super::parser::{Dialect, Parser};
+use crate::diagnostics::Diagnostic;
+
+/// Where a declaration stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scope {
+    /// Outside everything: all declarations may stand there.
+    Global,
+    /// In a template: types, variables, functions.
+    Template,
+    /// In a function: types and variables.
+    Function,
+}
 
 impl Parser<'_> {
     /// The declarations of a template, to the end of the text or a word that begins the next part of a process.
     pub(super) fn local_declarations(&mut self) -> Vec<Declaration> {
         let mut declarations = Vec::new();
         while !self.at_end() && !self.at(TokenKind::RightBrace) && !self.at_process_part() {
-            self.declaration(&mut declarations);
+            self.declaration(Scope::Template, &mut declarations);
         }
         declarations
     }
@@ -22,31 +35,55 @@ impl Parser<'_> {
     }
 
     /// Reads one declaration, or reports and recovers; it consumes at least one token.
-    pub(super) fn declaration(&mut self, declarations: &mut Vec<Declaration>) {
+    pub(super) fn declaration(&mut self, scope: Scope, declarations: &mut Vec<Declaration>) {
         let before = self.progress();
+        let is_new = self.dialect == Dialect::New;
+        if is_new && scope != Scope::Global && self.at_global_only() {
+            let message = format!("`{}` belongs to the global declarations", self.word());
+            self.error(codes::UNEXPECTED_TOKEN, self.here(), message);
+        }
         match self.word() {
-            "typedef" if self.dialect == Dialect::New => self.typedef(declarations),
-            "before_update" | "after_update" if self.dialect == Dialect::New => {
-                self.update_hook(declarations);
+            "typedef" if is_new => self.typedef(declarations),
+            "before_update" | "after_update" if is_new => self.update_hook(declarations),
+            "import" if is_new => self.import(),
+            "dynamic" if is_new => self.dynamic_template(),
+            "chan" if is_new && self.word_at(1) == "priority" => {
+                self.channel_priority(declarations);
             }
-            "import" if self.dialect == Dialect::New => self.import(),
-            "dynamic" if self.dialect == Dialect::New => self.dynamic_template(),
-            "chan" if self.word_at(1) == "priority" => self.channel_priority(declarations),
             "const" if self.at_old_constant() => self.old_constants(declarations),
             _ if self.at_type_word() || self.is_name_at(0) => {
-                self.variables_or_function(declarations);
+                self.variables_or_function(scope, declarations);
             }
-            _ if self.eat(TokenKind::Semicolon) => {
-                // utap's grammar has no empty declaration, but `};` behind a function is a common slip.
-            }
+            _ if self.at(TokenKind::Semicolon) => self.empty_declaration(),
             _ => {
                 self.expected("a declaration");
+                if self.at(TokenKind::Word) {
+                    self.bump();
+                }
                 self.recover();
             }
         }
         if self.progress() == before {
             self.bump();
         }
+    }
+
+    fn at_global_only(&self) -> bool {
+        match self.word() {
+            "before_update" | "after_update" | "import" | "dynamic" => true,
+            "chan" => self.word_at(1) == "priority",
+            _ => false,
+        }
+    }
+
+    /// `};` behind a function: a common slip, which UPPAAL refuses.
+    fn empty_declaration(&mut self) {
+        let message = "a `;` that ends nothing";
+        self.report(
+            Diagnostic::new(codes::UNEXPECTED_TOKEN, self.here(), message)
+                .help("remove it; the `}` of a function or process needs none"),
+        );
+        self.bump();
     }
 
     fn typedef(&mut self, declarations: &mut Vec<Declaration>) {
@@ -171,12 +208,19 @@ impl Parser<'_> {
         self.end_of_declaration("after the constants", before);
     }
 
-    fn variables_or_function(&mut self, declarations: &mut Vec<Declaration>) {
+    fn variables_or_function(&mut self, scope: Scope, declarations: &mut Vec<Declaration>) {
         let before = self.progress();
         let ty = self.type_expr();
         let is_function =
             self.kind() == TokenKind::Word && self.peek(1).kind == TokenKind::LeftParenthesis;
         if is_function && self.dialect == Dialect::New {
+            if scope == Scope::Function {
+                let message = "a function inside a function";
+                self.report(
+                    Diagnostic::new(codes::UNEXPECTED_TOKEN, self.here(), message)
+                        .help("declare it beside the other one"),
+                );
+            }
             let function = self.function(ty);
             declarations.push(Declaration::Function(function));
             return;

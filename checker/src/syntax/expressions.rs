@@ -341,7 +341,9 @@ impl Parser<'_> {
     pub(super) fn closing(&mut self, kind: TokenKind, context: &str) {
         if !self.expect(kind, context) {
             self.skip_to(&[kind, TokenKind::Semicolon]);
-            self.eat(kind);
+            if !self.eat(kind) {
+                self.stay_quiet();
+            }
         }
     }
 
@@ -445,6 +447,7 @@ impl Parser<'_> {
         let name = self.declared_name("the name of the bound variable");
         self.expect(TokenKind::Colon, "between the variable and its type");
         let ty = Box::new(self.type_expr());
+        let type_height = self.height;
         self.closing(TokenKind::RightParenthesis, "after the type");
         let body = Box::new(self.expression());
         let kind = ExprKind::Quantifier {
@@ -453,7 +456,7 @@ impl Parser<'_> {
             ty,
             body,
         };
-        self.node(start, kind, 0)
+        self.node(start, kind, type_height)
     }
 
     /// `spawn T(…)`, `exit()`, `numOf(T)`, `foreach (i : T) e`: read and recorded.

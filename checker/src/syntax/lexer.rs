@@ -214,7 +214,10 @@ impl Lexer<'_> {
 
     fn string(&mut self) {
         let start = self.position;
-        if let Some(length) = self.text[start + 1..].find('"') {
+        let rest = &self.text[start + 1..];
+        if let Some(length) = rest.find(['"', '\n'])
+            && rest[length..].starts_with('"')
+        {
             self.position = start + 1 + length + 1;
             self.push(TokenKind::String, start);
             return;

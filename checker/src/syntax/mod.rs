@@ -74,7 +74,7 @@ pub fn read_model(path: &str, bytes: &[u8], sources: &mut SourceMap) -> Parsed {
         Some(text) => xta::read(path, text, sources, &mut diagnostics),
         None => ast::Document::default(),
     };
-    diagnostics.dedup();
+    limit(&mut diagnostics);
     Parsed {
         document,
         diagnostics,
@@ -96,6 +96,21 @@ pub fn read_queries(
         None => Vec::new(),
     };
     (queries, diagnostics)
+}
+
+/// Keeps the mistakes that anybody may read.
+fn limit(diagnostics: &mut Vec<Diagnostic>) {
+    diagnostics.dedup();
+    if diagnostics.len() > MOST_MISTAKES {
+        diagnostics.truncate(MOST_MISTAKES);
+        if let Some(span) = diagnostics.last().map(|last| last.span) {
+            diagnostics.push(Diagnostic::new(
+                codes::TOO_MANY_MISTAKES,
+                span,
+                format!("more than {MOST_MISTAKES} mistakes; the rest is left out"),
+            ));
+        }
+    }
 }
 
 /// Adds a whole file as one source and returns the span of all of it.

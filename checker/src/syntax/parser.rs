@@ -213,8 +213,9 @@ impl<'a> Parser<'a> {
             }
             self.blamed = Some(self.position);
         }
-        self.diagnostics.push(diagnostic);
-        if self.diagnostics.len() > super::MOST_MISTAKES {
+        if self.diagnostics.len() <= super::MOST_MISTAKES {
+            self.diagnostics.push(diagnostic);
+        } else {
             self.give_up();
         }
     }
@@ -226,6 +227,11 @@ impl<'a> Parser<'a> {
     /// Leaves the rest of the text unread: nobody reads that many mistakes.
     fn give_up(&mut self) {
         self.position = self.tokens.len() - 1;
+        self.blamed = Some(self.position);
+    }
+
+    /// Reports nothing about the current token: the text was skipped up to here because of an earlier mistake.
+    pub(super) fn stay_quiet(&mut self) {
         self.blamed = Some(self.position);
     }
 
@@ -246,13 +252,40 @@ impl<'a> Parser<'a> {
 
     /// Reports that `what` was expected here.
     pub(super) fn expected(&mut self, what: &str) {
+        self.expected_at(self.here(), what);
+    }
+
+    /// Reports that a closing symbol was left out: behind the previous token if the next one is on another line.
+    pub(super) fn missing(&mut self, what: &str) {
+        let here = self.here();
+        let behind = self.behind_previous();
+        let between = &self.text[behind.start as usize..here.start as usize];
+        let is_behind = between.contains('\n') || self.at_end();
+        self.expected_at(if is_behind { behind } else { here }, what);
+    }
+
+    /// The empty span behind the previous token.
+    pub(super) fn behind_previous(&self) -> Span {
+        let here = self.here();
+        let end = match self.position.checked_sub(1) {
+            Some(index) => self.tokens[index].end,
+            None => here.start,
+        };
+        Span {
+            start: end,
+            end,
+            ..here
+        }
+    }
+
+    fn expected_at(&mut self, span: Span, what: &str) {
         if self.at(TokenKind::Unknown) {
             // The lexer reported the symbol itself.
-            self.blamed = Some(self.position);
+            self.stay_quiet();
             return;
         }
         let message = format!("expected {what}, found {}", self.found());
-        let mut diagnostic = Diagnostic::new(codes::UNEXPECTED_TOKEN, self.here(), message);
+        let mut diagnostic = Diagnostic::new(codes::UNEXPECTED_TOKEN, span, message);
         if matches!(self.kind(), TokenKind::EqualLess | TokenKind::EqualGreater) {
             diagnostic = self.old_comparison();
         }
@@ -274,7 +307,7 @@ impl<'a> Parser<'a> {
     pub(super) fn expect(&mut self, kind: TokenKind, context: &str) -> bool {
         let found = self.eat(kind);
         if !found {
-            self.expected(&format!("{} {context}", kind.shown()));
+            self.missing(&format!("{} {context}", kind.shown()));
         }
         found
     }
@@ -315,10 +348,14 @@ impl<'a> Parser<'a> {
 
     /// Whether the current word begins a construct of its own, so that it is more likely that a name was left out.
     fn is_structural_word(&self) -> bool {
-        matches!(
-            self.word(),
-            "process" | "system" | "state" | "trans" | "init" | "typedef" | "if" | "for" | "while"
-        )
+        let next = self.peek(1).kind;
+        match self.word() {
+            "process" | "system" | "state" | "trans" | "init" | "typedef" => {
+                next == TokenKind::Word
+            }
+            "if" | "for" | "while" => next == TokenKind::LeftParenthesis,
+            _ => false,
+        }
     }
 
     /// The name of something that is declared here; warns where UPPAAL 5 would refuse it.

@@ -5,6 +5,7 @@ use super::ast::{
     Sync, System, SystemItem, Template, TypeExpr,
 };
 use super::codes;
+use super::declarations::Scope;
 use super::expressions::join_all;
 use super::lexer::TokenKind;
 use super::parser::{Dialect, Parser};
@@ -32,13 +33,18 @@ impl Parser<'_> {
             let before = self.progress();
             match self.word() {
                 "process" => self.process_definition(document),
-                "system" => {
+                "system" if !has_system && matches!(part, Part::System | Part::Whole) => {
                     self.system_line(&mut document.system);
                     has_system = true;
                 }
                 "progress" if has_system => self.progress_measures(&mut document.system),
                 "gantt" if has_system => self.gantt(),
                 "query" if has_system => queries.extend(self.query_block()),
+                _ if has_system => {
+                    self.expected("the end of the model after the system line");
+                    self.bump();
+                    self.recover();
+                }
                 _ if self.at_instantiation() => self.instantiation(&mut document.system),
                 _ => self.declaration_of(part, document),
             }
@@ -48,7 +54,7 @@ impl Parser<'_> {
         }
         document.unsupported.append(&mut self.unsupported);
         if !has_system && matches!(part, Part::System | Part::Whole) {
-            let end = self.here();
+            let end = self.behind_previous();
             self.report(
                 Diagnostic::new(codes::MISSING_SYSTEM, end, "no `system` line")
                     .help("name the processes of the system, for example `system P, Q;`"),
@@ -59,7 +65,7 @@ impl Parser<'_> {
 
     fn declaration_of(&mut self, part: Part, document: &mut Document) {
         let mut declarations = Vec::new();
-        self.declaration(&mut declarations);
+        self.declaration(Scope::Global, &mut declarations);
         // In a textual model, declarations are global as long as a process may follow that uses them.
         let is_global = match part {
             Part::Declarations => true,
@@ -225,7 +231,7 @@ impl Parser<'_> {
             _ => {
                 let mut late: Vec<Declaration> = Vec::new();
                 self.expected("`state`, `init`, `trans` or the end of the process");
-                self.declaration(&mut late);
+                self.declaration(Scope::Template, &mut late);
                 template.declarations.append(&mut late);
                 return;
             }
@@ -349,8 +355,9 @@ impl Parser<'_> {
                 (Some(source), true) => source.clone(),
                 _ => self.name("the location that the edge leaves"),
             };
-            if let Some(edge) = self.transition(start, from.clone()) {
-                template.edges.push(edge);
+            match self.transition(start, from.clone()) {
+                Some(edge) => template.edges.push(edge),
+                None => self.skip_to(&[TokenKind::Comma, TokenKind::Semicolon]),
             }
             source = Some(from);
             if !self.eat(TokenKind::Comma) {

@@ -16,6 +16,10 @@ pub fn parse_query(span: Span, sources: &SourceMap) -> (Option<Query>, Vec<Diagn
     if let Some(first) = unsupported.into_iter().next() {
         query.kind = QueryKind::Unsupported(first);
     }
+    if matches!(query.kind, QueryKind::Unsupported(_)) {
+        // Operators of temporal logics that are not read at all are no tokens here.
+        diagnostics.retain(|diagnostic| diagnostic.code != codes::UNKNOWN_SYMBOL);
+    }
     let rejected = diagnostics.iter().any(Diagnostic::is_error);
     ((!rejected).then_some(query), diagnostics)
 }
@@ -359,6 +363,7 @@ impl Parser<'_> {
             let text = self.text_of(token);
             return text[1..text.len() - 1].to_owned();
         }
+        self.skip_to(&[TokenKind::Comma, TokenKind::RightParenthesis]);
         String::new()
     }
 
@@ -367,8 +372,13 @@ impl Parser<'_> {
         self.bump();
         self.expect(TokenKind::LeftParenthesis, "after `saveStrategy`");
         let file = self.file_name();
-        self.expect(TokenKind::Comma, "after the name of the file");
-        let strategy = self.name("the name of a strategy");
+        let mut strategy = Name {
+            text: String::new(),
+            span: self.here(),
+        };
+        if self.expect(TokenKind::Comma, "after the name of the file") {
+            strategy = self.name("the name of a strategy");
+        }
         self.closing(TokenKind::RightParenthesis, "after the strategy");
         QueryKind::SaveStrategy { file, strategy }
     }

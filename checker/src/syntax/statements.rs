@@ -2,6 +2,7 @@
 
 use super::ast::{Block, Expr, Statement};
 use super::codes;
+use super::declarations::Scope;
 use super::lexer::TokenKind;
 use super::parser::{Dialect, Parser};
 use crate::diagnostics::Diagnostic;
@@ -33,7 +34,7 @@ impl Parser<'_> {
                             .help("move it to the start of the block"),
                     );
                 }
-                self.declaration(&mut block.declarations);
+                self.declaration(Scope::Function, &mut block.declarations);
             } else {
                 block.statements.push(self.statement());
             }
@@ -49,7 +50,9 @@ impl Parser<'_> {
     }
 
     fn at_declaration(&self) -> bool {
-        self.at_type_word() || self.at_word("typedef") || (self.is_name_at(0) && self.is_name_at(1))
+        self.at_type_word()
+            || matches!(self.word(), "typedef" | "before_update" | "after_update")
+            || (self.is_name_at(0) && self.is_name_at(1))
     }
 
     /// A statement; it recovers by itself.
@@ -100,7 +103,7 @@ impl Parser<'_> {
 
     fn end_of_statement(&mut self) {
         if !self.eat(TokenKind::Semicolon) {
-            self.expected("`;` after the statement");
+            self.missing("`;` after the statement");
             self.recover();
         }
     }
@@ -118,9 +121,11 @@ impl Parser<'_> {
 
     /// `( condition )`
     fn condition(&mut self) -> Expr {
-        self.expect(TokenKind::LeftParenthesis, "before the condition");
+        let is_open = self.expect(TokenKind::LeftParenthesis, "before the condition");
         let condition = self.expression();
-        self.closing(TokenKind::RightParenthesis, "after the condition");
+        if is_open {
+            self.closing(TokenKind::RightParenthesis, "after the condition");
+        }
         condition
     }
 
@@ -163,8 +168,7 @@ impl Parser<'_> {
         self.bump();
         let body = Box::new(self.statement());
         if !self.eat_word("while") {
-            self.expected("`while` after the body of `do`");
-            self.recover();
+            self.missing("`while` after the body of `do`");
             let condition = self.error_expr();
             return Statement::DoWhile(body, condition);
         }

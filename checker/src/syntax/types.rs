@@ -29,10 +29,11 @@ impl Parser<'_> {
         ) && (keywords::is_reserved(word, self.dialect) || self.dialect == Dialect::Query)
     }
 
-    /// A type with its prefixes.
+    /// A type with its prefixes; its height is that of its highest expression.
     pub(super) fn type_expr(&mut self) -> TypeExpr {
         let start = self.here();
         let prefixes = self.prefixes();
+        self.height = 0;
         let kind = match self.nested(Parser::type_kind) {
             Some(kind) => kind,
             None => TypeKind::Void,
@@ -78,7 +79,9 @@ impl Parser<'_> {
             "clock" => TypeKind::Clock,
             "chan" => TypeKind::Channel,
             "scalar" => {
-                self.expect(TokenKind::LeftBracket, "after `scalar`");
+                if !self.expect(TokenKind::LeftBracket, "after `scalar`") {
+                    return TypeKind::Scalar(Box::new(self.error_expr()));
+                }
                 let size = self.expression();
                 self.closing(TokenKind::RightBracket, "after the size");
                 TypeKind::Scalar(Box::new(size))
@@ -93,25 +96,30 @@ impl Parser<'_> {
             return TypeKind::Int;
         }
         let low = self.expression();
+        let height = self.height;
         let both = self.expect(TokenKind::Comma, "between the bounds of the range");
         let high = if both {
             self.expression()
         } else {
             self.error_expr()
         };
+        self.height = self.height.max(height);
         self.closing(TokenKind::RightBracket, "after the range");
         TypeKind::Range(Box::new(low), Box::new(high))
     }
 
     fn struct_fields(&mut self) -> TypeKind {
         let mut fields = Vec::new();
+        let mut highest = 0;
         if !self.expect(TokenKind::LeftBrace, "after `struct`") {
             return TypeKind::Struct(fields);
         }
         while !self.at_end() && !self.at(TokenKind::RightBrace) {
             let before = self.progress();
             let ty = self.type_expr();
-            self.declarators("the name of a field", |_, name, dimensions| {
+            highest = highest.max(self.height);
+            self.declarators("the name of a field", |parser, name, dimensions| {
+                highest = highest.max(parser.height);
                 fields.push(StructField {
                     ty: ty.clone(),
                     name,
@@ -121,6 +129,7 @@ impl Parser<'_> {
             self.end_of_declaration("after the field", before);
         }
         self.expect(TokenKind::RightBrace, "after the fields");
+        self.height = highest + 1;
         TypeKind::Struct(fields)
     }
 
@@ -148,24 +157,27 @@ impl Parser<'_> {
         if self.eat(TokenKind::Semicolon) {
             return;
         }
-        self.expected(&format!("`;` {context}"));
+        self.missing(&format!("`;` {context}"));
         self.recover();
         if self.progress() == before {
             self.bump();
         }
     }
 
-    /// `[…][…]…`
+    /// `[…][…]…`; the height is that of the highest expression.
     pub(super) fn dimensions(&mut self) -> Vec<Dimension> {
         let mut dimensions = Vec::new();
+        let mut highest = 0;
         while self.eat(TokenKind::LeftBracket) {
             dimensions.push(if self.at_type_word() {
                 Dimension::Type(self.type_expr())
             } else {
                 Dimension::Size(self.expression())
             });
+            highest = highest.max(self.height);
             self.closing(TokenKind::RightBracket, "after the size of the array");
         }
+        self.height = highest;
         dimensions
     }
 

@@ -84,25 +84,25 @@ fn expands_too_much(text: &str) -> bool {
 
 fn malformed(error: &roxmltree::Error, file: &XmlFile, sources: &mut SourceMap) -> Diagnostic {
     let position = error.pos();
-    let line = file
-        .text
-        .split_inclusive('\n')
-        .nth(position.row.saturating_sub(1) as usize)
-        .unwrap_or("");
-    let line_start = line.as_ptr() as usize - file.text.as_ptr() as usize;
+    let (row, column) = (position.row.max(1) as usize, position.col.max(1) as usize);
+    let mut line_start = 0;
+    let mut line = "";
+    for (index, candidate) in file.text.split_inclusive('\n').enumerate() {
+        line_start += line.len();
+        line = candidate;
+        if index + 1 == row {
+            break;
+        }
+    }
     let column = line
         .char_indices()
-        .nth(position.col.saturating_sub(1) as usize)
+        .nth(column - 1)
         .map_or(line.len(), |(index, _)| index);
-    let (line_start, start) = if line.is_empty() {
-        (file.text.len(), 0)
-    } else {
-        (line_start, column)
-    };
-    let span = file.add_raw(line_start..line_start + line.len(), String::new(), sources);
+    let range = line_start..line_start + line.len();
+    let span = file.add_raw(range, String::new(), sources);
     let span = Span {
-        start: to_u32(start),
-        end: to_u32(start),
+        start: to_u32(column),
+        end: to_u32(column),
         ..span
     };
     let text = error.to_string();
@@ -438,7 +438,11 @@ impl Reader<'_, '_> {
                 self.error(codes::MISSING_PART, span, "this label has no `kind`");
                 continue;
             };
-            let is_blank = label.text().is_none_or(|text| text.trim().is_empty());
+            let is_blank = label
+                .children()
+                .filter(Node::is_text)
+                .filter_map(|child| child.text())
+                .all(|text| text.trim().is_empty());
             let is_known = !matches!(kind, "comments" | "testcode");
             let earlier = labels.iter_mut().find(|(other, _)| *other == kind);
             match earlier {

@@ -103,7 +103,8 @@ pub(super) fn end_of_tag(raw: &str) -> usize {
 
 /// The text as roxmltree understands it, for elements that use entities of the file's own.
 fn all_text(node: Node) -> String {
-    node.children().filter_map(|child| child.text()).collect()
+    let texts = node.children().filter(Node::is_text);
+    texts.filter_map(|child| child.text()).collect()
 }
 
 /// The decoded text and its offsets; `None` if it uses an entity that is not predefined.

@@ -48,18 +48,33 @@ fn word(text: &str, token: Token) -> &str {
     }
 }
 
+/// Prose has none of these words, and does not begin with a type.
 fn looks_like_a_model(text: &str, tokens: &[Token]) -> bool {
-    tokens.iter().any(|&token| {
-        matches!(
-            word(text, token),
-            "system" | "process" | "state" | "chan" | "clock"
-        )
-    })
+    let begins = tokens.first().is_some_and(|&first| {
+        let word = word(text, first);
+        keywords::is_reserved(word, Dialect::New)
+    });
+    begins
+        || tokens.iter().any(|&token| {
+            matches!(
+                word(text, token),
+                "system" | "process" | "state" | "chan" | "clock"
+            )
+        })
 }
 
 /// Whether a text holds what only the old syntax has: constants without a type or a `=`, processes without a list of
-/// parameters, and `;` between parameters.
+/// parameters, and `;` between parameters. A word that only the new syntax has decides otherwise: then it is a slip.
 pub(super) fn is_old_syntax(text: &str, tokens: &[Token]) -> bool {
+    let is_new = tokens.iter().any(|&token| {
+        matches!(
+            word(text, token),
+            "typedef" | "struct" | "return" | "void" | "select" | "meta"
+        )
+    });
+    if is_new {
+        return false;
+    }
     tokens.windows(3).enumerate().any(|(index, window)| {
         let [first, second, third] = [window[0], window[1], window[2]];
         let is_name = {
