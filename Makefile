@@ -1,0 +1,96 @@
+# The house of ntagen. Needs Python 3.11 or newer and a C tool chain; cargo is fetched if there is none.
+# Nothing has to be activated: everything runs in .venv, which is made on first use and kept up to date.
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+
+PYTHON ?= $(firstword $(foreach name,python3 python3.14 python3.13 python3.12 python3.11,\
+	$(shell $(name) -c 'import sys; sys.version_info >= (3, 11) and print("$(name)")' 2>/dev/null)) python3)
+BIN := .venv/bin
+# What the shell must know to find cargo: nothing, or where the fetched tool chain lies.
+RUST := .venv/rust.sh
+INSTALLED := .venv/installed
+# What the installed engine is built from. Python files and templates are used in place.
+ENGINE := pyproject.toml checker/Cargo.toml checker/Cargo.lock $(shell find checker/src -name '*.rs')
+
+.PHONY: help
+help: ## Show these targets
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 18
+
+.PHONY: setup
+setup: $(INSTALLED) ## Create .venv with ntagen and its tools in it (the first time takes minutes)
+
+.PHONY: demo
+demo: $(INSTALLED) ## Run the main job on the paper's environment; results in demo/
+	@mkdir -p demo
+	$(BIN)/ntagen compile examples/paper.nsl -o demo
+	$(BIN)/ntagen check examples/paper.nsl --plans demo/plans.json
+	$(BIN)/ntagen plot examples/paper.nsl -o demo/scene.png --plans 10
+	$(BIN)/ntagen drive examples/paper.nsl --seed 1 --log demo/run.mcap
+	@printf '%s\n' '' \
+	  'What happened: the environment became a UPPAAL model; both queries of the paper were checked on it;' \
+	  'all plans were ranked; a virtual needle was steered to the target by measuring and planning anew.' \
+	  'Where to look:' \
+	  '  demo/paper.xml   the model; UPPAAL opens it, with the queries in its verifier' \
+	  '  demo/plans.json  all plans with their clearance from the critical regions, best first' \
+	  '  demo/scene.png   the scene and the ten best plans' \
+	  '  demo/run.mcap    the run; see it with `$(BIN)/ntagen replay demo/run.mcap`, or in Foxglove'
+
+.PHONY: test
+test: $(INSTALLED) ## Run all tests, Rust and Python
+	source $(RUST) && cd checker && cargo test --locked --quiet
+	$(BIN)/python -m pytest
+
+.PHONY: quick
+quick: $(INSTALLED) ## Run the Python tests that take no more than a few seconds each
+	$(BIN)/python -m pytest -m 'not slow'
+
+.PHONY: lint
+lint: $(INSTALLED) ## Check formats, lints and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest ntagen._checker
+	source $(RUST) && cd checker && cargo fmt --check
+	source $(RUST) && cd checker && cargo clippy --locked --all-targets --quiet -- -D warnings
+
+.PHONY: format
+format: $(INSTALLED) ## Format all sources and repair what the linter can
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	source $(RUST) && cd checker && cargo fmt
+
+.PHONY: picture
+picture: $(INSTALLED) ## Draw examples/scene.png, the picture of the README
+	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10
+
+.PHONY: bench
+bench: $(INSTALLED) ## Measure the engine
+	source $(RUST) && cd checker && cargo bench --locked
+
+.PHONY: clean
+clean: ## Remove all that was built, also .venv
+	rm -rf .venv build dist demo checker/target ntagen/_checker*.so
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find ntagen tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(INSTALLED): $(RUST) $(ENGINE)
+	source $(RUST) && $(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@touch $@
+
+$(RUST): | .venv
+	@if ! command -v cargo >/dev/null; then \
+	  echo 'There is no cargo on the PATH: fetching a Rust tool chain into the cache.'; \
+	  $(BIN)/python -m pip install --quiet puccinialin; \
+	  $(BIN)/python -m puccinialin --program ntagen --info-json .venv/rust.json >/dev/null; \
+	  $(BIN)/python -c 'import json, shlex; \
+	    [print(f"export {k}={shlex.quote(v)}") for k, v in json.load(open(".venv/rust.json"))["env"].items()]' > $@.part; \
+	else : > $@.part; fi
+	@source $@.part && { { cargo fmt --version && cargo clippy --version; } >/dev/null 2>&1 || rustup component add rustfmt clippy || \
+	  echo 'cargo fmt and cargo clippy are missing: `make lint` needs them.'; }
+	@mv $@.part $@
+
+.venv:
+	@$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("ntagen needs Python 3.11 or newer; set PYTHON=…")'
+	$(PYTHON) -m venv $@
