@@ -9,6 +9,8 @@ pub mod syntax;
 pub mod ir;
 
 pub mod exec;
+
+pub mod semantics;
 pub mod zones;
 
 pub mod network;

@@ -1,0 +1,312 @@
+//! Calls: of functions of the model and of the built-in ones.
+
+use std::sync::Arc;
+
+use super::checker::Checker;
+use super::codes;
+use super::expressions::entity_kind;
+use super::scope::Entity;
+use super::typed::{Expr, Kind, Parameter, Signature};
+use super::types::Type;
+use crate::diagnostics::{Diagnostic, Span};
+use crate::exec::arithmetic;
+use crate::exec::math::{self, MathCode};
+use crate::ir::{FunctionId, MathFunction, RegisterType};
+use crate::syntax::ast::{self, ExprKind};
+
+impl Checker<'_> {
+    /// `callee(arguments)`
+    pub(super) fn call(&mut self, callee: &ast::Expr, arguments: &[ast::Expr], span: Span) -> Expr {
+        let ExprKind::Name(name) = &callee.kind else {
+            return self.call_of_member(callee, arguments, span);
+        };
+        match self.lookup(name) {
+            Some(Entity::Function(function, signature)) => {
+                self.call_function(function, &signature, arguments, span)
+            }
+            Some(Entity::Broken) => {
+                self.check_all(arguments);
+                Expr::error(span)
+            }
+            Some(Entity::OpenFunction) => {
+                self.check_all(arguments);
+                self.error(
+                    codes::FUNCTION_RECURSIVE,
+                    span,
+                    format!("'{name}' calls itself"),
+                    "use a loop",
+                );
+                Expr::error(span)
+            }
+            Some(entity) => {
+                self.check_all(arguments);
+                self.error(
+                    codes::CALL_OF_NO_FUNCTION,
+                    callee.span,
+                    format!("'{name}' is {}, not a function", entity_kind(&entity)),
+                    "only functions can be called",
+                );
+                Expr::error(span)
+            }
+            None => self.call_builtin(name, callee.span, arguments, span),
+        }
+    }
+
+    fn check_all(&mut self, arguments: &[ast::Expr]) -> Vec<Expr> {
+        arguments
+            .iter()
+            .map(|argument| self.expression(argument))
+            .collect()
+    }
+
+    /// A call of a function that is known.
+    pub(super) fn call_function(
+        &mut self,
+        function: FunctionId,
+        signature: &Arc<Signature>,
+        arguments: &[ast::Expr],
+        span: Span,
+    ) -> Expr {
+        let arguments = self.check_all(arguments);
+        if arguments.len() != signature.parameters.len() {
+            self.wrong_count(
+                &signature.name,
+                signature.parameters.len(),
+                arguments.len(),
+                span,
+            );
+            return Expr::error(span);
+        }
+        let mut converted = Vec::with_capacity(arguments.len());
+        for (argument, parameter) in arguments.into_iter().zip(&signature.parameters) {
+            converted.extend(self.argument(argument, parameter));
+        }
+        if converted.len() < signature.parameters.len() || signature.result.is_error() {
+            return Expr::error(span);
+        }
+        let kind = Kind::Call {
+            function,
+            signature: Arc::clone(signature),
+            arguments: converted,
+        };
+        Expr::new(kind, signature.result.clone(), span)
+    }
+
+    fn wrong_count(&mut self, name: &str, wanted: usize, given: usize, span: Span) {
+        self.error(
+            codes::ARGUMENT_COUNT,
+            span,
+            format!("'{name}' takes {wanted} arguments, but {given} are given"),
+            "give one argument for each parameter",
+        );
+    }
+
+    fn argument(&mut self, argument: Expr, parameter: &Parameter) -> Option<Expr> {
+        if argument.is_error() || parameter.ty.is_error() {
+            return None;
+        }
+        if !parameter.reference {
+            return self.converted(argument, &parameter.ty);
+        }
+        let is_place = argument.is_place();
+        let is_readable = is_place && parameter.ty.holds(&argument.ty);
+        if parameter.constant && !is_readable {
+            // A const reference also takes values; they get a place of their own.
+            let argument = self.converted(argument, &parameter.ty)?;
+            if argument.is_place() && argument.ty.is_register() {
+                self.mark_addressed(&argument);
+            }
+            return Some(argument);
+        }
+        if !parameter.constant && !self.expect_mutable(&argument) {
+            return None;
+        }
+        if !(parameter.constant || argument.ty.is_equivalent(&parameter.ty)) {
+            self.report(
+                Diagnostic::new(
+                    codes::REFERENCE_MISMATCHED,
+                    argument.span,
+                    format!(
+                        "the reference parameter '{}' needs {}, but this is {}",
+                        parameter.name,
+                        parameter.ty.described(),
+                        argument.ty.described()
+                    ),
+                )
+                .help("a reference needs a variable of the very same type, range included"),
+            );
+            return None;
+        }
+        self.mark_addressed(&argument);
+        Some(argument)
+    }
+
+    fn call_builtin(
+        &mut self,
+        name: &str,
+        name_span: Span,
+        arguments: &[ast::Expr],
+        span: Span,
+    ) -> Expr {
+        let arguments = self.check_all(arguments);
+        if name == "fint" {
+            return self.truncation(arguments, span);
+        }
+        let Some(function) = math_function(name) else {
+            if is_random(name) {
+                self.error(
+                    codes::RANDOM_UNSUPPORTED,
+                    name_span,
+                    format!("'{name}' is a random function: these exist in statistical model checking only"),
+                    "use select, or several edges, for a choice",
+                );
+            } else {
+                self.unknown_name(name, name_span);
+            }
+            return Expr::error(span);
+        };
+        let parameters = function.parameters();
+        if arguments.len() != parameters.len() {
+            self.wrong_count(name, parameters.len(), arguments.len(), span);
+            return Expr::error(span);
+        }
+        let mut converted = Vec::new();
+        for (argument, &register) in arguments.into_iter().zip(parameters) {
+            let wanted = if register == RegisterType::Double {
+                Type::Double
+            } else {
+                Type::ANY_INT
+            };
+            converted.extend(self.converted(argument, &wanted));
+        }
+        if converted.len() < parameters.len() {
+            return Expr::error(span);
+        }
+        folded_math(function, converted, span)
+    }
+
+    /// `fint(argument)`
+    fn truncation(&mut self, mut arguments: Vec<Expr>, span: Span) -> Expr {
+        let argument = match (arguments.pop(), arguments.len()) {
+            (Some(argument), 0) => argument,
+            (argument, rest) => {
+                self.wrong_count("fint", 1, rest + usize::from(argument.is_some()), span);
+                return Expr::error(span);
+            }
+        };
+        if argument.is_error() || argument.ty.is_integral() {
+            return Expr { span, ..argument };
+        }
+        let Some(argument) = self.converted(argument, &Type::Double) else {
+            return Expr::error(span);
+        };
+        if let Kind::Double(value) = argument.kind
+            && let Ok(value) = arithmetic::truncate(value)
+        {
+            return Expr::int(value, Type::ANY_INT, span);
+        }
+        Expr::new(Kind::ToInteger(Box::new(argument)), Type::ANY_INT, span)
+    }
+}
+
+/// A function of the mathematical library, evaluated if its arguments are known.
+fn folded_math(function: MathFunction, arguments: Vec<Expr>, span: Span) -> Expr {
+    let ty = match function {
+        MathFunction::Abs | MathFunction::Ilogb => Type::ANY_INT,
+        _ if function.result() == RegisterType::Integer => Type::Bool,
+        _ => Type::Double,
+    };
+    let doubles: Vec<f64> = arguments
+        .iter()
+        .filter_map(|argument| match argument.kind {
+            Kind::Double(value) => Some(value),
+            _ => None,
+        })
+        .collect();
+    let double = |value: f64| Expr::new(Kind::Double(value), Type::Double, span);
+    match (math::code_of(function), doubles.as_slice()) {
+        (MathCode::Abs, _) => absolute(arguments, span),
+        (MathCode::Unary(code), &[x]) => double(code(x)),
+        (MathCode::Binary(code), &[x, y]) => double(code(x, y)),
+        (MathCode::Ternary(code), &[x, y, z]) => double(code(x, y, z)),
+        _ => Expr::new(Kind::Math(function, arguments), ty, span),
+    }
+}
+
+fn absolute(arguments: Vec<Expr>, span: Span) -> Expr {
+    let (low, high) = arguments[0].interval;
+    if let Some(value) = arguments[0].constant()
+        && let Ok(value) = math::abs(value)
+    {
+        return Expr::int(value, Type::ANY_INT, span);
+    }
+    let least = if low <= 0 && 0 <= high {
+        0
+    } else {
+        low.saturating_abs().min(high.saturating_abs())
+    };
+    let most = low.saturating_abs().max(high.saturating_abs());
+    let kind = Kind::Math(MathFunction::Abs, arguments);
+    Expr::new(kind, Type::ANY_INT, span).within((least, most))
+}
+
+fn is_random(name: &str) -> bool {
+    name == "random" || name == "normal" || name.starts_with("random_")
+}
+
+fn math_function(name: &str) -> Option<MathFunction> {
+    Some(match name {
+        "abs" => MathFunction::Abs,
+        "fabs" => MathFunction::Fabs,
+        "exp" => MathFunction::Exp,
+        "exp2" => MathFunction::Exp2,
+        "expm1" => MathFunction::Expm1,
+        "ln" => MathFunction::Ln,
+        "log" => MathFunction::Log,
+        "log10" => MathFunction::Log10,
+        "log2" => MathFunction::Log2,
+        "log1p" => MathFunction::Log1p,
+        "sqrt" => MathFunction::Sqrt,
+        "cbrt" => MathFunction::Cbrt,
+        "sin" => MathFunction::Sin,
+        "cos" => MathFunction::Cos,
+        "tan" => MathFunction::Tan,
+        "asin" => MathFunction::Asin,
+        "acos" => MathFunction::Acos,
+        "atan" => MathFunction::Atan,
+        "sinh" => MathFunction::Sinh,
+        "cosh" => MathFunction::Cosh,
+        "tanh" => MathFunction::Tanh,
+        "asinh" => MathFunction::Asinh,
+        "acosh" => MathFunction::Acosh,
+        "atanh" => MathFunction::Atanh,
+        "erf" => MathFunction::Erf,
+        "erfc" => MathFunction::Erfc,
+        "tgamma" => MathFunction::Tgamma,
+        "lgamma" => MathFunction::Lgamma,
+        "ceil" => MathFunction::Ceil,
+        "floor" => MathFunction::Floor,
+        "trunc" => MathFunction::Trunc,
+        "round" => MathFunction::Round,
+        "logb" => MathFunction::Logb,
+        "ilogb" => MathFunction::Ilogb,
+        "fmod" => MathFunction::Fmod,
+        "fmax" => MathFunction::Fmax,
+        "fmin" => MathFunction::Fmin,
+        "fdim" => MathFunction::Fdim,
+        "pow" => MathFunction::Pow,
+        "hypot" => MathFunction::Hypot,
+        "atan2" => MathFunction::Atan2,
+        "nextafter" => MathFunction::Nextafter,
+        "copysign" => MathFunction::Copysign,
+        "ldexp" => MathFunction::Ldexp,
+        "fma" => MathFunction::Fma,
+        "isfinite" => MathFunction::IsFinite,
+        "isinf" => MathFunction::IsInfinite,
+        "isnan" => MathFunction::IsNan,
+        "isnormal" => MathFunction::IsNormal,
+        "signbit" => MathFunction::SignBit,
+        "isunordered" => MathFunction::IsUnordered,
+        _ => return None,
+    })
+}

@@ -1,0 +1,284 @@
+//! The state of a run of checking: diagnostics, scopes, and the network under construction.
+
+use std::collections::HashSet;
+
+use super::codes;
+use super::lower::{Builder, Images};
+use super::scope::{Entity, Scope};
+use super::typed::{Expr, Kind, Local, LocalId, Place, Root};
+use super::types::{Size, Type};
+use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
+use crate::exec::{Context, Executor, Interpreter};
+use crate::ir::{Channel, Clock, FunctionId, Network, ProcessId, RunTimeErrorKind, Variable};
+
+/// The place of the system section's scope: behind the prelude's and the global one.
+const SYSTEM_SCOPE: usize = 2;
+
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an independent fact about what is being checked"
+)]
+/// Everything that checking knows; a model keeps the lasting part for its queries.
+pub(super) struct Checker<'a> {
+    /// The texts, for labels and messages.
+    pub(super) sources: &'a SourceMap,
+    /// What lasts.
+    pub(super) world: World,
+    /// The open scopes, outermost first.
+    pub(super) scopes: Vec<Scope>,
+    /// What was found.
+    pub(super) diagnostics: Vec<Diagnostic>,
+    reported: HashSet<(&'static str, Span)>,
+    has_errors: bool,
+    /// The locals of the function, guard or update that is being checked.
+    pub(super) locals: Vec<Local>,
+    /// Set when a free parameter is looked up.
+    pub(super) free_parameter_seen: bool,
+    /// Whether a template is checked without an instance: values of parameters are unknown.
+    pub(super) is_generic: bool,
+    /// Whether the declarations of the system section are out of sight.
+    pub(super) hides_system: bool,
+    /// Set when a quantifier can only be checked value by value, because the members of a process set differ.
+    pub(super) needs_unrolling: bool,
+    /// Whether a query is checked.
+    pub(super) is_query: bool,
+    /// The process whose declarations are being checked.
+    pub(super) process: Option<(ProcessId, String)>,
+}
+
+/// What lasts from the model to its queries.
+#[derive(Debug, Default)]
+pub(super) struct World {
+    /// The network under construction.
+    pub(super) network: Network,
+    /// What lies in the constant memory.
+    pub(super) images: Images,
+    /// The initial words of the variables.
+    pub(super) initial: Vec<i32>,
+    /// The initial words of the `meta` variables.
+    pub(super) initial_meta: Vec<i32>,
+    /// How many scalar sets there are.
+    pub(super) scalar_sets: u32,
+    /// The scopes that queries see: prelude, globals, system.
+    pub(super) query_scopes: Vec<Scope>,
+    /// The processes by the name in the system line.
+    pub(super) processes: super::instantiate::Processes,
+}
+
+impl<'a> Checker<'a> {
+    pub(super) fn new(sources: &'a SourceMap, world: World) -> Checker<'a> {
+        Checker {
+            sources,
+            world,
+            scopes: vec![Scope::default()],
+            diagnostics: Vec::new(),
+            reported: HashSet::new(),
+            has_errors: false,
+            locals: Vec::new(),
+            free_parameter_seen: false,
+            is_generic: false,
+            hides_system: false,
+            needs_unrolling: false,
+            is_query: false,
+            process: None,
+        }
+    }
+
+    /// Reports a diagnostic, unless the same was reported at the same place (for another instance).
+    pub(super) fn report(&mut self, diagnostic: Diagnostic) {
+        if self
+            .reported
+            .insert((diagnostic.code.code, diagnostic.span))
+        {
+            self.has_errors |= diagnostic.is_error();
+            self.diagnostics.push(diagnostic);
+        }
+    }
+
+    /// Reports a mistake with a way out.
+    pub(super) fn error(&mut self, code: Code, span: Span, message: impl Into<String>, help: &str) {
+        self.report(Diagnostic::new(code, span, message).help(help));
+    }
+
+    /// Whether code may be made: nothing was wrong so far, and all values are known.
+    pub(super) fn can_lower(&self) -> bool {
+        !self.has_errors && !self.is_generic
+    }
+
+    /// Whether a mistake was reported.
+    pub(super) fn has_errors(&self) -> bool {
+        self.has_errors
+    }
+
+    /// What a name stands for.
+    pub(super) fn lookup(&mut self, name: &str) -> Option<Entity> {
+        let hidden = self.hides_system.then_some(SYSTEM_SCOPE);
+        let visible = self.scopes.iter().enumerate().rev();
+        let entity = visible
+            .filter(|&(i, _)| Some(i) != hidden)
+            .find_map(|(_, scope)| scope.get(name))
+            .map(|(entity, _)| entity.clone())?;
+        if let Entity::Constant { free: true, .. } = entity {
+            self.free_parameter_seen = true;
+        }
+        Some(entity)
+    }
+
+    /// A declared name like the given one.
+    pub(super) fn similar_name(&self, name: &str) -> Option<String> {
+        let nearest = self
+            .scopes
+            .iter()
+            .rev()
+            .filter_map(|scope| scope.similar(name));
+        nearest
+            .min_by_key(|&(distance, _)| distance)
+            .map(|(_, name)| name.to_owned())
+    }
+
+    /// Declares a name in the innermost scope.
+    pub(super) fn declare(&mut self, name: &crate::syntax::ast::Name, entity: Entity) {
+        let scope = self
+            .scopes
+            .last_mut()
+            .expect("the prelude's scope is always open");
+        if let Some((_, first)) = scope.get(&name.text) {
+            let place = self.sources.position(*first);
+            self.report(
+                Diagnostic::new(
+                    codes::NAME_DECLARED_TWICE,
+                    name.span,
+                    format!("'{}' is declared twice in the same scope", name.text),
+                )
+                .note(format!("first declared in line {}", place.line))
+                .help("give one of the two another name"),
+            );
+            return;
+        }
+        scope.set(&name.text, entity, name.span);
+    }
+
+    /// A new local of the body that is being checked.
+    pub(super) fn new_local(&mut self, ty: Type) -> LocalId {
+        self.locals.push(Local {
+            ty,
+            addressed: false,
+        });
+        LocalId(self.locals.len() as u32 - 1)
+    }
+
+    /// Notes that a place is referred to, so that it must lie in memory.
+    pub(super) fn mark_addressed(&mut self, expr: &Expr) {
+        match &expr.kind {
+            Kind::Variable(Place {
+                root: Root::Local(local),
+                ..
+            }) => self.locals[local.0 as usize].addressed = true,
+            Kind::Index { array: inner, .. }
+            | Kind::Field { record: inner, .. }
+            | Kind::Assign(inner, _)
+            | Kind::Compound(_, inner, _)
+            | Kind::Step { target: inner, .. } => self.mark_addressed(inner),
+            Kind::Ternary(_, then, otherwise) => {
+                self.mark_addressed(then);
+                self.mark_addressed(otherwise);
+            }
+            _ => {}
+        }
+    }
+
+    /// A builder for code over the given locals.
+    pub(super) fn builder<'b>(&'b mut self, locals: &'b [Local]) -> Builder<'b> {
+        Builder::new(&mut self.world.network, &mut self.world.images, locals)
+    }
+
+    /// Room for a variable of the state, with the given initial words and the names of its parts.
+    pub(super) fn allocate(&mut self, name: &str, ty: &Type, meta: bool, words: &[i32]) -> Place {
+        let full_name = match &self.process {
+            Some((_, process)) => format!("{process}.{name}"),
+            None => name.to_owned(),
+        };
+        let region = if meta {
+            &mut self.world.initial_meta
+        } else {
+            &mut self.world.initial
+        };
+        let offset = region.len() as u32;
+        region.extend_from_slice(words);
+        let base = Size {
+            words: if meta {
+                super::typed::META_WORDS + offset
+            } else {
+                offset
+            },
+            clocks: self.world.network.clocks.len() as u32,
+            channels: self.world.network.channels.len() as u32,
+        };
+        let owner = self.process.as_ref().map(|(process, _)| *process);
+        if !words.is_empty() {
+            self.world.network.layout.variables.push(Variable {
+                name: full_name.clone(),
+                owner,
+                offset: base.words,
+                shape: super::layout::shape(ty),
+                meta,
+            });
+        }
+        self.add_parts(&full_name, ty, owner);
+        Place {
+            root: Root::State,
+            base,
+            mutable: true,
+        }
+    }
+
+    /// Adds the clocks and channels of a variable.
+    fn add_parts(&mut self, name: &str, ty: &Type, owner: Option<ProcessId>) {
+        match ty {
+            Type::Clock { hybrid } => {
+                self.world.network.clocks.push(Clock {
+                    name: name.to_owned(),
+                    owner,
+                    hybrid: *hybrid,
+                });
+                self.world.network.initial_clocks.push(0);
+            }
+            Type::Channel { urgent, broadcast } => self.world.network.channels.push(Channel {
+                name: name.to_owned(),
+                broadcast: *broadcast,
+                urgent: *urgent,
+                priority: 0,
+            }),
+            Type::Array(array) if ty.size().clocks + ty.size().channels > 0 => {
+                for i in 0..array.index.length {
+                    let index = i64::from(array.index.first) + i64::from(i);
+                    self.add_parts(&format!("{name}[{index}]"), &array.part, owner);
+                }
+            }
+            Type::Struct(record) => {
+                for (field, ty) in &record.fields {
+                    self.add_parts(&format!("{name}.{field}"), ty, owner);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Runs a function that writes `words` words to the start of an otherwise empty state.
+    pub(super) fn run(
+        &self,
+        function: FunctionId,
+        words: u32,
+    ) -> Result<Vec<i32>, RunTimeErrorKind> {
+        let network = &self.world.network;
+        let interpreter = Interpreter::new(&network.functions, &network.constants);
+        let mut state = vec![0; words as usize];
+        let mut context = Context {
+            state: &mut state,
+            constraints: &mut Vec::new(),
+            assignments: &mut Vec::new(),
+        };
+        let result = interpreter.call(function, &[], &mut context);
+        result.map(|_| state).map_err(|error| error.kind)
+    }
+}

@@ -1,0 +1,288 @@
+//! Expressions on clocks: sums, comparisons, rates, assignments; and which class a condition on clocks is of.
+//!
+//! `x < c`, `x <= c`, `x > c`, `x >= c` and the same for differences can stand anywhere; equalities in guards and queries;
+//! inequalities, negations and disjunctions of such conditions in queries only. That keeps guards and invariants convex.
+//!
+//! Source: the classification of UPPAAL's type checker.
+
+use super::checker::Checker;
+use super::codes;
+use super::expressions::known_offset;
+use super::operators::{integer_operation, is_clock_term};
+use super::typed::{ClockRelation, ClockSum, Expr, Kind, Root};
+use super::types::{Class, Memory, Type};
+use crate::diagnostics::Span;
+use crate::ir::{CLOCK_LIMIT, ClockId, IntegerOperator, Relation};
+
+impl Checker<'_> {
+    /// `left + right` or `left - right` where one is a clock or a sum with one.
+    pub(super) fn add_clocks(&mut self, is_sum: bool, left: Expr, right: Expr, span: Span) -> Expr {
+        if !(is_clock_term(&left) || left.ty.is_integral())
+            || !(is_clock_term(&right) || right.ty.is_integral())
+        {
+            return self.clock_as_number(&left, &right, span);
+        }
+        let (left_sum, right_sum) = (into_sum(left), into_sum(right));
+        let right_sum = if is_sum {
+            right_sum
+        } else {
+            negated(right_sum, span)
+        };
+        let Some(sum) = added(left_sum, right_sum, span) else {
+            self.too_many_clocks(span);
+            return Expr::error(span);
+        };
+        Expr::new(Kind::ClockSum(sum), Type::ClockTerm, span)
+    }
+
+    fn too_many_clocks(&mut self, span: Span) {
+        self.error(
+            codes::CLOCKS_BEYOND_DIFFERENCE,
+            span,
+            "only single clocks and differences of two clocks can be compared",
+            "write x - y < c, x < y + c or x < c",
+        );
+    }
+
+    fn clock_as_number(&mut self, left: &Expr, right: &Expr, span: Span) -> Expr {
+        if left.is_error() || right.is_error() {
+            return Expr::error(span);
+        }
+        if !(left.ty == Type::Double || right.ty == Type::Double) {
+            return self.operands_refused(left, right, span);
+        }
+        self.error(
+            codes::CLOCK_WITH_DOUBLE,
+            span,
+            "a clock meets a double here: clocks have exact, symbolic values",
+            "compare clocks with integers; fint(…) truncates a double",
+        );
+        Expr::error(span)
+    }
+
+    /// A comparison in which at least one side is a clock or a sum with one.
+    pub(super) fn compare_clocks(
+        &mut self,
+        relation: Relation,
+        left: Expr,
+        right: Expr,
+        span: Span,
+    ) -> Expr {
+        let (left, right) = (integral_double(left), integral_double(right));
+        let is_term = |e: &Expr| is_clock_term(e) || e.ty.is_integral();
+        if !is_term(&left) || !is_term(&right) {
+            return self.clock_as_number(&left, &right, span);
+        }
+        let (left, right, relation) = match relation {
+            Relation::Greater => (right, left, ClockRelation::Less),
+            Relation::GreaterEqual => (right, left, ClockRelation::LessEqual),
+            Relation::Less => (left, right, ClockRelation::Less),
+            Relation::LessEqual => (left, right, ClockRelation::LessEqual),
+            Relation::Equal => (left, right, ClockRelation::Equal),
+            Relation::NotEqual => (left, right, ClockRelation::NotEqual),
+        };
+        let (mut left, mut right) = (into_sum(left), into_sum(right));
+        let offsets = (left.offset.take(), right.offset.take());
+        let Some(sum) = added(left, negated(right, span), span) else {
+            self.too_many_clocks(span);
+            return Expr::error(span);
+        };
+        let (bound, is_negated) = match offsets {
+            (None, None) => (Expr::int(0, Type::ANY_INT, span), false),
+            (None, Some(bound)) => (*bound, false),
+            (Some(bound), None) => (*bound, true),
+            (Some(minus), Some(plus)) => (
+                integer_operation(IntegerOperator::Subtract, *plus, *minus, span),
+                false,
+            ),
+        };
+        self.check_bound(&bound);
+        let class = match relation {
+            ClockRelation::Less | ClockRelation::LessEqual => Class::Invariant,
+            ClockRelation::Equal => Class::Guard,
+            ClockRelation::NotEqual => Class::Query,
+        };
+        let kind = Kind::ClockCompare {
+            relation,
+            left: sum.plus,
+            right: sum.minus,
+            bound: Box::new(bound),
+            negated: is_negated,
+        };
+        self.refuse_hybrid(&kind, span);
+        Expr::new(kind, Type::Constraint(class), span)
+    }
+
+    fn check_bound(&mut self, bound: &Expr) {
+        if let Some(value) = bound.constant()
+            && value.unsigned_abs() > CLOCK_LIMIT.unsigned_abs()
+        {
+            self.error(
+                codes::CLOCK_BOUND_TOO_LARGE,
+                bound.span,
+                format!("a clock is compared with {value}; the limit is {CLOCK_LIMIT}"),
+                "measure time in a larger unit",
+            );
+        }
+    }
+
+    /// Hybrid clocks are abstracted away, so nothing may depend on them.
+    fn refuse_hybrid(&mut self, kind: &Kind, span: Span) {
+        let Kind::ClockCompare { left, right, .. } = kind else {
+            return;
+        };
+        let hybrid = Type::Clock { hybrid: true };
+        if left.iter().chain(right).any(|clock| clock.ty == hybrid) {
+            self.error(
+                codes::HYBRID_CLOCK_COMPARED,
+                span,
+                "hybrid clocks are abstracted away in symbolic and game queries and cannot be compared",
+                "use an ordinary clock, or keep the hybrid one out of conditions",
+            );
+        }
+    }
+
+    /// `clock' == rate`
+    pub(super) fn rate(&mut self, clock: Expr, rate: Expr, span: Span) -> Expr {
+        if clock.is_error() || rate.is_error() {
+            return Expr::error(span);
+        }
+        let Type::Clock { hybrid } = clock.ty else {
+            self.error(
+                codes::RATE_OF_NO_CLOCK,
+                clock.span,
+                format!(
+                    "only clocks have a rate, but this is {}",
+                    clock.ty.described()
+                ),
+                "write x' for a clock x",
+            );
+            return Expr::error(span);
+        };
+        if hybrid {
+            return Expr::new(
+                Kind::Int(1),
+                Type::Constraint(Class::InvariantWithRate),
+                span,
+            );
+        }
+        let rate = integral_double(rate);
+        let outside = rate.interval.1 < 0 || rate.interval.0 > 1;
+        if !rate.ty.is_integral() || outside {
+            self.error(
+                codes::RATE_NOT_ZERO_OR_ONE,
+                rate.span,
+                "only the rates 0 and 1 are supported on ordinary clocks",
+                "declare the clock as a hybrid clock if no condition depends on it",
+            );
+            return Expr::error(span);
+        }
+        let kind = Kind::Rate {
+            clock: Box::new(clock),
+            rate: Box::new(rate),
+        };
+        Expr::new(kind, Type::Constraint(Class::InvariantWithRate), span)
+    }
+
+    /// `clock := value`
+    pub(super) fn assign_clock(&mut self, target: Expr, value: Expr, span: Span) -> Expr {
+        let ty = target.ty.clone();
+        if ty == (Type::Clock { hybrid: true }) {
+            // Nothing depends on a hybrid clock; only the side effects of the value remain.
+            return if value.has_effect() {
+                value
+            } else {
+                Expr::new(Kind::Int(0), Type::Void, span)
+            };
+        }
+        let value = integral_double(value);
+        let sum = if is_clock_term(&value) || value.ty.is_integral() {
+            into_sum(value)
+        } else {
+            return self.clock_as_number(&target, &value, span);
+        };
+        if sum.minus.is_some() {
+            self.error(
+                codes::CLOCK_SET_TO_DIFFERENCE,
+                span,
+                "a clock cannot be set to a difference of clocks",
+                "set it to an integer, or to a clock plus an integer",
+            );
+            return Expr::error(span);
+        }
+        if let Some(value) = &sum.offset {
+            self.check_bound(value);
+        }
+        let kind = Kind::AssignClock {
+            target: Box::new(target),
+            source: sum.plus,
+            value: sum.offset,
+        };
+        Expr::new(kind, ty, span)
+    }
+
+    /// Whether the place is one known clock, and which.
+    pub(super) fn known_clock(expr: &Expr) -> Option<ClockId> {
+        let root = expr.variable()?;
+        let offset = known_offset(expr, Memory::Clocks)?;
+        (root.root == Root::State).then_some(ClockId(offset))
+    }
+}
+
+/// A double constant without fraction as the integer that it is.
+fn integral_double(expr: Expr) -> Expr {
+    match expr.kind {
+        Kind::Double(value) if value.fract() == 0.0 && value.abs() <= f64::from(CLOCK_LIMIT) => {
+            Expr::int(value as i32, Type::ANY_INT, expr.span)
+        }
+        _ => expr,
+    }
+}
+
+fn into_sum(expr: Expr) -> ClockSum {
+    match expr.kind {
+        Kind::ClockSum(sum) => sum,
+        _ if expr.ty.is_clock() => ClockSum {
+            plus: Some(Box::new(expr)),
+            ..ClockSum::default()
+        },
+        _ => ClockSum {
+            offset: Some(Box::new(expr)),
+            ..ClockSum::default()
+        },
+    }
+}
+
+fn negated(sum: ClockSum, span: Span) -> ClockSum {
+    let zero = Expr::int(0, Type::ANY_INT, span);
+    ClockSum {
+        plus: sum.minus,
+        minus: sum.plus,
+        offset: sum
+            .offset
+            .map(|offset| integer_operation(IntegerOperator::Subtract, zero, *offset, span))
+            .map(Box::new),
+    }
+}
+
+/// The sum of two, if it has at most one clock of each sign.
+fn added(left: ClockSum, right: ClockSum, span: Span) -> Option<ClockSum> {
+    let one = |a: Option<Box<Expr>>, b: Option<Box<Expr>>| match (a, b) {
+        (Some(_), Some(_)) => None,
+        (a, b) => Some(a.or(b)),
+    };
+    let offset = match (left.offset, right.offset) {
+        (Some(a), Some(b)) => Some(Box::new(integer_operation(
+            IntegerOperator::Add,
+            *a,
+            *b,
+            span,
+        ))),
+        (a, b) => a.or(b),
+    };
+    Some(ClockSum {
+        plus: one(left.plus, right.plus)?,
+        minus: one(left.minus, right.minus)?,
+        offset,
+    })
+}

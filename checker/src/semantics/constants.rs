@@ -1,0 +1,171 @@
+//! Values that must be known when the model is loaded: bounds, sizes, initialisers, arguments of templates.
+//!
+//! Most are folded while they are checked. What is left (calls of functions, parts of constant arrays) is lowered and run
+//! by the interpreter, so there is one meaning of code only.
+
+use super::checker::Checker;
+use super::codes;
+use super::typed::{Expr, Kind, Root};
+use super::types::Type;
+use crate::diagnostics::{Diagnostic, Span};
+use crate::exec::arithmetic;
+use crate::ir::{IntegerOperator, RunTimeErrorKind};
+
+impl Checker<'_> {
+    /// Whether the value of an expression is known without a state.
+    pub(super) fn is_computable(expr: &Expr) -> bool {
+        !expr.any(&|e| match &e.kind {
+            Kind::Variable(place) => match place.root {
+                Root::Constants => false,
+                Root::State => true,
+                Root::Local(_) => !Self::is_bound_inside(expr, place.root),
+            },
+            Kind::Call { signature, .. } => {
+                signature.effects.reads_state
+                    || signature.effects.mentions_clocks
+                    || signature.may_write()
+            }
+            Kind::Deadlock
+            | Kind::ClockCompare { .. }
+            | Kind::ClockSum(_)
+            | Kind::Rate { .. }
+            | Kind::AssignClock { .. } => true,
+            _ => false,
+        })
+    }
+
+    /// Whether a local is bound by a quantifier inside the expression itself.
+    fn is_bound_inside(expr: &Expr, root: Root) -> bool {
+        expr.any(
+            &|e| matches!(&e.kind, Kind::Quantifier { local, .. } if root == Root::Local(*local)),
+        )
+    }
+
+    /// The words of an expression that must be known now, converted to `ty`; `None` if that was reported, or if it hangs on
+    /// a value that no instance gives.
+    pub(super) fn known_words(&mut self, expr: &Expr, ty: &Type, what: &str) -> Option<Vec<i32>> {
+        if expr.is_error() || ty.is_error() {
+            return None;
+        }
+        if !Self::is_computable(expr) {
+            self.error(
+                codes::VALUE_NOT_CONSTANT,
+                expr.span,
+                format!("{what} must be known when the model is loaded"),
+                "use constants, and functions that read nothing but constants",
+            );
+            return None;
+        }
+        let words = match expr.kind {
+            Kind::Int(value) => vec![value],
+            Kind::Double(value) => arithmetic::double_words(value).to_vec(),
+            _ => self.run_expression(expr)?,
+        };
+        let (low, high) = ty.bounds();
+        if ty.is_integral() && !(low..=high).contains(&words[0]) {
+            self.report(
+                Diagnostic::new(
+                    codes::CONSTANT_OUT_OF_RANGE,
+                    expr.span,
+                    format!("the value {} is outside {ty}", words[0]),
+                )
+                .help(format!(
+                    "use a value from {low} to {high}, or widen the range"
+                )),
+            );
+            return None;
+        }
+        Some(words)
+    }
+
+    fn run_expression(&mut self, expr: &Expr) -> Option<Vec<i32>> {
+        if !self.can_lower() {
+            return None;
+        }
+        let locals = self.locals.clone();
+        let functions = self.world.network.functions.len();
+        let function = self.builder(&locals).words(String::from("constant"), expr);
+        let result = self.run(function, expr.ty.size().words);
+        self.world.network.functions.truncate(functions);
+        match result {
+            Ok(words) => Some(words),
+            Err(kind) => {
+                self.report_failure(kind, expr.span);
+                None
+            }
+        }
+    }
+
+    fn report_failure(&mut self, kind: RunTimeErrorKind, span: Span) {
+        let reason = match kind {
+            RunTimeErrorKind::Overflow => "an overflow of 32 bits",
+            RunTimeErrorKind::DivisionByZero => "a division by zero",
+            RunTimeErrorKind::ShiftDistance => {
+                "a shift by a negative number of bits or by more than 31"
+            }
+            RunTimeErrorKind::NegativeExponent => "a negative exponent",
+            RunTimeErrorKind::OutOfRange => "a value outside its range",
+            RunTimeErrorKind::IndexOutOfBounds => "an index outside its array",
+            RunTimeErrorKind::NotAnInteger => "a double that fits into no integer",
+            RunTimeErrorKind::ClockValue => "a clock value beyond the limits",
+            RunTimeErrorKind::AssertionFailed => "an assertion that does not hold",
+            RunTimeErrorKind::StepLimit => "a loop without end",
+        };
+        self.error(
+            codes::CONSTANT_WITHOUT_VALUE,
+            span,
+            format!("this constant has no value: {reason}"),
+            "correct the expression",
+        );
+    }
+
+    /// The value of an integer that must be known now.
+    pub(super) fn known_int(&mut self, expr: &Expr, what: &str) -> Option<i32> {
+        if !expr.ty.is_integral() {
+            self.expect_integer(expr, what);
+            return None;
+        }
+        self.known_words(expr, &Type::ANY_INT, what)
+            .map(|words| words[0])
+    }
+
+    /// The bound of a range. As in C, and as UPPAAL does, the arithmetic of bounds wraps round where 32 bits are exceeded:
+    /// `-(1<<31)` and `(1<<31)-1` are common ways to write the limits of integers.
+    pub(super) fn known_bound(&mut self, expr: &Expr) -> Option<i32> {
+        wrapping_value(expr).or_else(|| self.known_int(expr, "the bound of a range"))
+    }
+
+    /// Reports that an integer is needed.
+    pub(super) fn expect_integer(&mut self, expr: &Expr, what: &str) -> bool {
+        if expr.is_error() || expr.ty.is_integral() {
+            return !expr.is_error();
+        }
+        self.error(
+            codes::INTEGER_EXPECTED,
+            expr.span,
+            format!(
+                "{what} must be an integer, but this is {}",
+                expr.ty.described()
+            ),
+            "use an integer expression; fint(…) truncates a double",
+        );
+        false
+    }
+}
+
+/// The value of arithmetic on integer constants, wrapping round.
+fn wrapping_value(expr: &Expr) -> Option<i32> {
+    match &expr.kind {
+        Kind::Int(value) => Some(*value),
+        Kind::Integer(operator, left, right) => {
+            let (left, right) = (wrapping_value(left)?, wrapping_value(right)?);
+            match operator {
+                IntegerOperator::Add => Some(left.wrapping_add(right)),
+                IntegerOperator::Subtract => Some(left.wrapping_sub(right)),
+                IntegerOperator::Multiply => Some(left.wrapping_mul(right)),
+                _ => arithmetic::integer(*operator, left, right).ok(),
+            }
+        }
+        _ => None,
+    }
+}

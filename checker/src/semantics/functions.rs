@@ -1,0 +1,456 @@
+//! Functions of the model and the statements of their bodies.
+
+use std::sync::Arc;
+
+use super::checker::Checker;
+use super::codes;
+use super::scope::{Entity, Scope};
+use super::typed::{Effects, Expr, Kind, LocalId, Parameter, Place, Root, Signature, Statement};
+use super::types::{Size, Type};
+use crate::diagnostics::Span;
+use crate::ir::FunctionId;
+use crate::syntax::ast::{self, Declaration, Name};
+
+/// The function of a declaration that could not be lowered; never called, because nothing is lowered after a mistake.
+const NO_FUNCTION: FunctionId = FunctionId(u32::MAX);
+
+impl Checker<'_> {
+    /// Checks a function, lowers it, and declares its name.
+    pub(super) fn function(&mut self, function: &ast::Function) {
+        let outer_locals = std::mem::take(&mut self.locals);
+        let result = self.result_type(&function.return_type);
+        self.declare(&function.name, Entity::OpenFunction);
+        self.scopes.push(Scope::default());
+        let parameters: Vec<Parameter> = function
+            .parameters
+            .iter()
+            .map(|parameter| self.function_parameter(parameter))
+            .collect();
+        let body = self.block_in_scope(&function.body, &result);
+        self.scopes.pop();
+        if result != Type::Void && !result.is_error() && !returns(&body) {
+            self.error(
+                codes::RETURN_MISSING,
+                function.name.span,
+                format!("'{}' can end without returning a value", function.name.text),
+                "return a value on every path",
+            );
+        }
+        let mut signature = Signature {
+            name: function.name.text.clone(),
+            parameters,
+            result,
+            effects: Effects::default(),
+        };
+        let id = self.lower_function(&mut signature, &body);
+        self.locals = outer_locals;
+        let entity = Entity::Function(id, Arc::new(signature));
+        let scope = self
+            .scopes
+            .last_mut()
+            .expect("the scope of the declaration is open");
+        if matches!(
+            scope.get(&function.name.text),
+            Some((Entity::OpenFunction, _))
+        ) {
+            scope.set(&function.name.text, entity, function.name.span);
+        }
+    }
+
+    fn lower_function(&mut self, signature: &mut Signature, body: &Statement) -> FunctionId {
+        if !self.can_lower() {
+            return NO_FUNCTION;
+        }
+        let name = match &self.process {
+            Some((_, process)) => format!("{process}.{}", signature.name),
+            None => signature.name.clone(),
+        };
+        let locals = std::mem::take(&mut self.locals);
+        let mut builder = self.builder(&locals);
+        builder.signature(&signature.parameters, &signature.result);
+        let (id, effects) = builder.function(name, body);
+        signature.effects = effects;
+        id
+    }
+
+    fn result_type(&mut self, ty: &ast::TypeExpr) -> Type {
+        let result = self.type_of(ty);
+        let is_value = result.is_number()
+            || matches!(
+                result,
+                Type::Void | Type::Error | Type::Scalar { .. } | Type::Struct(_)
+            );
+        let is_data = result.size().clocks + result.size().channels == 0;
+        if is_value && is_data {
+            return result;
+        }
+        self.error(
+            codes::RESULT_TYPE,
+            ty.span,
+            format!("a function cannot return {}", result.described()),
+            "pass it by reference, or put it into a struct",
+        );
+        Type::Error
+    }
+
+    fn function_parameter(&mut self, parameter: &ast::Parameter) -> Parameter {
+        let ty = self.dimensioned(&parameter.ty, &parameter.dimensions);
+        self.check_parameter_type(parameter, &ty);
+        let local = self.new_local(ty.clone());
+        let constant = parameter.ty.prefixes.constant;
+        let place = Place {
+            root: Root::Local(local),
+            base: Size::default(),
+            mutable: !constant,
+        };
+        let entity = if ty.is_error() {
+            Entity::Broken
+        } else {
+            Entity::Variable {
+                place,
+                ty: ty.clone(),
+            }
+        };
+        self.declare(&parameter.name, entity);
+        Parameter {
+            name: parameter.name.text.clone(),
+            ty,
+            reference: parameter.reference,
+            constant,
+        }
+    }
+
+    /// Checks that clocks and channels come by reference.
+    pub(super) fn check_parameter_type(&mut self, parameter: &ast::Parameter, ty: &Type) {
+        let size = ty.size();
+        if !parameter.reference && size.clocks + size.channels > 0 {
+            self.error(
+                codes::PARAMETER_BY_VALUE,
+                parameter.name.span,
+                format!("{} cannot be passed by value", ty.described()),
+                "write & before the name",
+            );
+        }
+        if matches!(ty, Type::Void | Type::String) {
+            self.error(
+                codes::TYPE_MISPLACED,
+                parameter.ty.span,
+                format!("{ty} cannot be the type of a parameter"),
+                "use another type",
+            );
+        }
+    }
+
+    fn block(&mut self, block: &ast::Block, result: &Type) -> Statement {
+        self.scopes.push(Scope::default());
+        let checked = self.block_in_scope(block, result);
+        self.scopes.pop();
+        checked
+    }
+
+    fn block_in_scope(&mut self, block: &ast::Block, result: &Type) -> Statement {
+        let mut statements = Vec::new();
+        for declaration in &block.declarations {
+            match declaration {
+                Declaration::Typedef {
+                    ty,
+                    name,
+                    dimensions,
+                } => self.typedef(ty, name, dimensions),
+                Declaration::Variable(variable) => {
+                    statements.extend(self.local_variable(variable));
+                }
+                Declaration::Function(function) => self.misplaced_declaration(function.name.span),
+                Declaration::ChannelPriority { span, .. }
+                | Declaration::BeforeUpdate(_, span)
+                | Declaration::AfterUpdate(_, span) => self.misplaced_declaration(*span),
+            }
+        }
+        for statement in &block.statements {
+            statements.push(self.statement(statement, result));
+        }
+        Statement::Block(statements)
+    }
+
+    fn misplaced_declaration(&mut self, span: Span) {
+        self.error(
+            codes::DECLARATION_MISPLACED,
+            span,
+            "only types and variables can be declared here",
+            "move the declaration out",
+        );
+    }
+
+    fn local_variable(&mut self, variable: &ast::Variable) -> Option<Statement> {
+        let ty = self.dimensioned(&variable.ty, &variable.dimensions);
+        let parts = variable
+            .initialiser
+            .as_ref()
+            .map(|initialiser| self.initialiser(initialiser, &ty));
+        let prefixes = variable.ty.prefixes;
+        let size = ty.size();
+        if size.clocks + size.channels > 0
+            || prefixes.meta
+            || matches!(ty, Type::Void | Type::String)
+        {
+            self.error(
+                codes::TYPE_MISPLACED,
+                variable.ty.span,
+                format!("{} cannot be a local of a function", ty.described()),
+                "declare it outside the function",
+            );
+            self.declare(&variable.name, Entity::Broken);
+            return None;
+        }
+        if ty.is_error() {
+            self.declare(&variable.name, Entity::Broken);
+            return None;
+        }
+        if prefixes.constant && parts.is_none() {
+            self.error(
+                codes::CONSTANT_NOT_INITIALISED,
+                variable.name.span,
+                format!("the constant '{}' has no value", variable.name.text),
+                "write = and a value",
+            );
+        }
+        let parts = parts.unwrap_or_default();
+        let is_known = parts.iter().all(|part| Self::is_computable(&part.value));
+        if prefixes.constant && is_known {
+            let entity = match self.initial_words(&parts, &ty) {
+                Some(words) => self.constant_entity(&words, &ty, false, variable.name.span),
+                None => Entity::Broken,
+            };
+            self.declare(&variable.name, entity);
+            return None;
+        }
+        Some(self.declare_local(variable, ty, parts))
+    }
+
+    fn declare_local(
+        &mut self,
+        variable: &ast::Variable,
+        ty: Type,
+        parts: Vec<super::declarations::InitialPart>,
+    ) -> Statement {
+        let local = self.new_local(ty.clone());
+        let root = Root::Local(local);
+        let assignments = parts
+            .into_iter()
+            .filter(|part| !part.value.is_error())
+            .map(|part| initial_assignment(root, part))
+            .collect();
+        let place = Place {
+            root,
+            base: Size::default(),
+            mutable: !variable.ty.prefixes.constant,
+        };
+        self.declare(&variable.name, Entity::Variable { place, ty });
+        Statement::Declare(local, assignments)
+    }
+
+    fn statement(&mut self, statement: &ast::Statement, result: &Type) -> Statement {
+        match statement {
+            ast::Statement::Empty => Statement::Block(Vec::new()),
+            ast::Statement::Block(block) => self.block(block, result),
+            ast::Statement::Expr(expr) => Statement::Expr(self.effect_expression(expr)),
+            ast::Statement::For {
+                init,
+                condition,
+                step,
+                body,
+            } => {
+                let init = init.as_ref().map(|init| self.effect_expression(init));
+                let condition = condition
+                    .as_ref()
+                    .map(|condition| self.condition(condition));
+                let step = step.as_ref().map(|step| self.effect_expression(step));
+                let body = Box::new(self.statement(body, result));
+                let repeat = Statement::Loop {
+                    condition,
+                    step,
+                    body,
+                    tested_first: true,
+                };
+                Statement::Block(
+                    init.map(Statement::Expr)
+                        .into_iter()
+                        .chain([repeat])
+                        .collect(),
+                )
+            }
+            ast::Statement::While(condition, body) => Statement::Loop {
+                condition: Some(self.condition(condition)),
+                step: None,
+                body: Box::new(self.statement(body, result)),
+                tested_first: true,
+            },
+            ast::Statement::DoWhile(body, condition) => {
+                let body = Box::new(self.statement(body, result));
+                Statement::Loop {
+                    condition: Some(self.condition(condition)),
+                    step: None,
+                    body,
+                    tested_first: false,
+                }
+            }
+            ast::Statement::Iterate { name, ty, body } => self.iterate(name, ty, body, result),
+            ast::Statement::If(condition, then, otherwise) => Statement::If(
+                self.condition(condition),
+                Box::new(self.statement(then, result)),
+                otherwise
+                    .as_ref()
+                    .map(|otherwise| Box::new(self.statement(otherwise, result))),
+            ),
+            ast::Statement::Return(value, span) => {
+                self.return_statement(value.as_ref(), *span, result)
+            }
+            ast::Statement::Assert(condition, span) => {
+                Statement::Assert(self.condition(condition), *span)
+            }
+        }
+    }
+
+    fn iterate(
+        &mut self,
+        name: &Name,
+        ty: &ast::TypeExpr,
+        body: &ast::Statement,
+        result: &Type,
+    ) -> Statement {
+        let iterated = self.iterated(ty);
+        self.scopes.push(Scope::default());
+        let (range, local) = if let Some((ty, range)) = iterated {
+            let local = self.new_local(ty.clone());
+            let place = Place {
+                root: Root::Local(local),
+                base: Size::default(),
+                mutable: false,
+            };
+            self.declare(name, Entity::Variable { place, ty });
+            (range, local)
+        } else {
+            self.declare(name, Entity::Broken);
+            ((0, 0), LocalId(0))
+        };
+        let body = Box::new(self.statement(body, result));
+        self.scopes.pop();
+        Statement::Iterate { local, range, body }
+    }
+
+    /// An expression that stands for its effect.
+    fn effect_expression(&mut self, expr: &ast::Expr) -> Expr {
+        let checked = self.expression(expr);
+        self.warn_without_effect(&checked);
+        checked
+    }
+
+    /// Warns of an expression whose value is dropped and that changes nothing.
+    pub(super) fn warn_without_effect(&mut self, expr: &Expr) {
+        // A call of a function without effect is common in libraries of models; a dropped comparison is a typing mistake.
+        let is_silent = expr.is_error() || expr.ty == Type::Void || expr.has_effect();
+        if !is_silent && !matches!(expr.kind, Kind::Call { .. }) {
+            self.report(
+                crate::diagnostics::Diagnostic::new(
+                    codes::EFFECT_MISSING,
+                    expr.span,
+                    "this changes nothing",
+                )
+                .help("did you mean an assignment?"),
+            );
+        }
+    }
+
+    /// The condition of a statement.
+    fn condition(&mut self, expr: &ast::Expr) -> Expr {
+        let checked = self.expression(expr);
+        if checked.is_error() {
+            return checked;
+        }
+        if !checked.ty.is_integral() {
+            let (message, help) = if matches!(checked.ty, Type::Constraint(_)) {
+                (
+                    String::from(
+                        "functions cannot look at clocks: their values are known only symbolically",
+                    ),
+                    "test the clock in the guard of an edge",
+                )
+            } else {
+                (
+                    format!(
+                        "a condition is needed, but this is {}",
+                        checked.ty.described()
+                    ),
+                    "compare it with something",
+                )
+            };
+            self.error(codes::CONDITION_EXPECTED, checked.span, message, help);
+            return Expr::error(checked.span);
+        }
+        checked
+    }
+
+    fn return_statement(
+        &mut self,
+        value: Option<&ast::Expr>,
+        span: Span,
+        result: &Type,
+    ) -> Statement {
+        let value = value.map(|value| self.expression(value));
+        match (value, result) {
+            (None, Type::Void | Type::Error) => Statement::Return(None),
+            (None, _) => {
+                self.error(
+                    codes::RETURN_MISMATCHED,
+                    span,
+                    format!(
+                        "the function returns {}, but no value stands here",
+                        result.described()
+                    ),
+                    "write the value after return",
+                );
+                Statement::Return(None)
+            }
+            (Some(value), Type::Void) => {
+                self.error(
+                    codes::RETURN_MISMATCHED,
+                    value.span,
+                    "the function returns nothing, but a value stands here",
+                    "write return; or change the type of the function",
+                );
+                Statement::Return(None)
+            }
+            (Some(value), _) => {
+                let value_span = value.span;
+                let value = self.converted(value, result);
+                Statement::Return(Some(value.unwrap_or_else(|| Expr::error(value_span))))
+            }
+        }
+    }
+}
+
+/// The assignment that gives a part of a local its initial value.
+fn initial_assignment(root: Root, part: super::declarations::InitialPart) -> Expr {
+    let place = Place {
+        root,
+        base: part.offset,
+        mutable: true,
+    };
+    let span = part.value.span;
+    let target = Expr::new(Kind::Variable(place), part.ty.clone(), span);
+    let kind = Kind::Assign(Box::new(target), Box::new(part.value));
+    Expr::new(kind, part.ty, span)
+}
+
+/// Whether a statement always ends in `return`.
+fn returns(statement: &Statement) -> bool {
+    match statement {
+        Statement::Block(statements) => statements.iter().any(returns),
+        Statement::If(_, then, Some(otherwise)) => returns(then) && returns(otherwise),
+        Statement::Return(..) => true,
+        Statement::Loop {
+            body, tested_first, ..
+        } => !tested_first && returns(body),
+        _ => false,
+    }
+}

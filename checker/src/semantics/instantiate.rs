@@ -1,0 +1,491 @@
+//! The system section: instantiations, process sets, and the processes of the network.
+//!
+//! A name in the system line that has parameters left stands for a set of processes, one for each combination of their
+//! values, the first parameter changing slowest. Arguments by value are constants; arguments by reference stand for the
+//! very variable, clock or channel.
+
+use std::collections::HashMap;
+
+use super::checker::Checker;
+use super::codes;
+use super::expressions::known_offset;
+use super::scope::{Entity, Scope};
+use super::typed::{Expr, Kind, Place, Root};
+use super::types::{DEFAULT_INT, Memory, Size, Type};
+use crate::diagnostics::Span;
+use crate::ir::ProcessId;
+use crate::syntax::ast::{self, Document, Name, Parameter, SystemItem};
+
+/// The most processes of a network.
+const PROCESS_LIMIT: u64 = 1 << 16;
+
+/// The processes of a network as queries name them.
+#[derive(Debug, Default)]
+pub(super) struct Processes {
+    /// By the name in the system line.
+    pub(super) groups: HashMap<String, Group>,
+    /// The names that each process declares.
+    pub(super) scopes: Vec<Scope>,
+}
+
+/// What a name in the system line stands for.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    /// The first process.
+    pub(super) first: u32,
+    /// The types of the free parameters; a single process has none.
+    pub(super) parameters: Vec<Type>,
+}
+
+impl Group {
+    /// How many processes it has.
+    pub(super) fn count(&self) -> u32 {
+        self.parameters.iter().map(parameter_count).product()
+    }
+}
+
+fn parameter_count(ty: &Type) -> u32 {
+    let (low, high) = ty.bounds();
+    high.abs_diff(low).saturating_add(1)
+}
+
+/// What is instantiated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Target {
+    Template(usize),
+    Instantiation(usize),
+}
+
+impl Checker<'_> {
+    /// Checks the system section and makes the processes.
+    pub(super) fn system(&mut self, document: &Document) {
+        for (i, item) in document.system.items.iter().enumerate() {
+            match item {
+                SystemItem::Declaration(declaration) => {
+                    self.declarations(std::slice::from_ref(declaration));
+                }
+                SystemItem::Instantiation { name, .. } => {
+                    self.check_instantiation(document, i);
+                    self.declare(name, Entity::Instantiation(i));
+                }
+            }
+        }
+        let mut used = vec![false; document.templates.len()];
+        for (level, names) in document.system.processes.iter().enumerate() {
+            for name in names {
+                self.system_line_name(document, name, level as u32, &mut used);
+            }
+        }
+        for (template, _) in document
+            .templates
+            .iter()
+            .zip(used)
+            .filter(|(_, used)| !used)
+        {
+            self.check_unused_template(template);
+        }
+    }
+
+    /// Checks an instantiation without knowing the values of its parameters.
+    fn check_instantiation(&mut self, document: &Document, item: usize) {
+        let SystemItem::Instantiation {
+            parameters,
+            template,
+            arguments,
+            ..
+        } = &document.system.items[item]
+        else {
+            return;
+        };
+        self.scopes.push(Scope::default());
+        for parameter in parameters {
+            let ty = self.dimensioned(&parameter.ty, &parameter.dimensions);
+            self.check_parameter_type(parameter, &ty);
+            let entity = if parameter.reference {
+                unknown_variable(ty)
+            } else {
+                Entity::Broken
+            };
+            self.declare(&parameter.name, entity);
+        }
+        for argument in arguments {
+            let argument = self.expression(argument);
+            self.expect_pure(&argument, "an argument of a template");
+        }
+        self.scopes.pop();
+        if let Some(target) = self.target(template) {
+            let wanted = formal_parameters(document, target).len();
+            if wanted != arguments.len() {
+                self.error(
+                    codes::ARGUMENT_COUNT,
+                    template.span,
+                    format!(
+                        "'{}' takes {wanted} arguments, but {} are given",
+                        template.text,
+                        arguments.len()
+                    ),
+                    "give one argument for each parameter",
+                );
+            }
+        }
+    }
+
+    /// The template or instantiation with a name.
+    fn target(&mut self, name: &Name) -> Option<Target> {
+        match self.lookup(&name.text) {
+            Some(Entity::Template(i)) => Some(Target::Template(i)),
+            Some(Entity::Instantiation(i)) => Some(Target::Instantiation(i)),
+            Some(Entity::Broken) => None,
+            Some(entity) => {
+                self.error(
+                    codes::TEMPLATE_EXPECTED,
+                    name.span,
+                    format!(
+                        "'{}' is {}, not a template",
+                        name.text,
+                        super::expressions::entity_kind(&entity)
+                    ),
+                    "name a template or an instantiation",
+                );
+                None
+            }
+            None => {
+                self.unknown_name(&name.text, name.span);
+                None
+            }
+        }
+    }
+
+    fn system_line_name(
+        &mut self,
+        document: &Document,
+        name: &Name,
+        level: u32,
+        used: &mut [bool],
+    ) {
+        let Some(target) = self.target(name) else {
+            return;
+        };
+        mark_used(document, self, target, used);
+        if self.world.processes.groups.contains_key(&name.text) {
+            self.error(
+                codes::PROCESS_TWICE,
+                name.span,
+                format!("'{}' stands twice in the system line", name.text),
+                "give the second process a name of its own by an instantiation",
+            );
+            return;
+        }
+        let formals = formal_parameters(document, target);
+        let Some(types) = self.free_parameters(formals, name, target) else {
+            return;
+        };
+        let group = Group {
+            first: self.world.network.processes.len() as u32,
+            parameters: types.clone(),
+        };
+        let count: u64 = types
+            .iter()
+            .map(|ty| u64::from(parameter_count(ty)))
+            .product();
+        if count + self.world.network.processes.len() as u64 > PROCESS_LIMIT {
+            self.error(
+                codes::RANGE_TOO_LARGE,
+                name.span,
+                format!("'{}' stands for {count} processes", name.text),
+                "use smaller ranges for its parameters",
+            );
+            return;
+        }
+        self.world.processes.groups.insert(name.text.clone(), group);
+        for values in combinations(&types) {
+            self.make_process(document, (name, target, formals), (&types, &values), level);
+        }
+    }
+
+    /// The types of the parameters that the system line leaves free.
+    fn free_parameters(
+        &mut self,
+        formals: &[Parameter],
+        name: &Name,
+        target: Target,
+    ) -> Option<Vec<Type>> {
+        let mut types = Vec::new();
+        for formal in formals {
+            let ty = self.formal_type(formal, target, &mut Scope::default());
+            let bounds = ty.bounds();
+            let is_bounded = matches!(ty, Type::Scalar { .. })
+                || (matches!(ty, Type::Int { .. })
+                    && bounds != DEFAULT_INT
+                    && bounds != (i32::MIN, i32::MAX));
+            if ty.is_error() {
+                return None;
+            }
+            if !is_bounded || formal.reference {
+                self.error(
+                    codes::FREE_PARAMETER_UNBOUNDED,
+                    name.span,
+                    format!(
+                        "'{}' cannot stand in the system line: its parameter '{}' has no value and is no bounded integer or scalar",
+                        name.text, formal.name.text
+                    ),
+                    "instantiate it with arguments, or give the parameter a range",
+                );
+                return None;
+            }
+            types.push(ty);
+        }
+        Some(types)
+    }
+
+    /// The type of a formal parameter, seen from where it is declared; earlier parameters may stand in it.
+    fn formal_type(&mut self, formal: &Parameter, target: Target, earlier: &mut Scope) -> Type {
+        let hidden = std::mem::replace(
+            &mut self.hides_system,
+            matches!(target, Target::Template(_)),
+        );
+        self.scopes.push(std::mem::take(earlier));
+        let ty = self.dimensioned(&formal.ty, &formal.dimensions);
+        self.check_parameter_type(formal, &ty);
+        *earlier = self.scopes.pop().expect("the scope was just opened");
+        self.hides_system = hidden;
+        ty
+    }
+
+    fn make_process(
+        &mut self,
+        document: &Document,
+        (name, target, formals): (&Name, Target, &[Parameter]),
+        (types, values): (&[Type], &[i32]),
+        level: u32,
+    ) {
+        let mut scope = Scope::default();
+        for (formal, (ty, &value)) in formals.iter().zip(types.iter().zip(values)) {
+            let value = Expr::int(value, ty.clone(), formal.name.span);
+            let entity = Entity::Constant { value, free: true };
+            scope.set(&formal.name.text, entity, formal.name.span);
+        }
+        let Some((template, scope)) = self.bind(document, target, scope) else {
+            return;
+        };
+        let full_name = if values.is_empty() {
+            name.text.clone()
+        } else {
+            let values: Vec<String> = values.iter().map(i32::to_string).collect();
+            format!("{}({})", name.text, values.join(","))
+        };
+        let id = ProcessId(self.world.network.processes.len() as u32);
+        let outer = self.process.replace((id, full_name));
+        self.hides_system = true;
+        self.scopes.push(scope);
+        let process = self.template(&document.templates[template], level);
+        let scope = self.scopes.pop().expect("the scope was just opened");
+        self.hides_system = false;
+        self.process = outer;
+        self.world.processes.scopes.push(scope);
+        self.world.network.processes.push(process);
+    }
+
+    /// Follows instantiations down to a template; returns it with the scope of its parameters.
+    fn bind(
+        &mut self,
+        document: &Document,
+        target: Target,
+        scope: Scope,
+    ) -> Option<(usize, Scope)> {
+        let item = match target {
+            Target::Template(i) => return Some((i, scope)),
+            Target::Instantiation(item) => item,
+        };
+        let SystemItem::Instantiation {
+            template,
+            arguments,
+            ..
+        } = &document.system.items[item]
+        else {
+            return None;
+        };
+        let next = self.target(template)?;
+        let formals = formal_parameters(document, next);
+        if formals.len() != arguments.len() {
+            return None;
+        }
+        let mut bound = Scope::default();
+        for (formal, argument) in formals.iter().zip(arguments) {
+            let ty = self.formal_type(formal, next, &mut bound);
+            self.scopes.push(scope.clone());
+            self.free_parameter_seen = false;
+            let argument = self.expression(argument);
+            let entity = self.bind_argument(formal, &ty, argument);
+            self.scopes.pop();
+            bound.set(&formal.name.text, entity?, formal.name.span);
+        }
+        self.bind(document, next, bound)
+    }
+
+    fn bind_argument(&mut self, formal: &Parameter, ty: &Type, argument: Expr) -> Option<Entity> {
+        if argument.is_error() || ty.is_error() {
+            return None;
+        }
+        self.expect_pure(&argument, "an argument of a template");
+        let constant = formal.ty.prefixes.constant;
+        if !formal.reference || (constant && !is_fixed_place(&argument)) {
+            let free = self.free_parameter_seen;
+            let span = argument.span;
+            let argument = self.converted(argument, ty)?;
+            let words = self.known_words(&argument, ty, "an argument of a template")?;
+            return Some(self.constant_entity(&words, ty, free, span));
+        }
+        if !is_fixed_place(&argument) {
+            self.error(
+                codes::REFERENCE_NOT_UNIQUE,
+                argument.span,
+                "a reference parameter needs one variable that is known when the model is loaded",
+                "name a variable, or a part of an array with a constant index",
+            );
+            return None;
+        }
+        if !constant && !argument.is_mutable_place() && argument.ty.size().words > 0 {
+            self.expect_mutable(&argument);
+            return None;
+        }
+        let fits = if constant {
+            ty.accepts(&argument.ty) && ty.size() == argument.ty.size()
+        } else {
+            ty.is_equivalent(&argument.ty)
+        };
+        if !fits || !(constant || ty.accepts_channel(&argument.ty)) {
+            self.error(
+                codes::REFERENCE_MISMATCHED,
+                argument.span,
+                format!(
+                    "the reference parameter '{}' needs {}, but this is {}",
+                    formal.name.text,
+                    ty.described(),
+                    argument.ty.described()
+                ),
+                "a reference needs a variable of the very same type, range included",
+            );
+            return None;
+        }
+        let root = argument.variable()?.root;
+        let base = Size {
+            words: known_offset(&argument, Memory::Words)?,
+            clocks: known_offset(&argument, Memory::Clocks)?,
+            channels: known_offset(&argument, Memory::Channels)?,
+        };
+        let place = Place {
+            root,
+            base,
+            mutable: !constant,
+        };
+        // Ranges are checked against the variable's own type; hybrid clocks stay hybrid.
+        Some(Entity::Variable {
+            place,
+            ty: argument.ty,
+        })
+    }
+
+    /// Checks a template that no process uses; nothing of it enters the network.
+    fn check_unused_template(&mut self, template: &ast::Template) {
+        let network = &self.world.network;
+        let lengths = (
+            network.clocks.len(),
+            network.channels.len(),
+            network.layout.variables.len(),
+            self.world.initial.len(),
+            self.world.initial_meta.len(),
+        );
+        self.is_generic = true;
+        self.hides_system = true;
+        self.scopes.push(Scope::default());
+        for formal in &template.parameters {
+            let ty = self.dimensioned(&formal.ty, &formal.dimensions);
+            self.check_parameter_type(formal, &ty);
+            let entity = if formal.reference && !ty.is_error() {
+                unknown_variable(ty)
+            } else {
+                Entity::Broken
+            };
+            self.declare(&formal.name, entity);
+        }
+        self.template(template, 0);
+        self.scopes.pop();
+        self.hides_system = false;
+        self.is_generic = false;
+        let network = &mut self.world.network;
+        network.clocks.truncate(lengths.0);
+        network.initial_clocks.truncate(lengths.0);
+        network.channels.truncate(lengths.1);
+        network.layout.variables.truncate(lengths.2);
+        self.world.initial.truncate(lengths.3);
+        self.world.initial_meta.truncate(lengths.4);
+    }
+}
+
+/// A variable of a template without instance: its type is known, its place is not.
+fn unknown_variable(ty: Type) -> Entity {
+    let place = Place {
+        root: Root::State,
+        base: Size::default(),
+        mutable: true,
+    };
+    Entity::Variable { place, ty }
+}
+
+/// Whether it is a part of a variable that does not depend on the state.
+fn is_fixed_place(expr: &Expr) -> bool {
+    expr.variable().is_some()
+        && known_offset(expr, Memory::Words).is_some()
+        && !matches!(expr.kind, Kind::Error)
+}
+
+fn formal_parameters(document: &Document, target: Target) -> &[Parameter] {
+    match target {
+        Target::Template(i) => &document.templates[i].parameters,
+        Target::Instantiation(i) => match &document.system.items[i] {
+            SystemItem::Instantiation { parameters, .. } => parameters,
+            SystemItem::Declaration(_) => &[],
+        },
+    }
+}
+
+/// Notes the template that an instantiation comes down to.
+fn mark_used(document: &Document, checker: &mut Checker<'_>, target: Target, used: &mut [bool]) {
+    match target {
+        Target::Template(i) => used[i] = true,
+        Target::Instantiation(i) => {
+            if let SystemItem::Instantiation { template, .. } = &document.system.items[i]
+                && let Some(next) = checker.target(template)
+                && next != target
+            {
+                mark_used(document, checker, next, used);
+            }
+        }
+    }
+}
+
+/// All combinations of values of the types, the first changing slowest.
+fn combinations(types: &[Type]) -> Vec<Vec<i32>> {
+    let mut all = vec![Vec::new()];
+    for ty in types {
+        let (low, high) = ty.bounds();
+        all = all
+            .into_iter()
+            .flat_map(|start: Vec<i32>| {
+                (low..=high).map(move |value| {
+                    let mut combination = start.clone();
+                    combination.push(value);
+                    combination
+                })
+            })
+            .collect();
+    }
+    all
+}
+
+/// Where a mistake in a name of the system line is shown.
+pub(super) fn system_span(document: &Document) -> Span {
+    let names = document.system.processes.iter().flatten();
+    names.map(|name| name.span).next().unwrap_or_default()
+}

@@ -1,0 +1,334 @@
+//! Guards, invariants, synchronisations and updates: checking, and lowering to what the network runs.
+
+use super::checker::Checker;
+use super::codes;
+use super::layout::merge_ranges;
+use super::lower::{bound_range, comparisons};
+use super::templates::conjuncts;
+use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId};
+use super::types::{Class, Type};
+use crate::ir::{
+    self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, ClockRange,
+    FixedConstraint, FunctionId, Guard, Update,
+};
+use crate::syntax::ast;
+
+/// A `select` binding: the local that stands for it, and its range.
+pub(super) struct Select {
+    pub(super) local: LocalId,
+    pub(super) range: ir::Select,
+}
+
+impl Checker<'_> {
+    /// Checks and lowers a guard.
+    pub(super) fn guard(&mut self, guard: &ast::Expr, locals: &[LocalId], place: &str) -> Guard {
+        let guard = self.expression(guard);
+        self.expect_pure(&guard, "a guard");
+        if !self.expect_condition(&guard) {
+            return Guard::default();
+        }
+        let sets_rates = guard.any(&|e| matches!(e.kind, Kind::Rate { .. }))
+            || guard.ty == Type::Constraint(Class::InvariantWithRate);
+        if sets_rates || guard.ty == Type::Constraint(Class::Query) {
+            self.error(
+                codes::CONDITION_NOT_A_GUARD,
+                guard.span,
+                "this cannot be a guard: inequalities, negations and disjunctions of clock conditions, and rates, are no guards",
+                "split the edge into one for each case",
+            );
+            return Guard::default();
+        }
+        let mut parts = Vec::new();
+        conjuncts(guard, &mut parts);
+        self.make_guard(&parts, locals, place)
+    }
+
+    /// Lowers a conjunction of conditions.
+    pub(super) fn make_guard(&mut self, parts: &[Expr], locals: &[LocalId], place: &str) -> Guard {
+        let mut guard = Guard::default();
+        if !self.can_lower() {
+            guard.atoms = parts.iter().flat_map(fixed_constraints).map(atom).collect();
+            return guard;
+        }
+        let mut rest = Vec::new();
+        for part in parts {
+            let fixed = fixed_constraints(part);
+            if fixed.is_empty() {
+                rest.push(part);
+            }
+            guard.atoms.extend(fixed.iter().copied().map(atom));
+            guard.fixed.extend(fixed);
+        }
+        if rest.is_empty() {
+            return guard;
+        }
+        let known = self.locals.clone();
+        let mut builder = self.builder(&known);
+        builder.select_parameters(locals);
+        let (function, effects, emits) = builder.guard(place.to_owned(), &rest);
+        guard.function = Some(function);
+        guard.atoms.extend(effects.atoms);
+        guard.emits = emits;
+        guard
+    }
+
+    /// The clock and the function of `clock' == rate`.
+    pub(super) fn make_rate(&mut self, rate: Expr, place: &str) -> Option<(ClockId, FunctionId)> {
+        let span = rate.span;
+        let Kind::Rate { clock, rate } = rate.kind else {
+            return None;
+        };
+        let Some(clock) = Self::known_clock(&clock) else {
+            self.error(
+                codes::RATE_OF_NO_CLOCK,
+                span,
+                "the rate of a clock that is chosen when the model runs cannot be set",
+                "use a constant index",
+            );
+            return None;
+        };
+        if !self.can_lower() {
+            return None;
+        }
+        let zero_or_one = Type::Int { low: 0, high: 1 };
+        let known = self.locals.clone();
+        let (function, _) = self
+            .builder(&known)
+            .ranged(place.to_owned(), &rate, &zero_or_one);
+        Some((clock, function))
+    }
+
+    /// Checks and lowers a synchronisation.
+    pub(super) fn synchronisation(
+        &mut self,
+        sync: &ast::Sync,
+        locals: &[LocalId],
+        place: &str,
+    ) -> Option<ir::Sync> {
+        let channel = self.expression(&sync.channel);
+        self.expect_pure(&channel, "a synchronisation");
+        if channel.is_error() {
+            return None;
+        }
+        if !matches!(channel.ty, Type::Channel { .. }) || channel.variable().is_none() {
+            self.error(
+                codes::CHANNEL_EXPECTED,
+                channel.span,
+                format!(
+                    "a channel is needed here, but this is {}",
+                    channel.ty.described()
+                ),
+                "write channel! or channel?",
+            );
+            return None;
+        }
+        if !self.can_lower() {
+            return None;
+        }
+        let known = self.locals.clone();
+        let functions = self.world.network.functions.len();
+        let mut builder = self.builder(&known);
+        builder.select_parameters(locals);
+        let (first, count, index) = builder.offset(&channel, super::types::Memory::Channels);
+        let index = index.map(|index| builder.offset_function(place.to_owned(), index));
+        if index.is_none() {
+            self.world.network.functions.truncate(functions);
+        }
+        Some(ir::Sync {
+            send: sync.send,
+            channel: ChannelId(first),
+            count,
+            index,
+        })
+    }
+
+    /// Checks and lowers an update.
+    pub(super) fn update(
+        &mut self,
+        exprs: &[ast::Expr],
+        locals: &[LocalId],
+        place: &str,
+    ) -> Update {
+        let mut checked = Vec::new();
+        for expr in exprs {
+            let expr = self.expression(expr);
+            self.warn_without_effect(&expr);
+            if !matches!(expr.kind, Kind::Int(_)) {
+                checked.push(expr);
+            }
+        }
+        if !self.can_lower() || checked.is_empty() {
+            return Update::default();
+        }
+        self.make_update(&checked, locals, place)
+    }
+
+    /// Lowers an update. Resets to constants are taken out if nothing else sets or reads clocks.
+    fn make_update(&mut self, exprs: &[Expr], locals: &[LocalId], place: &str) -> Update {
+        let mut update = Update::default();
+        let (resets, others): (Vec<Expr>, Vec<Expr>) = exprs
+            .iter()
+            .cloned()
+            .partition(|expr| fixed_reset(expr).is_some());
+        let is_separable = !others.iter().any(sets_clocks);
+        let rest = if is_separable { &others[..] } else { exprs };
+        if is_separable {
+            for (clock, value) in resets.iter().filter_map(fixed_reset) {
+                update.fixed.retain(|&(earlier, _)| earlier != clock);
+                update.fixed.push((clock, value));
+            }
+        }
+        update.assignments = update
+            .fixed
+            .iter()
+            .map(|&reset| fixed_assignment(reset))
+            .collect();
+        if rest.is_empty() {
+            return update;
+        }
+        let known = self.locals.clone();
+        let mut builder = self.builder(&known);
+        builder.select_parameters(locals);
+        let (function, effects, emits) = builder.update(place.to_owned(), rest);
+        update.function = Some(function);
+        update.emits = emits;
+        update.assignments.extend(assignments(&effects));
+        update.writes = merge_ranges(effects.writes);
+        update
+    }
+
+    /// The labels of an edge as text.
+    pub(super) fn edge_labels(&self, edge: &ast::Edge) -> ir::EdgeLabels {
+        let text = |span| collapse(self.sources.text(span));
+        let select: Vec<String> = edge
+            .select
+            .iter()
+            .map(|(name, ty)| format!("{} : {}", name.text, text(ty.span)))
+            .collect();
+        let update: Vec<String> = edge.update.iter().map(|expr| text(expr.span)).collect();
+        ir::EdgeLabels {
+            select: select.join(", "),
+            guard: edge
+                .guard
+                .as_ref()
+                .map(|guard| text(guard.span))
+                .unwrap_or_default(),
+            sync: edge
+                .sync
+                .as_ref()
+                .map(|sync| {
+                    format!(
+                        "{}{}",
+                        text(sync.channel.span),
+                        if sync.send { '!' } else { '?' }
+                    )
+                })
+                .unwrap_or_default(),
+            update: update.join(", "),
+        }
+    }
+}
+
+/// A text with its blanks collapsed.
+pub(super) fn collapse(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The constraints that a condition stands for, if it compares known clocks with a constant.
+fn fixed_constraints(expr: &Expr) -> Vec<FixedConstraint> {
+    let Kind::ClockCompare {
+        relation,
+        left,
+        right,
+        bound,
+        negated,
+    } = &expr.kind
+    else {
+        return Vec::new();
+    };
+    let known = |clock: &Option<Box<Expr>>| match clock {
+        None => Some(ClockId(0)),
+        Some(clock) => Checker::known_clock(clock),
+    };
+    let (Some(left), Some(right), Some(bound)) = (known(left), known(right), bound.constant())
+    else {
+        return Vec::new();
+    };
+    let constraint = |(swapped, negated, strict)| {
+        let (left, right) = if swapped {
+            (right, left)
+        } else {
+            (left, right)
+        };
+        FixedConstraint {
+            left,
+            right,
+            bound: bound_range((bound, bound), negated).0,
+            strict,
+        }
+    };
+    comparisons(*relation, *negated)
+        .into_iter()
+        .map(constraint)
+        .collect()
+}
+
+fn atom(constraint: FixedConstraint) -> ClockAtom {
+    ClockAtom {
+        left: single(constraint.left),
+        right: single(constraint.right),
+        low: constraint.bound,
+        high: constraint.bound,
+        strict: constraint.strict,
+    }
+}
+
+fn single(first: ClockId) -> ClockRange {
+    ClockRange { first, count: 1 }
+}
+
+/// The clock and the value of `clock = constant`, if both are known and legal.
+fn fixed_reset(expr: &Expr) -> Option<(ClockId, i32)> {
+    let Kind::AssignClock {
+        target,
+        source: None,
+        value: Some(value),
+    } = &expr.kind
+    else {
+        return None;
+    };
+    let value = value.constant().filter(|&value| value >= 0)?;
+    Some((Checker::known_clock(target)?, value))
+}
+
+/// Whether an expression sets a clock, itself or in a function that it calls.
+fn sets_clocks(expr: &Expr) -> bool {
+    expr.any(&|e| match &e.kind {
+        Kind::AssignClock { .. } => true,
+        Kind::Call { signature, .. } => !signature.effects.assignments.is_empty(),
+        _ => false,
+    })
+}
+
+fn fixed_assignment((clock, value): (ClockId, i32)) -> ClockAssignment {
+    ClockAssignment {
+        target: single(clock),
+        value: AssignedValue::Integer(value, value),
+    }
+}
+
+/// The clock assignments of code outside functions, where no clock is a parameter.
+fn assignments(effects: &Effects) -> Vec<ClockAssignment> {
+    let range = |set: ClockSet| match set {
+        ClockSet::Range(range) => range,
+        ClockSet::Parameter(_) => unreachable!("updates have no clock parameters"),
+    };
+    let assignment = |effect: &ClockEffect| ClockAssignment {
+        target: range(effect.target),
+        value: match effect.source {
+            None => AssignedValue::Integer(effect.range.0, effect.range.1),
+            Some(source) => AssignedValue::Clock(range(source), effect.range.0, effect.range.1),
+        },
+    };
+    effects.assignments.iter().map(assignment).collect()
+}

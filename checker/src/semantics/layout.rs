@@ -1,0 +1,132 @@
+//! The final layout of the state: locations, variables, `meta` variables.
+//!
+//! How many processes there are is known only at the end, when the global functions have long been lowered. Until then the
+//! offsets of variables count from 0, those of `meta` variables from [`META_WORDS`], those of locations from
+//! [`LOCATION_WORDS`]; [`Relocation`] turns them into offsets of words.
+
+use super::typed::{LOCATION_WORDS, META_WORDS};
+use super::types::Type;
+use crate::ir::{Address, Base, Function, Instruction, Network, Shape, Update};
+
+/// From provisional offsets to those of the final layout.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Relocation {
+    /// How many processes there are.
+    pub(super) locations: u32,
+    /// How many words the variables take.
+    pub(super) variables: u32,
+}
+
+impl Relocation {
+    /// The final offset of a provisional one.
+    pub(super) fn offset(self, offset: u32) -> u32 {
+        if offset >= LOCATION_WORDS {
+            offset - LOCATION_WORDS
+        } else if offset >= META_WORDS {
+            offset - META_WORDS + self.locations + self.variables
+        } else {
+            offset + self.locations
+        }
+    }
+
+    fn address(self, address: &mut Address) {
+        if address.base == Base::State {
+            address.offset = self.offset(address.offset);
+        }
+    }
+
+    /// Relocates the code of functions.
+    pub(super) fn functions(self, functions: &mut [Function]) {
+        let blocks = functions.iter_mut().flat_map(|f| &mut f.blocks);
+        for instruction in blocks.flat_map(|block| &mut block.instructions) {
+            match instruction {
+                Instruction::LoadInteger { address, .. }
+                | Instruction::LoadDouble { address, .. }
+                | Instruction::StoreInteger { address, .. }
+                | Instruction::StoreDouble { address, .. }
+                | Instruction::AddressOf { address, .. } => self.address(address),
+                Instruction::CopyWords { target, source, .. } => {
+                    self.address(target);
+                    self.address(source);
+                }
+                Instruction::EqualWords { left, right, .. } => {
+                    self.address(left);
+                    self.address(right);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Relocates what the network says about words.
+    pub(super) fn network(self, network: &mut Network) {
+        self.functions(&mut network.functions);
+        for variable in &mut network.layout.variables {
+            variable.offset = self.offset(variable.offset);
+        }
+        network
+            .layout
+            .variables
+            .sort_by_key(|variable| variable.offset);
+        let edges = network.processes.iter_mut().flat_map(|p| &mut p.edges);
+        let of_edges = edges.flat_map(|edge| {
+            let branches = edge.branches.iter_mut().map(|branch| &mut branch.update);
+            std::iter::once(&mut edge.update).chain(branches)
+        });
+        let of_all = [&mut network.before_update, &mut network.after_update];
+        for update in of_edges.chain(of_all.into_iter().flatten()) {
+            self.update(update);
+        }
+    }
+
+    fn update(self, update: &mut Update) {
+        for (offset, _) in &mut update.writes {
+            *offset = self.offset(*offset);
+        }
+        update.writes.sort_unstable();
+    }
+}
+
+/// Ascending disjoint ranges that cover the same words.
+pub(super) fn merge_ranges(mut ranges: Vec<(u32, u32)>) -> Vec<(u32, u32)> {
+    ranges.sort_unstable();
+    let mut merged: Vec<(u32, u32)> = Vec::new();
+    for (start, count) in ranges {
+        match merged.last_mut() {
+            Some((last, length)) if start <= *last + *length => {
+                *length = (*length).max(start + count - *last);
+            }
+            _ => merged.push((start, count)),
+        }
+    }
+    merged
+}
+
+/// The shape of the words of a type; clocks and channels have none.
+pub(super) fn shape(ty: &Type) -> Shape {
+    match ty {
+        Type::Bool => Shape::Bool,
+        Type::Double => Shape::Double,
+        Type::Scalar { set, size } => Shape::Scalar {
+            size: *size,
+            set: *set,
+        },
+        Type::Array(array) => Shape::Array {
+            part: Box::new(shape(&array.part)),
+            length: array.index.length,
+            first: array.index.first,
+        },
+        Type::Struct(record) => Shape::Struct(
+            record
+                .fields
+                .iter()
+                .filter(|(_, ty)| ty.size().words > 0)
+                .map(|(name, ty)| (name.clone(), shape(ty)))
+                .collect(),
+        ),
+        _ => {
+            let (low, high) = ty.bounds();
+            Shape::Integer { low, high }
+        }
+    }
+}

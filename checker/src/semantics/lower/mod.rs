@@ -1,0 +1,410 @@
+//! From typed trees to code: one [`Builder`] makes one function.
+//!
+//! Invariants:
+//! * Nothing here fails: every tree that reaches it was checked and holds no error.
+//! * Operands are evaluated from left to right; a local's register that a later operand may change is copied first.
+//! * A check is emitted only where the interval of the value does not prove it away.
+//! * Local scalars live in registers unless something refers to them; arrays and structs live in the frame.
+//! * Parameters of a function in order: a scalar by value is a register of its type; an array or struct by value and
+//!   words by reference are an address; clocks by reference are the index of the first clock. A returned array or
+//!   struct is written to an address that comes as last parameter.
+
+mod clocks;
+mod expressions;
+mod places;
+mod statements;
+
+pub(super) use clocks::{bound_range, comparisons};
+
+use std::collections::HashMap;
+
+use super::typed::{Effects, Expr, Local, LocalId, Statement};
+use super::types::{Memory, Type};
+use crate::diagnostics::Span;
+use crate::ir::{
+    Address, Base, Block, BlockId, Function, FunctionId, Instruction, IntegerOperator, Network,
+    Register, RegisterType, Site, SiteId, Terminator,
+};
+
+/// Images of values in the constant memory that were stored before.
+pub(super) type Images = HashMap<Vec<i32>, u32>;
+
+/// Puts words into the constant memory once, and returns where they lie.
+pub(super) fn store_constant(network: &mut Network, images: &mut Images, words: &[i32]) -> u32 {
+    if let Some(&offset) = images.get(words) {
+        return offset;
+    }
+    let offset = network.constants.len() as u32;
+    network.constants.extend_from_slice(words);
+    images.insert(words.to_vec(), offset);
+    offset
+}
+
+/// Where a local lives.
+#[derive(Clone, Copy, Debug)]
+enum Home {
+    Register(Register),
+    Frame(u32),
+    Reference {
+        address: Option<Register>,
+        clock: Option<Register>,
+    },
+}
+
+/// A function in the making.
+pub(super) struct Builder<'n> {
+    network: &'n mut Network,
+    images: &'n mut Images,
+    locals: &'n [Local],
+    homes: Vec<Option<Home>>,
+    registers: Vec<RegisterType>,
+    parameters: u32,
+    frame_words: u32,
+    blocks: Vec<Block>,
+    current: usize,
+    loops: u32,
+    result: Type,
+    result_address: Option<Register>,
+    /// What the code does to the state.
+    pub(super) effects: Effects,
+    /// Whether clock constraints or assignments are emitted.
+    pub(super) emits: bool,
+}
+
+impl<'n> Builder<'n> {
+    /// A function without parameters; `locals` are those of the trees that it will be given.
+    pub(super) fn new(
+        network: &'n mut Network,
+        images: &'n mut Images,
+        locals: &'n [Local],
+    ) -> Builder<'n> {
+        Builder {
+            network,
+            images,
+            locals,
+            homes: vec![None; locals.len()],
+            registers: Vec::new(),
+            parameters: 0,
+            frame_words: 0,
+            blocks: vec![open_block()],
+            current: 0,
+            loops: 0,
+            result: Type::Void,
+            result_address: None,
+            effects: Effects::default(),
+            emits: false,
+        }
+    }
+
+    /// Adds an integer parameter for each of the locals (the `select` bindings of an edge).
+    pub(super) fn select_parameters(&mut self, locals: &[LocalId]) {
+        for &local in locals {
+            let register = self.register(RegisterType::Integer);
+            self.parameters += 1;
+            self.homes[local.0 as usize] = Some(Home::Register(register));
+        }
+    }
+
+    /// Adds the parameters of a function of the model, whose first locals they are, and what it returns.
+    pub(super) fn signature(&mut self, parameters: &[super::typed::Parameter], result: &Type) {
+        let mut copies = Vec::new();
+        for (i, parameter) in parameters.iter().enumerate() {
+            let local = LocalId(i as u32);
+            let home = if parameter.reference {
+                let size = parameter.ty.size();
+                let address = (size.words > 0).then(|| self.register(RegisterType::Address));
+                let clock = (size.clocks > 0).then(|| self.register(RegisterType::Integer));
+                Home::Reference { address, clock }
+            } else if parameter.ty.is_aggregate() {
+                let source = self.register(RegisterType::Address);
+                copies.push((local, source));
+                Home::Reference {
+                    address: Some(source),
+                    clock: None,
+                }
+            } else {
+                let register = self.register(register_type(&parameter.ty));
+                if self.locals[i].addressed {
+                    copies.push((local, register));
+                }
+                Home::Register(register)
+            };
+            self.homes[i] = Some(home);
+        }
+        if result.is_aggregate() {
+            self.result_address = Some(self.register(RegisterType::Address));
+        }
+        self.result = result.clone();
+        self.parameters = self.registers.len() as u32;
+        for (local, register) in copies {
+            self.copy_parameter(local, register);
+        }
+    }
+
+    /// Moves a parameter that was passed by value into the frame, so that it can be changed and referred to.
+    fn copy_parameter(&mut self, local: LocalId, register: Register) {
+        let ty = self.locals[local.0 as usize].ty.clone();
+        let target = self.frame(ty.size().words);
+        let offset = target.offset;
+        if ty.is_aggregate() {
+            self.emit(Instruction::CopyWords {
+                target,
+                source: at(Base::Register(register), 0),
+                words: ty.size().words,
+            });
+        } else {
+            self.store(places::Target::Memory(target), register, &ty);
+        }
+        self.homes[local.0 as usize] = Some(Home::Frame(offset));
+    }
+
+    /// Lowers the body of a function of the model and adds the function.
+    pub(super) fn function(mut self, name: String, body: &Statement) -> (FunctionId, Effects) {
+        self.statement(body);
+        let result = self
+            .result
+            .is_register()
+            .then(|| register_type(&self.result));
+        // Checking has shown that the end of the body is not reached where a value is to be returned.
+        let end = result.map(|ty| self.zero(ty));
+        self.terminate(Terminator::Return(end));
+        self.finish(name, result)
+    }
+
+    /// A function that returns the value of an expression.
+    pub(super) fn expression(mut self, name: String, expr: &Expr) -> (FunctionId, Effects) {
+        let value = self.value(expr);
+        let result = self.registers[value.0 as usize];
+        self.terminate(Terminator::Return(Some(value)));
+        self.finish(name, Some(result))
+    }
+
+    /// A function that writes the words of an expression to the start of the state, which it does not read.
+    pub(super) fn words(mut self, name: String, expr: &Expr) -> FunctionId {
+        let target = at(Base::State, 0);
+        if expr.ty.is_aggregate() {
+            let source = self.address(expr);
+            let words = expr.ty.size().words;
+            self.emit(Instruction::CopyWords {
+                target,
+                source,
+                words,
+            });
+        } else {
+            let value = self.value(expr);
+            self.store(places::Target::Memory(target), value, &expr.ty);
+        }
+        self.terminate(Terminator::Return(None));
+        self.finish(name, None).0
+    }
+
+    /// A function that evaluates expressions for their effects.
+    pub(super) fn update(mut self, name: String, exprs: &[Expr]) -> (FunctionId, Effects, bool) {
+        for expr in exprs {
+            self.effect(expr);
+        }
+        self.terminate(Terminator::Return(None));
+        let emits = self.emits;
+        let (function, effects) = self.finish(name, None);
+        (function, effects, emits)
+    }
+
+    /// A function that returns whether all conditions may hold and emits their clock constraints.
+    pub(super) fn guard(
+        mut self,
+        name: String,
+        conditions: &[&Expr],
+    ) -> (FunctionId, Effects, bool) {
+        let fail = self.new_block();
+        for condition in conditions {
+            self.constrain(condition, fail);
+        }
+        let one = self.integer(1);
+        self.terminate(Terminator::Return(Some(one)));
+        self.switch(fail);
+        let zero = self.integer(0);
+        self.terminate(Terminator::Return(Some(zero)));
+        let emits = self.emits;
+        let (function, effects) = self.finish(name, Some(RegisterType::Integer));
+        (function, effects, emits)
+    }
+
+    /// A function that returns the value of an expression, checked against the range of a type.
+    pub(super) fn ranged(mut self, name: String, expr: &Expr, ty: &Type) -> (FunctionId, Effects) {
+        let value = self.checked_value(expr, ty);
+        self.terminate(Terminator::Return(Some(value)));
+        self.finish(name, Some(RegisterType::Integer))
+    }
+
+    /// The first clock or channel that a place may be, how many it may be, and the computed offset from the first.
+    pub(super) fn offset(&mut self, expr: &Expr, memory: Memory) -> (u32, u32, Option<Register>) {
+        let path = self.path(expr, memory);
+        debug_assert!(path.start == places::Start::Fixed, "it is no local");
+        (path.offset, path.reach + 1, path.index)
+    }
+
+    /// A function that returns the computed offset.
+    pub(super) fn offset_function(mut self, name: String, index: Register) -> FunctionId {
+        self.terminate(Terminator::Return(Some(index)));
+        self.finish(name, Some(RegisterType::Integer)).0
+    }
+
+    fn finish(self, name: String, result: Option<RegisterType>) -> (FunctionId, Effects) {
+        let id = FunctionId(self.network.functions.len() as u32);
+        self.network.functions.push(Function {
+            name,
+            registers: self.registers,
+            parameters: self.parameters,
+            frame_words: self.frame_words,
+            result,
+            blocks: reachable_blocks(self.blocks),
+        });
+        (id, self.effects)
+    }
+
+    fn register(&mut self, ty: RegisterType) -> Register {
+        self.registers.push(ty);
+        Register(self.registers.len() as u32 - 1)
+    }
+
+    fn frame(&mut self, words: u32) -> Address {
+        let offset = self.frame_words;
+        self.frame_words += words;
+        at(Base::Frame, offset)
+    }
+
+    fn site(&mut self, span: Span) -> SiteId {
+        self.network.sites.push(Site { span });
+        SiteId(self.network.sites.len() as u32 - 1)
+    }
+
+    fn emit(&mut self, instruction: Instruction) {
+        self.blocks[self.current].instructions.push(instruction);
+    }
+
+    fn new_block(&mut self) -> BlockId {
+        self.blocks.push(open_block());
+        BlockId(self.blocks.len() as u32 - 1)
+    }
+
+    fn switch(&mut self, block: BlockId) {
+        self.current = block.0 as usize;
+    }
+
+    /// Ends the current block; what is emitted next, before a switch, is not reached.
+    fn terminate(&mut self, terminator: Terminator) {
+        self.blocks[self.current].terminator = terminator;
+        let unreachable = self.new_block();
+        self.switch(unreachable);
+    }
+
+    fn jump(&mut self, block: BlockId) {
+        self.terminate(Terminator::Jump(block));
+    }
+
+    fn integer(&mut self, value: i32) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.emit(Instruction::Integer { target, value });
+        target
+    }
+
+    fn zero(&mut self, ty: RegisterType) -> Register {
+        if ty == RegisterType::Double {
+            let target = self.register(ty);
+            self.emit(Instruction::Double { target, value: 0.0 });
+            return target;
+        }
+        self.integer(0)
+    }
+
+    fn copy(&mut self, target: Register, source: Register) {
+        if target != source {
+            self.emit(Instruction::Copy { target, source });
+        }
+    }
+
+    fn arithmetic(
+        &mut self,
+        operator: IntegerOperator,
+        left: Register,
+        right: Register,
+        span: Span,
+    ) -> Register {
+        let site = self.site(span);
+        let target = self.register(RegisterType::Integer);
+        self.emit(Instruction::Arithmetic {
+            operator,
+            target,
+            left,
+            right,
+            site,
+        });
+        target
+    }
+}
+
+/// The registers that hold values of a type.
+fn register_type(ty: &Type) -> RegisterType {
+    if *ty == Type::Double {
+        RegisterType::Double
+    } else {
+        RegisterType::Integer
+    }
+}
+
+fn at(base: Base, offset: u32) -> Address {
+    Address {
+        base,
+        offset,
+        index: None,
+    }
+}
+
+fn open_block() -> Block {
+    Block {
+        instructions: Vec::new(),
+        terminator: Terminator::Return(None),
+    }
+}
+
+fn successors(terminator: Terminator) -> [Option<BlockId>; 2] {
+    match terminator {
+        Terminator::Jump(block) => [Some(block), None],
+        Terminator::Branch(_, yes, no) => [Some(yes), Some(no)],
+        Terminator::Return(_) | Terminator::Fail(..) => [None, None],
+    }
+}
+
+/// Leaves out the blocks that are never reached and numbers the others anew.
+fn reachable_blocks(blocks: Vec<Block>) -> Vec<Block> {
+    let mut reached = vec![false; blocks.len()];
+    let mut open = vec![0];
+    while let Some(block) = open.pop() {
+        if !std::mem::replace(&mut reached[block], true) {
+            let next = successors(blocks[block].terminator);
+            open.extend(next.into_iter().flatten().map(|b| b.0 as usize));
+        }
+    }
+    let mut numbers = Vec::with_capacity(blocks.len());
+    let mut count = 0;
+    for &is_reached in &reached {
+        numbers.push(BlockId(count));
+        count += u32::from(is_reached);
+    }
+    let renumber = |block: BlockId| numbers[block.0 as usize];
+    let kept = blocks
+        .into_iter()
+        .zip(reached)
+        .filter(|&(_, reached)| reached);
+    kept.map(|(mut block, _)| {
+        block.terminator = match block.terminator {
+            Terminator::Jump(next) => Terminator::Jump(renumber(next)),
+            Terminator::Branch(condition, yes, no) => {
+                Terminator::Branch(condition, renumber(yes), renumber(no))
+            }
+            other => other,
+        };
+        block
+    })
+    .collect()
+}

@@ -1,0 +1,396 @@
+//! Places: variables, their parts, and what is loaded from and stored to them.
+
+use super::super::typed::{ClockSet, Expr, Kind, LocalId, Place, Root};
+use super::super::types::{Memory, Type};
+use super::{Builder, Home, at, register_type};
+use crate::ir::{
+    Address, Base, ClockId, ClockOperand, ClockRange, Instruction, Register, RegisterType,
+};
+
+/// Where a value can be stored.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Target {
+    /// In a register.
+    Register(Register),
+    /// In memory.
+    Memory(Address),
+}
+
+/// What a path of indices and fields starts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Start {
+    /// The memory that is meant, counted from its beginning.
+    Fixed,
+    /// The constants.
+    Constants,
+    /// The frame.
+    Frame,
+    /// An address, or the index of a clock, in a register; and the parameter it came from.
+    Register(Register, Option<LocalId>),
+    /// The variable is a register.
+    Home(Register),
+}
+
+/// A place in one memory.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Path {
+    pub(super) start: Start,
+    /// The known part of the offset.
+    pub(super) offset: u32,
+    /// The computed part.
+    pub(super) index: Option<Register>,
+    /// The greatest value of the computed part.
+    pub(super) reach: u32,
+}
+
+impl Builder<'_> {
+    /// The place in one of the memories that an expression names.
+    pub(super) fn path(&mut self, expr: &Expr, memory: Memory) -> Path {
+        match &expr.kind {
+            Kind::Variable(place) => self.root(place, memory),
+            Kind::Field { record, offset } => {
+                let mut path = self.path(record, memory);
+                path.offset += offset.of(memory);
+                path
+            }
+            Kind::Index {
+                array,
+                index,
+                first,
+                length,
+                stride,
+            } => {
+                let path = self.path(array, memory);
+                self.indexed(path, index, (*first, *length, stride.of(memory)))
+            }
+            _ => {
+                let address = self.address(expr);
+                address_path(address)
+            }
+        }
+    }
+
+    fn root(&mut self, place: &Place, memory: Memory) -> Path {
+        let offset = place.base.of(memory);
+        let start = match place.root {
+            Root::State => {
+                if memory == Memory::Words {
+                    self.effects.reads_state = true;
+                }
+                Start::Fixed
+            }
+            Root::Constants => Start::Constants,
+            Root::Local(local) => match self.homes[local.0 as usize] {
+                Some(Home::Register(register)) => Start::Home(register),
+                Some(Home::Frame(frame)) => return fixed_path(Start::Frame, offset + frame),
+                Some(Home::Reference { address, clock }) => {
+                    let register = if memory == Memory::Clocks {
+                        clock
+                    } else {
+                        address
+                    };
+                    let register = register.expect("a reference holds what its type promises");
+                    Start::Register(register, Some(local))
+                }
+                None => unreachable!("locals are declared before they are used"),
+            },
+        };
+        fixed_path(start, offset)
+    }
+
+    fn indexed(
+        &mut self,
+        mut path: Path,
+        index: &Expr,
+        (first, length, stride): (i32, u32, u32),
+    ) -> Path {
+        let position = index.constant().map(|i| i64::from(i) - i64::from(first));
+        if let Some(position) = position
+            && (0..i64::from(length)).contains(&position)
+        {
+            path.offset += position as u32 * stride;
+            return path;
+        }
+        let source = self.value(index);
+        let site = self.site(index.span);
+        let scaled = self.register(RegisterType::Integer);
+        self.emit(Instruction::ScaleIndex {
+            target: scaled,
+            index: source,
+            first,
+            length,
+            stride,
+            site,
+        });
+        path.reach += (length - 1) * stride;
+        path.index = Some(self.add_indices(path.index, scaled));
+        path
+    }
+
+    fn add_indices(&mut self, left: Option<Register>, right: Register) -> Register {
+        let Some(left) = left else { return right };
+        let target = self.register(RegisterType::Integer);
+        self.emit(Instruction::AddIndices {
+            target,
+            left,
+            right,
+        });
+        target
+    }
+
+    /// The address of a place in the words that is not a register.
+    pub(super) fn path_address(path: Path) -> Address {
+        let base = match path.start {
+            Start::Fixed => Base::State,
+            Start::Constants => Base::Constants,
+            Start::Frame => Base::Frame,
+            Start::Register(register, _) => Base::Register(register),
+            Start::Home(_) => unreachable!("only whole scalars live in registers"),
+        };
+        Address {
+            base,
+            offset: path.offset,
+            index: path.index,
+        }
+    }
+
+    /// Where an assignment to a place stores; `written` records the words as changed.
+    pub(super) fn target(&mut self, expr: &Expr, written: bool) -> Target {
+        match &expr.kind {
+            Kind::Variable(_) | Kind::Index { .. } | Kind::Field { .. } => {
+                let path = self.path(expr, Memory::Words);
+                if written {
+                    self.record_write(path, expr.ty.size().words);
+                }
+                match path.start {
+                    Start::Home(register) => Target::Register(register),
+                    _ => Target::Memory(Self::path_address(path)),
+                }
+            }
+            Kind::Ternary(condition, then, otherwise) => {
+                Target::Memory(self.choose_address(condition, then, otherwise, written))
+            }
+            Kind::Assign(target, value) => self.assign(target, value),
+            Kind::Compound(operator, target, value) => {
+                self.compound(*operator, target, value, expr.span).0
+            }
+            Kind::Step { target, delta, .. } => self.step(target, *delta, expr.span).0,
+            _ => Target::Memory(self.address(expr)),
+        }
+    }
+
+    fn choose_address(
+        &mut self,
+        condition: &Expr,
+        then: &Expr,
+        otherwise: &Expr,
+        written: bool,
+    ) -> Address {
+        let chosen = self.register(RegisterType::Address);
+        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
+        self.condition(condition, yes, no);
+        for (block, side) in [(yes, then), (no, otherwise)] {
+            self.switch(block);
+            let address = match self.target(side, written) {
+                Target::Memory(address) => address,
+                Target::Register(_) => unreachable!("places that are chosen from lie in memory"),
+            };
+            self.emit(Instruction::AddressOf {
+                target: chosen,
+                address,
+            });
+            self.jump(end);
+        }
+        self.switch(end);
+        at(Base::Register(chosen), 0)
+    }
+
+    /// Records that words may be changed, if they are words of the state.
+    pub(super) fn record_write(&mut self, path: Path, words: u32) {
+        if path.start == Start::Fixed {
+            self.effects.writes.push((path.offset, path.reach + words));
+        }
+    }
+
+    /// The words of an array or struct, or of a scalar in memory.
+    pub(super) fn address(&mut self, expr: &Expr) -> Address {
+        match &expr.kind {
+            Kind::Call { .. } => {
+                let target = self.frame(expr.ty.size().words);
+                self.call(expr, Some(target));
+                target
+            }
+            Kind::Ternary(condition, then, otherwise) if expr.ty.is_aggregate() => {
+                self.choose_value_address(condition, then, otherwise)
+            }
+            _ if expr.is_place() => match self.target(expr, false) {
+                Target::Memory(address) => address,
+                Target::Register(register) => self.spill(register, &expr.ty),
+            },
+            _ => {
+                let value = self.value(expr);
+                self.spill(value, &expr.ty)
+            }
+        }
+    }
+
+    fn choose_value_address(&mut self, condition: &Expr, then: &Expr, otherwise: &Expr) -> Address {
+        let chosen = self.register(RegisterType::Address);
+        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
+        self.condition(condition, yes, no);
+        for (block, side) in [(yes, then), (no, otherwise)] {
+            self.switch(block);
+            let address = self.address(side);
+            self.emit(Instruction::AddressOf {
+                target: chosen,
+                address,
+            });
+            self.jump(end);
+        }
+        self.switch(end);
+        at(Base::Register(chosen), 0)
+    }
+
+    /// Puts a value into memory of its own.
+    fn spill(&mut self, register: Register, ty: &Type) -> Address {
+        let address = self.frame(ty.size().words.max(1));
+        self.store(Target::Memory(address), register, ty);
+        address
+    }
+
+    /// Stores a scalar.
+    pub(super) fn store(&mut self, target: Target, source: Register, ty: &Type) {
+        match target {
+            Target::Register(register) => self.copy(register, source),
+            Target::Memory(address) => self.emit(if *ty == Type::Double {
+                Instruction::StoreDouble { address, source }
+            } else {
+                Instruction::StoreInteger { address, source }
+            }),
+        }
+    }
+
+    /// Loads a scalar.
+    pub(super) fn load(&mut self, target: Target, ty: &Type) -> Register {
+        match target {
+            Target::Register(register) => register,
+            Target::Memory(address) => {
+                let target = self.register(register_type(ty));
+                self.emit(if *ty == Type::Double {
+                    Instruction::LoadDouble { target, address }
+                } else {
+                    Instruction::LoadInteger { target, address }
+                });
+                target
+            }
+        }
+    }
+
+    /// A clock as an operand, and the clocks that it may be.
+    pub(super) fn clock(&mut self, expr: &Expr) -> (ClockOperand, ClockSet) {
+        self.effects.mentions_clocks = true;
+        if let Kind::Ternary(condition, then, otherwise) = &expr.kind {
+            return self.choose_clock(condition, then, otherwise);
+        }
+        let path = self.path(expr, Memory::Clocks);
+        let first = ClockId(path.offset);
+        let Start::Register(register, parameter) = path.start else {
+            let operand = ClockOperand {
+                first,
+                index: path.index,
+            };
+            let count = path.reach + 1;
+            return (operand, ClockSet::Range(ClockRange { first, count }));
+        };
+        let index = match path.index {
+            Some(index) => self.add_indices(Some(register), index),
+            None => register,
+        };
+        let operand = ClockOperand {
+            first,
+            index: Some(index),
+        };
+        let parameter = parameter.expect("clocks come in parameters");
+        (operand, ClockSet::Parameter(parameter))
+    }
+
+    /// One of two clocks; static analysis takes all clocks between them for possible.
+    fn choose_clock(
+        &mut self,
+        condition: &Expr,
+        then: &Expr,
+        otherwise: &Expr,
+    ) -> (ClockOperand, ClockSet) {
+        let chosen = self.register(RegisterType::Integer);
+        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
+        self.condition(condition, yes, no);
+        let mut sets = Vec::new();
+        for (block, side) in [(yes, then), (no, otherwise)] {
+            self.switch(block);
+            let (operand, set) = self.clock(side);
+            let number = self.clock_number(operand);
+            self.copy(chosen, number);
+            self.jump(end);
+            sets.push(set);
+        }
+        self.switch(end);
+        let operand = ClockOperand {
+            first: ClockId(0),
+            index: Some(chosen),
+        };
+        (operand, join_clock_sets(sets[0], sets[1]))
+    }
+
+    /// The index of a clock, to be passed by reference.
+    pub(super) fn clock_number(&mut self, operand: ClockOperand) -> Register {
+        match operand.index {
+            Some(index) if operand.first.0 == 0 => index,
+            index => {
+                let first = self.integer(operand.first.0 as i32);
+                match index {
+                    Some(index) => self.add_indices(Some(first), index),
+                    None => first,
+                }
+            }
+        }
+    }
+}
+
+fn address_path(address: Address) -> Path {
+    let start = match address.base {
+        Base::State => Start::Fixed,
+        Base::Constants => Start::Constants,
+        Base::Frame => Start::Frame,
+        Base::Register(register) => Start::Register(register, None),
+    };
+    Path {
+        start,
+        offset: address.offset,
+        index: address.index,
+        reach: 0,
+    }
+}
+
+fn fixed_path(start: Start, offset: u32) -> Path {
+    Path {
+        start,
+        offset,
+        index: None,
+        reach: 0,
+    }
+}
+
+/// The smallest set of consecutive clocks that holds both; a parameter stands for itself.
+fn join_clock_sets(left: ClockSet, right: ClockSet) -> ClockSet {
+    match (left, right) {
+        (ClockSet::Range(a), ClockSet::Range(b)) => {
+            let first = a.first.min(b.first);
+            let end = (a.first.0 + a.count).max(b.first.0 + b.count);
+            ClockSet::Range(ClockRange {
+                first,
+                count: end - first.0,
+            })
+        }
+        (ClockSet::Range(_), other) | (other, _) => other,
+    }
+}

@@ -1,0 +1,125 @@
+//! From syntax trees to the network: names, types, constants, every static rule of the language, and lowering to code.
+//!
+//! The way: declarations are checked in order, functions are lowered as soon as they are checked, so that constants can be
+//! computed with them; then the system section is instantiated, and every template is checked and lowered once for each of
+//! its processes, with its parameters known. Templates that no process uses are checked with unknown parameters.
+//!
+//! Invariants:
+//! * All mistakes are reported in one run; what hangs on a mistake is silent.
+//! * Nothing is lowered after a mistake, so lowering never fails.
+//! * The scopes of a model outlive its check: queries are compiled against them, and only append to the network.
+//!
+//! Source: UPPAAL's language reference, and the rules of its official parser where that is silent. Where we differ:
+//! * Names that UPPAAL predeclares may be declared again by a model.
+//! * Parameters of templates by value are constants.
+//! * Mutable doubles are part of the state, with a warning.
+//!
+//! Cost: linear in the trees, times the number of processes of a template.
+
+pub mod codes;
+
+mod types;
+
+mod typed;
+
+mod scope;
+
+mod layout;
+
+mod checker;
+
+mod operators;
+
+mod clock_expressions;
+
+mod expressions;
+
+mod calls;
+
+mod constants;
+
+mod declarations;
+
+mod functions;
+
+mod lower;
+
+mod labels;
+
+mod templates;
+
+mod instantiate;
+
+mod system;
+
+mod members;
+
+mod queries;
+
+use crate::diagnostics::{Diagnostic, SourceMap};
+use crate::ir;
+use crate::syntax::ast;
+
+/// A checked model: the network, and what is needed to compile queries for it.
+#[derive(Debug)]
+pub struct Model {
+    /// The network.
+    pub network: ir::Network,
+    world: checker::World,
+    relocation: layout::Relocation,
+}
+
+/// Checks and lowers a model; `None` if there are mistakes. The diagnostics are sorted by place.
+pub fn analyse(
+    document: &ast::Document,
+    prelude: &[ast::Declaration],
+    sources: &SourceMap,
+) -> (Option<Model>, Vec<Diagnostic>) {
+    let mut checker = checker::Checker::new(sources, checker::World::default());
+    let relocation = checker.document(document, prelude);
+    let has_errors = checker.has_errors();
+    let mut world = checker.world;
+    let network = std::mem::take(&mut world.network);
+    let model = Model {
+        network,
+        world,
+        relocation,
+    };
+    ((!has_errors).then_some(model), sorted(checker.diagnostics))
+}
+
+impl Model {
+    /// Checks and lowers a query; its functions and sites are appended to the network. `strategies` are the names of the
+    /// strategies that exist so far.
+    pub fn compile_query(
+        &mut self,
+        query: &ast::Query,
+        sources: &SourceMap,
+        strategies: &[String],
+    ) -> (Option<ir::Query>, Vec<Diagnostic>) {
+        let mut world = std::mem::take(&mut self.world);
+        world.network = std::mem::take(&mut self.network);
+        let known = world.network.functions.len();
+        let scopes = std::mem::take(&mut world.query_scopes);
+        let mut checker = checker::Checker::new(sources, world);
+        checker.scopes = scopes;
+        checker.is_query = true;
+        let compiled = checker.query(query, strategies);
+        let has_errors = checker.has_errors();
+        let diagnostics = sorted(checker.diagnostics);
+        self.world = checker.world;
+        self.world.query_scopes = checker.scopes;
+        self.network = std::mem::take(&mut self.world.network);
+        if has_errors {
+            self.network.functions.truncate(known);
+        }
+        self.relocation
+            .functions(&mut self.network.functions[known..]);
+        (compiled.filter(|_| !has_errors), diagnostics)
+    }
+}
+
+fn sorted(mut diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    diagnostics.sort_by_key(|diagnostic| diagnostic.span);
+    diagnostics
+}

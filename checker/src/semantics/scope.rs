@@ -1,0 +1,80 @@
+//! Names and what they stand for.
+//!
+//! One namespace per scope, names of locations included; an inner scope hides an outer one. The scopes of a template are
+//! the prelude, the global declarations and its own; the declarations of the system section are seen by the system line and
+//! by queries only. The prelude is a scope of its own, so a model may declare its names again.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::typed::{Expr, Place, Signature};
+use super::types::Type;
+use crate::diagnostics::Span;
+use crate::ir::FunctionId;
+
+/// What a name stands for.
+#[derive(Clone, Debug)]
+pub(super) enum Entity {
+    /// A scalar whose value is known; `free` if it hangs on a free parameter of a process set.
+    Constant { value: Expr, free: bool },
+    /// A variable, clock or channel, or an array or struct of any.
+    Variable { place: Place, ty: Type },
+    /// A type.
+    Type(Type),
+    /// A function.
+    Function(FunctionId, Arc<Signature>),
+    /// The function whose body is being checked.
+    OpenFunction,
+    /// A template, by its place in the file.
+    Template(usize),
+    /// An instantiation, by its place in the system section.
+    Instantiation(usize),
+    /// A location of the template.
+    Location(u32),
+    /// Something about which a mistake was reported, or of which nothing is known.
+    Broken,
+}
+
+/// The names of one scope.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scope {
+    names: HashMap<String, (Entity, Span)>,
+}
+
+impl Scope {
+    /// What a name stands for in this scope, and where it was declared.
+    pub(super) fn get(&self, name: &str) -> Option<&(Entity, Span)> {
+        self.names.get(name)
+    }
+
+    /// Declares a name, or declares it again.
+    pub(super) fn set(&mut self, name: &str, entity: Entity, span: Span) {
+        self.names.insert(name.to_owned(), (entity, span));
+    }
+
+    /// The declared name that is most like the given one, for a hint.
+    pub(super) fn similar(&self, name: &str) -> Option<(usize, &str)> {
+        let limit = name.len().div_ceil(3);
+        self.names
+            .keys()
+            .map(|known| (distance(known, name), known.as_str()))
+            .filter(|&(distance, _)| distance <= limit)
+            .min()
+    }
+}
+
+/// The edit distance of two names.
+fn distance(left: &str, right: &str) -> usize {
+    let right: Vec<char> = right.chars().collect();
+    let mut row: Vec<usize> = (0..=right.len()).collect();
+    for (i, a) in left.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &b) in right.iter().enumerate() {
+            let replaced = diagonal + usize::from(!a.eq_ignore_ascii_case(&b));
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[right.len()]
+}

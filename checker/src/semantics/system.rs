@@ -1,0 +1,275 @@
+//! A whole model: the order in which its parts are checked, what concerns all processes, and the finished network.
+
+use super::checker::Checker;
+use super::codes;
+use super::expressions::known_offset;
+use super::layout::Relocation;
+use super::scope::{Entity, Scope};
+use super::typed::{Expr, Root};
+use super::types::Memory;
+use crate::diagnostics::Span;
+use crate::ir::{AssignedValue, Clock, ClockAtom, Features, Location, Network};
+use crate::syntax::ast::{Declaration, Document, SystemItem};
+
+impl Checker<'_> {
+    /// Checks and lowers a model. Returns how its provisional offsets of words are to be read.
+    pub(super) fn document(&mut self, document: &Document, prelude: &[Declaration]) -> Relocation {
+        self.world.network.clocks.push(Clock {
+            name: String::from("0"),
+            owner: None,
+            hybrid: false,
+        });
+        self.world.network.initial_clocks.push(0);
+        for construct in &document.unsupported {
+            self.error(
+                codes::CONSTRUCT_UNSUPPORTED,
+                construct.span,
+                format!("{} are not supported", construct.text),
+                "remove them from the model",
+            );
+        }
+        self.declarations(prelude);
+        self.scopes.push(Scope::default());
+        self.declarations(&document.declarations);
+        for (i, template) in document.templates.iter().enumerate() {
+            self.declare(&template.name, Entity::Template(i));
+        }
+        self.scopes.push(Scope::default());
+        self.system(document);
+        self.whole_system(document);
+        self.world.query_scopes = std::mem::take(&mut self.scopes);
+        self.finish()
+    }
+
+    /// Priorities, hooks and progress measures.
+    fn whole_system(&mut self, document: &Document) {
+        let in_system = document.system.items.iter().filter_map(|item| match item {
+            SystemItem::Declaration(declaration) => Some(declaration),
+            SystemItem::Instantiation { .. } => None,
+        });
+        let mut has_priorities = false;
+        for declaration in document.declarations.iter().chain(in_system) {
+            match declaration {
+                Declaration::ChannelPriority { levels, span } => {
+                    if std::mem::replace(&mut has_priorities, true) {
+                        self.declared_again(*span, "chan priority");
+                    }
+                    self.channel_priorities(levels);
+                }
+                Declaration::BeforeUpdate(exprs, span) => {
+                    self.locals.clear();
+                    let update = self.update(exprs, &[], "before_update");
+                    if self.world.network.before_update.replace(update).is_some() {
+                        self.declared_again(*span, "before_update");
+                    }
+                }
+                Declaration::AfterUpdate(exprs, span) => {
+                    self.locals.clear();
+                    let update = self.update(exprs, &[], "after_update");
+                    if self.world.network.after_update.replace(update).is_some() {
+                        self.declared_again(*span, "after_update");
+                    }
+                }
+                _ => {}
+            }
+        }
+        self.misplaced_hooks(document);
+        self.locals.clear();
+        for measure in &document.system.progress {
+            let measure = self.expression(measure);
+            self.expect_pure(&measure, "a progress measure");
+            self.expect_integer(&measure, "a progress measure");
+        }
+        if self.world.network.processes.is_empty() && !self.has_errors() {
+            self.error(
+                codes::SYSTEM_EMPTY,
+                super::instantiate::system_span(document),
+                "the system has no process",
+                "name the processes in the system line: system P, Q;",
+            );
+        }
+    }
+
+    fn declared_again(&mut self, span: Span, what: &str) {
+        self.error(
+            codes::NAME_DECLARED_TWICE,
+            span,
+            format!("{what} is declared twice"),
+            "join the two declarations",
+        );
+    }
+
+    fn misplaced_hooks(&mut self, document: &Document) {
+        for declaration in document.templates.iter().flat_map(|t| &t.declarations) {
+            if let Declaration::ChannelPriority { span, .. }
+            | Declaration::BeforeUpdate(_, span)
+            | Declaration::AfterUpdate(_, span) = declaration
+            {
+                self.error(
+                    codes::DECLARATION_MISPLACED,
+                    *span,
+                    "priorities and update hooks belong to the global declarations",
+                    "move the declaration out of the template",
+                );
+            }
+        }
+    }
+
+    fn channel_priorities(&mut self, levels: &[Vec<Option<crate::syntax::ast::Expr>>]) {
+        self.world.network.features.priorities = true;
+        // Without `default`, unlisted channels and internal edges come below all others.
+        let default = levels
+            .iter()
+            .position(|level| level.iter().any(Option::is_none));
+        let shift = u32::from(default.is_none());
+        let default = default.map_or(0, |level| level as u32);
+        self.world.network.features.default_priority = default;
+        for channel in &mut self.world.network.channels {
+            channel.priority = default;
+        }
+        let mut listed = vec![false; self.world.network.channels.len()];
+        for (level, channels) in levels.iter().enumerate() {
+            for channel in channels.iter().flatten() {
+                let expr = self.expression(channel);
+                let Some((first, count)) = self.channel_range(&expr) else {
+                    continue;
+                };
+                for i in first..first + count {
+                    if std::mem::replace(&mut listed[i as usize], true) {
+                        self.error(
+                            codes::PRIORITY_TWICE,
+                            expr.span,
+                            "this channel has a priority already",
+                            "list every channel once",
+                        );
+                        break;
+                    }
+                    self.world.network.channels[i as usize].priority = level as u32 + shift;
+                }
+            }
+        }
+    }
+
+    /// The channels that an expression means, all known.
+    fn channel_range(&mut self, expr: &Expr) -> Option<(u32, u32)> {
+        if expr.is_error() {
+            return None;
+        }
+        let is_channels = expr.ty.size().channels > 0
+            && expr
+                .variable()
+                .is_some_and(|place| place.root == Root::State);
+        let known = if is_channels {
+            known_offset(expr, Memory::Channels)
+        } else {
+            None
+        };
+        if known.is_none() {
+            self.error(
+                codes::CHANNEL_EXPECTED,
+                expr.span,
+                "a channel that is known when the model is loaded is needed here",
+                "name a channel, an array of channels, or a part with a constant index",
+            );
+        }
+        known.map(|first| (first, expr.ty.size().channels))
+    }
+
+    /// Puts the parts of the state into their final order and sums up what the model uses.
+    fn finish(&mut self) -> Relocation {
+        let network = &mut self.world.network;
+        let relocation = Relocation {
+            locations: network.processes.len() as u32,
+            variables: self.world.initial.len() as u32,
+        };
+        if self.has_errors() {
+            return relocation;
+        }
+        let network = &mut self.world.network;
+        network.initial = network
+            .processes
+            .iter()
+            .map(|p| p.initial.0 as i32)
+            .collect();
+        network.initial.append(&mut self.world.initial);
+        network.layout.identity_words = network.initial.len() as u32;
+        network.initial.append(&mut self.world.initial_meta);
+        network.layout.words = network.initial.len() as u32;
+        relocation.network(network);
+        let features = features(network);
+        network.features = features;
+        relocation
+    }
+}
+
+/// What a network uses.
+fn features(network: &Network) -> Features {
+    let edges = || network.processes.iter().flat_map(|process| &process.edges);
+    let locations = || {
+        network
+            .processes
+            .iter()
+            .flat_map(|process| &process.locations)
+    };
+    let atoms = || {
+        let guards = edges().map(|edge| &edge.guard);
+        let invariants = locations().map(|location| &location.invariant);
+        guards.chain(invariants).flat_map(|guard| &guard.atoms)
+    };
+    let mut updates = edges()
+        .flat_map(|edge| {
+            let branches = edge.branches.iter().map(|branch| &branch.update);
+            std::iter::once(&edge.update).chain(branches)
+        })
+        .chain(&network.before_update)
+        .chain(&network.after_update);
+    let synchronises = |with: fn(&crate::ir::Channel, bool) -> bool| {
+        edges().any(|edge| {
+            edge.sync.is_some_and(|sync| {
+                let channels = &network.channels[sync.channel.0 as usize..][..sync.count as usize];
+                !edge.guard.atoms.is_empty() && channels.iter().any(|c| with(c, sync.send))
+            })
+        })
+    };
+    let mut levels = network.processes.iter().map(|process| process.priority);
+    Features {
+        priorities: network.features.priorities || levels.any(|level| level > 0),
+        default_priority: network.features.default_priority,
+        diagonals: atoms().any(is_diagonal),
+        stopwatches: locations().any(|location: &Location| !location.rates.is_empty()),
+        strict_invariants: locations()
+            .flat_map(|location| &location.invariant.atoms)
+            .any(super::templates::is_strict_upper_bound),
+        guarded_receivers: synchronises(|channel, send| channel.broadcast && !send),
+        clock_guarded_urgent: synchronises(|channel, _| channel.urgent),
+        clock_copies: updates.any(|update| {
+            let copies = |value: &AssignedValue| matches!(value, AssignedValue::Clock(..));
+            update
+                .assignments
+                .iter()
+                .any(|assignment| copies(&assignment.value))
+        }),
+        doubles: network
+            .layout
+            .variables
+            .iter()
+            .any(|variable| has_double(&variable.shape)),
+        hybrid_clocks: network.clocks.iter().any(|clock| clock.hybrid),
+        uncontrollable: edges().any(|edge| !edge.controllable),
+    }
+}
+
+/// Whether neither side of a comparison is the reference clock.
+fn is_diagonal(atom: &ClockAtom) -> bool {
+    let is_clock = |range: crate::ir::ClockRange| range.first.0 > 0 || range.count > 1;
+    is_clock(atom.left) && is_clock(atom.right)
+}
+
+fn has_double(shape: &crate::ir::Shape) -> bool {
+    match shape {
+        crate::ir::Shape::Double => true,
+        crate::ir::Shape::Array { part, .. } => has_double(part),
+        crate::ir::Shape::Struct(fields) => fields.iter().any(|(_, shape)| has_double(shape)),
+        _ => false,
+    }
+}

@@ -1,0 +1,381 @@
+//! Templates: locations and edges of one process.
+
+use std::collections::HashMap;
+
+use super::checker::Checker;
+use super::codes;
+use super::labels::Select;
+use super::scope::{Entity, Scope};
+use super::typed::{Expr, Kind, LocalId, Place, Root};
+use super::types::{Class, Size, Type};
+use crate::diagnostics::Span;
+use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationId, Urgency};
+use crate::syntax::ast;
+
+/// What an edge can lead to.
+#[derive(Clone, Copy, Debug)]
+enum Node {
+    Location(u32),
+    Branchpoint(usize),
+}
+
+impl Checker<'_> {
+    /// Checks a template whose parameters are declared in the innermost scope, and makes a process of it.
+    pub(super) fn template(&mut self, template: &ast::Template, priority: u32) -> ir::Process {
+        self.declarations(&template.declarations);
+        for (i, location) in template.locations.iter().enumerate() {
+            if let Some(name) = &location.name {
+                self.declare(name, Entity::Location(i as u32));
+            }
+        }
+        let nodes = nodes(template);
+        let mut locations: Vec<ir::Location> = template
+            .locations
+            .iter()
+            .map(|location| self.location(template, location))
+            .collect();
+        let mut edges = Vec::new();
+        for edge in &template.edges {
+            let Some(Node::Location(source)) = self.node(&nodes, &edge.source) else {
+                continue;
+            };
+            let edge = self.edge(template, edge, &nodes, LocationId(source));
+            locations[source as usize]
+                .edges
+                .push(EdgeId(edges.len() as u32));
+            edges.push(edge);
+        }
+        let initial = template
+            .initial
+            .as_ref()
+            .map(|name| self.node(&nodes, name));
+        let initial = match initial.flatten() {
+            Some(Node::Location(i)) => LocationId(i),
+            Some(Node::Branchpoint(_)) => {
+                self.error(
+                    codes::INITIAL_LOCATION,
+                    template.name.span,
+                    "a branch point cannot be the initial location",
+                    "let a location be initial",
+                );
+                LocationId(0)
+            }
+            None => LocationId(0),
+        };
+        ir::Process {
+            name: match &self.process {
+                Some((_, name)) => name.clone(),
+                None => template.name.text.clone(),
+            },
+            template: template.name.text.clone(),
+            locations,
+            edges,
+            initial,
+            priority,
+        }
+    }
+
+    fn node(&mut self, nodes: &HashMap<&str, Node>, name: &ast::Name) -> Option<Node> {
+        let node = nodes.get(name.text.as_str()).copied();
+        if node.is_none() {
+            self.error(
+                codes::LOCATION_UNKNOWN,
+                name.span,
+                format!("there is no location '{}'", name.text),
+                "name a location or a branch point of this template",
+            );
+        }
+        node
+    }
+
+    fn location(&mut self, template: &ast::Template, location: &ast::Location) -> ir::Location {
+        let name = match &location.name {
+            Some(name) => name.text.clone(),
+            None => format!("_{}", location.id),
+        };
+        let urgency = match (location.committed, location.urgent) {
+            (true, true) => {
+                self.error(
+                    codes::LOCATION_URGENT_AND_COMMITTED,
+                    location.span,
+                    format!("the location {name} is both urgent and committed"),
+                    "committed includes urgent: leave urgent out",
+                );
+                Urgency::Committed
+            }
+            (true, false) => Urgency::Committed,
+            (false, true) => Urgency::Urgent,
+            (false, false) => Urgency::Normal,
+        };
+        let place = format!("template {}, location {name}", template.name.text);
+        let (invariant, rates) = match &location.invariant {
+            Some(invariant) => self.invariant(invariant, &place),
+            None => (Guard::default(), Vec::new()),
+        };
+        if let Some(rate) = &location.exponential_rate {
+            let rate = self.expression(rate);
+            self.expect_number(&rate, "an exponential rate");
+        }
+        ir::Location {
+            name,
+            urgency,
+            invariant,
+            rates,
+            edges: Vec::new(),
+            position: location.position.map(|point| (point.x, point.y)),
+            span: location.span,
+        }
+    }
+
+    fn expect_number(&mut self, expr: &Expr, what: &str) {
+        if expr.is_error() {
+            return;
+        }
+        self.expect_pure(expr, what);
+        if !expr.ty.is_number() {
+            self.error(
+                codes::NUMBER_EXPECTED,
+                expr.span,
+                format!(
+                    "{what} must be a number, but this is {}",
+                    expr.ty.described()
+                ),
+                "use a number",
+            );
+        }
+    }
+
+    fn invariant(&mut self, expr: &ast::Expr, place: &str) -> (Guard, Vec<(ClockId, FunctionId)>) {
+        self.locals.clear();
+        let invariant = self.expression(expr);
+        self.expect_pure(&invariant, "an invariant");
+        if !self.expect_condition(&invariant) {
+            return (Guard::default(), Vec::new());
+        }
+        if let Type::Constraint(class) = invariant.ty
+            && class > Class::InvariantWithRate
+        {
+            self.error(
+                codes::CONDITION_NOT_AN_INVARIANT,
+                invariant.span,
+                "this cannot be an invariant: equalities, negations and disjunctions of clock conditions are too strong",
+                "invariants are conjunctions of clock bounds and conditions on variables",
+            );
+            return (Guard::default(), Vec::new());
+        }
+        let mut parts = Vec::new();
+        conjuncts(invariant, &mut parts);
+        let (rates, conditions): (Vec<Expr>, Vec<Expr>) = parts
+            .into_iter()
+            .partition(|part| matches!(part.kind, Kind::Rate { .. }));
+        let guard = self.make_guard(&conditions, &[], &format!("{place}, invariant"));
+        self.warn_of_strictness(&guard, expr.span);
+        let rates = rates
+            .into_iter()
+            .filter_map(|rate| self.make_rate(rate, &format!("{place}, rate")))
+            .collect();
+        (guard, rates)
+    }
+
+    fn warn_of_strictness(&mut self, invariant: &Guard, span: Span) {
+        if invariant.atoms.iter().any(is_strict_upper_bound) {
+            self.report(
+                crate::diagnostics::Diagnostic::new(
+                    codes::INVARIANT_STRICT,
+                    span,
+                    "this invariant has a strict upper bound",
+                )
+                .note("game queries are refused on models with strict invariants")
+                .help("use <= instead of <"),
+            );
+        }
+    }
+
+    fn edge(
+        &mut self,
+        template: &ast::Template,
+        edge: &ast::Edge,
+        nodes: &HashMap<&str, Node>,
+        source: LocationId,
+    ) -> ir::Edge {
+        self.locals.clear();
+        let place = format!(
+            "template {}, edge {} → {}",
+            template.name.text,
+            node_name(template, &edge.source.text),
+            node_name(template, &edge.target.text)
+        );
+        self.scopes.push(Scope::default());
+        let selects = self.selects(&edge.select);
+        let locals: Vec<LocalId> = selects.iter().map(|select| select.local).collect();
+        let guard = match &edge.guard {
+            Some(guard) => self.guard(guard, &locals, &format!("{place}, guard")),
+            None => Guard::default(),
+        };
+        let sync = edge.sync.as_ref().and_then(|sync| {
+            self.synchronisation(sync, &locals, &format!("{place}, synchronisation"))
+        });
+        let update = self.update(&edge.update, &locals, &format!("{place}, update"));
+        self.scopes.pop();
+        let branches = self.branches(template, edge, nodes, selects.len(), &place);
+        ir::Edge {
+            source,
+            select: selects.into_iter().map(|select| select.range).collect(),
+            guard,
+            sync,
+            update,
+            branches,
+            controllable: edge.controllable,
+            labels: self.edge_labels(edge),
+            nails: edge.nails.iter().map(|point| (point.x, point.y)).collect(),
+            span: edge.span,
+        }
+    }
+
+    fn selects(&mut self, bindings: &[(ast::Name, ast::TypeExpr)]) -> Vec<Select> {
+        let mut selects = Vec::new();
+        for (name, ty) in bindings {
+            let outer = std::mem::take(&mut self.free_parameter_seen);
+            let iterated = self.iterated(ty);
+            if self.free_parameter_seen {
+                self.error(
+                    codes::SIZE_HANGS_ON_FREE_PARAMETER,
+                    ty.span,
+                    "the range of a select must not depend on a free parameter of a process set",
+                    "use the widest range and restrict it in the guard",
+                );
+            }
+            self.free_parameter_seen = outer;
+            let Some((ty, (low, high))) = iterated else {
+                self.declare(name, Entity::Broken);
+                continue;
+            };
+            let local = self.new_local(ty.clone());
+            let place = Place {
+                root: Root::Local(local),
+                base: Size::default(),
+                mutable: false,
+            };
+            self.declare(name, Entity::Variable { place, ty });
+            let range = ir::Select {
+                name: name.text.clone(),
+                low,
+                high,
+            };
+            selects.push(Select { local, range });
+        }
+        selects
+    }
+
+    fn branches(
+        &mut self,
+        template: &ast::Template,
+        edge: &ast::Edge,
+        nodes: &HashMap<&str, Node>,
+        parameters: usize,
+        place: &str,
+    ) -> Vec<ir::Branch> {
+        let branchpoint = match self.node(nodes, &edge.target) {
+            None => return Vec::new(),
+            Some(Node::Location(target)) => {
+                return vec![ir::Branch {
+                    target: LocationId(target),
+                    update: ir::Update::default(),
+                }];
+            }
+            Some(Node::Branchpoint(i)) => &template.branchpoints[i],
+        };
+        let mut branches = Vec::new();
+        for leg in template
+            .edges
+            .iter()
+            .filter(|leg| leg.source.text == branchpoint.id)
+        {
+            let Some(Node::Location(target)) = self.node(nodes, &leg.target) else {
+                self.leg_refused(
+                    leg.target.span,
+                    "a leg of a branch point must end in a location",
+                );
+                continue;
+            };
+            branches.push(ir::Branch {
+                target: LocationId(target),
+                update: self.leg(leg, parameters, place),
+            });
+        }
+        if branches.is_empty() {
+            self.leg_refused(branchpoint.span, "the branch point leads nowhere");
+        }
+        branches
+    }
+
+    fn leg_refused(&mut self, span: Span, message: &str) {
+        self.error(
+            codes::BRANCH_REFUSED,
+            span,
+            message,
+            "legs have updates and weights only, and end in locations",
+        );
+    }
+
+    fn leg(&mut self, leg: &ast::Edge, parameters: usize, place: &str) -> ir::Update {
+        if leg.guard.is_some() || leg.sync.is_some() || !leg.select.is_empty() {
+            self.leg_refused(
+                leg.span,
+                "a leg of a branch point has no select, guard or synchronisation",
+            );
+        }
+        // The functions of a leg take the values of the select bindings too, but its expressions do not see them.
+        self.locals.clear();
+        let unseen: Vec<LocalId> = (0..parameters)
+            .map(|_| self.new_local(Type::ANY_INT))
+            .collect();
+        if let Some(weight) = &leg.probability {
+            let weight = self.expression(weight);
+            self.expect_number(&weight, "a weight");
+        }
+        self.update(
+            &leg.update,
+            &unseen,
+            &format!("{place}, update of a branch"),
+        )
+    }
+}
+
+fn nodes(template: &ast::Template) -> HashMap<&str, Node> {
+    let mut nodes = HashMap::new();
+    for (i, location) in template.locations.iter().enumerate() {
+        nodes
+            .entry(location.id.as_str())
+            .or_insert(Node::Location(i as u32));
+    }
+    for (i, branchpoint) in template.branchpoints.iter().enumerate() {
+        nodes
+            .entry(branchpoint.id.as_str())
+            .or_insert(Node::Branchpoint(i));
+    }
+    nodes
+}
+
+fn node_name<'t>(template: &'t ast::Template, id: &'t str) -> &'t str {
+    let location = template.locations.iter().find(|location| location.id == id);
+    let name = location.and_then(|location| location.name.as_ref());
+    name.map_or(id, |name| name.text.as_str())
+}
+
+/// Splits a conjunction into its parts, from left to right.
+pub(super) fn conjuncts(expr: Expr, parts: &mut Vec<Expr>) {
+    match expr.kind {
+        Kind::And(left, right) => {
+            conjuncts(*left, parts);
+            conjuncts(*right, parts);
+        }
+        Kind::Int(value) if value != 0 => {}
+        _ => parts.push(expr),
+    }
+}
+
+/// Whether a comparison bounds a clock, or a difference of clocks, strictly from above.
+pub(super) fn is_strict_upper_bound(atom: &ir::ClockAtom) -> bool {
+    atom.strict && (atom.left.first.0 != 0 || atom.left.count > 1)
+}
