@@ -146,7 +146,9 @@ class _Layout:
             self._statement.append(comment)
             return
         is_line_shared = comment.line == self._end_line and bool(self._lines)
-        is_followed = following is not None and following.line == comment.line
+        is_followed = (
+            following is not None and following.text != "}" and following.line == comment.line
+        )
         self._end_statement()
         line = self._lines[-1] if self._lines else None
         if line is None or not is_line_shared or line.comment is not None:

@@ -331,6 +331,8 @@ class _Parser:
                 hint="write for example `query Reach = E<> Checker.Final_TR_Reached`",
             )
             return None
+        if len(words) > 1:
+            self._report_unexpected(words, words[1], ())
         start = span.start + text.index(name, len("query"))
         identifier = tree.Identifier(self._source.span(start, start + len(name)), name)
         return tree.Query(span, identifier, query.strip())

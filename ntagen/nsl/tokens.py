@@ -6,8 +6,10 @@ The terminals are those of `grammar.lark`; lark is imported when the first text 
 from __future__ import annotations
 
 import functools
+import os
+import sys
 from dataclasses import dataclass
-from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, cast
 
 from ntagen.nsl.source import Source, Span
@@ -85,10 +87,15 @@ class Comment:
 
 @functools.cache
 def grammar() -> lark.Lark:
-    """The parser of single statements; lark is imported when the first file is read."""
+    """The parser of single statements.
+
+    Working out its tables takes longer than all else that happens to a file (some 80 ms), so lark
+    keeps them in the user's cache folder; it works them out anew when the grammar or lark changes,
+    or when the folder cannot be used.
+    """
     import lark
 
-    text = resources.files("ntagen.nsl").joinpath("grammar.lark").read_text("utf-8")
+    text = Path(__file__).with_name("grammar.lark").read_text("utf-8")
     return lark.Lark(
         text,
         parser="lalr",
@@ -96,7 +103,24 @@ def grammar() -> lark.Lark:
         start=["statement", "outside"],
         propagate_positions=True,
         maybe_placeholders=False,
+        cache=_cache_file() or False,
     )
+
+
+def _cache_file() -> str | None:
+    """Where the grammar's tables are kept; None if there is no place that is the user's own.
+
+    A folder that all users share will not do: whoever can write there could have code run here.
+    """
+    root = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    folder = os.path.join(root, "ntagen")
+    if not os.path.isabs(folder):
+        return None
+    try:
+        os.makedirs(folder, mode=0o700, exist_ok=True)
+    except OSError:
+        return None
+    return os.path.join(folder, f"nsl-grammar-{sys.version_info[0]}.{sys.version_info[1]}.tables")
 
 
 def tokenise(source: Source) -> list[Token | Comment]:
