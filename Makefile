@@ -40,7 +40,7 @@ demo: $(INSTALLED) ## Run the main job on the paper's environment; results in de
 .PHONY: test
 test: $(INSTALLED) ## Run all tests, Rust and Python
 	source $(RUST) && cd checker && cargo test --locked --quiet
-	$(BIN)/python -m pytest
+	source $(RUST) && $(BIN)/python -m pytest
 
 .PHONY: quick
 quick: $(INSTALLED) ## Run the Python tests that take no more than a few seconds each

@@ -1,1 +1,1 @@
-"""ntagen: from the description of a needle-steering task to a verified strategy and a steered needle."""
+"""From the description of a needle-steering task to a verified strategy and a steered needle."""

@@ -5,10 +5,11 @@ and replaced by a new one whenever the driver learns something (a pose, a radius
 
 Conventions (paper, section 2 and appendix; the code of the appendix wins over its comments):
 
-* A pose has the tip's position, its *heading* (the direction of travel; `TIP_X` in the model) and its
-  *bevel* direction (`TIP_Z`): the unit vector that points away from the centre of the motion circle.
-  The centre lies at ``position - radius * bevel``.
-* Heading and bevel are unit vectors at right angles. The third axis is ``bevel x heading`` (`TIP_Y`).
+* A pose has the tip's position, its *heading* (the direction of travel; `TIP_X` in the model) and
+  its *bevel* direction (`TIP_Z`): the unit vector that points away from the centre of the motion
+  circle. The centre lies at ``position - radius * bevel``.
+* Heading and bevel are unit vectors at right angles. The third axis is ``bevel x heading``
+  (`TIP_Y`).
 * `Scene.axis` is the direction in which insertion makes progress: the heading written in the file.
   It stays the same when the tip's pose is measured anew. The model calls this direction -y.
 """

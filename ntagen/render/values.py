@@ -116,6 +116,8 @@ def model_values(scene: Scene) -> ModelValues:
     """
     if not scene.targets:
         raise InputError("the scene has no target\nhint: add a line such as `target T1 sphere …`")
+    if not scene.limits.roll_angles_rad:
+        raise InputError("no roll is given\nhint: to forbid rolls, allow them `at most 0 times`")
     scale = scene.resolution_per_mm
     frame = model_frame(scene.axis)
     writer = _Writer(scale, frame)

@@ -1,0 +1,166 @@
+"""Which part of the package may know which other, and who may print, exit or look at the clock.
+
+The arrows of the design, downwards only. Stated as what may be imported; all else is an error:
+a new arrow is a decision and belongs into `MAY_IMPORT`, with a reason in the change.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "ntagen"
+
+BASE = {"errors", "scene", "units"}
+MAY_IMPORT: dict[str, set[str]] = {
+    "errors": set(),
+    "units": set(),
+    "scene": set(),
+    "nsl": BASE,
+    "render": BASE,
+    "checker": {"errors", "_checker"},
+    "needle": BASE,
+    "plan": BASE | {"needle", "render", "checker"},
+    "drive": BASE | {"needle", "nsl", "plan", "render", "checker"},
+    "campaign": BASE | {"needle", "nsl", "plan", "render", "checker", "drive"},
+    "plot": BASE | {"needle", "plan", "drive"},
+    "cli": BASE | {"needle", "nsl", "plan", "render", "checker", "drive", "campaign", "plot"},
+    "__main__": {"cli"},
+}
+"""By room: the rooms that it may import. Each may import itself."""
+
+ONLY_IN: dict[str, set[str]] = {
+    "click": {"cli"},
+    "rich": {"cli"},
+    "lark": {"nsl"},
+    "jinja2": {"render"},
+    "markupsafe": {"render"},
+    "matplotlib": {"plot"},
+    "scipy": {"needle", "plan"},
+    "mcap": {"drive"},
+    "mcap_protobuf": {"drive"},
+    "foxglove_schemas_protobuf": {"drive"},
+    "serial": {"drive"},
+    # Devices and clocks.
+    "socket": {"drive"},
+    "select": {"drive"},
+    "asyncio": {"drive"},
+    "threading": {"drive", "cli"},
+    "time": {"drive", "cli"},
+    "datetime": {"drive"},
+    # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
+    "random": {"needle", "drive"},
+}
+"""By library: the rooms that may import it. Libraries that are not listed may be used anywhere."""
+
+PRINTS_OR_EXITS = {"print", "input", "exit", "quit", "breakpoint"}
+EXITING_ATTRIBUTES = {("sys", "exit"), ("os", "_exit"), ("os", "abort")}
+ALLOWED_TO_PRINT = {"cli", "__main__"}
+
+
+@dataclass(frozen=True)
+class Import:
+    """One imported module: where it stands and what it names."""
+
+    room: str
+    place: str
+    module: str
+
+
+def room_of(path: Path) -> str:
+    """The part of the package that a file belongs to; the package's own face is ``ntagen``."""
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return "ntagen" if parts == ("__init__",) else parts[0]
+
+
+def trees() -> Iterator[tuple[Path, ast.Module]]:
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if "templates" not in path.relative_to(PACKAGE).parts:
+            yield path, ast.parse(path.read_text("utf-8"), str(path))
+
+
+def imports() -> Iterator[Import]:
+    for path, tree in trees():
+        for node in ast.walk(tree):
+            match node:
+                case ast.Import(names=names):
+                    modules = [alias.name for alias in names]
+                case ast.ImportFrom(module="ntagen", names=names, level=0):
+                    modules = [f"ntagen.{alias.name}" for alias in names]
+                case ast.ImportFrom(module=str(module), level=0):
+                    modules = [module]
+                case ast.ImportFrom():
+                    modules = ["relative import"]
+                case _:
+                    continue
+            place = f"{path.relative_to(PACKAGE)}:{node.lineno}"
+            for module in modules:
+                yield Import(room_of(path), place, module)
+
+
+def test_every_room_is_known() -> None:
+    rooms = {room_of(path) for path, _ in trees()} - {"ntagen"}
+    assert rooms <= set(MAY_IMPORT)
+
+
+def test_arrows_between_rooms_point_downwards() -> None:
+    wrong = []
+    for item in imports():
+        parts = item.module.split(".")
+        if parts[0] == "ntagen" and len(parts) > 1 and item.room != "ntagen":
+            allowed = MAY_IMPORT[item.room] | {item.room}
+            if parts[1] not in allowed:
+                wrong.append(f"{item.place}: {item.room} must not import {item.module}")
+    assert wrong == []
+
+
+def test_the_allowed_arrows_make_no_circle() -> None:
+    done: set[str] = {"_checker"}
+    while done < set(MAY_IMPORT) | done:
+        ready = {room for room, below in MAY_IMPORT.items() if room not in done and below <= done}
+        assert ready, f"a circle among {sorted(set(MAY_IMPORT) - done)}"
+        done |= ready
+
+
+def test_libraries_stay_in_their_rooms() -> None:
+    wrong = [
+        f"{item.place}: {item.module} belongs into {sorted(ONLY_IN[top])}"
+        for item in imports()
+        if (top := item.module.partition(".")[0]) in ONLY_IN and item.room not in ONLY_IN[top]
+    ]
+    assert wrong == []
+
+
+def test_imports_are_absolute() -> None:
+    assert [item.place for item in imports() if item.module == "relative import"] == []
+
+
+def test_only_the_command_line_prints_or_exits() -> None:
+    wrong = []
+    for path, tree in trees():
+        if room_of(path) in ALLOWED_TO_PRINT:
+            continue
+        for node in ast.walk(tree):
+            match node:
+                case ast.Call(func=ast.Name(id=name)) if name in PRINTS_OR_EXITS:
+                    wrong.append(f"{path.relative_to(PACKAGE)}:{node.lineno}: {name}")
+                case ast.Attribute(value=ast.Name(id=module), attr=name) if (
+                    module,
+                    name,
+                ) in EXITING_ATTRIBUTES or (
+                    module == "sys" and name in ("stdout", "stderr", "stdin")
+                ):
+                    wrong.append(f"{path.relative_to(PACKAGE)}:{node.lineno}: {module}.{name}")
+                case ast.Name(id="SystemExit"):
+                    wrong.append(f"{path.relative_to(PACKAGE)}:{node.lineno}: SystemExit")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("module", ["ntagen._checker"])
+def test_the_compiled_engine_has_one_door(module: str) -> None:
+    users = {item.room for item in imports() if item.module.startswith(module)}
+    assert users <= {"checker"}
