@@ -12,7 +12,13 @@
 //!
 //! Cost: O(n) for delay, freeing and resetting; O(n^2) for the past and for assignments that drop valuations.
 
-use super::dbm::{Constraint, constrain, for_small_dimension, is_empty, rows, rows_mut, set_empty};
+#![expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+
+use super::dbm::{Constraint, constrain, is_empty, set_empty};
+use super::rows::{for_small_dimension, rows, rows_mut};
 use super::{Bound, ClockSet};
 
 /// One step of an update of clocks; a list of them is carried out in order.
@@ -74,10 +80,6 @@ pub fn down(zone: &mut [Bound], dimension: usize) {
 }
 
 /// Sets row 0 to the least entry of each column, not above `<= 0`.
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
 #[inline(always)]
 fn lower_to_columns(zone: &mut [Bound], dimension: usize) {
     let (lower_bounds, others) = zone.split_at_mut(dimension);
@@ -98,6 +100,9 @@ fn lower_to_columns(zone: &mut [Bound], dimension: usize) {
 /// `{s, d}` to `{r, 0}` along closed entries, hence the lesser of the two pairings
 /// `(s, r) + delay(0)` and `(s, 0) + delay(r)`.
 pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
+    if stopped.is_empty() {
+        return down(zone, dimension);
+    }
     let is_running = |clock: usize| clock != 0 && !stopped.contains(clock);
     let column_least = |zone: &[Bound], column: usize| {
         let running = (1..dimension).filter(|clock| is_running(*clock));

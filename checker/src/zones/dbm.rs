@@ -14,34 +14,20 @@
 //! not be used any further except with [`is_empty`]. Indices must be below the dimension, and slices must have the
 //! right length: both are contracts, checked by the bounds of the slices only.
 //!
-//! Source: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4. Where we differ:
-//! rows are relaxed as vectors of four entries, the last of which may overlap the one before it. That is sound because
-//! relaxing is idempotent, and it spares short rows the scalar rest.
+//! Source: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4.
 //!
-//! Cost: closing n^3 / 4 vector steps, one constraint n^2 / 4, all others at most that; no allocation anywhere.
+//! Cost: closing takes n^3 / 4 vector steps, one constraint n^2 / 4, all others at most that; only [`least_point`]
+//! allocates.
+
+#![expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
 
 use std::cmp::Ordering;
 
+use super::rows::{for_small_dimension, relax_row, rows, rows_mut};
 use super::{Bound, ClockSet};
-
-/// Calls a function with the dimension as its last argument, which is a constant where it is small.
-///
-/// Small zones are the common ones, and their rows then unroll into a few vectors.
-macro_rules! for_small_dimension {
-    ($dimension:expr, $function:ident($($argument:expr),*)) => {
-        match $dimension {
-            2 => $function($($argument,)* 2),
-            3 => $function($($argument,)* 3),
-            4 => $function($($argument,)* 4),
-            5 => $function($($argument,)* 5),
-            6 => $function($($argument,)* 6),
-            7 => $function($($argument,)* 7),
-            8 => $function($($argument,)* 8),
-            dimension => $function($($argument,)* dimension),
-        }
-    };
-}
-pub(super) use for_small_dimension;
 
 /// How two zones of the same dimension lie to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,10 +104,6 @@ pub fn close(zone: &mut [Bound], dimension: usize) -> bool {
     for_small_dimension!(dimension, close_all(zone))
 }
 
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
 #[inline(always)]
 fn close_all(zone: &mut [Bound], dimension: usize) -> bool {
     (0..dimension).all(|via| close_through(zone, dimension, via))
@@ -140,10 +122,6 @@ pub fn close_touched(zone: &mut [Bound], dimension: usize, touched: &ClockSet) -
 }
 
 /// One step of Floyd–Warshall: admits paths through the clock `via`.
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
 #[inline(always)]
 fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
     let (before, rest) = zone.split_at_mut(via * dimension);
@@ -162,93 +140,6 @@ fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
         set_empty(zone);
     }
     is_consistent
-}
-
-/// The rows of a matrix: as `chunks_exact_mut`, without its division, which is a good part of an operation.
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
-#[inline(always)]
-pub(super) fn rows_mut(
-    matrix: &mut [Bound],
-    dimension: usize,
-) -> impl Iterator<Item = &mut [Bound]> {
-    let mut rest = matrix;
-    std::iter::from_fn(move || {
-        let (row, others) = std::mem::take(&mut rest).split_at_mut_checked(dimension)?;
-        rest = others;
-        Some(row)
-    })
-}
-
-/// The rows of a matrix that is only read; see [`rows_mut`].
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
-#[inline(always)]
-pub(super) fn rows(matrix: &[Bound], dimension: usize) -> impl Iterator<Item = &[Bound]> {
-    let mut rest = matrix;
-    std::iter::from_fn(move || {
-        let (row, others) = rest.split_at_checked(dimension)?;
-        rest = others;
-        Some(row)
-    })
-}
-
-/// Tightens every entry of `target` to the sum of `via` and the entry of `source`, where that is less.
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
-#[inline(always)]
-pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
-    if via.is_infinite() {
-        return;
-    }
-    let length = target.len().min(source.len());
-    let (target, source) = (&mut target[..length], &source[..length]);
-    let Some(tail) = last_relaxed(target, via, source) else {
-        for (entry, rest) in target.iter_mut().zip(source) {
-            *entry = Bound::relaxed(*entry, via, *rest);
-        }
-        return;
-    };
-    let (targets, _) = target.as_chunks_mut::<4>();
-    let (sources, _) = source.as_chunks::<4>();
-    for (entries, rests) in targets.iter_mut().zip(sources) {
-        *entries = relaxed_four(*entries, via, *rests);
-    }
-    if !length.is_multiple_of(4)
-        && let Some(entries) = target.last_chunk_mut::<4>()
-    {
-        *entries = tail;
-    }
-}
-
-/// The last four entries after relaxing, computed before any other is written so that no load waits for a store that
-/// overlaps it; none if the row is shorter.
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
-#[inline(always)]
-fn last_relaxed(target: &[Bound], via: Bound, source: &[Bound]) -> Option<[Bound; 4]> {
-    Some(relaxed_four(
-        *target.last_chunk::<4>()?,
-        via,
-        *source.last_chunk::<4>()?,
-    ))
-}
-
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
-#[inline(always)]
-fn relaxed_four(entries: [Bound; 4], via: Bound, rests: [Bound; 4]) -> [Bound; 4] {
-    std::array::from_fn(|lane| Bound::relaxed(entries[lane], via, rests[lane]))
 }
 
 /// Intersects the zone with `x_left - x_right` bounded by `bound`; returns whether something is left.
@@ -273,10 +164,6 @@ pub fn constrain(
     true
 }
 
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
 #[inline(always)]
 fn tighten(zone: &mut [Bound], left: usize, right: usize, bound: Bound, dimension: usize) {
     let (before, rest) = zone.split_at_mut(right * dimension);

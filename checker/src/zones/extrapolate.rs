@@ -23,10 +23,16 @@
 //!
 //! Cost: O(n^2) to forget, then n^2 / 4 vector steps for each row that lost something.
 
+#![expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+
 use std::cmp::Ordering;
 
-use super::dbm::{self, Constraint, for_small_dimension, relax_row, rows_mut};
+use super::dbm::{self, Constraint};
 use super::federation::Federation;
+use super::rows::{for_small_dimension, relax_row, rows_mut};
 use super::{Bound, ClockSet};
 
 /// The greatest constants that each clock is compared with, prepared for extrapolation.
@@ -160,10 +166,6 @@ pub fn lu_plus(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     for_small_dimension!(dimension, forget_and_close(zone, ceilings));
 }
 
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
 #[inline(always)]
 fn forget_and_close(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
     let (weakened, between) = forget_plus(zone, ceilings, dimension);
@@ -178,10 +180,6 @@ fn forget_and_close(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
 
 /// Writes the matrix of `Extra_LU+`, not closed; returns the clocks whose rows lost a bound that closing may restore,
 /// and the clocks that are neither certainly above L nor certainly above U.
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
 #[inline(always)]
 fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (ClockSet, ClockSet) {
     let (lower_bounds, rows) = zone.split_at_mut(dimension);
@@ -213,10 +211,6 @@ fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (Cl
 
 /// Makes the entries of a row infinite that exceed `limit` or whose clock is certainly above its U; returns whether
 /// that weakened one.
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
 #[inline(always)]
 fn forget_in_row(
     row: &mut [Bound],
@@ -237,10 +231,6 @@ fn forget_in_row(
 }
 
 /// Admits paths through `via` into the given rows.
-#[expect(
-    clippy::inline_always,
-    reason = "the dimension is a constant at some calls"
-)]
 #[inline(always)]
 fn relax_rows(zone: &mut [Bound], dimension: usize, targets: &ClockSet, via: usize) {
     let (before, rest) = zone.split_at_mut(via * dimension);

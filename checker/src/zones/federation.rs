@@ -17,6 +17,7 @@
 
 use super::clocks::{self, Assignment};
 use super::dbm::{self, Constraint, Relation};
+use super::rows::rows;
 use super::{Bound, ClockSet, minimal};
 
 /// A finite union of zones of the same dimension.
@@ -204,11 +205,7 @@ impl Federation {
     pub fn down(&mut self, stopped: &ClockSet) {
         let dimension = self.dimension;
         self.update(|zone| {
-            if stopped.is_empty() {
-                clocks::down(zone, dimension);
-            } else {
-                clocks::down_stopped(zone, dimension, stopped);
-            }
+            clocks::down_stopped(zone, dimension, stopped);
             true
         });
     }
@@ -439,7 +436,7 @@ fn join(hull: &mut [Bound], zone: &[Bound], other: &[Bound], dimension: usize) -
 fn has_gap(zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
     let lies_apart =
         |bound: &Bound, opposite: Bound| bound.is_finite() && opposite < bound.negated();
-    dbm::rows(zone, dimension).enumerate().any(|(left, row)| {
+    rows(zone, dimension).enumerate().any(|(left, row)| {
         row.iter()
             .enumerate()
             .any(|(right, bound)| lies_apart(bound, other[right * dimension + left]))

@@ -15,7 +15,8 @@
 //!
 //! Cost: reduction O(n^3), inclusion linear in the number of constraints, unpacking that of closing.
 
-use super::dbm::{self, Constraint, relax_row, rows};
+use super::dbm::{self, Constraint};
+use super::rows::{relax_row, rows};
 use super::{Bound, ClockSet};
 
 /// One constraint of a stored zone in eight bytes.

@@ -5,6 +5,7 @@
 //!
 //! * [`bound`]: one bound `x - y < c` or `x - y <= c` in an `i32`;
 //! * [`clock_set`]: a set of clocks as a bit set;
+//! * `rows`: the innermost loops;
 //! * [`dbm`]: zones on slices, so that callers keep them in arenas; the contract of a zone stands at its top;
 //! * [`clocks`]: what moves clocks: delay, reset, assignment, freeing, and the way back of an update;
 //! * [`zone`]: one zone that owns its matrix;
@@ -18,6 +19,8 @@
 
 pub mod bound;
 pub mod clock_set;
+mod rows;
+
 pub mod dbm;
 
 pub mod clocks;

@@ -9,6 +9,9 @@
 //! form an interval, each zone of B cuts off a final part of it, and of finitely many initial parts the shortest is
 //! contained in all.
 //!
+//! Where we differ: instead of intersecting unions, which multiplies overlapping zones, we collect what each zone of B
+//! takes away, `(G↓ ∩ B↓) \ ((G ∩ B↓) \ B)↓`, and subtract that from `G↓` once.
+//!
 //! With stopped clocks the past of a zone is over-approximated (see [`super::clocks`]), so the result is an
 //! approximation in either direction and a verdict that rests on it is "maybe".
 //!
@@ -18,24 +21,30 @@
 use super::federation::Federation;
 use super::{Bound, ClockSet, clocks, dbm};
 
-/// The safe timed predecessors of `good` with respect to `bad`.
+/// Subtracting a zone can multiply the zones of the rest, reducing costs the square of their number: from about this
+/// many zones on, reducing first was faster on random federations.
+const WORTH_REDUCING: usize = 16;
+
+/// The safe timed predecessors of `good` with respect to `bad`, with the clocks of `stopped` at rest.
 #[must_use]
 pub fn predecessors(good: &Federation, bad: &Federation, stopped: &ClockSet) -> Federation {
     let dimension = good.dimension();
-    let past_of_bad: Vec<Box<[Bound]>> = bad
-        .zones()
-        .map(|zone| past(zone, dimension, stopped))
-        .collect();
+    let with_past = |zone| WithPast::new(zone, dimension, stopped);
+    let bad: Vec<WithPast> = bad.zones().map(with_past).collect();
     let mut result = Federation::empty(dimension);
-    for zone in good.zones() {
-        let past_of_good = past(zone, dimension, stopped);
-        let mut safe = Federation::of_zone(dimension, &past_of_good);
-        for (bad_zone, bad_past) in bad.zones().zip(&past_of_bad) {
+    for good in good.zones().map(with_past) {
+        let mut lost = Federation::empty(dimension);
+        for bad in &bad {
             // Where the pasts do not meet, this bad zone forbids nothing.
-            if !dbm::are_apart(&past_of_good, bad_past, dimension) {
-                avoid(&mut safe, zone, bad_zone, bad_past, stopped);
+            if !dbm::are_apart(&good.past, &bad.past, dimension) {
+                lost.unite(&lost_to(&good, bad, dimension, stopped));
             }
         }
+        if lost.zone_count() > WORTH_REDUCING {
+            lost.reduce();
+        }
+        let mut safe = Federation::of_zone(dimension, &good.past);
+        safe.subtract(&lost);
         result.unite(&safe);
     }
     result
@@ -49,32 +58,28 @@ pub fn predecessors_without_delay(good: &Federation, bad: &Federation) -> Federa
     result
 }
 
-/// Keeps in `safe`, a part of the past of the zone `good`, what reaches it without meeting the zone `bad`.
-fn avoid(
-    safe: &mut Federation,
-    good: &[Bound],
-    bad: &[Bound],
-    past_of_bad: &[Bound],
-    stopped: &ClockSet,
-) {
-    let dimension = safe.dimension();
-    let mut before_bad = Federation::of_zone(dimension, good);
-    before_bad.intersect_zone(past_of_bad);
-    before_bad.subtract_zone(bad);
-    before_bad.down(stopped);
-    let mut kept = safe.intersection(&before_bad);
-    safe.subtract_zone(past_of_bad);
-    kept.unite(safe);
-    *safe = kept;
+/// A zone and its past.
+struct WithPast<'a> {
+    zone: &'a [Bound],
+    past: Box<[Bound]>,
 }
 
-/// The past of a zone.
-fn past(zone: &[Bound], dimension: usize, stopped: &ClockSet) -> Box<[Bound]> {
-    let mut past: Box<[Bound]> = zone.into();
-    if stopped.is_empty() {
-        clocks::down(&mut past, dimension);
-    } else {
+impl<'a> WithPast<'a> {
+    fn new(zone: &'a [Bound], dimension: usize, stopped: &ClockSet) -> WithPast<'a> {
+        let mut past: Box<[Bound]> = zone.into();
         clocks::down_stopped(&mut past, dimension, stopped);
+        WithPast { zone, past }
     }
-    past
+}
+
+/// The part of the past of `good` that cannot reach it without meeting `bad` first.
+fn lost_to(good: &WithPast, bad: &WithPast, dimension: usize, stopped: &ClockSet) -> Federation {
+    let mut before_bad = Federation::of_zone(dimension, good.zone);
+    before_bad.intersect_zone(&bad.past);
+    before_bad.subtract_zone(bad.zone);
+    before_bad.down(stopped);
+    let mut lost = Federation::of_zone(dimension, &good.past);
+    lost.intersect_zone(&bad.past);
+    lost.subtract(&before_bad);
+    lost
 }

@@ -97,12 +97,7 @@ impl Zone {
 
     /// Lets time run backwards while the clocks of `stopped` keep their values; see [`clocks::down_stopped`].
     pub fn down(&mut self, stopped: &ClockSet) {
-        if self.is_empty() {
-            return;
-        }
-        if stopped.is_empty() {
-            clocks::down(&mut self.bounds, self.dimension);
-        } else {
+        if !self.is_empty() {
             clocks::down_stopped(&mut self.bounds, self.dimension, stopped);
         }
     }

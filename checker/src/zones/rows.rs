@@ -1,0 +1,98 @@
+//! The innermost loops: rows of a matrix, and the step that all closing consists of.
+//!
+//! Rows are relaxed as vectors of four entries, the last of which may overlap the one before it. That is sound because
+//! relaxing is idempotent, and it spares short rows a scalar rest. Everything here is inlined into loops whose bounds are
+//! constants for small dimensions.
+
+#![expect(
+    clippy::inline_always,
+    reason = "the dimension is a constant at some calls"
+)]
+
+use super::Bound;
+
+/// Calls a function with the dimension as its last argument, which is a constant where it is small.
+///
+/// Small zones are the common ones, and their rows then unroll into a few vectors.
+macro_rules! for_small_dimension {
+    ($dimension:expr, $function:ident($($argument:expr),*)) => {
+        match $dimension {
+            2 => $function($($argument,)* 2),
+            3 => $function($($argument,)* 3),
+            4 => $function($($argument,)* 4),
+            5 => $function($($argument,)* 5),
+            6 => $function($($argument,)* 6),
+            7 => $function($($argument,)* 7),
+            8 => $function($($argument,)* 8),
+            dimension => $function($($argument,)* dimension),
+        }
+    };
+}
+pub(super) use for_small_dimension;
+
+/// The rows of a matrix: as `chunks_exact_mut`, without its division, which is a good part of an operation.
+#[inline(always)]
+pub(super) fn rows_mut(
+    matrix: &mut [Bound],
+    dimension: usize,
+) -> impl Iterator<Item = &mut [Bound]> {
+    let mut rest = matrix;
+    std::iter::from_fn(move || {
+        let (row, others) = std::mem::take(&mut rest).split_at_mut_checked(dimension)?;
+        rest = others;
+        Some(row)
+    })
+}
+
+/// The rows of a matrix that is only read; see [`rows_mut`].
+#[inline(always)]
+pub(super) fn rows(matrix: &[Bound], dimension: usize) -> impl Iterator<Item = &[Bound]> {
+    let mut rest = matrix;
+    std::iter::from_fn(move || {
+        let (row, others) = rest.split_at_checked(dimension)?;
+        rest = others;
+        Some(row)
+    })
+}
+
+/// Tightens every entry of `target` to the sum of `via` and the entry of `source`, where that is less.
+#[inline(always)]
+pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
+    if via.is_infinite() {
+        return;
+    }
+    let length = target.len().min(source.len());
+    let (target, source) = (&mut target[..length], &source[..length]);
+    let Some(tail) = last_relaxed(target, via, source) else {
+        for (entry, rest) in target.iter_mut().zip(source) {
+            *entry = Bound::relaxed(*entry, via, *rest);
+        }
+        return;
+    };
+    let (targets, _) = target.as_chunks_mut::<4>();
+    let (sources, _) = source.as_chunks::<4>();
+    for (entries, rests) in targets.iter_mut().zip(sources) {
+        *entries = relaxed_four(*entries, via, *rests);
+    }
+    if !length.is_multiple_of(4)
+        && let Some(entries) = target.last_chunk_mut::<4>()
+    {
+        *entries = tail;
+    }
+}
+
+/// The last four entries after relaxing, computed before any other is written so that no load waits for a store that
+/// overlaps it; none if the row is shorter.
+#[inline(always)]
+fn last_relaxed(target: &[Bound], via: Bound, source: &[Bound]) -> Option<[Bound; 4]> {
+    Some(relaxed_four(
+        *target.last_chunk::<4>()?,
+        via,
+        *source.last_chunk::<4>()?,
+    ))
+}
+
+#[inline(always)]
+fn relaxed_four(entries: [Bound; 4], via: Bound, rests: [Bound; 4]) -> [Bound; 4] {
+    std::array::from_fn(|lane| Bound::relaxed(entries[lane], via, rests[lane]))
+}
