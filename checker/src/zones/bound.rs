@@ -77,7 +77,7 @@ impl Bound {
     /// Infinity has no complement; the result for it is meaningless.
     #[must_use]
     pub const fn negated(self) -> Bound {
-        Bound(1 - self.0)
+        Bound(1_i32.saturating_sub(self.0))
     }
 
     /// The encoding, for storing and hashing.

@@ -148,12 +148,6 @@ impl Ceilings {
     fn is_above_lower(&self, clock: usize, entry: Bound) -> bool {
         entry.0 < 1_i32.saturating_sub(self.rows[clock].0)
     }
-
-    /// What row 0 becomes where a clock is certainly above U.
-    #[inline]
-    fn forgotten_lower_bound(column: Bound) -> Bound {
-        column.min(Bound::LE_ZERO)
-    }
 }
 
 /// Extrapolates by `Extra_LU+`; by `Extra_M+` if the ceilings are [`Ceilings::maximal`].
@@ -203,7 +197,8 @@ fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (Cl
     }
     for (lower, column) in lower_bounds.iter_mut().zip(columns).skip(1) {
         if *lower < *column {
-            *lower = Ceilings::forgotten_lower_bound(*column);
+            // Without U nothing is left of a lower bound but `x >= 0`.
+            *lower = (*column).min(Bound::LE_ZERO);
         }
     }
     (weakened, between)
@@ -249,24 +244,22 @@ fn relax_rows(zone: &mut [Bound], dimension: usize, targets: &ClockSet, via: usi
 pub fn lu(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     let columns = &ceilings.columns[..dimension];
     let mut weakened = ClockSet::EMPTY;
-    for (clock, row) in zone.chunks_exact_mut(dimension).enumerate() {
+    for (clock, row) in rows_mut(zone, dimension).enumerate() {
+        let limit = ceilings.rows[clock];
+        // Without U nothing is left of a lower bound but `x >= 0`.
+        let greatest = if clock == 0 {
+            Bound::LE_ZERO
+        } else {
+            Bound::INFINITY
+        };
+        // The diagonal must not count as weakened.
         row[clock] = Bound::INFINITY;
         let mut is_weakened = false;
         for (bound, column) in row.iter_mut().zip(columns) {
-            let is_above = bound.0 > ceilings.rows[clock].0;
-            let is_below = bound.0 < column.0;
-            // A clock without U keeps only what follows from the other bounds, a lower bound no more than `x >= 0`.
-            let below = if clock == 0 {
-                Ceilings::forgotten_lower_bound(*column)
-            } else {
-                *column
-            };
-            let new = if is_above && clock != 0 {
-                Bound::INFINITY
-            } else if is_below {
-                below
-            } else {
-                *bound
+            let new = match *bound {
+                above if above > limit => Bound::INFINITY,
+                below if below < *column => (*column).min(greatest),
+                kept => kept,
             };
             is_weakened |= new > *bound;
             *bound = new;

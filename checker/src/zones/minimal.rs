@@ -135,7 +135,7 @@ fn are_tied(zone: &[Bound], dimension: usize, left: usize, right: usize) -> bool
         zone[left * dimension + right],
         zone[right * dimension + left],
     );
-    forth.is_finite() && !forth.is_strict() && back == Bound(2 - forth.raw())
+    forth.is_finite() && !forth.is_strict() && back.raw() == 2_i32.saturating_sub(forth.raw())
 }
 
 /// The least clock of each class of tied clocks.
