@@ -84,6 +84,9 @@ impl Checker<'_> {
         if converted.len() < signature.parameters.len() || signature.result.is_error() {
             return Expr::error(span);
         }
+        if signature.effects.uses_clock_values {
+            self.clock_values.push(span);
+        }
         let kind = Kind::Call {
             function,
             signature: Arc::clone(signature),
@@ -210,7 +213,7 @@ impl Checker<'_> {
 }
 
 /// A function of the mathematical library, evaluated if its arguments are known.
-fn folded_math(function: MathFunction, arguments: Vec<Expr>, span: Span) -> Expr {
+pub(super) fn folded_math(function: MathFunction, arguments: Vec<Expr>, span: Span) -> Expr {
     let ty = match function {
         MathFunction::Abs | MathFunction::Ilogb => Type::ANY_INT,
         _ if function.result() == RegisterType::Integer => Type::Bool,

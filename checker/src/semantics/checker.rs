@@ -32,6 +32,8 @@ pub(super) struct Checker<'a> {
     has_errors: bool,
     /// The locals of the function, guard or update that is being checked.
     pub(super) locals: Vec<Local>,
+    /// Where values of clocks are used as numbers, as long as it is open whether anything depends on them.
+    pub(super) clock_values: Vec<Span>,
     /// Set when a free parameter is looked up.
     pub(super) free_parameter_seen: bool,
     /// Whether a template is checked without an instance: values of parameters are unknown.
@@ -75,6 +77,7 @@ impl<'a> Checker<'a> {
             reported: HashSet::new(),
             has_errors: false,
             locals: Vec::new(),
+            clock_values: Vec::new(),
             free_parameter_seen: false,
             is_generic: false,
             hides_system: false,
@@ -101,7 +104,15 @@ impl<'a> Checker<'a> {
     }
 
     /// Whether code may be made: nothing was wrong so far, and all values are known.
-    pub(super) fn can_lower(&self) -> bool {
+    pub(super) fn can_lower(&mut self) -> bool {
+        for span in std::mem::take(&mut self.clock_values) {
+            self.error(
+                codes::CLOCK_AS_NUMBER,
+                span,
+                "the value of a clock is no number here: it is known only symbolically",
+                "compare the clock in a guard instead",
+            );
+        }
         !self.has_errors && !self.is_generic
     }
 

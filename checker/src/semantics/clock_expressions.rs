@@ -13,26 +13,49 @@ use super::typed::{ClockRelation, ClockSum, Expr, Kind, Root};
 use super::types::{Class, Memory, Type};
 use crate::diagnostics::Span;
 use crate::ir::{CLOCK_LIMIT, ClockId, IntegerOperator, Relation};
+use crate::syntax::ast::BinaryOp;
 
 impl Checker<'_> {
     /// `left + right` or `left - right` where one is a clock or a sum with one.
     pub(super) fn add_clocks(&mut self, is_sum: bool, left: Expr, right: Expr, span: Span) -> Expr {
-        if !(is_clock_term(&left) || left.ty.is_integral())
-            || !(is_clock_term(&right) || right.ty.is_integral())
-        {
-            return self.clock_as_number(&left, &right, span);
+        let (left, right) = (integral_double(left), integral_double(right));
+        if left.ty == Type::Double || right.ty == Type::Double {
+            return self.add_clock_values(is_sum, left, right, span);
         }
-        let (left_sum, right_sum) = (into_sum(left), into_sum(right));
+        let is_term = |e: &Expr| is_clock_term(e) || e.ty.is_integral();
+        if !is_term(&left) || !is_term(&right) {
+            return self.operands_refused(&left, &right, span);
+        }
+        let (left_sum, right_sum) = (into_sum(left.clone()), into_sum(right.clone()));
         let right_sum = if is_sum {
             right_sum
         } else {
             negated(right_sum, span)
         };
-        let Some(sum) = added(left_sum, right_sum, span) else {
-            self.too_many_clocks(span);
-            return Expr::error(span);
+        match added(left_sum, right_sum, span) {
+            Some(sum) => Expr::new(Kind::ClockSum(sum), Type::ClockTerm, span),
+            None => self.add_clock_values(is_sum, left, right, span),
+        }
+    }
+
+    fn add_clock_values(&mut self, is_sum: bool, left: Expr, right: Expr, span: Span) -> Expr {
+        let (left, right) = (self.clock_value(left), self.clock_value(right));
+        let operator = if is_sum {
+            BinaryOp::Add
+        } else {
+            BinaryOp::Subtract
         };
-        Expr::new(Kind::ClockSum(sum), Type::ClockTerm, span)
+        self.binary(operator, left, right, span)
+    }
+
+    /// A clock as a number; anything else as it is. Whether that can be is decided where it is used.
+    pub(super) fn clock_value(&mut self, expr: Expr) -> Expr {
+        if !is_clock_term(&expr) {
+            return expr;
+        }
+        let span = expr.span;
+        self.clock_values.push(span);
+        Expr::new(Kind::ClockValue(Box::new(expr)), Type::Double, span)
     }
 
     fn too_many_clocks(&mut self, span: Span) {
@@ -51,13 +74,18 @@ impl Checker<'_> {
         if !(left.ty == Type::Double || right.ty == Type::Double) {
             return self.operands_refused(left, right, span);
         }
+        self.clock_with_double(span);
+        Expr::error(span)
+    }
+
+    /// Reports that a clock meets a double.
+    pub(super) fn clock_with_double(&mut self, span: Span) {
         self.error(
             codes::CLOCK_WITH_DOUBLE,
             span,
             "a clock meets a double here: clocks have exact, symbolic values",
-            "compare clocks with integers; fint(…) truncates a double",
+            "use integers for clocks; fint(…) truncates a double",
         );
-        Expr::error(span)
     }
 
     /// A comparison in which at least one side is a clock or a sum with one.
@@ -142,8 +170,8 @@ impl Checker<'_> {
         }
     }
 
-    /// `clock' == rate`
-    pub(super) fn rate(&mut self, clock: Expr, rate: Expr, span: Span) -> Expr {
+    /// `clock' == rate`; `before` is how many values of clocks were used before the two were checked.
+    pub(super) fn rate(&mut self, clock: Expr, rate: Expr, before: usize, span: Span) -> Expr {
         if clock.is_error() || rate.is_error() {
             return Expr::error(span);
         }
@@ -160,6 +188,8 @@ impl Checker<'_> {
             return Expr::error(span);
         };
         if hybrid {
+            // Nothing depends on a hybrid clock, so its rate may depend on anything.
+            self.clock_values.truncate(before);
             return Expr::new(
                 Kind::Int(1),
                 Type::Constraint(Class::InvariantWithRate),
@@ -184,16 +214,22 @@ impl Checker<'_> {
         Expr::new(kind, Type::Constraint(Class::InvariantWithRate), span)
     }
 
-    /// `clock := value`
-    pub(super) fn assign_clock(&mut self, target: Expr, value: Expr, span: Span) -> Expr {
+    /// `clock := value`; `before` is how many values of clocks were used before the two were checked.
+    pub(super) fn assign_clock(
+        &mut self,
+        target: Expr,
+        value: Expr,
+        before: usize,
+        span: Span,
+    ) -> Expr {
         let ty = target.ty.clone();
         if ty == (Type::Clock { hybrid: true }) {
             // Nothing depends on a hybrid clock; only the side effects of the value remain.
-            return if value.has_effect() {
-                value
-            } else {
-                Expr::new(Kind::Int(0), Type::Void, span)
-            };
+            if value.has_effect() {
+                return value;
+            }
+            self.clock_values.truncate(before);
+            return Expr::new(Kind::Int(0), Type::Void, span);
         }
         let value = integral_double(value);
         let sum = if is_clock_term(&value) || value.ty.is_integral() {
@@ -230,7 +266,7 @@ impl Checker<'_> {
 }
 
 /// A double constant without fraction as the integer that it is.
-fn integral_double(expr: Expr) -> Expr {
+pub(super) fn integral_double(expr: Expr) -> Expr {
     match expr.kind {
         Kind::Double(value) if value.fract() == 0.0 && value.abs() <= f64::from(CLOCK_LIMIT) => {
             Expr::int(value as i32, Type::ANY_INT, expr.span)

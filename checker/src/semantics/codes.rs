@@ -169,6 +169,8 @@ codes! {
     EFFECT_MISSING = "W0201" "effect-missing";
     /// An invariant with a strict upper bound.
     INVARIANT_STRICT = "W0202" "invariant-strict";
+    /// Fewer initial values than the array has parts.
+    INITIALISER_INCOMPLETE = "W0205" "initialiser-incomplete";
     /// A mutable double, which UPPAAL would leave out of the state.
     DOUBLE_IN_STATE = "W0203" "double-in-state";
     /// A strategy that takes the place of an earlier one.

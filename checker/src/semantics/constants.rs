@@ -7,7 +7,7 @@ use super::checker::Checker;
 use super::codes;
 use super::typed::{Expr, Kind, Root};
 use super::types::Type;
-use crate::diagnostics::{Diagnostic, Span};
+use crate::diagnostics::Span;
 use crate::exec::arithmetic;
 use crate::ir::{IntegerOperator, RunTimeErrorKind};
 
@@ -61,17 +61,16 @@ impl Checker<'_> {
             Kind::Double(value) => arithmetic::double_words(value).to_vec(),
             _ => self.run_expression(expr)?,
         };
-        let (low, high) = ty.bounds();
-        if ty.is_integral() && !(low..=high).contains(&words[0]) {
-            self.report(
-                Diagnostic::new(
-                    codes::CONSTANT_OUT_OF_RANGE,
-                    expr.span,
-                    format!("the value {} is outside {ty}", words[0]),
-                )
-                .help(format!(
-                    "use a value from {low} to {high}, or widen the range"
-                )),
+        if ty.split_value(&words).is_none() {
+            let value = match words[..] {
+                [value] => format!("the value {value}"),
+                _ => String::from("a part of this value"),
+            };
+            self.error(
+                codes::CONSTANT_OUT_OF_RANGE,
+                expr.span,
+                format!("{value} is outside {ty}"),
+                "use another value, or widen the range",
             );
             return None;
         }

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use super::checker::Checker;
+use super::clock_expressions::integral_double;
 use super::codes;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{DEFAULT_INT, Index, Size, StructType, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
+use crate::ir::CLOCK_LIMIT;
 use crate::syntax::ast::{self, Declaration, Dimension, Initialiser, Name, TypeExpr, TypeKind};
 
 /// The value that one part of a variable starts with.
@@ -40,11 +42,8 @@ impl Checker<'_> {
         }
     }
 
-    /// A `typedef`.
+    /// A `typedef`. `const` and `meta` in it say nothing: they belong to variables.
     pub(super) fn typedef(&mut self, ty: &TypeExpr, name: &Name, dimensions: &[Dimension]) {
-        if ty.prefixes.constant || ty.prefixes.meta {
-            self.misplaced_prefix(ty.span, "const and meta belong to variables, not to types");
-        }
         let ty = self.dimensioned(ty, dimensions);
         self.declare(name, Entity::Type(ty));
     }
@@ -283,8 +282,8 @@ impl Checker<'_> {
         let mut known: Vec<(String, Type)> = Vec::new();
         let mut is_broken = false;
         for field in fields {
-            if field.ty.prefixes.constant || field.ty.prefixes.meta {
-                self.misplaced_prefix(field.ty.span, "fields of a struct cannot be const or meta");
+            if field.ty.prefixes.constant {
+                self.misplaced_prefix(field.ty.span, "fields of a struct cannot be const");
             }
             let ty = self.dimensioned(&field.ty, &field.dimensions);
             if matches!(ty, Type::String | Type::Void) {
@@ -446,9 +445,12 @@ impl Checker<'_> {
         self.warn_of_doubles(variable, ty, meta);
         let words = words.unwrap_or_else(|| vec![0; ty.size().words as usize]);
         let place = self.allocate(&variable.name.text, ty, meta, &words);
+        let clock_start = Type::Int {
+            low: 0,
+            high: CLOCK_LIMIT,
+        };
         for part in parts.iter().filter(|part| part.ty.is_clock()) {
-            if let Some(words) =
-                self.known_words(&part.value, &Type::ANY_INT, "the start of a clock")
+            if let Some(words) = self.known_words(&part.value, &clock_start, "the start of a clock")
             {
                 let clock = place.base.clocks + part.offset.clocks;
                 self.world.network.initial_clocks[clock as usize] = words[0];
@@ -513,7 +515,7 @@ impl Checker<'_> {
                 let value = self.expression(expr);
                 self.expect_pure(&value, "an initial value");
                 let value = if ty.is_clock() {
-                    self.converted(value, &Type::ANY_INT)
+                    self.initial_clock(value, ty)
                 } else if ty.size().channels > 0 || *ty == Type::Void {
                     self.misplaced_initialiser(expr.span, ty);
                     None
@@ -531,7 +533,24 @@ impl Checker<'_> {
                 });
             }
             (Initialiser::List(items, span), Type::Array(array)) => {
-                if items.len() != array.index.length as usize {
+                if items.len() < array.index.length as usize {
+                    self.report(
+                        Diagnostic::new(
+                            codes::INITIALISER_INCOMPLETE,
+                            *span,
+                            format!(
+                                "the array has {} parts, but only {} values are given",
+                                array.index.length,
+                                items.len()
+                            ),
+                        )
+                        .note(
+                            "the other parts start with the value of an array without initialiser",
+                        )
+                        .help("give one value for each part"),
+                    );
+                }
+                if items.len() > array.index.length as usize {
                     let message = format!(
                         "the array has {} parts, but {} values are given",
                         array.index.length,
@@ -564,6 +583,25 @@ impl Checker<'_> {
                 parts.push(broken_part(offset, ty, *span));
             }
         }
+    }
+
+    /// The value that a clock starts with; that of a hybrid clock does not matter.
+    fn initial_clock(&mut self, value: Expr, ty: &Type) -> Option<Expr> {
+        let value = integral_double(value);
+        if *ty == (Type::Clock { hybrid: true }) && value.ty == Type::Double {
+            return Some(Expr::int(0, Type::ANY_INT, value.span));
+        }
+        if value.ty == Type::Double {
+            self.clock_with_double(value.span);
+            return None;
+        }
+        self.converted(
+            value,
+            &Type::Int {
+                low: 0,
+                high: CLOCK_LIMIT,
+            },
+        )
     }
 
     fn misplaced_initialiser(&mut self, span: Span, ty: &Type) {

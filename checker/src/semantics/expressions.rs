@@ -34,10 +34,11 @@ impl Checker<'_> {
                 self.ternary(condition, then, otherwise, span)
             }
             ExprKind::Assign(operator, target, value) => {
+                let before = self.clock_values.len();
                 let target = self.expression(target);
                 let value = self.expression(value);
                 match operator {
-                    None => self.assignment(target, value, span),
+                    None => self.assignment(target, value, before, span),
                     Some(operator) => self.compound(*operator, target, value, span),
                 }
             }
@@ -268,9 +269,10 @@ impl Checker<'_> {
         if operator == BinaryOp::Equal {
             for (rate, value) in [(left, right), (right, left)] {
                 if let ExprKind::Rate(clock) = &rate.kind {
+                    let before = self.clock_values.len();
                     let clock = self.expression(clock);
                     let value = self.expression(value);
-                    return self.rate(clock, value, span);
+                    return self.rate(clock, value, before, span);
                 }
             }
         }
@@ -347,12 +349,12 @@ impl Checker<'_> {
     }
 
     /// `target = value`
-    pub(super) fn assignment(&mut self, target: Expr, value: Expr, span: Span) -> Expr {
+    fn assignment(&mut self, target: Expr, value: Expr, before: usize, span: Span) -> Expr {
         if !self.expect_mutable(&target) || value.is_error() {
             return Expr::error(span);
         }
         if target.ty.is_clock() && (target.ty.accepts(&value.ty)) {
-            return self.assign_clock(target, value, span);
+            return self.assign_clock(target, value, before, span);
         }
         let size = target.ty.size();
         if size.clocks + size.channels > 0 {
@@ -386,15 +388,11 @@ impl Checker<'_> {
         if value.is_error() || ty.is_error() {
             return None;
         }
-        if value.ty.is_clock() || value.ty == Type::ClockTerm {
-            self.error(
-                codes::CLOCK_AS_NUMBER,
-                value.span,
-                "the value of a clock is not a number here: it is known only symbolically",
-                "compare the clock in a guard instead",
-            );
-            return None;
-        }
+        let value = if *ty == Type::Double {
+            self.clock_value(value)
+        } else {
+            value
+        };
         if !ty.accepts(&value.ty) {
             let help = if ty.is_integral() && value.ty == Type::Double {
                 "convert with fint(…), which truncates"

@@ -18,6 +18,7 @@ impl Checker<'_> {
     /// Checks a function, lowers it, and declares its name.
     pub(super) fn function(&mut self, function: &ast::Function) {
         let outer_locals = std::mem::take(&mut self.locals);
+        let clock_values = self.clock_values.len();
         let result = self.result_type(&function.return_type);
         self.declare(&function.name, Entity::OpenFunction);
         self.scopes.push(Scope::default());
@@ -42,6 +43,11 @@ impl Checker<'_> {
             result,
             effects: Effects::default(),
         };
+        if self.clock_values.len() > clock_values {
+            // Such a function can only be called where nothing depends on the result.
+            self.clock_values.truncate(clock_values);
+            signature.effects.uses_clock_values = true;
+        }
         let id = self.lower_function(&mut signature, &body);
         self.locals = outer_locals;
         let entity = Entity::Function(id, Arc::new(signature));
@@ -58,7 +64,7 @@ impl Checker<'_> {
     }
 
     fn lower_function(&mut self, signature: &mut Signature, body: &Statement) -> FunctionId {
-        if !self.can_lower() {
+        if signature.effects.uses_clock_values || !self.can_lower() {
             return NO_FUNCTION;
         }
         let name = match &self.process {

@@ -12,7 +12,6 @@ use super::expressions::known_offset;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{DEFAULT_INT, Memory, Size, Type};
-use crate::diagnostics::Span;
 use crate::ir::ProcessId;
 use crate::syntax::ast::{self, Document, Name, Parameter, SystemItem};
 
@@ -466,7 +465,7 @@ fn mark_used(document: &Document, checker: &mut Checker<'_>, target: Target, use
 }
 
 /// All combinations of values of the types, the first changing slowest.
-fn combinations(types: &[Type]) -> Vec<Vec<i32>> {
+pub(super) fn combinations(types: &[Type]) -> Vec<Vec<i32>> {
     let mut all = vec![Vec::new()];
     for ty in types {
         let (low, high) = ty.bounds();
@@ -482,10 +481,4 @@ fn combinations(types: &[Type]) -> Vec<Vec<i32>> {
             .collect();
     }
     all
-}
-
-/// Where a mistake in a name of the system line is shown.
-pub(super) fn system_span(document: &Document) -> Span {
-    let names = document.system.processes.iter().flatten();
-    names.map(|name| name.span).next().unwrap_or_default()
 }

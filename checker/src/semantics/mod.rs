@@ -105,7 +105,7 @@ impl Model {
         checker.scopes = scopes;
         checker.is_query = true;
         let compiled = checker.query(query, strategies);
-        let has_errors = checker.has_errors();
+        let has_errors = !checker.can_lower();
         let diagnostics = sorted(checker.diagnostics);
         self.world = checker.world;
         self.world.query_scopes = checker.scopes;

@@ -1,12 +1,13 @@
 //! Typing of operators on integers, truth values and doubles; folding of constants; intervals of results.
 
+use super::calls::folded_math;
 use super::checker::Checker;
 use super::codes;
 use super::typed::{Expr, Kind};
 use super::types::{Class, Type};
 use crate::diagnostics::Span;
 use crate::exec::arithmetic;
-use crate::ir::{DoubleOperator, IntegerOperator, Relation};
+use crate::ir::{DoubleOperator, IntegerOperator, MathFunction, Relation};
 use crate::syntax::ast::BinaryOp;
 
 impl Checker<'_> {
@@ -42,9 +43,14 @@ impl Checker<'_> {
         {
             return self.add_clocks(operator == BinaryOp::Add, left, right, span);
         }
+        let (left, right) = (self.clock_value(left), self.clock_value(right));
         let integer = integer_operator(operator);
         if left.ty.is_integral() && right.ty.is_integral() {
             return integer_operation(integer, left, right, span);
+        }
+        if operator == BinaryOp::Power && left.ty.is_number() && right.ty.is_number() {
+            let operands = vec![to_double(left), to_double(right)];
+            return folded_math(MathFunction::Pow, operands, span);
         }
         if let Some(double) = double_operator(operator)
             && left.ty.is_number()
@@ -91,7 +97,8 @@ impl Checker<'_> {
             return compare_integers(relation, left, right, span);
         }
         let is_data = left.ty.size().clocks + left.ty.size().channels == 0;
-        if is_equality && same && is_data && left.ty.is_aggregate() {
+        let is_comparable = left.ty.has_parts_of(&right.ty);
+        if is_equality && is_comparable && is_data && left.ty.is_aggregate() {
             let equal = relation == Relation::Equal;
             let kind = Kind::CompareWords(equal, Box::new(left), Box::new(right));
             return Expr::new(kind, Type::Bool, span);
@@ -189,6 +196,7 @@ impl Checker<'_> {
             return Expr::error(span);
         }
         let zero = Expr::int(0, Type::ANY_INT, span);
+        let inner = self.clock_value(inner);
         if inner.ty.is_integral() {
             return integer_operation(IntegerOperator::Subtract, zero, inner, span);
         }

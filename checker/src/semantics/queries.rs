@@ -17,6 +17,15 @@ use crate::syntax::ast;
 impl Checker<'_> {
     /// Checks and lowers a query.
     pub(super) fn query(&mut self, query: &ast::Query, strategies: &[String]) -> Option<ir::Query> {
+        if let ast::QueryKind::Unsupported(name) = &query.kind {
+            self.error(
+                codes::QUERY_UNSUPPORTED,
+                name.span,
+                format!("{} queries are not supported", name.text),
+                "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds and control:",
+            );
+            return None;
+        }
         if let Some(under) = &query.under {
             self.known_strategy(under, strategies);
         }
@@ -66,7 +75,7 @@ impl Checker<'_> {
                 query.kind,
                 ast::QueryKind::Control(_) | ast::QueryKind::LoadStrategy { .. }
             );
-            if !is_strategy && !matches!(query.kind, ast::QueryKind::Unsupported(_)) {
+            if !is_strategy {
                 self.error(
                     codes::STRATEGY_OF_NO_GAME,
                     strategy.span,
@@ -114,15 +123,7 @@ impl Checker<'_> {
                 }
                 Some(QueryKind::LoadStrategy { file: file.clone() })
             }
-            ast::QueryKind::Unsupported(name) => {
-                self.error(
-                    codes::QUERY_UNSUPPORTED,
-                    name.span,
-                    format!("{} queries are not supported", name.text),
-                    "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds and control:",
-                );
-                None
-            }
+            ast::QueryKind::Unsupported(_) => None,
         }
     }
 

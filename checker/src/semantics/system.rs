@@ -80,10 +80,11 @@ impl Checker<'_> {
             self.expect_pure(&measure, "a progress measure");
             self.expect_integer(&measure, "a progress measure");
         }
-        if self.world.network.processes.is_empty() && !self.has_errors() {
+        let has_templates = !document.templates.is_empty();
+        if has_templates && self.world.network.processes.is_empty() && !self.has_errors() {
             self.error(
                 codes::SYSTEM_EMPTY,
-                super::instantiate::system_span(document),
+                document.templates[0].name.span,
                 "the system has no process",
                 "name the processes in the system line: system P, Q;",
             );
@@ -177,12 +178,12 @@ impl Checker<'_> {
 
     /// Puts the parts of the state into their final order and sums up what the model uses.
     fn finish(&mut self) -> Relocation {
-        let network = &mut self.world.network;
+        let network = &self.world.network;
         let relocation = Relocation {
             locations: network.processes.len() as u32,
             variables: self.world.initial.len() as u32,
         };
-        if self.has_errors() {
+        if !self.can_lower() {
             return relocation;
         }
         let network = &mut self.world.network;

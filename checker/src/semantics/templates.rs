@@ -12,6 +12,9 @@ use crate::diagnostics::Span;
 use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationId, Urgency};
 use crate::syntax::ast;
 
+/// The most branches that the select bindings of one leg may stand for.
+const BRANCH_LIMIT: u64 = 1 << 16;
+
 /// What an edge can lead to.
 #[derive(Clone, Copy, Debug)]
 enum Node {
@@ -113,8 +116,10 @@ impl Checker<'_> {
             None => (Guard::default(), Vec::new()),
         };
         if let Some(rate) = &location.exponential_rate {
+            let before = self.clock_values.len();
             let rate = self.expression(rate);
             self.expect_number(&rate, "an exponential rate");
+            self.clock_values.truncate(before);
         }
         ir::Location {
             name,
@@ -132,7 +137,7 @@ impl Checker<'_> {
             return;
         }
         self.expect_pure(expr, what);
-        if !expr.ty.is_number() {
+        if !(expr.ty.is_number() || expr.ty.is_clock()) {
             self.error(
                 codes::NUMBER_EXPECTED,
                 expr.span,
@@ -298,10 +303,11 @@ impl Checker<'_> {
                 );
                 continue;
             };
-            branches.push(ir::Branch {
+            let updates = self.leg(leg, parameters, place);
+            branches.extend(updates.into_iter().map(|update| ir::Branch {
                 target: LocationId(target),
-                update: self.leg(leg, parameters, place),
-            });
+                update,
+            }));
         }
         if branches.is_empty() {
             self.leg_refused(branchpoint.span, "the branch point leads nowhere");
@@ -318,21 +324,59 @@ impl Checker<'_> {
         );
     }
 
-    fn leg(&mut self, leg: &ast::Edge, parameters: usize, place: &str) -> ir::Update {
-        if leg.guard.is_some() || leg.sync.is_some() || !leg.select.is_empty() {
+    /// The updates of a leg: one for each combination of the values of its `select` bindings.
+    fn leg(&mut self, leg: &ast::Edge, parameters: usize, place: &str) -> Vec<ir::Update> {
+        if leg.guard.is_some() || leg.sync.is_some() {
             self.leg_refused(
                 leg.span,
-                "a leg of a branch point has no select, guard or synchronisation",
+                "a leg of a branch point has no guard and no synchronisation",
             );
         }
-        // The functions of a leg take the values of the select bindings too, but its expressions do not see them.
+        let mut ranges = Vec::new();
+        for (name, ty) in &leg.select {
+            let Some((ty, _)) = self.iterated(ty) else {
+                return Vec::new();
+            };
+            ranges.push((name, ty));
+        }
+        let types: Vec<Type> = ranges.iter().map(|(_, ty)| ty.clone()).collect();
+        let counts = types.iter().map(|ty| {
+            let (low, high) = ty.bounds();
+            u64::from(high.abs_diff(low)) + 1
+        });
+        if counts.product::<u64>() > BRANCH_LIMIT {
+            self.error(
+                codes::RANGE_TOO_LARGE,
+                leg.span,
+                "the select of this leg ranges over too many values",
+                "use smaller ranges",
+            );
+            return Vec::new();
+        }
+        let mut updates = Vec::new();
+        for values in super::instantiate::combinations(&types) {
+            self.scopes.push(Scope::default());
+            for ((name, ty), value) in ranges.iter().zip(values) {
+                let value = Expr::int(value, ty.clone(), name.span);
+                self.declare(name, Entity::Constant { value, free: false });
+            }
+            updates.push(self.leg_update(leg, parameters, place));
+            self.scopes.pop();
+        }
+        updates
+    }
+
+    fn leg_update(&mut self, leg: &ast::Edge, parameters: usize, place: &str) -> ir::Update {
+        // The functions of a leg take the values of the entry's select bindings too, but its expressions do not see them.
         self.locals.clear();
         let unseen: Vec<LocalId> = (0..parameters)
             .map(|_| self.new_local(Type::ANY_INT))
             .collect();
         if let Some(weight) = &leg.probability {
+            let before = self.clock_values.len();
             let weight = self.expression(weight);
             self.expect_number(&weight, "a weight");
+            self.clock_values.truncate(before);
         }
         self.update(
             &leg.update,

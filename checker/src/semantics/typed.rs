@@ -81,6 +81,8 @@ pub(super) enum Kind {
     Field { record: Box<Expr>, offset: Size },
     /// An integer as a double.
     ToDouble(Box<Expr>),
+    /// The value of a clock as a double; it stands only where nothing depends on it, and is never lowered.
+    ClockValue(Box<Expr>),
     /// A double truncated to an integer.
     ToInteger(Box<Expr>),
     /// Arithmetic on integers.
@@ -207,6 +209,8 @@ pub(super) struct Effects {
     pub(super) reads_state: bool,
     /// Whether a clock is mentioned.
     pub(super) mentions_clocks: bool,
+    /// Whether the value of a clock is used as a number.
+    pub(super) uses_clock_values: bool,
 }
 
 /// An assignment to a clock that may be a parameter of the function.
@@ -388,6 +392,7 @@ impl Expr {
             | Kind::Deadlock => {}
             Kind::Field { record: inner, .. }
             | Kind::ToDouble(inner)
+            | Kind::ClockValue(inner)
             | Kind::ToInteger(inner)
             | Kind::Not(inner)
             | Kind::Step { target: inner, .. }

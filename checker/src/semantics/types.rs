@@ -337,6 +337,41 @@ impl Type {
         }
     }
 
+    /// Whether values of the two types have the same parts, ranges apart.
+    pub(super) fn has_parts_of(&self, other: &Type) -> bool {
+        match (self, other) {
+            (Type::Array(a), Type::Array(b)) => a.index == b.index && a.part.has_parts_of(&b.part),
+            (Type::Struct(a), Type::Struct(b)) => {
+                a.fields.len() == b.fields.len()
+                    && a.fields
+                        .iter()
+                        .zip(&b.fields)
+                        .all(|(a, b)| a.0 == b.0 && a.1.has_parts_of(&b.1))
+            }
+            (Type::Int { .. }, Type::Int { .. }) => true,
+            _ => self.is_equivalent(other),
+        }
+    }
+
+    /// Whether the words are those of a value of this type; returns the rest.
+    pub(super) fn split_value<'w>(&self, words: &'w [i32]) -> Option<&'w [i32]> {
+        match self {
+            Type::Array(array) => {
+                (0..array.index.length).try_fold(words, |rest, _| array.part.split_value(rest))
+            }
+            Type::Struct(record) => record
+                .fields
+                .iter()
+                .try_fold(words, |rest, (_, ty)| ty.split_value(rest)),
+            _ => {
+                let (low, high) = self.bounds();
+                let (value, rest) = words.split_at_checked(self.size().words as usize)?;
+                let fits = |&word: &i32| low <= word && word <= high;
+                value.iter().all(fits).then_some(rest)
+            }
+        }
+    }
+
     /// Whether a value of type `value` may be assigned to a variable of this type.
     pub(super) fn accepts(&self, value: &Type) -> bool {
         match (self, value) {
@@ -346,7 +381,7 @@ impl Type {
                 value.is_number() || value.is_clock() || *value == Type::ClockTerm
             }
             _ if self.is_integral() => value.is_integral(),
-            _ => self.holds(value),
+            _ => self.has_parts_of(value),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::super::operators::integer_interval;
 use super::super::typed::{ClockEffect, ClockSet, Expr, Kind, LocalId, Parameter, Root, Signature};
-use super::super::types::Type;
+use super::super::types::{Index, Type};
 use super::places::Target;
 use super::{Builder, Home, at, register_type};
 use crate::diagnostics::Span;
@@ -321,6 +321,19 @@ impl Builder<'_> {
         expr: &Expr,
         body: &mut dyn FnMut(&mut Self),
     ) {
+        self.counted((low, high), expr.span, &mut |builder, counter| {
+            builder.bind_counter(local, counter);
+            body(builder);
+        });
+    }
+
+    /// Runs `body` for each value of a counter from `low` to `high`.
+    fn counted(
+        &mut self,
+        (low, high): (i32, i32),
+        span: Span,
+        body: &mut dyn FnMut(&mut Self, Register),
+    ) {
         let counter = self.register(RegisterType::Integer);
         self.emit(Instruction::Integer {
             target: counter,
@@ -329,9 +342,8 @@ impl Builder<'_> {
         let (head, next, end) = (self.new_block(), self.new_block(), self.new_block());
         self.jump(head);
         self.switch(head);
-        self.bind_counter(local, counter);
         self.loops += 1;
-        body(self);
+        body(self, counter);
         self.loops -= 1;
         let last = self.integer(high);
         let is_last = self.register(RegisterType::Integer);
@@ -344,7 +356,7 @@ impl Builder<'_> {
         self.terminate(Terminator::Branch(is_last, end, next));
         self.switch(next);
         let one = self.integer(1);
-        let increased = self.arithmetic(IntegerOperator::Add, counter, one, expr.span);
+        let increased = self.arithmetic(IntegerOperator::Add, counter, one, span);
         self.copy(counter, increased);
         self.jump(head);
         self.switch(end);
@@ -416,7 +428,7 @@ impl Builder<'_> {
     pub(super) fn assign(&mut self, target: &Expr, value: &Expr) -> Target {
         let place = self.target(target, true);
         if target.ty.is_aggregate() {
-            let source = self.address(value);
+            let source = self.checked_address(value, &target.ty);
             if let Target::Memory(address) = place
                 && address != source
             {
@@ -439,6 +451,51 @@ impl Builder<'_> {
         let value = self.value(expr);
         self.check_range(value, expr.interval, ty, expr.span);
         value
+    }
+
+    /// The address of an array, struct or scalar whose parts are checked against the ranges of the type that it is given to.
+    pub(super) fn checked_address(&mut self, expr: &Expr, ty: &Type) -> Address {
+        let address = self.address(expr);
+        self.check_parts(address, ty, &expr.ty, expr.span);
+        address
+    }
+
+    fn check_parts(&mut self, address: Address, ty: &Type, given: &Type, span: Span) {
+        if ty.holds(given) {
+            return;
+        }
+        match (ty, given) {
+            (Type::Array(array), Type::Array(given)) => {
+                let Index { length, .. } = array.index;
+                let stride = array.part.size().words;
+                self.counted((0, length as i32 - 1), span, &mut |builder, counter| {
+                    let site = builder.site(span);
+                    let scaled = builder.register(RegisterType::Integer);
+                    builder.emit(Instruction::ScaleIndex {
+                        target: scaled,
+                        index: counter,
+                        first: 0,
+                        length,
+                        stride,
+                        site,
+                    });
+                    let index = Some(builder.add_indices(address.index, scaled));
+                    let part = Address { index, ..address };
+                    builder.check_parts(part, &array.part, &given.part, span);
+                });
+            }
+            (Type::Struct(record), Type::Struct(given)) => {
+                let mut part = address;
+                for ((_, ty), (_, given)) in record.fields.iter().zip(&given.fields) {
+                    self.check_parts(part, ty, given, span);
+                    part.offset += ty.size().words;
+                }
+            }
+            _ => {
+                let value = self.load(Target::Memory(address), ty);
+                self.check_range(value, given.bounds(), ty, span);
+            }
+        }
     }
 
     fn check_range(&mut self, value: Register, interval: (i32, i32), ty: &Type, span: Span) {
@@ -539,7 +596,7 @@ impl Builder<'_> {
             return self.reference(argument, parameter, registers);
         }
         if parameter.ty.is_aggregate() {
-            let source = self.address(argument);
+            let source = self.checked_address(argument, &parameter.ty);
             let address = if changes_follow {
                 let words = parameter.ty.size().words;
                 let target = self.frame(words);
@@ -571,7 +628,11 @@ impl Builder<'_> {
     ) -> Option<ClockSet> {
         let size = parameter.ty.size();
         if size.words > 0 {
-            let address = self.address(argument);
+            let address = if parameter.constant {
+                self.checked_address(argument, &parameter.ty)
+            } else {
+                self.address(argument)
+            };
             if !parameter.constant
                 && argument
                     .variable()

@@ -127,7 +127,7 @@ impl Builder<'_> {
         path
     }
 
-    fn add_indices(&mut self, left: Option<Register>, right: Register) -> Register {
+    pub(super) fn add_indices(&mut self, left: Option<Register>, right: Register) -> Register {
         let Some(left) = left else { return right };
         let target = self.register(RegisterType::Integer);
         self.emit(Instruction::AddIndices {

@@ -118,8 +118,9 @@ impl Builder<'_> {
             return;
         };
         if let Some(result) = self.result_address {
-            let source = self.address(value);
-            let words = value.ty.size().words;
+            let ty = self.result.clone();
+            let source = self.checked_address(value, &ty);
+            let words = ty.size().words;
             self.emit(Instruction::CopyWords {
                 target: at(Base::Register(result), 0),
                 source,
