@@ -17,11 +17,12 @@ PACKAGE = Path(__file__).parents[1] / "ntagen"
 
 BASE = {"errors", "scene", "units"}
 MAY_IMPORT: dict[str, set[str]] = {
+    "cache": set(),
     "errors": set(),
     "units": set(),
     "scene": set(),
-    "nsl": BASE,
-    "render": BASE,
+    "nsl": BASE | {"cache"},
+    "render": BASE | {"cache"},
     "checker": {"errors", "_checker"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},

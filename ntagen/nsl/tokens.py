@@ -6,12 +6,12 @@ The terminals are those of `grammar.lark`; lark is imported when the first text 
 from __future__ import annotations
 
 import functools
-import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, cast
 
+from ntagen.cache import cache_folder
 from ntagen.nsl.source import Source, Span
 
 if TYPE_CHECKING:
@@ -108,19 +108,10 @@ def grammar() -> lark.Lark:
 
 
 def _cache_file() -> str | None:
-    """Where the grammar's tables are kept; None if there is no place that is the user's own.
-
-    A folder that all users share will not do: whoever can write there could have code run here.
-    """
-    root = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    folder = os.path.join(root, "ntagen")
-    if not os.path.isabs(folder):
-        return None
-    try:
-        os.makedirs(folder, mode=0o700, exist_ok=True)
-    except OSError:
-        return None
-    return os.path.join(folder, f"nsl-grammar-{sys.version_info[0]}.{sys.version_info[1]}.tables")
+    """Where the grammar's tables are kept; None if there is no place that is the user's own."""
+    folder = cache_folder()
+    version = f"{sys.version_info[0]}.{sys.version_info[1]}"
+    return None if folder is None else str(folder / f"nsl-grammar-{version}.tables")
 
 
 def tokenise(source: Source) -> list[Token | Comment]:

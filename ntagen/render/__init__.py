@@ -10,7 +10,7 @@ paper.
 
 from __future__ import annotations
 
-from xml.sax.saxutils import escape
+import html
 
 from markupsafe import Markup
 
@@ -41,5 +41,7 @@ def render(scene: Scene, source: str | None = None) -> str:
         model=values, source=None if source is None else " ".join(source.split())
     )
     return templates.get_template("model.xml.jinja").render(
-        model=values, declaration=Markup(escape(declaration)), queries=model_queries(scene)
+        model=values,
+        declaration=Markup(html.escape(declaration, quote=False)),
+        queries=model_queries(scene),
     )
