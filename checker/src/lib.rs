@@ -9,8 +9,17 @@ pub mod syntax;
 pub mod ir;
 
 pub mod exec;
-
 pub mod semantics;
+
 pub mod zones;
 
 pub mod network;
+
+pub mod search;
+
+pub mod game;
+
+pub mod engine;
+
+#[cfg(feature = "python")]
+mod python;

@@ -533,6 +533,22 @@ impl<'a> Stepper<'a> {
         Ok(Some(&self.constraints))
     }
 
+    /// Evaluates the invariant of one process: `None` if the words break it.
+    pub fn invariant_of(
+        &mut self,
+        process: usize,
+        words: &mut [i32],
+    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+        let network = self.network;
+        self.constraints.clear();
+        self.arguments.clear();
+        let invariant = &network.processes[process].locations[words[process] as usize].invariant;
+        if !self.guard(invariant, words)? {
+            return Ok(None);
+        }
+        Ok(Some(&self.constraints))
+    }
+
     /// Runs a function of a query on the state.
     pub fn evaluate(
         &mut self,

@@ -1,0 +1,238 @@
+//! States, moves and zones in the words of the model.
+//!
+//! The text of a trace follows the form that UPPAAL's command-line checker prints, so that scripts written for that can read it.
+
+use std::fmt::Write as _;
+
+use super::LoadedModel;
+use crate::ir::{EdgeLabels, Network, RunTimeErrorKind, Shape};
+use crate::network::stepper::{select_count, select_values};
+use crate::network::{Failure, Part};
+use crate::search::reach::Trace;
+use crate::zones::{Bound, Zone};
+
+/// Calls `visit` with the name and the value of every scalar part of every variable.
+pub fn for_each_value(network: &Network, words: &[i32], mut visit: impl FnMut(&str, Value)) {
+    for variable in &network.layout.variables {
+        let offset = variable.offset as usize;
+        let words = &words[offset..offset + variable.shape.words() as usize];
+        visit_shape(&variable.shape, &variable.name, words, &mut visit);
+    }
+}
+
+/// A value of a variable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// An integer, truth value or scalar.
+    Integer(i32),
+    /// A double.
+    Double(f64),
+}
+
+fn visit_shape(shape: &Shape, name: &str, words: &[i32], visit: &mut impl FnMut(&str, Value)) {
+    match shape {
+        Shape::Integer { .. } | Shape::Bool | Shape::Scalar { .. } => {
+            visit(name, Value::Integer(words[0]));
+        }
+        Shape::Double => {
+            let bits = u64::from(words[0] as u32) | u64::from(words[1] as u32) << 32;
+            visit(name, Value::Double(f64::from_bits(bits)));
+        }
+        Shape::Array {
+            part,
+            length,
+            first,
+        } => {
+            let size = part.words() as usize;
+            for index in 0..*length {
+                let words = &words[index as usize * size..][..size];
+                visit_shape(
+                    part,
+                    &format!("{name}[{}]", first + index as i32),
+                    words,
+                    visit,
+                );
+            }
+        }
+        Shape::Struct(fields) => {
+            let mut offset = 0;
+            for (field, shape) in fields {
+                let size = shape.words() as usize;
+                visit_shape(
+                    shape,
+                    &format!("{name}.{field}"),
+                    &words[offset..offset + size],
+                    visit,
+                );
+                offset += size;
+            }
+        }
+    }
+}
+
+/// The name of the location that a process is in.
+pub fn location_name<'n>(network: &'n Network, process: usize, words: &[i32]) -> &'n str {
+    &network.processes[process].locations[words[process] as usize].name
+}
+
+/// The constraints of a zone that say something, as `x - y <= 3` and its kin.
+pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
+    let name = |clock: usize| network.clocks[clock].name.as_str();
+    let mut constraints = Vec::new();
+    let dimension = zone.dimension();
+    for left in 0..dimension {
+        for right in 0..dimension {
+            let bound = zone.bound(left, right);
+            let is_trivial =
+                left == right || bound.is_infinite() || (left == 0 && bound >= Bound::LE_ZERO);
+            if is_trivial {
+                continue;
+            }
+            let strict = bound.is_strict();
+            constraints.push(match (left, right) {
+                (0, _) => format!(
+                    "{} {} {}",
+                    name(right),
+                    if strict { ">" } else { ">=" },
+                    -bound.value()
+                ),
+                (_, 0) => format!(
+                    "{} {} {}",
+                    name(left),
+                    if strict { "<" } else { "<=" },
+                    bound.value()
+                ),
+                _ => format!(
+                    "{}-{} {} {}",
+                    name(left),
+                    name(right),
+                    if strict { "<" } else { "<=" },
+                    bound.value()
+                ),
+            });
+        }
+    }
+    constraints
+}
+
+/// An edge as `P.a->P.b { guard, sync, update }`, with the select values.
+pub fn part_text(network: &Network, part: Part) -> String {
+    let process = &network.processes[part.process as usize];
+    let edge = &process.edges[part.edge as usize];
+    let target = edge.branches[part.branch as usize].target;
+    let name = |location: u32| {
+        format!(
+            "{}.{}",
+            process.name, process.locations[location as usize].name
+        )
+    };
+    let EdgeLabels {
+        guard,
+        sync,
+        update,
+        ..
+    } = &edge.labels;
+    let or = |text: &str, default: &str| {
+        if text.is_empty() {
+            default.to_owned()
+        } else {
+            text.to_owned()
+        }
+    };
+    let mut text = format!(
+        "{}->{} {{ {}, {}, {} }}",
+        name(edge.source.0),
+        name(target.0),
+        or(guard, "1"),
+        or(sync, "tau"),
+        or(update, "1")
+    );
+    for (name, value) in selects(network, part) {
+        // Writing to a string cannot fail.
+        let _ = write!(text, " [{name}={value}]");
+    }
+    text
+}
+
+/// The select bindings of a part.
+pub fn selects(network: &Network, part: Part) -> Vec<(&str, i32)> {
+    let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+    if select_count(edge) == 0 {
+        return Vec::new();
+    }
+    let mut values = Vec::new();
+    select_values(edge, part.select, &mut values);
+    edge.select
+        .iter()
+        .map(|select| select.name.as_str())
+        .zip(values)
+        .collect()
+}
+
+/// A trace as text: each state in full, and the transitions between.
+pub fn trace_text(network: &Network, trace: &Trace) -> String {
+    let mut text = String::new();
+    for (index, (words, zone)) in trace.states.iter().enumerate() {
+        if index > 0 {
+            text.push_str("\nTransitions:\n");
+            for part in &trace.moves[index - 1] {
+                let _ = writeln!(text, "  {}", part_text(network, *part));
+            }
+            text.push('\n');
+        }
+        text.push_str("State:\n(");
+        for process in 0..network.processes.len() {
+            let _ = write!(
+                text,
+                " {}.{}",
+                network.processes[process].name,
+                location_name(network, process, words)
+            );
+        }
+        text.push_str(" )\n");
+        for_each_value(network, words, |name, value| {
+            let _ = match value {
+                Value::Integer(value) => write!(text, "{name}={value} "),
+                Value::Double(value) => write!(text, "{name}={value:?} "),
+            };
+        });
+        let _ = writeln!(text, "{}", zone_constraints(network, zone).join(" "));
+    }
+    text
+}
+
+/// What went wrong in the model, and where.
+pub fn failure_text(model: &LoadedModel, failure: Failure) -> String {
+    let network = model.network();
+    match failure {
+        Failure::RunTime(error) => {
+            let (place, text) = model.place(network.sites[error.site.0 as usize].span);
+            format!("{}, at {place}: {text}", run_time_error(error.kind))
+        }
+        Failure::ClockLimit(value) => {
+            format!("a clock is set to or compared with {value}, beyond what zones can hold")
+        }
+        Failure::Rate { process, rate } => {
+            let process = &network.processes[process as usize].name;
+            format!("{process} gives a clock the rate {rate}; only 0 and 1 have a meaning here")
+        }
+        Failure::InitialInvariant => "the initial state breaks an invariant".to_owned(),
+    }
+}
+
+fn run_time_error(kind: RunTimeErrorKind) -> &'static str {
+    match kind {
+        RunTimeErrorKind::Overflow => "the result of integer arithmetic does not fit into 32 bits",
+        RunTimeErrorKind::DivisionByZero => "division by zero",
+        RunTimeErrorKind::ShiftDistance => "shift by a negative number of bits, or by more than 31",
+        RunTimeErrorKind::NegativeExponent => "negative exponent",
+        RunTimeErrorKind::OutOfRange => "value out of range",
+        RunTimeErrorKind::IndexOutOfBounds => "array index out of bounds",
+        RunTimeErrorKind::NotAnInteger => "the number does not fit into an integer",
+        RunTimeErrorKind::ClockValue => {
+            "negative value of a clock, or clock bound beyond the limits"
+        }
+        RunTimeErrorKind::AssertionFailed => "assertion failed",
+        RunTimeErrorKind::StepLimit => "a function ran too long",
+    }
+}

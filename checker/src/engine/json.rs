@@ -1,0 +1,146 @@
+//! Answers as JSON: traces, strategies and plans in the words of the model.
+//!
+//! A strategy file has `format` "ntagen-strategy" and `version` 1. Its `states` each have `locations` by process, `variables`
+//! (those that some update writes), and `decisions` in order: the first whose `zones` hold for the clock values applies. A
+//! zone is a list of constraints that all hold; an empty list of constraints always holds. `action` is a list of edges, or null
+//! for waiting. `rank` falls along every play; states inside chains of forced moves have none.
+
+use serde_json::{Map, Value as Json, json};
+
+use crate::game::plans::Plan;
+use crate::game::strategy::{Decision, Strategy};
+use crate::ir::Network;
+use crate::network::Part;
+use crate::search::StateStore;
+use crate::search::reach::Trace;
+use crate::zones::Zone;
+
+use super::describe::{self, Value};
+
+/// An edge.
+pub fn part(network: &Network, part: Part) -> Json {
+    let process = &network.processes[part.process as usize];
+    let edge = &process.edges[part.edge as usize];
+    let target = edge.branches[part.branch as usize].target;
+    let select: Map<String, Json> = describe::selects(network, part)
+        .into_iter()
+        .map(|(name, value)| (name.to_owned(), json!(value)))
+        .collect();
+    json!({
+        "process": process.name,
+        "edge": part.edge,
+        "source": process.locations[edge.source.0 as usize].name,
+        "target": process.locations[target.0 as usize].name,
+        "select": select,
+        "guard": edge.labels.guard,
+        "sync": edge.labels.sync,
+        "update": edge.labels.update,
+        "controllable": edge.controllable,
+    })
+}
+
+fn parts(network: &Network, list: &[Part]) -> Json {
+    Json::Array(list.iter().map(|&one| part(network, one)).collect())
+}
+
+fn locations(network: &Network, words: &[i32]) -> Json {
+    let entries = network.processes.iter().enumerate();
+    Json::Object(
+        entries
+            .map(|(index, process)| {
+                (
+                    process.name.clone(),
+                    json!(describe::location_name(network, index, words)),
+                )
+            })
+            .collect(),
+    )
+}
+
+fn variables(network: &Network, words: &[i32]) -> Json {
+    let mut values = Map::new();
+    describe::for_each_value(network, words, |name, value| {
+        let value = match value {
+            Value::Integer(value) => json!(value),
+            Value::Double(value) => json!(value),
+        };
+        values.insert(name.to_owned(), value);
+    });
+    Json::Object(values)
+}
+
+/// A trace.
+pub fn trace(network: &Network, trace: &Trace) -> Json {
+    let states = trace.states.iter().map(|(words, zone)| {
+        json!({
+            "locations": locations(network, words),
+            "variables": variables(network, words),
+            "zone": describe::zone_constraints(network, zone),
+        })
+    });
+    let moves = trace.moves.iter().map(|one| parts(network, one));
+    json!({ "states": states.collect::<Vec<_>>(), "transitions": moves.collect::<Vec<_>>() })
+}
+
+/// Plans: of each, the transitions that leave a state without committed locations; all others follow from them.
+pub fn plans(network: &Network, plans: &[Plan], query: &str, has_more: bool) -> Json {
+    let list = plans.iter().map(|plan| {
+        let steps = plan.steps.iter().filter(|step| !step.was_committed);
+        let steps: Vec<Json> = steps.map(|step| json!({ "edges": parts(network, &step.parts) })).collect();
+        json!({ "steps": steps, "end": { "locations": locations(network, &plan.end), "variables": variables(network, &plan.end) } })
+    });
+    json!({
+        "format": "ntagen-model-plans",
+        "version": 1,
+        "query": query,
+        "count": plans.len(),
+        "complete": !has_more,
+        "plans": list.collect::<Vec<_>>(),
+    })
+}
+
+/// A strategy. Decisions of states with the same words are joined and come in the order of their ranks.
+pub fn strategy(network: &Network, strategy: &Strategy, query: &str) -> Json {
+    let mut store = StateStore::new(network);
+    let mut joined: Vec<(&[i32], bool, Vec<&Decision>)> = Vec::new();
+    for state in &strategy.states {
+        let (id, is_new) = store.intern(&state.words);
+        if is_new {
+            joined.push((&state.words, state.is_goal, Vec::new()));
+        }
+        let entry = &mut joined[id.0 as usize];
+        entry.1 |= state.is_goal;
+        let is_inner = state
+            .decisions
+            .iter()
+            .any(|decision| decision.rank == u32::MAX);
+        if !is_inner || entry.2.is_empty() {
+            entry.2.extend(&state.decisions);
+        }
+    }
+    let states = joined.iter_mut().map(|(words, is_goal, decisions)| {
+        decisions.sort_by_key(|decision| decision.rank);
+        let decisions: Vec<Json> = decisions.iter().map(|one| decision(network, one)).collect();
+        json!({
+            "locations": locations(network, words),
+            "variables": variables(network, words),
+            "goal": is_goal,
+            "decisions": decisions,
+        })
+    });
+    let states: Vec<Json> = states.collect();
+    json!({ "format": "ntagen-strategy", "version": 1, "query": query, "states": states })
+}
+
+fn decision(network: &Network, decision: &Decision) -> Json {
+    let dimension = decision.zones.dimension();
+    let zones = decision.zones.zones().map(|bounds| {
+        let zone = Zone::from_bounds(dimension, bounds);
+        json!(describe::zone_constraints(network, &zone))
+    });
+    json!({
+        "zones": zones.collect::<Vec<_>>(),
+        "action": decision.action.as_ref().map(|action| parts(network, action)),
+        "rank": (decision.rank != u32::MAX).then_some(decision.rank),
+    })
+}

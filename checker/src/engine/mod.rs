@@ -1,0 +1,332 @@
+//! The face of the engine: load a model, ask it queries, get answers.
+//!
+//! Everything here is a value: diagnostics, answers, traces, strategies, plans. Nothing prints, and the only clock that is read
+//! is the one for the time limit and the measured seconds.
+
+pub mod answer;
+pub mod describe;
+pub mod json;
+pub mod limits;
+
+use std::time::Instant;
+
+use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
+use crate::exec::Executor;
+use crate::exec::Interpreter;
+#[cfg(feature = "jit")]
+use crate::exec::Jit;
+use crate::ir::{Network, QueryKind};
+use crate::semantics::{self, Model};
+use crate::syntax::{self, ast::QueryText};
+
+pub use answer::{Answer, Evidence, Verdict};
+pub use limits::Limits;
+
+use crate::game::Forced;
+use crate::search::reach::Order;
+
+/// Codes of what the engine refuses to answer although the model is right.
+pub mod codes {
+    use super::Code;
+
+    /// A kind of query that the engine has no algorithm for.
+    pub const UNSUPPORTED_QUERY: Code = Code {
+        code: "E0801",
+        name: "unsupported-query",
+    };
+    /// A construct of the model that the engine has no algorithm for.
+    pub const UNSUPPORTED_CONSTRUCT: Code = Code {
+        code: "E0802",
+        name: "unsupported-construct",
+    };
+    /// Compiled code was asked for, and this build or machine has none.
+    pub const NO_COMPILED_CODE: Code = Code {
+        code: "E0803",
+        name: "no-compiled-code",
+    };
+}
+
+/// What runs the code of the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum CodeEngine {
+    /// Compiled by Cranelift.
+    #[default]
+    Jit,
+    /// Interpreted: the reference.
+    Interpreter,
+}
+
+/// Which plans are wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum PlansWanted {
+    /// None.
+    #[default]
+    No,
+    /// The first that is found.
+    First,
+    /// All, up to this number.
+    All(usize),
+}
+
+/// How a query is to be answered.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// In which order states are explored.
+    pub order: Order,
+    /// The rule for forced moves of the environment.
+    pub forced: Forced,
+    /// What runs the code of the model.
+    pub code: CodeEngine,
+    /// When to give up.
+    pub limits: Limits,
+    /// Which plans are wanted.
+    pub plans: PlansWanted,
+    /// Whether a strategy is wanted.
+    pub strategy: bool,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options {
+            order: Order::BreadthFirst,
+            forced: Forced::default(),
+            code: CodeEngine::default(),
+            limits: Limits::default(),
+            plans: PlansWanted::default(),
+            strategy: false,
+        }
+    }
+}
+
+/// A model or query that is not accepted: what is wrong, rendered for the user.
+#[derive(Clone, Debug)]
+pub struct Rejection {
+    /// The diagnostics with their sources.
+    pub diagnostics: Vec<Diagnostic>,
+    /// One text for each diagnostic.
+    pub rendered: Vec<String>,
+}
+
+impl Rejection {
+    fn new(diagnostics: Vec<Diagnostic>, sources: &SourceMap) -> Rejection {
+        let rendered = diagnostics
+            .iter()
+            .map(|diagnostic| diagnostic.render(sources))
+            .collect();
+        Rejection {
+            diagnostics,
+            rendered,
+        }
+    }
+}
+
+/// A model that was loaded and accepted.
+pub struct LoadedModel {
+    model: Model,
+    sources: SourceMap,
+    /// The queries of the file.
+    pub queries: Vec<QueryText>,
+    /// Warnings of loading, rendered.
+    pub warnings: Vec<String>,
+    /// Seconds that loading took, compilation of code included once a query was checked.
+    pub load_seconds: f64,
+    code: Option<(CodeEngine, Code_)>,
+}
+
+/// The code of the model, ready to run.
+enum Code_ {
+    Interpreter(Interpreter),
+    #[cfg(feature = "jit")]
+    Jit(Box<Jit>),
+}
+
+impl Code_ {
+    fn executor(&self) -> &dyn Executor {
+        match self {
+            Code_::Interpreter(interpreter) => interpreter,
+            #[cfg(feature = "jit")]
+            Code_::Jit(jit) => jit.as_ref(),
+        }
+    }
+}
+
+impl LoadedModel {
+    /// Reads and checks a model. `path` names it in diagnostics.
+    pub fn load(path: &str, bytes: &[u8]) -> Result<LoadedModel, Rejection> {
+        let start = Instant::now();
+        let mut sources = SourceMap::default();
+        let prelude = syntax::prelude(&mut sources);
+        let parsed = syntax::read_model(path, bytes, &mut sources);
+        let mut diagnostics = parsed.diagnostics;
+        if diagnostics.iter().any(Diagnostic::is_error) {
+            return Err(Rejection::new(diagnostics, &sources));
+        }
+        let (model, more) = semantics::analyse(&parsed.document, &prelude, &sources);
+        diagnostics.extend(more);
+        let Some(model) = model else {
+            return Err(Rejection::new(diagnostics, &sources));
+        };
+        let warnings = Rejection::new(diagnostics, &sources).rendered;
+        let queries = parsed.document.queries;
+        let load_seconds = start.elapsed().as_secs_f64();
+        Ok(LoadedModel {
+            model,
+            sources,
+            queries,
+            warnings,
+            load_seconds,
+            code: None,
+        })
+    }
+
+    /// The network.
+    pub fn network(&self) -> &Network {
+        &self.model.network
+    }
+
+    /// Where a span lies, as `file:line:column`, with the text it covers.
+    pub fn place(&self, span: Span) -> (String, String) {
+        let source = self.sources.get(span.source);
+        let position = self.sources.position(span);
+        let place = format!("{}:{}:{}", source.path, position.line, position.column);
+        let place = if source.place.is_empty() {
+            place
+        } else {
+            format!("{place} ({})", source.place)
+        };
+        (place, self.sources.text(span).to_owned())
+    }
+
+    /// Reads the queries of a `.q` file.
+    pub fn read_queries(&mut self, path: &str, bytes: &[u8]) -> Result<Vec<QueryText>, Rejection> {
+        let (queries, diagnostics) = syntax::read_queries(path, bytes, &mut self.sources);
+        if diagnostics.iter().any(Diagnostic::is_error) {
+            return Err(Rejection::new(diagnostics, &self.sources));
+        }
+        Ok(queries)
+    }
+
+    /// A query given as text.
+    pub fn add_query(&mut self, text: &str) -> QueryText {
+        let span = syntax::add_query_text(text, &mut self.sources);
+        QueryText {
+            span,
+            text: text.trim().to_owned(),
+            comment: String::new(),
+            expect: None,
+        }
+    }
+
+    /// Answers a query.
+    pub fn check(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
+        let start = Instant::now();
+        let query = self.compile(text.span)?;
+        self.refuse_unsupported(&query)?;
+        self.prepare_code(options.code, query.span)?;
+        self.load_seconds += start.elapsed().as_secs_f64();
+        let Some((_, code)) = &self.code else {
+            unreachable!("code was just prepared")
+        };
+        let mut answer = answer::answer(&self.model.network, code.executor(), &query, options);
+        answer.load_seconds = self.load_seconds;
+        Ok(answer)
+    }
+
+    fn compile(&mut self, span: Span) -> Result<crate::ir::Query, Rejection> {
+        let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
+        if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
+            let (query, more) = self.model.compile_query(&parsed, &self.sources, &[]);
+            if let Some(query) = query {
+                return Ok(query);
+            }
+            diagnostics.extend(more);
+        }
+        Err(Rejection::new(diagnostics, &self.sources))
+    }
+
+    /// Makes the code of the model, or adds what queries brought since.
+    fn prepare_code(&mut self, wanted: CodeEngine, span: Span) -> Result<(), Rejection> {
+        let network = &self.model.network;
+        let result = match (&mut self.code, wanted) {
+            (
+                Some((CodeEngine::Interpreter, Code_::Interpreter(interpreter))),
+                CodeEngine::Interpreter,
+            ) => {
+                interpreter.extend(&network.functions, &network.constants);
+                Ok(())
+            }
+            #[cfg(feature = "jit")]
+            (Some((CodeEngine::Jit, Code_::Jit(jit))), CodeEngine::Jit) => {
+                jit.extend(&network.functions, &network.constants);
+                Ok(())
+            }
+            (code, CodeEngine::Interpreter) => {
+                let interpreter = Interpreter::new(&network.functions, &network.constants);
+                *code = Some((wanted, Code_::Interpreter(interpreter)));
+                Ok(())
+            }
+            #[cfg(feature = "jit")]
+            (code, CodeEngine::Jit) => Jit::new(&network.functions, &network.constants)
+                .map(|jit| *code = Some((wanted, Code_::Jit(Box::new(jit)))))
+                .map_err(|error| error.to_string()),
+            #[cfg(not(feature = "jit"))]
+            (_, CodeEngine::Jit) => Err("this build of the engine has no compiler".to_owned()),
+        };
+        result.map_err(|message| {
+            let diagnostic = Diagnostic::new(codes::NO_COMPILED_CODE, span, message)
+                .help("use the interpreter: --engine interpreter");
+            Rejection::new(vec![diagnostic], &self.sources)
+        })
+    }
+
+    /// Refuses, by name, what there is no algorithm for.
+    fn refuse_unsupported(&self, query: &crate::ir::Query) -> Result<(), Rejection> {
+        let kind = match &query.kind {
+            QueryKind::Reachable(_) | QueryKind::Invariantly(_) => None,
+            QueryKind::Control {
+                objective,
+                cooperative,
+                time_optimal,
+                observations,
+            } => answer::unsupported_game(
+                objective,
+                *cooperative,
+                time_optimal.is_some(),
+                observations.is_some(),
+            ),
+            QueryKind::PotentiallyAlways(_) => Some("E[]"),
+            QueryKind::Eventually(_) => Some("A<>"),
+            QueryKind::LeadsTo(..) => Some("-->"),
+            QueryKind::Extremum { .. } => Some("sup, inf and bounds"),
+            QueryKind::SaveStrategy { .. } => Some("saveStrategy"),
+            QueryKind::LoadStrategy { .. } => Some("loadStrategy"),
+        };
+        let under = query.under.as_ref().map(|_| "under a strategy");
+        let features = &self.model.network.features;
+        let construct = [
+            (features.priorities, "channel and process priorities"),
+            (
+                features.clock_guarded_urgent,
+                "clock guards on edges of urgent channels",
+            ),
+        ];
+        let construct = construct.into_iter().find(|one| one.0).map(|one| one.1);
+        let diagnostic = if let Some(kind) = kind.or(under) {
+            Diagnostic::new(
+                codes::UNSUPPORTED_QUERY,
+                query.span,
+                format!("queries with {kind} are not supported"),
+            )
+            .help("supported are E<>, A[], and control: with A<> or A[ U ]")
+        } else if let Some(construct) = construct {
+            Diagnostic::new(
+                codes::UNSUPPORTED_CONSTRUCT,
+                query.span,
+                format!("the model uses {construct}, which the engine does not support"),
+            )
+        } else {
+            return Ok(());
+        };
+        Err(Rejection::new(vec![diagnostic], &self.sources))
+    }
+}

@@ -1,0 +1,447 @@
+//! The forward part of a game: nodes are symbolic states, edges are moves, and both are made as they are asked for.
+//!
+//! Invariants:
+//! * A node's zone contains its own future where time may pass, and satisfies the invariants.
+//! * An edge may stand for a *chain* of moves: a move and the moves that follow without any choice. A state belongs to the
+//!   inside of a chain if it has exactly one move as far as words decide, the goal holds nowhere in it and what must be
+//!   kept everywhere, and time cannot pass in it, or (if waiting never helps the controller) the one move is the
+//!   controller's. Nothing of the inside is stored. The winning valuations of the inside follow from those of the end,
+//!   since nobody has a choice.
+//! * An edge leads to a node whose zone contains the zone that the moves reach.
+//!
+//! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly.
+
+use crate::ir::Predicate;
+use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
+use crate::search::store::{DiscreteId, StateStore};
+use crate::search::zone_table::{ZoneId, ZoneTable};
+use crate::zones::{Bound, Federation, Zone, dbm};
+
+use super::programs::{ProgramId, ProgramStep, Programs};
+
+/// Moves in one chain, at most; longer ones are cut by a node, so that loops end.
+const LONGEST_CHAIN: usize = 64;
+
+/// No node or edge.
+pub const NONE: u32 = u32::MAX;
+
+/// A symbolic state.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// Its words.
+    pub discrete: DiscreteId,
+    /// Its zone.
+    pub zone: ZoneId,
+    /// The next node with the same words.
+    next: u32,
+    /// Its edges, once it is expanded.
+    pub edges: (u32, u32),
+    /// The first edge into it, [`NONE`] without one.
+    pub first_in: u32,
+    /// Whether its edges are known.
+    pub is_expanded: bool,
+    /// Whether time may pass in it; known once it is expanded.
+    pub delays: bool,
+    /// Where the goal holds, and where what must be kept does not.
+    pub standing: Standing,
+}
+
+/// Whether a node is decided by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// Neither the goal holds anywhere nor is anything broken.
+    Open,
+    /// The goal holds in the whole node.
+    Goal,
+    /// What must be kept is broken in the whole node, and the goal holds nowhere.
+    Broken,
+    /// Both depend on the clocks; see [`Graph::parts`].
+    Mixed,
+}
+
+/// The parts of a mixed node.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    /// Where the goal holds.
+    pub goal: Federation,
+    /// Where neither the goal holds nor what must be kept.
+    pub broken: Federation,
+}
+
+/// A move, with those that follow without a choice.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    /// Where it starts.
+    pub source: u32,
+    /// Where it ends.
+    pub target: u32,
+    /// The next edge into the same target.
+    pub next_in: u32,
+    /// What it does to clocks.
+    pub program: ProgramId,
+    /// The index of the first move among the moves of the source.
+    pub ordinal: u32,
+    /// How many moves it stands for.
+    pub length: u32,
+    /// Whether the controller owns the first move.
+    pub controllable: bool,
+    /// Whether it leads from every valuation of the source into the target.
+    pub is_total: bool,
+}
+
+/// What is to be reached and kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Objective<'q> {
+    /// The goal; play ends where it holds. `None`: there is none (safety).
+    pub goal: Option<&'q Predicate>,
+    /// What must hold until then; `None`: nothing.
+    pub keep: Option<&'q Predicate>,
+    /// Whether waiting for ever never helps the controller.
+    pub must_progress: bool,
+}
+
+/// The game graph.
+pub struct Graph<'s, 'a> {
+    /// The network.
+    pub symbolic: &'s mut Symbolic<'a>,
+    objective: Objective<'s>,
+    store: StateStore,
+    zones: ZoneTable,
+    /// What edges do to clocks.
+    pub programs: Programs,
+    /// The nodes; the first is the initial one.
+    pub nodes: Vec<Node>,
+    /// The edges.
+    pub edges: Vec<Edge>,
+    heads: Vec<u32>,
+    parts: rustc_hash::FxHashMap<u32, Parts>,
+    /// How many states were expanded, those inside chains included.
+    pub explored: u64,
+    words: Vec<i32>,
+    target: Vec<i32>,
+    /// The words after a move that may belong to a chain.
+    spare: Vec<i32>,
+    moves: Moves,
+    chain_moves: Moves,
+    steps: Vec<ProgramStep>,
+    entries: Vec<Zone>,
+    chains_delays: bool,
+}
+
+impl<'s, 'a> Graph<'s, 'a> {
+    /// A graph that holds the initial node only.
+    pub fn new(
+        symbolic: &'s mut Symbolic<'a>,
+        objective: Objective<'s>,
+    ) -> Result<Graph<'s, 'a>, Failure> {
+        let network = symbolic.stepper.network();
+        let mut graph = Graph {
+            store: StateStore::new(network),
+            zones: ZoneTable::new(symbolic.dimension()),
+            programs: Programs::default(),
+            nodes: Vec::new(),
+            edges: Vec::new(),
+            heads: Vec::new(),
+            parts: rustc_hash::FxHashMap::default(),
+            explored: 0,
+            words: network.initial.clone(),
+            target: network.initial.clone(),
+            spare: network.initial.clone(),
+            moves: Moves::default(),
+            chain_moves: Moves::default(),
+            steps: Vec::new(),
+            entries: Vec::new(),
+            chains_delays: objective.must_progress && !network.features.stopwatches,
+            objective,
+            symbolic,
+        };
+        let (mut words, mut zone) = graph.symbolic.initial()?;
+        graph.symbolic.extrapolate(&words, zone.bounds_mut());
+        graph.node(&mut words, &zone)?;
+        Ok(graph)
+    }
+
+    /// The number of clocks, the reference clock included.
+    pub fn dimension(&self) -> usize {
+        self.symbolic.dimension()
+    }
+
+    /// The zone of a node.
+    pub fn zone(&self, node: u32) -> &[Bound] {
+        self.zones.get(self.nodes[node as usize].zone)
+    }
+
+    /// The parts of a mixed node; `None` for all others.
+    pub fn parts(&self, node: u32) -> Option<&Parts> {
+        self.parts.get(&node)
+    }
+
+    /// The bytes that nodes, edges and states take.
+    pub fn bytes(&self) -> u64 {
+        let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
+        (self.store.bytes()
+            + self.zones.bytes()
+            + nodes
+            + self.edges.capacity() * size_of::<Edge>()) as u64
+    }
+
+    /// Writes the words of a node over those of another state.
+    pub fn load(&self, node: u32, words: &mut [i32]) {
+        self.store.load(self.nodes[node as usize].discrete, words);
+    }
+
+    /// The edges of an expanded node.
+    pub fn edges_of(&self, node: u32) -> std::ops::Range<usize> {
+        let (first, last) = self.nodes[node as usize].edges;
+        first as usize..last as usize
+    }
+
+    /// The node of a state, made if no stored one contains it.
+    fn node(&mut self, words: &mut [i32], zone: &Zone) -> Result<u32, Failure> {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        let id = self.zones.intern(zone.bounds());
+        let mut node = self.heads[discrete.0 as usize];
+        while node != NONE {
+            let Node {
+                zone: other, next, ..
+            } = self.nodes[node as usize];
+            if other == id || dbm::is_subset(zone.bounds(), self.zones.get(other)) {
+                return Ok(node);
+            }
+            node = next;
+        }
+        let made = self.nodes.len() as u32;
+        let standing = self.standing(made, words, zone)?;
+        self.nodes.push(Node {
+            discrete,
+            zone: id,
+            next: self.heads[discrete.0 as usize],
+            edges: (0, 0),
+            first_in: NONE,
+            is_expanded: false,
+            delays: false,
+            standing,
+        });
+        self.heads[discrete.0 as usize] = made;
+        Ok(made)
+    }
+
+    /// Evaluates the objective in a state that becomes the node `made`.
+    fn standing(&mut self, made: u32, words: &mut [i32], zone: &Zone) -> Result<Standing, Failure> {
+        let (goal, keep) = self.extents(words, zone)?;
+        match (goal, keep) {
+            (Extent::Everywhere, _) => Ok(Standing::Goal),
+            (Extent::Nowhere, Extent::Everywhere) => Ok(Standing::Open),
+            (Extent::Nowhere, Extent::Nowhere) => Ok(Standing::Broken),
+            (goal, keep) => {
+                let dimension = self.dimension();
+                let goal = goal.to_federation(zone.bounds(), dimension);
+                let mut broken = Federation::of_zone(dimension, zone.bounds());
+                broken.subtract(&keep.to_federation(zone.bounds(), dimension));
+                broken.subtract(&goal);
+                self.parts.insert(made, Parts { goal, broken });
+                Ok(Standing::Mixed)
+            }
+        }
+    }
+
+    /// Where the goal holds, and where what must be kept does.
+    fn extents(&mut self, words: &mut [i32], zone: &Zone) -> Result<(Extent, Extent), Failure> {
+        let goal = match self.objective.goal {
+            Some(goal) => self.symbolic.extent(goal, words, zone.bounds())?,
+            None => Extent::Nowhere,
+        };
+        let keep = match self.objective.keep {
+            Some(keep) => self.symbolic.extent(keep, words, zone.bounds())?,
+            None => Extent::Everywhere,
+        };
+        Ok((goal, keep))
+    }
+
+    /// Computes the edges of a node. Nodes that this makes are behind the ones there were.
+    pub fn expand(&mut self, node: u32) -> Result<(), Failure> {
+        let mut words = std::mem::take(&mut self.words);
+        let mut moves = std::mem::take(&mut self.moves);
+        self.load(node, &mut words);
+        let result = self.expand_from(node, &mut words, &mut moves);
+        self.words = words;
+        self.moves = moves;
+        result
+    }
+
+    fn expand_from(
+        &mut self,
+        node: u32,
+        words: &mut [i32],
+        moves: &mut Moves,
+    ) -> Result<(), Failure> {
+        self.explored += 1;
+        self.symbolic.stepper.moves(words, moves)?;
+        let delays = self.symbolic.stepper.may_delay(words, moves);
+        let first = self.edges.len() as u32;
+        for ordinal in 0..moves.len() {
+            let mut target = std::mem::take(&mut self.target);
+            target.copy_from_slice(words);
+            let result = self.follow(node, moves, ordinal as u32, &mut target);
+            self.target = target;
+            result?;
+        }
+        let node = &mut self.nodes[node as usize];
+        node.edges = (first, self.edges.len() as u32);
+        node.delays = delays;
+        node.is_expanded = true;
+        Ok(())
+    }
+
+    /// Takes a move of a node, and the moves after it as long as there is no choice; adds the edge.
+    fn follow(
+        &mut self,
+        node: u32,
+        moves: &Moves,
+        ordinal: u32,
+        target: &mut Vec<i32>,
+    ) -> Result<(), Failure> {
+        let one = moves.get(ordinal as usize);
+        let origin = (ordinal, one.controllable);
+        let Some(effect) = self.symbolic.fire(one, target)? else {
+            return Ok(());
+        };
+        effect.entry_zones(
+            self.zones.get(self.nodes[node as usize].zone),
+            self.symbolic.dimension(),
+            &mut self.entries,
+        );
+        self.steps.clear();
+        self.push_step(false, &effect);
+        if self.entries.len() != 1 {
+            let mut entries = std::mem::take(&mut self.entries);
+            return self.end_in_pieces(node, target, &mut entries, &effect.invariant, origin);
+        }
+        let mut zone = self.entries.swap_remove(0);
+        let mut invariant = effect.invariant;
+        let mut length = 1;
+        loop {
+            let may_delay = self.symbolic.may_delay(target)?;
+            self.symbolic
+                .delay(target, may_delay, &invariant, zone.bounds_mut())?;
+            if length as usize == LONGEST_CHAIN {
+                break;
+            }
+            let Some((effect, entry)) = self.only_move(target, &zone, may_delay)? else {
+                break;
+            };
+            self.push_step(may_delay, &effect);
+            std::mem::swap(target, &mut self.spare);
+            zone = entry;
+            invariant = effect.invariant;
+            length += 1;
+        }
+        self.symbolic.extrapolate(target, zone.bounds_mut());
+        self.add_edge(node, target, &zone, origin, length)
+    }
+
+    /// Takes the only move of a state inside a chain: its effect and the zone on entry, with the words after it in `spare`.
+    /// `None` if the chain ends with the state.
+    fn only_move(
+        &mut self,
+        words: &mut [i32],
+        zone: &Zone,
+        may_delay: bool,
+    ) -> Result<Option<(ClockEffect, Zone)>, Failure> {
+        if may_delay && !self.chains_delays {
+            return Ok(None);
+        }
+        if !matches!(
+            self.extents(words, zone)?,
+            (Extent::Nowhere, Extent::Everywhere)
+        ) {
+            return Ok(None);
+        }
+        self.symbolic.stepper.moves(words, &mut self.chain_moves)?;
+        if self.chain_moves.len() != 1 || (may_delay && !self.chain_moves.get(0).controllable) {
+            return Ok(None);
+        }
+        self.spare.copy_from_slice(words);
+        let Some(effect) = self
+            .symbolic
+            .fire(self.chain_moves.get(0), &mut self.spare)?
+        else {
+            return Ok(None);
+        };
+        effect.entry_zones(zone.bounds(), self.symbolic.dimension(), &mut self.entries);
+        if self.entries.len() != 1 {
+            return Ok(None);
+        }
+        self.explored += 1;
+        Ok(Some((effect, self.entries.swap_remove(0))))
+    }
+
+    /// Adds a step to the program at hand. One that changes nothing is left out, unless it is the first or ends an invariant.
+    fn push_step(&mut self, delays: bool, effect: &ClockEffect) {
+        let is_kept = self
+            .steps
+            .last()
+            .is_none_or(|last| !last.effect.invariant.is_empty());
+        if delays || is_kept || !effect.is_trivial() {
+            self.steps.push(ProgramStep {
+                delays,
+                effect: effect.clone(),
+            });
+        }
+    }
+
+    /// Ends an edge whose first move enters in several zones, or none: an edge to each.
+    fn end_in_pieces(
+        &mut self,
+        node: u32,
+        target: &mut [i32],
+        entries: &mut [Zone],
+        invariant: &[crate::zones::dbm::Constraint],
+        origin: (u32, bool),
+    ) -> Result<(), Failure> {
+        for zone in entries {
+            let may_delay = self.symbolic.may_delay(target)?;
+            self.symbolic
+                .delay(target, may_delay, invariant, zone.bounds_mut())?;
+            self.symbolic.extrapolate(target, zone.bounds_mut());
+            self.add_edge(node, target, zone, origin, 1)?;
+        }
+        Ok(())
+    }
+
+    fn add_edge(
+        &mut self,
+        source: u32,
+        words: &mut [i32],
+        zone: &Zone,
+        (ordinal, controllable): (u32, bool),
+        length: u32,
+    ) -> Result<(), Failure> {
+        let target = self.node(words, zone)?;
+        let program = self.programs.intern(&self.steps);
+        let (from, to) = (
+            self.nodes[source as usize].zone,
+            self.nodes[target as usize].zone,
+        );
+        let ends = ((from, self.zones.get(from)), (to, self.zones.get(to)));
+        let is_total = self
+            .programs
+            .is_total(program, ends.0, ends.1, self.symbolic.dimension());
+        let edge = self.edges.len() as u32;
+        let next_in = std::mem::replace(&mut self.nodes[target as usize].first_in, edge);
+        self.edges.push(Edge {
+            source,
+            target,
+            next_in,
+            program,
+            ordinal,
+            length,
+            controllable,
+            is_total,
+        });
+        Ok(())
+    }
+}

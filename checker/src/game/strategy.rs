@@ -1,0 +1,211 @@
+//! Strategies: what the controller does, state by state.
+//!
+//! A strategy lists, for each discrete state that play under it can reach, decisions in order: the first decision whose zones
+//! contain the clock values applies. A decision is a move, or to wait. States inside chains of forced moves are listed too,
+//! so that a strategy can be followed, and checked, move by move.
+//!
+//! For reachability the strategy follows the stamps of the gains: from valuations of stamp k it moves only into valuations of
+//! smaller stamps, or waits for them; so it makes progress and ends in the goal.
+//!
+//! Source: Cassez et al., CONCUR 2005, section 5 (strategies from the order in which winning states were found).
+
+use crate::network::{Failure, Moves, Part};
+use crate::zones::{Federation, Zone};
+
+use super::graph::Standing;
+use super::reach::{Gain, Solver, Win};
+
+/// What to do in some part of a state.
+#[derive(Clone, Debug)]
+pub struct Decision {
+    /// Where it applies.
+    pub zones: Federation,
+    /// The move to take; `None` is to wait.
+    pub action: Option<Vec<Part>>,
+    /// The rank of the valuations: the strategy only ever goes to smaller ones. 0 is the goal.
+    pub rank: u32,
+}
+
+/// A discrete state with its decisions.
+#[derive(Clone, Debug)]
+pub struct StrategyState {
+    /// The words.
+    pub words: Vec<i32>,
+    /// The decisions, in order.
+    pub decisions: Vec<Decision>,
+    /// Whether the play ends here because the goal holds.
+    pub is_goal: bool,
+}
+
+/// A strategy.
+#[derive(Clone, Debug, Default)]
+pub struct Strategy {
+    /// The states, the initial one first.
+    pub states: Vec<StrategyState>,
+}
+
+/// Reads the strategy of a solved and winning game.
+pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
+    let mut strategy = Strategy::default();
+    let mut seen = vec![false; solver.graph.nodes.len()];
+    let mut waiting = vec![0_u32];
+    seen[0] = true;
+    while let Some(node) = waiting.pop() {
+        let (decisions, taken) = decisions(solver, node)?;
+        let mut words = solver.graph.symbolic.stepper.network().initial.clone();
+        solver.graph.load(node, &mut words);
+        let is_goal = solver.graph.nodes[node as usize].standing == Standing::Goal;
+        let source = words.clone();
+        strategy.states.push(StrategyState {
+            words,
+            decisions,
+            is_goal,
+        });
+        for edge in taken {
+            inner_states(solver, edge, &source, &mut strategy)?;
+            let target = solver.graph.edges[edge as usize].target;
+            if !std::mem::replace(&mut seen[target as usize], true) {
+                waiting.push(target);
+            }
+        }
+    }
+    Ok(strategy)
+}
+
+/// The decisions in a node, and the edges that play may take from it.
+fn decisions(
+    solver: &mut Solver<'_, '_, '_>,
+    node: u32,
+) -> Result<(Vec<Decision>, Vec<u32>), Failure> {
+    let mut decisions = Vec::new();
+    let mut taken = Vec::new();
+    if solver.graph.nodes[node as usize].standing == Standing::Goal {
+        return Ok((decisions, taken));
+    }
+    let moves = moves_of(solver, node)?;
+    for gain in solver.gains[node as usize].clone() {
+        let mut rest = whole_or_part(solver, node, gain.part.as_ref());
+        if gain.stamp > 0 {
+            for edge in solver.graph.edges_of(node) {
+                let edge_data = solver.graph.edges[edge];
+                if !edge_data.controllable {
+                    continue;
+                }
+                let earlier = won_before(solver, edge_data.target, gain.stamp);
+                let mut zones = solver.before(&edge_data, &earlier);
+                zones = zones.intersection(&rest);
+                if !zones.is_empty() {
+                    rest.subtract(&zones);
+                    let action = Some(moves.get(edge_data.ordinal as usize).parts.to_vec());
+                    decisions.push(Decision {
+                        zones,
+                        action,
+                        rank: gain.stamp,
+                    });
+                    taken.push(edge as u32);
+                }
+            }
+        }
+        if !rest.is_empty() {
+            decisions.push(Decision {
+                zones: rest,
+                action: None,
+                rank: gain.stamp,
+            });
+        }
+    }
+    let opponent = solver
+        .graph
+        .edges_of(node)
+        .filter(|&edge| !solver.graph.edges[edge].controllable);
+    taken.extend(opponent.map(|edge| edge as u32));
+    Ok((decisions, taken))
+}
+
+fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Moves, Failure> {
+    let mut words = solver.graph.symbolic.stepper.network().initial.clone();
+    solver.graph.load(node, &mut words);
+    let mut moves = Moves::default();
+    solver
+        .graph
+        .symbolic
+        .stepper
+        .moves(&mut words, &mut moves)?;
+    Ok(moves)
+}
+
+fn whole_or_part(solver: &Solver<'_, '_, '_>, node: u32, part: Option<&Federation>) -> Federation {
+    match part {
+        Some(part) => part.clone(),
+        None => Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node)),
+    }
+}
+
+/// The valuations of a node that were won before a stamp.
+fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
+    let mut won: Option<Federation> = None;
+    for Gain { stamp: _, part } in solver.gains[node as usize]
+        .iter()
+        .filter(|gain| gain.stamp < stamp)
+    {
+        let Some(part) = part else {
+            return Win::Everything;
+        };
+        match &mut won {
+            None => won = Some(part.clone()),
+            Some(won) => {
+                won.unite(part);
+            }
+        }
+    }
+    won.map_or(Win::Nothing, Win::Part)
+}
+
+/// Adds the states inside a chain: each has one move, which is taken as soon as it is possible.
+fn inner_states(
+    solver: &mut Solver<'_, '_, '_>,
+    edge: u32,
+    source: &[i32],
+    strategy: &mut Strategy,
+) -> Result<(), Failure> {
+    let edge = solver.graph.edges[edge as usize];
+    let dimension = solver.graph.dimension();
+    let symbolic = &mut *solver.graph.symbolic;
+    let mut words = source.to_vec();
+    let mut moves = Moves::default();
+    symbolic.stepper.moves(&mut words, &mut moves)?;
+    symbolic
+        .stepper
+        .fire(moves.get(edge.ordinal as usize).parts, &mut words)?;
+    for _ in 1..edge.length {
+        symbolic.stepper.moves(&mut words, &mut moves)?;
+        let before = words.clone();
+        let one = moves.get(0);
+        let (parts, controllable) = (one.parts.to_vec(), one.controllable);
+        let Some(effect) = symbolic.fire(one, &mut words)? else {
+            break;
+        };
+        let everything = Zone::universe(dimension);
+        let mut decisions = Vec::new();
+        if controllable {
+            let zones = effect.enabled_part(everything.bounds(), dimension);
+            decisions.push(Decision {
+                zones,
+                action: Some(parts),
+                rank: u32::MAX,
+            });
+        }
+        let zones = Federation::of_zone(dimension, everything.bounds());
+        decisions.push(Decision {
+            zones,
+            action: None,
+            rank: u32::MAX,
+        });
+        strategy.states.push(StrategyState {
+            words: before,
+            decisions,
+            is_goal: false,
+        });
+    }
+    Ok(())
+}

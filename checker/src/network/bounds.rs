@@ -1,0 +1,276 @@
+//! Clock bounds for extrapolation: the constants that matter to each clock, location by location.
+//!
+//! For a process in location l and a clock x, `lower` is the greatest c of a comparison `x > c` or `x >= c`, and `upper` of a
+//! comparison `x < c` or `x <= c`, that some path from l may evaluate before x is assigned. Bounds of a state are the
+//! greatest over its processes. A clock without bounds is *inactive*: its value no longer matters.
+//!
+//! Source: G. Behrmann, P. Bouyer, E. Fleury, K. G. Larsen, "Static guard analysis in timed automata verification", TACAS 2003
+//! (the fixpoint over locations), and G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and upper bounds in
+//! zone-based abstractions of timed automata", STTT 8, 2006 (lower and upper bounds apart).
+//! Where we differ: a process does not see the resets of other processes, which only makes bounds greater; with
+//! assignments from clock to clock the bounds do not depend on locations.
+//!
+//! Invariant: an assignment counts as a reset only if it is certain (among [`crate::ir::Update::fixed`]).
+
+use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Process, Update};
+use crate::zones::extrapolate::Ceilings;
+use crate::zones::{Bound, extrapolate};
+
+/// No comparison: the clock is inactive in this direction.
+const NONE: i32 = i32::MIN;
+
+/// Which abstraction is applied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Abstraction {
+    /// None: the zone graph may be infinite.
+    Exact,
+    /// Extra-M+: keeps what comparisons with the greatest constant can tell.
+    Maximum,
+    /// Extra-LU+: keeps what reachability of locations needs.
+    LowerUpper,
+}
+
+/// The bounds of all locations.
+#[derive(Clone, Debug)]
+pub struct ClockBounds {
+    /// By process and location; `None` where nothing is bounded.
+    ceilings: Vec<Vec<Option<Ceilings>>>,
+    /// Bounds that hold everywhere: those of queries.
+    everywhere: Ceilings,
+    abstraction: Abstraction,
+}
+
+/// Lower and upper bounds of all clocks in all locations of a process.
+type Table = Vec<Vec<(i32, i32)>>;
+
+impl ClockBounds {
+    /// The bounds of a network; `atoms` are comparisons of queries, which matter in every location.
+    pub fn new(network: &Network, atoms: &[ClockAtom], abstraction: Abstraction) -> ClockBounds {
+        let clock_count = network.clocks.len();
+        let mut tables: Vec<Table> = network
+            .processes
+            .iter()
+            .map(|process| fixpoint(process, clock_count))
+            .collect();
+        let mut everywhere = vec![(NONE, NONE); clock_count.max(1)];
+        for atom in atoms {
+            add_atom(&mut everywhere, atom);
+        }
+        if network.features.clock_copies {
+            spread_over_copies(network, &mut tables, &mut everywhere);
+        }
+        let ceilings = tables
+            .iter()
+            .map(|table| table.iter().map(|bounds| ceilings_of(bounds)).collect())
+            .collect();
+        let everywhere = to_ceilings(&everywhere);
+        ClockBounds {
+            ceilings,
+            everywhere,
+            abstraction,
+        }
+    }
+
+    /// Applies the abstraction to the zone of a state with these words; `scratch` is overwritten.
+    pub fn extrapolate(
+        &self,
+        words: &[i32],
+        zone: &mut [Bound],
+        dimension: usize,
+        scratch: &mut Ceilings,
+    ) {
+        if self.abstraction == Abstraction::Exact {
+            return;
+        }
+        scratch.clone_from(&self.everywhere);
+        for (locations, &location) in self.ceilings.iter().zip(words) {
+            if let Some(ceilings) = &locations[location as usize] {
+                scratch.raise(ceilings);
+            }
+        }
+        match self.abstraction {
+            Abstraction::Exact => {}
+            Abstraction::Maximum => extrapolate::lu_plus(zone, dimension, &scratch.to_maximal()),
+            Abstraction::LowerUpper => extrapolate::lu_plus(zone, dimension, scratch),
+        }
+    }
+
+    /// Bounds to start from: those that hold everywhere.
+    pub fn everywhere(&self) -> &Ceilings {
+        &self.everywhere
+    }
+}
+
+fn ceilings_of(bounds: &[(i32, i32)]) -> Option<Ceilings> {
+    bounds
+        .iter()
+        .any(|bound| *bound != (NONE, NONE))
+        .then(|| to_ceilings(bounds))
+}
+
+fn to_ceilings(bounds: &[(i32, i32)]) -> Ceilings {
+    let known = |bound: i32| (bound != NONE).then_some(bound);
+    let lower: Vec<_> = bounds.iter().map(|bound| known(bound.0)).collect();
+    let upper: Vec<_> = bounds.iter().map(|bound| known(bound.1)).collect();
+    Ceilings::lower_upper(&lower, &upper)
+}
+
+/// The least bounds of a process that satisfy: those of a location cover its invariant and the guards of its edges, and those
+/// of every target for the clocks that the edge does not certainly reset.
+fn fixpoint(process: &Process, clock_count: usize) -> Table {
+    let mut table: Table = vec![vec![(NONE, NONE); clock_count.max(1)]; process.locations.len()];
+    for (location, bounds) in process.locations.iter().zip(&mut table) {
+        location
+            .invariant
+            .atoms
+            .iter()
+            .for_each(|atom| add_atom(bounds, atom));
+        for edge in &location.edges {
+            let guard = &process.edges[edge.0 as usize].guard;
+            guard.atoms.iter().for_each(|atom| add_atom(bounds, atom));
+        }
+    }
+    loop {
+        let mut changed = false;
+        for edge in &process.edges {
+            for branch in 0..edge.branches.len() {
+                changed |= propagate(edge, branch, &mut table);
+            }
+        }
+        if !changed {
+            return table;
+        }
+    }
+}
+
+/// Carries the bounds of a branch's target to the edge's source; returns whether they grew.
+fn propagate(edge: &Edge, branch: usize, table: &mut Table) -> bool {
+    let (source, target) = (
+        edge.source.0 as usize,
+        edge.branches[branch].target.0 as usize,
+    );
+    let is_reset = |clock: usize| {
+        is_certain(&edge.update, clock) || is_certain(&edge.branches[branch].update, clock)
+    };
+    let mut changed = false;
+    for clock in 1..table[source].len() {
+        let (low, high) = table[target][clock];
+        let own = table[source][clock];
+        let joined = (own.0.max(low), own.1.max(high));
+        if joined != own && !is_reset(clock) {
+            table[source][clock] = joined;
+            changed = true;
+        }
+    }
+    changed
+}
+
+fn is_certain(update: &Update, clock: usize) -> bool {
+    update
+        .fixed
+        .iter()
+        .any(|&(target, _)| target.0 as usize == clock)
+}
+
+/// `left - right ≺ b` is an upper bound b on left, and a lower bound -b on right. A difference of two clocks bounds both.
+fn add_atom(bounds: &mut [(i32, i32)], atom: &ClockAtom) {
+    for clock in range(atom.left.first.0, atom.left.count) {
+        bounds[clock].1 = bounds[clock].1.max(atom.high);
+        if atom.right.first.0 != 0 || atom.right.count > 1 {
+            bounds[clock].0 = bounds[clock].0.max(atom.high);
+        }
+    }
+    for clock in range(atom.right.first.0, atom.right.count) {
+        let bound = atom.low.checked_neg().unwrap_or(i32::MAX);
+        bounds[clock].0 = bounds[clock].0.max(bound);
+        if atom.left.first.0 != 0 || atom.left.count > 1 {
+            bounds[clock].1 = bounds[clock].1.max(bound);
+        }
+    }
+}
+
+fn range(first: u32, count: u32) -> impl Iterator<Item = usize> {
+    (first..first + count)
+        .map(|clock| clock as usize)
+        .filter(|&clock| clock != 0)
+}
+
+/// With `x := y + k` the bounds of x become bounds of y, less k, everywhere.
+fn spread_over_copies(network: &Network, tables: &mut [Table], everywhere: &mut [(i32, i32)]) {
+    for table in tables {
+        for bounds in table.iter_mut() {
+            for (clock, bound) in bounds.iter_mut().enumerate() {
+                everywhere[clock] = (
+                    everywhere[clock].0.max(bound.0),
+                    everywhere[clock].1.max(bound.1),
+                );
+                *bound = (NONE, NONE);
+            }
+        }
+    }
+    let edges = network.processes.iter().flat_map(|process| &process.edges);
+    let updates = edges.flat_map(|edge| {
+        std::iter::once(&edge.update).chain(edge.branches.iter().map(|branch| &branch.update))
+    });
+    let copies: Vec<_> = updates.flat_map(|update| &update.assignments).collect();
+    // As many rounds as there are clocks reach the end of every chain of copies. Bounds that still grow then do so for ever
+    // (a cycle of copies that adds a negative number): they become the greatest bound that zones can hold.
+    let mut step: fn(&mut [(i32, i32)], &ClockAssignment) -> bool = spread;
+    let mut round = 0;
+    loop {
+        let mut changed = false;
+        for copy in &copies {
+            changed |= step(everywhere, copy);
+        }
+        if !changed {
+            return;
+        }
+        round += 1;
+        if round == network.clocks.len() {
+            step = spread_to_limit;
+        }
+    }
+}
+
+/// Raises the bounds of the source of a copy by those of its target; returns whether they grew.
+fn spread(bounds: &mut [(i32, i32)], copy: &ClockAssignment) -> bool {
+    let AssignedValue::Clock(source, increment, _) = copy.value else {
+        return false;
+    };
+    let shifted = |bound: i32| {
+        if bound == NONE {
+            NONE
+        } else {
+            bound.saturating_sub(increment)
+        }
+    };
+    let mut changed = false;
+    for target in range(copy.target.first.0, copy.target.count) {
+        for clock in range(source.first.0, source.count) {
+            let old = bounds[clock];
+            bounds[clock] = (
+                old.0.max(shifted(bounds[target].0)),
+                old.1.max(shifted(bounds[target].1)),
+            );
+            changed |= bounds[clock] != old;
+        }
+    }
+    changed
+}
+
+/// As [`spread`], but whatever grows becomes the greatest bound.
+fn spread_to_limit(bounds: &mut [(i32, i32)], copy: &ClockAssignment) -> bool {
+    let before = bounds.to_vec();
+    spread(bounds, copy);
+    let limit = |old: i32, new: i32| {
+        if new > old {
+            Bound::MAX_VALUE.max(old)
+        } else {
+            old
+        }
+    };
+    for (bound, old) in bounds.iter_mut().zip(&before) {
+        *bound = (limit(old.0, bound.0), limit(old.1, bound.1));
+    }
+    before != bounds
+}

@@ -1,0 +1,27 @@
+//! Why exploring a model ended without an answer.
+
+use crate::exec::RunTimeError;
+
+/// The model did something that has no meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// A run-time error in the model's code.
+    RunTime(RunTimeError),
+    /// A clock bound or value is beyond what zones can hold; the number is the value.
+    ClockLimit(i32),
+    /// A rate other than 0 and 1 on a clock of the process with this index.
+    Rate {
+        /// The process.
+        process: u32,
+        /// The rate.
+        rate: i32,
+    },
+    /// The initial state breaks an invariant.
+    InitialInvariant,
+}
+
+impl From<RunTimeError> for Failure {
+    fn from(error: RunTimeError) -> Failure {
+        Failure::RunTime(error)
+    }
+}

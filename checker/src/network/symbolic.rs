@@ -1,0 +1,332 @@
+//! Symbolic states: words with a zone, and their successors.
+//!
+//! Invariants:
+//! * The zone of a state is closed, not empty, satisfies all invariants and, where time may pass, contains its own future
+//!   within them.
+//! * Successors are exact; extrapolation is a step of its own ([`Symbolic::extrapolate`]).
+//! * A clock bound or value that zones cannot hold ends in [`Failure::ClockLimit`], never in a wrong zone.
+//!
+//! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4.
+
+use crate::exec::{EmittedAssignment, EmittedConstraint};
+use crate::ir::ClockId;
+use crate::zones::clocks::{self, Assignment};
+use crate::zones::dbm::{self, Constraint};
+use crate::zones::extrapolate::Ceilings;
+use crate::zones::{Bound, ClockSet, Federation, Zone};
+
+use super::bounds::ClockBounds;
+use super::{Failure, MoveRef, Moves, Part, Stepper};
+
+/// Zones on top of the moves of a network. One per thread.
+pub struct Symbolic<'a> {
+    /// Moves and their effects on words.
+    pub stepper: Stepper<'a>,
+    dimension: usize,
+    bounds: ClockBounds,
+    has_rates: bool,
+    has_urgent_channels: bool,
+    ceilings: Ceilings,
+    inner_moves: Moves,
+}
+
+/// What a move does to clocks, from the source's zone to the zone on entry.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct ClockEffect {
+    /// The guard.
+    pub guard: Vec<Constraint>,
+    /// Conjunctions that must not hold.
+    pub excluded: Vec<Vec<Constraint>>,
+    /// The assignments.
+    pub assignments: Vec<Assignment>,
+    /// The invariants of the target.
+    pub invariant: Vec<Constraint>,
+}
+
+impl<'a> Symbolic<'a> {
+    /// Zones for the network of `stepper`; `bounds` are the constants that extrapolation must keep apart.
+    pub fn new(stepper: Stepper<'a>, bounds: ClockBounds) -> Symbolic<'a> {
+        let network = stepper.network();
+        let dimension = network.clocks.len().max(1);
+        let has_rates = network
+            .processes
+            .iter()
+            .any(|process| process.locations.iter().any(|l| !l.rates.is_empty()));
+        Symbolic {
+            dimension,
+            has_rates,
+            has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
+            ceilings: bounds.everywhere().clone(),
+            bounds,
+            inner_moves: Moves::default(),
+            stepper,
+        }
+    }
+
+    /// The number of clocks, the reference clock included.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// The initial words and zone.
+    pub fn initial(&mut self) -> Result<(Vec<i32>, Zone), Failure> {
+        let network = self.stepper.network();
+        let mut words = network.initial.clone();
+        let mut zone = Zone::zero(self.dimension);
+        for (clock, &value) in network.initial_clocks.iter().enumerate().skip(1) {
+            if value != 0 {
+                check_limit(value)?;
+                zone.assign(&[Assignment::Value { clock, value }]);
+            }
+        }
+        let Some(invariant) = self.invariant(&mut words)? else {
+            return Err(Failure::InitialInvariant);
+        };
+        if !dbm::constrain_all(zone.bounds_mut(), self.dimension, &invariant) {
+            return Err(Failure::InitialInvariant);
+        }
+        let may_delay = self.may_delay(&mut words)?;
+        self.delay(&words, may_delay, &invariant, zone.bounds_mut())?;
+        Ok((words, zone))
+    }
+
+    /// Takes a move on `words`, and gives its effect on clocks; `None` if the target's invariants or the guards forbid it
+    /// whatever the clocks say.
+    pub fn fire(
+        &mut self,
+        one: MoveRef<'_>,
+        words: &mut [i32],
+    ) -> Result<Option<ClockEffect>, Failure> {
+        let mut effect = ClockEffect::default();
+        match to_constraints(one.constraints)? {
+            Some(guard) => effect.guard = guard,
+            None => return Ok(None),
+        }
+        for conjunction in one.excluded() {
+            effect.excluded.extend(to_constraints(conjunction)?);
+        }
+        self.fire_parts(one.parts, words, &mut effect.assignments)?;
+        match self.invariant(words)? {
+            Some(invariant) => effect.invariant = invariant,
+            None => return Ok(None),
+        }
+        Ok(Some(effect))
+    }
+
+    fn fire_parts(
+        &mut self,
+        parts: &[Part],
+        words: &mut [i32],
+        assignments: &mut Vec<Assignment>,
+    ) -> Result<(), Failure> {
+        let emitted = self.stepper.fire(parts, words)?;
+        if !emitted.is_empty() {
+            assignments.reserve(emitted.len());
+            for one in emitted {
+                assignments.push(to_assignment(one)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The clock part of all invariants; `None` if they cannot hold.
+    pub fn invariant(&mut self, words: &mut [i32]) -> Result<Option<Vec<Constraint>>, Failure> {
+        match self.stepper.invariants(words)? {
+            Some(emitted) => to_constraints(emitted),
+            None => Ok(None),
+        }
+    }
+
+    /// Whether time may pass in a state with these words.
+    pub fn may_delay(&mut self, words: &mut [i32]) -> Result<bool, Failure> {
+        if self.stepper.is_urgent(words) {
+            return Ok(false);
+        }
+        if !self.has_urgent_channels {
+            return Ok(true);
+        }
+        let mut moves = std::mem::take(&mut self.inner_moves);
+        let result = self
+            .stepper
+            .moves(words, &mut moves)
+            .map(|()| self.stepper.may_delay(words, &moves));
+        self.inner_moves = moves;
+        Ok(result?)
+    }
+
+    /// Lets time pass within the invariant if it may.
+    pub fn delay(
+        &mut self,
+        words: &[i32],
+        may_delay: bool,
+        invariant: &[Constraint],
+        zone: &mut [Bound],
+    ) -> Result<(), Failure> {
+        if !may_delay || self.dimension == 1 {
+            return Ok(());
+        }
+        if self.has_rates {
+            let stopped = self.stopped(words)?;
+            clocks::up_stopped(zone, self.dimension, &stopped);
+        } else {
+            clocks::up(zone, self.dimension);
+        }
+        dbm::constrain_all(zone, self.dimension, invariant);
+        Ok(())
+    }
+
+    /// The clocks whose rate is 0 in a state with these words.
+    pub fn stopped(&mut self, words: &[i32]) -> Result<ClockSet, Failure> {
+        let mut stopped = ClockSet::default();
+        if !self.has_rates {
+            return Ok(stopped);
+        }
+        let network = self.stepper.network();
+        let mut words = words.to_vec();
+        for (index, process) in network.processes.iter().enumerate() {
+            for &(clock, function) in &process.locations[words[index] as usize].rates {
+                match self.stepper.evaluate(function, &mut words)? {
+                    0 => stopped.insert(clock.0 as usize),
+                    1 => {}
+                    rate => {
+                        return Err(Failure::Rate {
+                            process: index as u32,
+                            rate,
+                        });
+                    }
+                }
+            }
+        }
+        Ok(stopped)
+    }
+
+    /// Forgets differences between clock values that no guard or invariant from here on can tell apart.
+    pub fn extrapolate(&mut self, words: &[i32], zone: &mut [Bound]) {
+        if self.dimension > 1 {
+            self.bounds
+                .extrapolate(words, zone, self.dimension, &mut self.ceilings);
+        }
+    }
+
+    /// The stop points that the invariant of each process makes: its weak upper bounds, with the process.
+    pub fn upper_bounds(&mut self, words: &mut [i32]) -> Result<Vec<(u32, Constraint)>, Failure> {
+        let mut bounds = Vec::new();
+        for process in 0..self.stepper.network().processes.len() {
+            if let Some(emitted) = self.stepper.invariant_of(process, words)? {
+                for one in to_constraints(emitted)?.unwrap_or_default() {
+                    if one.right == 0 && one.left != 0 && !one.bound.is_strict() {
+                        bounds.push((process as u32, one));
+                    }
+                }
+            }
+        }
+        Ok(bounds)
+    }
+}
+
+impl ClockEffect {
+    /// Whether the move is possible everywhere and leaves every zone as it is.
+    pub fn is_trivial(&self) -> bool {
+        self.guard.is_empty()
+            && self.excluded.is_empty()
+            && self.assignments.is_empty()
+            && self.invariant.is_empty()
+    }
+
+    /// The zones on entry of the target: the source's zone within the guard, after the assignments, within the invariant.
+    /// More than one only if some clock-guarded receiver abstains.
+    pub fn entry_zones(&self, zone: &[Bound], dimension: usize, out: &mut Vec<Zone>) {
+        out.clear();
+        let mut within = Zone::from_bounds(dimension, zone);
+        if !within.constrain_all(&self.guard) {
+            return;
+        }
+        if self.excluded.is_empty() {
+            out.push(within);
+        } else {
+            let mut rest = Federation::of_zone(dimension, within.bounds());
+            self.subtract_excluded(&mut rest);
+            out.extend(
+                rest.zones()
+                    .map(|bounds| Zone::from_bounds(dimension, bounds)),
+            );
+        }
+        out.retain_mut(|piece| {
+            piece.assign(&self.assignments) && piece.constrain_all(&self.invariant)
+        });
+    }
+
+    /// The valuations from which the move leads into the federation, as far as guard and assignments say.
+    pub fn preimage(&self, federation: &mut Federation) {
+        if self.is_trivial() {
+            return;
+        }
+        federation.constrain_all(&self.invariant);
+        federation.preimage(&self.guard, &self.assignments);
+        self.subtract_excluded(federation);
+    }
+
+    /// The part of a zone in which the move is possible.
+    pub fn enabled_part(&self, zone: &[Bound], dimension: usize) -> Federation {
+        let mut enabled = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
+        self.preimage(&mut enabled);
+        enabled.intersect_zone(zone);
+        enabled
+    }
+
+    fn subtract_excluded(&self, federation: &mut Federation) {
+        for conjunction in &self.excluded {
+            let excluded = Zone::of_constraints(federation.dimension(), conjunction);
+            if !excluded.is_empty() {
+                federation.subtract_zone(excluded.bounds());
+            }
+        }
+    }
+}
+
+fn check_limit(value: i32) -> Result<(), Failure> {
+    if Bound::is_allowed(value) {
+        Ok(())
+    } else {
+        Err(Failure::ClockLimit(value))
+    }
+}
+
+/// Emitted constraints as constraints on zones; `None` if one of them never holds (a clock compared with itself).
+fn to_constraints(emitted: &[EmittedConstraint]) -> Result<Option<Vec<Constraint>>, Failure> {
+    let mut constraints = Vec::with_capacity(emitted.len());
+    for one in emitted {
+        let bound = if one.strict {
+            Bound::strict(one.bound)
+        } else {
+            Bound::weak(one.bound)
+        };
+        let bound = bound.ok_or(Failure::ClockLimit(one.bound))?;
+        if one.left != one.right {
+            constraints.push(Constraint {
+                left: one.left.0 as usize,
+                right: one.right.0 as usize,
+                bound,
+            });
+        } else if bound < Bound::LE_ZERO {
+            return Ok(None);
+        }
+    }
+    Ok(Some(constraints))
+}
+
+fn to_assignment(one: &EmittedAssignment) -> Result<Assignment, Failure> {
+    check_limit(one.value)?;
+    let clock = one.target.0 as usize;
+    if one.source == ClockId(0) {
+        return Ok(Assignment::Value {
+            clock,
+            value: one.value,
+        });
+    }
+    Ok(Assignment::Copy {
+        clock,
+        source: one.source.0 as usize,
+        increment: one.value,
+    })
+}

@@ -1,0 +1,396 @@
+//! The Python module `ntagen._checker`: conversions only.
+//!
+//! A model is behind a lock, so that Python threads may share it; the interpreter is released while the engine works, and
+//! signals (Ctrl-C) are looked for now and then.
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::engine::limits::Observer;
+use crate::engine::{
+    self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, Verdict, describe, json,
+};
+use crate::game::Forced;
+use crate::search::limits::StopReason;
+use crate::search::reach::Order;
+
+pyo3::create_exception!(
+    _checker,
+    RejectedError,
+    PyValueError,
+    "The engine does not accept a model or query; `args[0]` is a list of diagnostics as text."
+);
+
+fn rejected(rejection: Rejection) -> PyErr {
+    RejectedError::new_err((rejection.rendered,))
+}
+
+/// Shows the counters to a Python function, and ends the search if it raises or a signal came.
+fn observer(progress: Option<Py<PyAny>>) -> Observer {
+    Arc::new(move |counters| {
+        Python::attach(|py| {
+            let shown = match &progress {
+                Some(progress) => progress.call1(
+                    py,
+                    (
+                        counters.explored,
+                        counters.stored,
+                        counters.waiting,
+                        counters.bytes,
+                    ),
+                ),
+                None => Ok(py.None()),
+            };
+            shown.and_then(|_| py.check_signals()).is_err()
+        })
+    })
+}
+
+/// A loaded model.
+#[pyclass(frozen, module = "ntagen._checker")]
+struct Model {
+    inner: Mutex<LoadedModel>,
+}
+
+impl Model {
+    fn with<T>(&self, action: impl FnOnce(&mut LoadedModel) -> T) -> T {
+        action(
+            &mut self
+                .inner
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner),
+        )
+    }
+}
+
+/// A query as it stands in a file: its formula and its comment.
+type QueryEntry = (String, String);
+
+/// An edge as it stands in the model: process, source, targets of the branches, select names, synchronisation, whether
+/// controllable.
+type EdgeEntry = (String, String, Vec<String>, Vec<String>, String, bool);
+
+/// A step of a plan: for each edge that is taken, process, edge, branch and select values.
+type StepEntry = Vec<(u32, u32, u32, Vec<i32>)>;
+
+#[pymethods]
+impl Model {
+    /// The queries of the file.
+    #[getter]
+    fn queries(&self) -> Vec<QueryEntry> {
+        self.with(|model| {
+            model
+                .queries
+                .iter()
+                .map(|one| (one.text.clone(), one.comment.clone()))
+                .collect()
+        })
+    }
+
+    /// The warnings of loading.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.with(|model| model.warnings.clone())
+    }
+
+    /// The seconds that loading took.
+    #[getter]
+    fn load_seconds(&self) -> f64 {
+        self.with(|model| model.load_seconds)
+    }
+
+    /// By process: its edges.
+    fn edges(&self) -> Vec<Vec<EdgeEntry>> {
+        self.with(|model| {
+            let processes = model.network().processes.iter().map(|process| {
+                let location = |index: u32| process.locations[index as usize].name.clone();
+                let edges = process.edges.iter().map(|edge| {
+                    let targets = edge
+                        .branches
+                        .iter()
+                        .map(|branch| location(branch.target.0))
+                        .collect();
+                    let selects = edge
+                        .select
+                        .iter()
+                        .map(|select| select.name.clone())
+                        .collect();
+                    let sync = edge.labels.sync.clone();
+                    (
+                        process.name.clone(),
+                        location(edge.source.0),
+                        targets,
+                        selects,
+                        sync,
+                        edge.controllable,
+                    )
+                });
+                edges.collect()
+            });
+            processes.collect()
+        })
+    }
+
+    /// Reads the queries of a `.q` file.
+    fn read_queries(&self, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Vec<QueryEntry>> {
+        let queries = self
+            .with(|model| model.read_queries(path, data.as_bytes()))
+            .map_err(rejected)?;
+        Ok(queries
+            .into_iter()
+            .map(|one| (one.text, one.comment))
+            .collect())
+    }
+
+    /// Answers a query.
+    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, progress))]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one for each option of the command line"
+    )]
+    fn check(
+        slf: &Bound<'_, Self>,
+        query: &str,
+        search: &str,
+        seed: u64,
+        forced: &str,
+        engine: &str,
+        states: Option<u64>,
+        memory_bytes: Option<u64>,
+        timeout_s: Option<f64>,
+        max_plans: Option<usize>,
+        strategy: bool,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Answer> {
+        let unknown =
+            |what: &str, value: &str| PyValueError::new_err(format!("unknown {what}: {value}"));
+        let timeout = match timeout_s.map(Duration::try_from_secs_f64) {
+            None => None,
+            Some(Ok(timeout)) => Some(timeout),
+            Some(Err(_)) => return Err(unknown("time limit", &format!("{timeout_s:?}"))),
+        };
+        let options = Options {
+            order: match search {
+                "bfs" => Order::BreadthFirst,
+                "dfs" => Order::DepthFirst,
+                "random" => Order::Random(seed),
+                other => return Err(unknown("search order", other)),
+            },
+            forced: match forced {
+                "tiga" => Forced::Tiga,
+                "product" => Forced::Product,
+                "neutral" => Forced::Neutral,
+                other => return Err(unknown("rule for forced moves", other)),
+            },
+            code: match engine {
+                "jit" => CodeEngine::Jit,
+                "interpreter" => CodeEngine::Interpreter,
+                other => return Err(unknown("engine", other)),
+            },
+            limits: Limits {
+                states,
+                memory_bytes,
+                timeout,
+                observer: Some(observer(progress)),
+            },
+            plans: match max_plans {
+                None => PlansWanted::No,
+                Some(1) => PlansWanted::First,
+                Some(most) => PlansWanted::All(most),
+            },
+            strategy,
+        };
+        let model = slf.get();
+        let answer = slf.py().detach(|| {
+            model.with(|model| {
+                let text = model.add_query(query);
+                model.check(&text, &options)
+            })
+        });
+        let answer = answer.map_err(rejected)?;
+        if answer.verdict == Verdict::Unknown(StopReason::Interrupted) {
+            return Err(PyKeyboardInterrupt::new_err(()));
+        }
+        Ok(Answer {
+            model: slf.clone().unbind(),
+            query: query.to_owned(),
+            inner: answer,
+        })
+    }
+}
+
+/// The answer to a query.
+#[pyclass(frozen, module = "ntagen._checker")]
+struct Answer {
+    model: Py<Model>,
+    query: String,
+    inner: engine::Answer,
+}
+
+#[pymethods]
+impl Answer {
+    /// "satisfied", "not satisfied", "maybe", "unknown" or "error".
+    #[getter]
+    fn verdict(&self) -> &'static str {
+        match self.inner.verdict {
+            Verdict::Satisfied => "satisfied",
+            Verdict::NotSatisfied => "not satisfied",
+            Verdict::Maybe => "maybe",
+            Verdict::Unknown(_) => "unknown",
+            Verdict::Error(_) => "error",
+        }
+    }
+
+    /// "states", "memory" or "time" if a limit stopped the search.
+    #[getter]
+    fn stop(&self) -> Option<&'static str> {
+        match self.inner.verdict {
+            Verdict::Unknown(StopReason::States) => Some("states"),
+            Verdict::Unknown(StopReason::Memory) => Some("memory"),
+            Verdict::Unknown(StopReason::Time) => Some("time"),
+            _ => None,
+        }
+    }
+
+    /// A remark, or what went wrong in the model.
+    #[getter]
+    fn message(&self) -> Option<String> {
+        match self.inner.verdict {
+            Verdict::Error(failure) => Some(
+                self.model
+                    .get()
+                    .with(|model| describe::failure_text(model, failure)),
+            ),
+            _ => self.inner.message.clone(),
+        }
+    }
+
+    #[getter]
+    fn explored(&self) -> u64 {
+        self.inner.counters.explored
+    }
+
+    #[getter]
+    fn stored(&self) -> u64 {
+        self.inner.counters.stored
+    }
+
+    #[getter]
+    fn seconds(&self) -> f64 {
+        self.inner.seconds
+    }
+
+    #[getter]
+    fn load_seconds(&self) -> f64 {
+        self.inner.load_seconds
+    }
+
+    #[getter]
+    fn peak_bytes(&self) -> u64 {
+        self.inner.peak_bytes
+    }
+
+    /// How many plans there are; `None` if none were asked for or there is no list of plans.
+    #[getter]
+    fn plan_count(&self) -> Option<usize> {
+        self.inner.evidence.plans.as_ref().map(Vec::len)
+    }
+
+    /// Whether there are more plans than were asked for.
+    #[getter]
+    fn has_more_plans(&self) -> bool {
+        self.inner.evidence.has_more_plans
+    }
+
+    /// The plans: of each, the steps that leave a state without committed locations.
+    fn plans(&self) -> Vec<Vec<StepEntry>> {
+        self.model.get().with(|model| {
+            let network = model.network();
+            let plans = self.inner.evidence.plans.iter().flatten().map(|plan| {
+                let steps = plan
+                    .steps
+                    .iter()
+                    .filter(|step| !step.was_committed)
+                    .map(|step| {
+                        let entry = |part: &crate::network::Part| {
+                            let values = describe::selects(network, *part)
+                                .into_iter()
+                                .map(|one| one.1)
+                                .collect();
+                            (part.process, part.edge, part.branch, values)
+                        };
+                        step.parts.iter().map(entry).collect()
+                    });
+                steps.collect()
+            });
+            plans.collect()
+        })
+    }
+
+    /// The plans as JSON; `None` without plans.
+    fn plans_json(&self) -> Option<String> {
+        let evidence = &self.inner.evidence;
+        let plans = evidence.plans.as_ref()?;
+        let more = evidence.has_more_plans;
+        Some(
+            self.model
+                .get()
+                .with(|model| json::plans(model.network(), plans, &self.query, more).to_string()),
+        )
+    }
+
+    /// The trace in UPPAAL's form; `None` without a trace.
+    fn trace_text(&self) -> Option<String> {
+        let trace = self.inner.evidence.trace.as_ref()?;
+        Some(
+            self.model
+                .get()
+                .with(|model| describe::trace_text(model.network(), trace)),
+        )
+    }
+
+    /// The trace as JSON; `None` without a trace.
+    fn trace_json(&self) -> Option<String> {
+        let trace = self.inner.evidence.trace.as_ref()?;
+        Some(
+            self.model
+                .get()
+                .with(|model| json::trace(model.network(), trace).to_string()),
+        )
+    }
+
+    /// The strategy as JSON; `None` without a strategy.
+    fn strategy_json(&self) -> Option<String> {
+        let strategy = self.inner.evidence.strategy.as_ref()?;
+        Some(
+            self.model
+                .get()
+                .with(|model| json::strategy(model.network(), strategy, &self.query).to_string()),
+        )
+    }
+}
+
+/// Loads a model from its bytes; `path` names it in diagnostics.
+#[pyfunction]
+fn load(py: Python<'_>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Model> {
+    let bytes = data.as_bytes();
+    let model = py
+        .detach(|| LoadedModel::load(path, bytes))
+        .map_err(rejected)?;
+    Ok(Model {
+        inner: Mutex::new(model),
+    })
+}
+
+/// The engine of ntagen.
+#[pymodule]
+fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Model>()?;
+    module.add_class::<Answer>()?;
+    module.add("RejectedError", module.py().get_type::<RejectedError>())?;
+    module.add_function(wrap_pyfunction!(load, module)?)
+}

@@ -1,0 +1,468 @@
+//! Reachability: is there a state in which a predicate holds?
+//!
+//! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one with the same words contains
+//! its zone, and stored ones that a new one contains are dropped from the waiting list. States with a committed location
+//! are explored where they arise and not stored: no time passes in them, and chains of them are short. A chain that is not
+//! short ([`LONGEST_CHAIN`]) is stored after all, so that loops of committed locations end.
+//!
+//! Each stored state remembers its parent and the moves from it, so that a trace is found by taking the moves again.
+//!
+//! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 3; G. Behrmann, J. Bengtsson, A. David,
+//! K. G. Larsen, P. Pettersson, W. Yi, "UPPAAL Implementation Secrets", 2002 (one list for passed and waiting states).
+
+use std::collections::VecDeque;
+
+use crate::ir::Predicate;
+use crate::network::{Extent, Failure, Moves, Part, Symbolic};
+use crate::zones::{Zone, dbm};
+
+use super::limits::{Counters, StopReason, Watch};
+use super::store::{DiscreteId, StateStore};
+use super::zone_table::{ZoneId, ZoneTable};
+
+/// Committed states that are explored one below the other without being stored.
+const LONGEST_CHAIN: usize = 64;
+
+/// States between two looks at the limits.
+const LOOK_EVERY: u64 = 256;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// In which order states are explored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Breadth first: traces are shortest in stored states.
+    BreadthFirst,
+    /// Depth first.
+    DepthFirst,
+    /// Depth first among the successors of a state in random order, from this seed.
+    Random(u64),
+}
+
+/// What a search found.
+#[derive(Debug)]
+pub enum Outcome {
+    /// A state in which the predicate holds; the way to it.
+    Found(Trace),
+    /// There is none.
+    Exhausted,
+    /// A limit came first.
+    Stopped(StopReason),
+}
+
+/// The end of a search.
+#[derive(Debug)]
+pub struct Report {
+    /// What was found, or the failure and the way to the state whose exploration failed.
+    pub outcome: Result<Outcome, (Failure, Trace)>,
+    /// What was done.
+    pub counters: Counters,
+}
+
+/// A symbolic run: states, and the moves between them (one less).
+#[derive(Clone, Debug, Default)]
+pub struct Trace {
+    /// Words and zone of each state.
+    pub states: Vec<(Vec<i32>, Zone)>,
+    /// The parts of each move.
+    pub moves: Vec<Vec<Part>>,
+}
+
+/// A move of a state: its index, and which of the zones on entry (more than one only for abstaining receivers).
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    ordinal: u32,
+    piece: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    discrete: DiscreteId,
+    zone: ZoneId,
+    /// The next node with the same words.
+    next: u32,
+    parent: u32,
+    path: (u32, u32),
+    is_covered: bool,
+}
+
+/// A state on the stack of unstored ones.
+#[derive(Debug)]
+struct Frame {
+    words: Vec<i32>,
+    zone: Zone,
+    moves: Moves,
+    next: usize,
+}
+
+/// How the exploration of one stored state ended.
+enum Visit {
+    Done,
+    Found,
+}
+
+/// Searches for a state in which `goal` holds.
+pub fn search(
+    symbolic: &mut Symbolic<'_>,
+    goal: &Predicate,
+    order: Order,
+    watch: &mut dyn Watch,
+) -> Report {
+    let mut search = Search::new(symbolic, goal, order);
+    let outcome = match search.run(watch) {
+        Ok(outcome) => Ok(outcome),
+        Err(failure) => Err((failure, search.trace())),
+    };
+    Report {
+        outcome,
+        counters: search.counters(),
+    }
+}
+
+struct Search<'s, 'a> {
+    symbolic: &'s mut Symbolic<'a>,
+    goal: &'s Predicate,
+    order: Order,
+    store: StateStore,
+    zones: ZoneTable,
+    nodes: Vec<Node>,
+    /// By discrete state: its first node.
+    heads: Vec<u32>,
+    paths: Vec<Step>,
+    waiting: VecDeque<u32>,
+    frames: Vec<Frame>,
+    /// The moves from the node that is being explored to the state at hand.
+    path: Vec<Step>,
+    current: u32,
+    entries: Vec<Zone>,
+    explored: u64,
+    random: u64,
+}
+
+impl<'s, 'a> Search<'s, 'a> {
+    fn new(symbolic: &'s mut Symbolic<'a>, goal: &'s Predicate, order: Order) -> Search<'s, 'a> {
+        let network = symbolic.stepper.network();
+        Search {
+            store: StateStore::new(network),
+            zones: ZoneTable::new(symbolic.dimension()),
+            nodes: Vec::new(),
+            heads: Vec::new(),
+            paths: Vec::new(),
+            waiting: VecDeque::new(),
+            frames: Vec::new(),
+            path: Vec::new(),
+            current: NONE,
+            entries: Vec::new(),
+            explored: 0,
+            random: if let Order::Random(seed) = order {
+                seed | 1
+            } else {
+                1
+            },
+            symbolic,
+            goal,
+            order,
+        }
+    }
+
+    fn counters(&self) -> Counters {
+        let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
+        let paths = self.paths.capacity() * size_of::<Step>() + self.waiting.capacity() * 4;
+        Counters {
+            explored: self.explored,
+            stored: self.nodes.len() as u64,
+            waiting: self.waiting.len() as u64,
+            bytes: (self.store.bytes() + self.zones.bytes() + nodes + paths) as u64,
+        }
+    }
+
+    fn run(&mut self, watch: &mut dyn Watch) -> Result<Outcome, Failure> {
+        let (mut words, mut zone) = self.symbolic.initial()?;
+        if self.holds(&mut words, &zone)? {
+            let states = vec![(words, zone)];
+            return Ok(Outcome::Found(Trace {
+                states,
+                moves: Vec::new(),
+            }));
+        }
+        self.symbolic.extrapolate(&words, zone.bounds_mut());
+        self.add(&words, &zone);
+        let mut next_look = LOOK_EVERY;
+        while let Some(node) = self.next_node() {
+            if self.nodes[node as usize].is_covered {
+                continue;
+            }
+            self.current = node;
+            let first = self.waiting.len();
+            if let Visit::Found = self.visit(node)? {
+                return Ok(Outcome::Found(self.trace()));
+            }
+            self.shuffle_from(first);
+            if self.explored >= next_look {
+                next_look = self.explored + LOOK_EVERY;
+                if let Some(reason) = watch.look(&self.counters()) {
+                    return Ok(Outcome::Stopped(reason));
+                }
+            }
+        }
+        Ok(Outcome::Exhausted)
+    }
+
+    fn next_node(&mut self) -> Option<u32> {
+        match self.order {
+            Order::BreadthFirst => self.waiting.pop_front(),
+            Order::DepthFirst | Order::Random(_) => self.waiting.pop_back(),
+        }
+    }
+
+    /// Puts the newest waiting nodes into an order that fits the search order.
+    fn shuffle_from(&mut self, first: usize) {
+        let Order::Random(_) = self.order else { return };
+        let first = first.saturating_sub(1).min(self.waiting.len());
+        for index in (first + 1..self.waiting.len()).rev() {
+            let other = first + (self.next_random() % (index - first + 1) as u64) as usize;
+            self.waiting.swap(index, other);
+        }
+    }
+
+    /// Xorshift; only the order of the search depends on it.
+    fn next_random(&mut self) -> u64 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 7;
+        self.random ^= self.random << 17;
+        self.random >> 16
+    }
+
+    fn holds(&mut self, words: &mut [i32], zone: &Zone) -> Result<bool, Failure> {
+        Ok(!matches!(
+            self.symbolic.extent(self.goal, words, zone.bounds())?,
+            Extent::Nowhere
+        ))
+    }
+
+    /// Explores a stored state and, below it, all committed states.
+    fn visit(&mut self, node: u32) -> Result<Visit, Failure> {
+        self.path.clear();
+        let Node { discrete, zone, .. } = self.nodes[node as usize];
+        let mut frames = std::mem::take(&mut self.frames);
+        if frames.is_empty() {
+            frames.push(self.new_frame());
+        }
+        self.store.load(discrete, &mut frames[0].words);
+        frames[0]
+            .zone
+            .bounds_mut()
+            .copy_from_slice(self.zones.get(zone));
+        let result = self.visit_frames(&mut frames);
+        self.frames = frames;
+        result
+    }
+
+    fn new_frame(&self) -> Frame {
+        Frame {
+            words: self.symbolic.stepper.network().initial.clone(),
+            zone: Zone::zero(self.symbolic.dimension()),
+            moves: Moves::default(),
+            next: 0,
+        }
+    }
+
+    fn visit_frames(&mut self, frames: &mut Vec<Frame>) -> Result<Visit, Failure> {
+        let mut depth = 0;
+        self.open(&mut frames[0])?;
+        loop {
+            if frames[depth].next == frames[depth].moves.len() {
+                if depth == 0 {
+                    return Ok(Visit::Done);
+                }
+                depth -= 1;
+                self.path.pop();
+                continue;
+            }
+            if frames.len() == depth + 1 {
+                frames.push(self.new_frame());
+            }
+            let (above, below) = frames.split_at_mut(depth + 1);
+            match self.take_next(&mut above[depth], &mut below[0], depth)? {
+                Taken::Nothing => {}
+                Taken::Found => return Ok(Visit::Found),
+                Taken::Down => {
+                    depth += 1;
+                    self.open(&mut frames[depth])?;
+                }
+            }
+        }
+    }
+
+    fn open(&mut self, frame: &mut Frame) -> Result<(), Failure> {
+        self.explored += 1;
+        frame.next = 0;
+        self.symbolic
+            .stepper
+            .moves(&mut frame.words, &mut frame.moves)?;
+        Ok(())
+    }
+
+    /// Takes the next move of `source`; a committed target is left in `target` to be explored at once.
+    fn take_next(
+        &mut self,
+        source: &mut Frame,
+        target: &mut Frame,
+        depth: usize,
+    ) -> Result<Taken, Failure> {
+        let ordinal = source.next as u32;
+        source.next += 1;
+        target.words.copy_from_slice(&source.words);
+        let one = source.moves.get(ordinal as usize);
+        let Some(effect) = self.symbolic.fire(one, &mut target.words)? else {
+            return Ok(Taken::Nothing);
+        };
+        let mut entries = std::mem::take(&mut self.entries);
+        effect.entry_zones(
+            source.zone.bounds(),
+            self.symbolic.dimension(),
+            &mut entries,
+        );
+        let descends = entries.len() == 1
+            && depth < LONGEST_CHAIN
+            && self.symbolic.stepper.is_committed(&target.words);
+        let may_delay = !entries.is_empty() && self.symbolic.may_delay(&mut target.words)?;
+        let mut taken = Taken::Nothing;
+        for (piece, entry) in entries.iter_mut().enumerate() {
+            self.symbolic.delay(
+                &target.words,
+                may_delay,
+                &effect.invariant,
+                entry.bounds_mut(),
+            )?;
+            self.path.push(Step {
+                ordinal,
+                piece: piece as u32,
+            });
+            if self.holds(&mut target.words, entry)? {
+                taken = Taken::Found;
+                break;
+            }
+            self.symbolic.extrapolate(&target.words, entry.bounds_mut());
+            if descends {
+                target.zone.bounds_mut().copy_from_slice(entry.bounds());
+                taken = Taken::Down;
+                break;
+            }
+            self.add(&target.words, entry);
+            self.path.pop();
+        }
+        self.entries = entries;
+        Ok(taken)
+    }
+
+    /// Stores a state and lets it wait, unless a stored one contains it.
+    fn add(&mut self, words: &[i32], zone: &Zone) {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        let id = self.zones.intern(zone.bounds());
+        if self.is_covered(discrete, id, zone) {
+            return;
+        }
+        let first = self.paths.len() as u32;
+        self.paths.extend_from_slice(&self.path);
+        let node = Node {
+            discrete,
+            zone: id,
+            next: self.heads[discrete.0 as usize],
+            parent: self.current,
+            path: (first, self.paths.len() as u32),
+            is_covered: false,
+        };
+        self.heads[discrete.0 as usize] = self.nodes.len() as u32;
+        self.waiting.push_back(self.nodes.len() as u32);
+        self.nodes.push(node);
+    }
+
+    /// Whether a stored state contains the new one; unlinks those that the new one contains.
+    fn is_covered(&mut self, discrete: DiscreteId, id: ZoneId, zone: &Zone) -> bool {
+        let mut previous = NONE;
+        let mut node = self.heads[discrete.0 as usize];
+        while node != NONE {
+            let Node {
+                zone: other, next, ..
+            } = self.nodes[node as usize];
+            if other == id || dbm::is_subset(zone.bounds(), self.zones.get(other)) {
+                return true;
+            }
+            if dbm::is_subset(self.zones.get(other), zone.bounds()) {
+                self.nodes[node as usize].is_covered = true;
+                if previous == NONE {
+                    self.heads[discrete.0 as usize] = next;
+                } else {
+                    self.nodes[previous as usize].next = next;
+                }
+            } else {
+                previous = node;
+            }
+            node = next;
+        }
+        false
+    }
+
+    /// The way to the state at hand: the parents of the current node, then the moves below it. The states are computed anew;
+    /// what fails on the way is left out.
+    fn trace(&mut self) -> Trace {
+        let mut steps: Vec<Step> = self.path.iter().rev().copied().collect();
+        let mut node = self.current;
+        while node != NONE {
+            let Node { parent, path, .. } = self.nodes[node as usize];
+            steps.extend(self.paths[path.0 as usize..path.1 as usize].iter().rev());
+            node = parent;
+        }
+        let mut trace = Trace::default();
+        let Ok((words, zone)) = self.symbolic.initial() else {
+            return trace;
+        };
+        trace.states.push((words, zone));
+        for step in steps.iter().rev() {
+            if self.retrace(*step, &mut trace).is_err() {
+                break;
+            }
+        }
+        trace
+    }
+
+    fn retrace(&mut self, step: Step, trace: &mut Trace) -> Result<(), Failure> {
+        let Some((words, zone)) = trace.states.last() else {
+            return Ok(());
+        };
+        let (mut words, mut moves) = (words.clone(), Moves::default());
+        self.symbolic.stepper.moves(&mut words, &mut moves)?;
+        let one = moves.get(step.ordinal as usize);
+        let Some(effect) = self.symbolic.fire(one, &mut words)? else {
+            return Ok(());
+        };
+        let mut entries = Vec::new();
+        effect.entry_zones(zone.bounds(), self.symbolic.dimension(), &mut entries);
+        let may_delay = self.symbolic.may_delay(&mut words)?;
+        // Extrapolation can split a zone in more pieces than the exact one has.
+        let piece = (step.piece as usize).min(entries.len().saturating_sub(1));
+        let Some(mut entry) = entries.into_iter().nth(piece) else {
+            return Ok(());
+        };
+        self.symbolic
+            .delay(&words, may_delay, &effect.invariant, entry.bounds_mut())?;
+        trace.moves.push(one.parts.to_vec());
+        trace.states.push((words, entry));
+        Ok(())
+    }
+}
+
+/// What became of a move.
+enum Taken {
+    /// Nothing more to do: impossible, stored, or covered.
+    Nothing,
+    /// The goal holds in the target.
+    Found,
+    /// The target is committed and is explored at once.
+    Down,
+}
