@@ -1,0 +1,162 @@
+//! Models with the verdicts of their queries: `tests/corpus/verdicts` and `tests/corpus/games`.
+//!
+//! A file begins with lines `// query: …`, each followed by `// verdict: …` (`// verdict neutral: …` and `// verdict product: …`
+//! where the rule for forced moves matters) and `// origin: …`, which says how the verdict is known. Other comment lines are
+//! prose. Every query is answered with every search order and with the interpreter and compiled code, and must come out
+//! the same.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
+use checker::game::Forced;
+use checker::search::reach::Order;
+
+struct Case {
+    query: String,
+    verdicts: Vec<(Option<Forced>, String)>,
+    origin: String,
+}
+
+fn cases(path: &Path, text: &str) -> Vec<Case> {
+    let mut cases: Vec<Case> = Vec::new();
+    for line in text
+        .lines()
+        .map_while(|line| line.strip_prefix("//"))
+        .map(str::trim)
+    {
+        let Some((key, value)) = line.split_once(':') else {
+            continue;
+        };
+        let (key, value) = (key.trim(), value.trim().to_owned());
+        let forced = match key {
+            "query" => {
+                cases.push(Case {
+                    query: value,
+                    verdicts: Vec::new(),
+                    origin: String::new(),
+                });
+                continue;
+            }
+            "origin" => {
+                cases
+                    .last_mut()
+                    .unwrap_or_else(|| panic!("{}: origin without query", path.display()))
+                    .origin = value;
+                continue;
+            }
+            "verdict" => None,
+            "verdict neutral" => Some(Forced::Neutral),
+            "verdict product" => Some(Forced::Product),
+            _ if key.starts_with("verdict") => {
+                panic!("{}: unknown directive {key}", path.display())
+            }
+            _ => continue,
+        };
+        let case = cases
+            .last_mut()
+            .unwrap_or_else(|| panic!("{}: verdict without query", path.display()));
+        case.verdicts.push((forced, value));
+    }
+    cases
+}
+
+fn engines() -> Vec<CodeEngine> {
+    if cfg!(feature = "jit") {
+        vec![CodeEngine::Interpreter, CodeEngine::Jit]
+    } else {
+        vec![CodeEngine::Interpreter]
+    }
+}
+
+fn verdict_of(path: &Path, bytes: &[u8], query: &str, options: &Options) -> String {
+    let mut model = LoadedModel::load(&path.display().to_string(), bytes)
+        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    let text = model.add_query(query);
+    match model.check(&text, options) {
+        Err(_) => "rejected".to_owned(),
+        Ok(answer) => match answer.verdict {
+            Verdict::Satisfied => "satisfied".to_owned(),
+            Verdict::NotSatisfied => "not satisfied".to_owned(),
+            Verdict::Maybe => "maybe".to_owned(),
+            Verdict::Unknown(reason) => format!("stopped: {reason:?}"),
+            Verdict::Error(_) => "error".to_owned(),
+        },
+    }
+}
+
+fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>) {
+    for (forced, expected) in &case.verdicts {
+        for code in engines() {
+            for order in [Order::BreadthFirst, Order::DepthFirst, Order::Random(7)] {
+                let options = Options {
+                    order,
+                    code,
+                    forced: forced.unwrap_or_default(),
+                    strategy: true,
+                    ..Options::default()
+                };
+                let found = verdict_of(path, bytes, &case.query, &options);
+                if &found != expected {
+                    failures.push(format!(
+                        "{}: {}\n  expected {expected} ({}), found {found} with {order:?}, {code:?}, {forced:?}",
+                        path.display(),
+                        case.query,
+                        case.origin
+                    ));
+                }
+            }
+        }
+    }
+}
+
+fn check_folder(name: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../tests/corpus")
+        .join(name);
+    let mut paths: Vec<PathBuf> = fs::read_dir(&folder)
+        .expect("the corpus is there")
+        .map(|entry| entry.expect("the corpus can be listed").path())
+        .collect();
+    paths.sort();
+    let mut failures = Vec::new();
+    let mut count = 0;
+    for path in &paths {
+        let bytes = fs::read(path).expect("the corpus can be read");
+        let cases = cases(path, &String::from_utf8_lossy(&bytes));
+        assert!(!cases.is_empty(), "{}: no query", path.display());
+        for case in &cases {
+            assert!(
+                !case.verdicts.is_empty(),
+                "{}: no verdict for {}",
+                path.display(),
+                case.query
+            );
+            assert!(
+                !case.origin.is_empty(),
+                "{}: no origin for {}",
+                path.display(),
+                case.query
+            );
+            check_case(path, &bytes, case, &mut failures);
+            count += 1;
+        }
+    }
+    assert!(count > 0, "the corpus {name} is empty");
+    assert!(
+        failures.is_empty(),
+        "{} of the queries:\n{}",
+        failures.len(),
+        failures.join("\n")
+    );
+}
+
+#[test]
+fn symbolic_verdicts_hold() {
+    check_folder("verdicts");
+}
+
+#[test]
+fn game_verdicts_hold() {
+    check_folder("games");
+}
