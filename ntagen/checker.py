@@ -1,0 +1,281 @@
+"""The typed face of the engine: verdicts, traces, strategies and plans of UPPAAL models.
+
+The engine is the Rust crate in ``checker/``; this module only gives its answers Python types.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from ntagen import _checker
+from ntagen.errors import InputError
+
+Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
+SearchOrder = Literal["bfs", "dfs", "random"]
+ForcedRule = Literal["tiga", "product", "neutral"]
+CodeEngine = Literal["jit", "interpreter"]
+PlansWanted = Literal["none", "first", "all"]
+
+Progress = Callable[[int, int, int, int], object]
+"""Is shown explored, stored and waiting states, and bytes."""
+
+MAX_PLANS = 1_000_000
+"""Plans that are listed at most, unless the caller says otherwise."""
+
+
+class RejectedError(InputError):
+    """The engine does not accept a model or a query; `diagnostics` say what is wrong and where."""
+
+    def __init__(self, diagnostics: list[str]) -> None:
+        super().__init__("\n".join(text.rstrip() for text in diagnostics))
+        self.diagnostics = tuple(diagnostics)
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """A query of a file: its formula and the comment beside it."""
+
+    text: str
+    comment: str
+
+
+@dataclass(frozen=True, slots=True)
+class EngineEdge:
+    """An edge as it is taken in a plan.
+
+    Attributes:
+        process: The process, for example ``User``.
+        source: The location that it leaves.
+        target: The location that it enters.
+        sync: The synchronisation as written, for example ``do_push!``; empty for an internal edge.
+        select: The values of the select bindings.
+    """
+
+    process: str
+    source: str
+    target: str
+    sync: str
+    select: dict[str, int] = field(hash=False)
+
+
+@dataclass(frozen=True, slots=True)
+class EngineStep:
+    """A transition of a plan: the edges that are taken together, the sender's first."""
+
+    edges: tuple[EngineEdge, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class EnginePlan:
+    """A winning sequence: the transitions that leave a state without committed locations."""
+
+    steps: tuple[EngineStep, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _EdgeEntry:
+    process: str
+    source: str
+    targets: list[str]
+    selects: list[str]
+    sync: str
+
+    def taken(self, branch: int, values: list[int]) -> EngineEdge:
+        select = dict(zip(self.selects, values, strict=True))
+        return EngineEdge(self.process, self.source, self.targets[branch], self.sync, select)
+
+
+class Answer:
+    """The answer to a query.
+
+    Attributes:
+        query: The query as given.
+        verdict: ``satisfied``, ``not satisfied``, ``maybe`` (an over-approximation could not
+            decide), ``unknown`` (a limit came first: see `stop`) or ``error`` (the model failed:
+            see `message`).
+        message: A remark for the user, or what went wrong in the model.
+        stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
+        explored: States whose successors were computed.
+        stored: States that were stored.
+        seconds: Seconds of the search alone.
+        load_seconds: Seconds of loading the model and compiling its code.
+        peak_bytes: The greatest number of bytes that states and tables took.
+        plan_count: How many plans were found; ``None`` if none were asked for, or if the
+            environment has choices, so that a strategy is no list of plans.
+    """
+
+    def __init__(self, raw: _checker.Answer, query: str, edges: list[list[_EdgeEntry]]) -> None:
+        self._raw = raw
+        self._edges = edges
+        self.query = query
+        self.verdict: Verdict = raw.verdict
+        self.message = raw.message
+        self.stop = raw.stop
+        self.explored = raw.explored
+        self.stored = raw.stored
+        self.seconds = raw.seconds
+        self.load_seconds = raw.load_seconds
+        self.peak_bytes = raw.peak_bytes
+        self.plan_count = raw.plan_count
+        self.has_more_plans = raw.has_more_plans
+
+    @property
+    def plans(self) -> tuple[EnginePlan, ...]:
+        """The plans; empty if none were asked for or found."""
+        return tuple(self._plans())
+
+    def _plans(self) -> Iterator[EnginePlan]:
+        for plan in self._raw.plans():
+            yield EnginePlan(tuple(EngineStep(tuple(self._taken(step))) for step in plan))
+
+    def _taken(self, step: list[tuple[int, int, int, list[int]]]) -> Iterator[EngineEdge]:
+        for process, edge, branch, values in step:
+            yield self._edges[process][edge].taken(branch, values)
+
+    def plans_json(self) -> str | None:
+        """The plans as JSON text with every edge in full; ``None`` without plans."""
+        return self._raw.plans_json()
+
+    def trace_text(self) -> str | None:
+        """The witness, counterexample or way to the failure as UPPAAL prints it, if any."""
+        return self._raw.trace_text()
+
+    def trace_json(self) -> str | None:
+        """The same as JSON text."""
+        return self._raw.trace_json()
+
+    def strategy_json(self) -> str | None:
+        """The strategy as JSON text; ``None`` if none was asked for or found."""
+        return self._raw.strategy_json()
+
+
+class Model:
+    """A model that the engine has accepted."""
+
+    def __init__(self, raw: _checker.Model) -> None:
+        self._raw = raw
+        self._edges: list[list[_EdgeEntry]] | None = None
+
+    @property
+    def queries(self) -> tuple[Query, ...]:
+        """The queries of the file, in order."""
+        return tuple(Query(text, comment) for text, comment in self._raw.queries)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know about the model, one text a warning."""
+        return tuple(self._raw.warnings)
+
+    @property
+    def load_seconds(self) -> float:
+        """Seconds of loading, and of compiling the code once a query was checked."""
+        return self._raw.load_seconds
+
+    def read_queries(self, path: Path) -> tuple[Query, ...]:
+        """Reads a ``.q`` file.
+
+        Raises:
+            RejectedError: The file is no list of queries.
+            OSError: The file cannot be read.
+        """
+        try:
+            entries = self._raw.read_queries(str(path), path.read_bytes())
+        except _checker.RejectedError as error:
+            raise RejectedError(error.args[0]) from None
+        return tuple(Query(text, comment) for text, comment in entries)
+
+    def check(
+        self,
+        query: str,
+        *,
+        search: SearchOrder = "bfs",
+        seed: int = 0,
+        forced: ForcedRule = "tiga",
+        engine: CodeEngine = "jit",
+        states: int | None = None,
+        memory_bytes: int | None = None,
+        timeout_s: float | None = None,
+        plans: PlansWanted = "none",
+        max_plans: int = MAX_PLANS,
+        strategy: bool = False,
+        progress: Progress | None = None,
+    ) -> Answer:
+        """Answers a query.
+
+        Args:
+            query: The query in UPPAAL's language.
+            search: The order of the search; verdicts do not depend on it.
+            seed: For ``search="random"``.
+            forced: What happens where time cannot pass and only the environment can move.
+            engine: What runs the code of the model; answers do not depend on it.
+            states: The search stops after this many stored states.
+            memory_bytes: The search stops when its states take this much.
+            timeout_s: The search stops after this time.
+            plans: Which winning sequences to list.
+            max_plans: At most this many plans are listed.
+            strategy: Whether a winning strategy is wanted.
+            progress: Is called some twenty times a second with the numbers of explored,
+                stored and waiting states and of bytes.
+
+        Returns:
+            The answer; a limit that was reached is an answer too.
+
+        Raises:
+            RejectedError: The query is wrong or of a kind that is not supported.
+            KeyboardInterrupt: The user interrupted.
+        """
+        wanted = {"none": None, "first": 1, "all": max(max_plans, 2)}[plans]
+        try:
+            raw = self._raw.check(
+                query,
+                search=search,
+                seed=seed,
+                forced=forced,
+                engine=engine,
+                states=states,
+                memory_bytes=memory_bytes,
+                timeout_s=timeout_s,
+                max_plans=wanted,
+                strategy=strategy,
+                progress=progress,
+            )
+        except _checker.RejectedError as error:
+            raise RejectedError(error.args[0]) from None
+        if self._edges is None:
+            self._edges = [
+                [_EdgeEntry(*entry[:5]) for entry in process] for process in self._raw.edges()
+            ]
+        return Answer(raw, query, self._edges)
+
+
+def load(text: str, path: str = "") -> Model:
+    """Loads a model from its text (UPPAAL XML or XTA).
+
+    Args:
+        text: The whole file.
+        path: What to call it in diagnostics.
+
+    Raises:
+        RejectedError: The engine does not accept it.
+    """
+    return _load(path, text.encode())
+
+
+def load_file(path: Path) -> Model:
+    """Loads a model from a file (UPPAAL XML or XTA).
+
+    Raises:
+        RejectedError: The engine does not accept it.
+        OSError: The file cannot be read.
+    """
+    return _load(str(path), path.read_bytes())
+
+
+def _load(path: str, data: bytes) -> Model:
+    try:
+        return Model(_checker.load(path, data))
+    except _checker.RejectedError as error:
+        raise RejectedError(error.args[0]) from None

@@ -1,0 +1,373 @@
+"""`ntagen check`: the answers to the queries of a model or an environment."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from ntagen.cli.files import write_files
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from ntagen.checker import Answer, Model, Query
+    from ntagen.scene import Scene
+
+STOPPED: Final = 3
+"""Exit code after a limit or a ``maybe``."""
+
+MODEL_ERROR: Final = 4
+"""Exit code after a run-time error in the model."""
+
+_BYTES_PER: Final = {
+    "": 1,
+    "B": 1,
+    "KB": 10**3,
+    "MB": 10**6,
+    "GB": 10**9,
+    "KIB": 2**10,
+    "MIB": 2**20,
+    "GIB": 2**30,
+    "TIB": 2**40,
+}
+_SECONDS_PER: Final = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
+_MARK: Final = {
+    "satisfied": ("yes", "green"),
+    "not satisfied": ("no", "red"),
+    "maybe": ("maybe", "yellow"),
+    "unknown": ("stopped", "yellow"),
+    "error": ("error", "red"),
+}
+
+
+class _Quantity(click.ParamType[float]):
+    """A number with a unit, such as ``4GiB`` or ``60s``."""
+
+    def __init__(self, name: str, units: dict[str, float] | dict[str, int]) -> None:
+        self.name = name
+        self._units = units
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([A-Za-z]*)\s*", str(value))
+        units = {unit.lower(): size for unit, size in self._units.items()}
+        if not match or match[2].lower() not in units:
+            known = ", ".join(unit for unit in self._units if unit)
+            self.fail(f"{value!r} is no {self.name}; write a number and one of {known}", param, ctx)
+        return float(match[1]) * units[match[2].lower()]
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A query to be answered."""
+
+    name: str | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Outputs:
+    """Where evidence goes; ``None`` is nowhere."""
+
+    trace: str | None
+    strategy: Path | None
+    plans: Path | None
+    ranking: str
+
+
+@click.command(
+    "check",
+    epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected, "
+    "3 stopped by a limit or maybe, 4 run-time error in the model.",
+)
+@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
+@click.option(
+    "--query",
+    "asked",
+    metavar="TEXT|NAME",
+    multiple=True,
+    help="A query, or the name of one of the model's; may be given again.  [default: all]",
+)
+@click.option(
+    "--queries",
+    "query_file",
+    metavar="FILE.q",
+    type=click.Path(path_type=Path),
+    help="A file of queries, answered instead of the model's own.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line, nothing else.")
+@click.option("--trace", metavar="FILE|-", help="Write witnesses and counterexamples; - is stdout.")
+@click.option(
+    "--strategy",
+    metavar="FILE.json",
+    type=click.Path(path_type=Path),
+    help="Write the strategy of the (last) satisfied control query.",
+)
+@click.option(
+    "--plans",
+    metavar="FILE.json",
+    type=click.Path(path_type=Path),
+    help="Write all plans of the (last) control query: of an environment, ranked and certified.",
+)
+@click.option(
+    "--rank",
+    "ranking",
+    metavar="CRITERIA",
+    default="clearance,rolls,length",
+    show_default=True,
+    help="How plans of an environment are ranked.",
+)
+@click.option(
+    "--max-plans", type=click.IntRange(2), default=1_000_000, help="List at most so many."
+)
+@click.option("--search", type=click.Choice(["bfs", "dfs", "random"]), default="bfs")
+@click.option("--seed", type=int, default=0, help="For --search random.")
+@click.option(
+    "--forced",
+    type=click.Choice(["tiga", "product", "neutral"]),
+    default="tiga",
+    help="When the environment must move because time cannot pass.",
+)
+@click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
+@click.option("--states", type=click.IntRange(1), help="Stop after so many stored states.")
+@click.option("--memory", metavar="SIZE", type=_Quantity("size", _BYTES_PER), help="Such as 4GiB.")
+@click.option(
+    "--timeout", metavar="TIME", type=_Quantity("time", _SECONDS_PER), help="Such as 60s."
+)
+def command(
+    model_path: Path,
+    asked: tuple[str, ...],
+    query_file: Path | None,
+    as_json: bool,
+    trace: str | None,
+    strategy: Path | None,
+    plans: Path | None,
+    ranking: str,
+    max_plans: int,
+    search: Any,  # noqa: ANN401  click gives a str where the engine wants literals
+    seed: int,
+    forced: Any,  # noqa: ANN401
+    engine: Any,  # noqa: ANN401
+    states: int | None,
+    memory: float | None,
+    timeout: float | None,
+) -> int:
+    """Answer the queries of a model or an environment.
+
+    MODEL is an environment (.nsl) or a UPPAAL model (.xml, .xta).
+
+    \b
+    Examples:
+      ntagen check examples/paper.nsl --plans plans.json
+      ntagen check model.xml --query "E<> Gate.Open" --trace -
+      ntagen check model.xml --queries model.q --json --timeout 60s
+    """  # noqa: D301  click wants the control character
+    outputs = _Outputs(trace, strategy, plans, ranking)
+    model, scene = _load(model_path)
+    todo = _queries(model, asked, query_file)
+    for warning in model.warnings:
+        click.echo(warning.rstrip(), err=True)
+    worst = 0
+    if not as_json:
+        _header(model_path, model)
+    for query in todo:
+        with _progress(as_json) as shown:
+            answer = model.check(
+                query.text,
+                search=search,
+                seed=seed,
+                forced=forced,
+                engine=engine,
+                states=states,
+                memory_bytes=None if memory is None else int(memory),
+                timeout_s=timeout,
+                plans="all" if plans else "none",
+                max_plans=max_plans,
+                strategy=strategy is not None,
+                progress=shown,
+            )
+        notes = _write_evidence(answer, query, outputs, scene)
+        if as_json:
+            click.echo(json.dumps(_record(answer, query)))
+        else:
+            _row(answer, query, notes)
+        worst = max(worst, _severity(answer), key=_SEVERITIES.index)
+    return worst
+
+
+_SEVERITIES: Final = (0, 1, STOPPED, MODEL_ERROR)
+"""Exit codes of single answers; the last in this order decides."""
+
+
+def _severity(answer: Answer) -> int:
+    codes = {"satisfied": 0, "not satisfied": 1, "maybe": STOPPED, "unknown": STOPPED}
+    return codes.get(answer.verdict, MODEL_ERROR)
+
+
+def _load(path: Path) -> tuple[Model, Scene | None]:
+    """The model of a file, and the scene if it is an environment."""
+    from ntagen import checker
+
+    if path.suffix.lower() != ".nsl":
+        return checker.load_file(path), None
+    from ntagen.nsl import load_with_warnings
+    from ntagen.render import render
+
+    scene, warnings = load_with_warnings(path)
+    for warning in warnings:
+        click.echo(warning.render(), err=True)
+    return checker.load(render(scene, source=path.name), path=str(path.with_suffix(".xml"))), scene
+
+
+def _queries(model: Model, asked: Sequence[str], file: Path | None) -> list[_Asked]:
+    """The queries to answer: those asked for, else those of the file, else those of the model."""
+    known = [_asked(query) for query in model.queries]
+    from_file = [_asked(query) for query in model.read_queries(file)] if file else []
+    if file and not from_file:
+        raise InputError(f"{file} holds no query")
+    if asked:
+        named = {query.name: query for query in [*known, *from_file] if query.name}
+        return [_find(text, named) for text in asked]
+    if not (from_file or known):
+        raise InputError("the model holds no query\nhint: give one with --query or --queries")
+    return from_file or known
+
+
+def _asked(query: Query) -> _Asked:
+    """A query of a file, named by the first line of its comment or by its strategy."""
+    first_line = query.comment.strip().splitlines()[0].strip() if query.comment.strip() else ""
+    strategy = re.match(r"strategy\s+(\w+)\s*=", query.text)
+    if re.fullmatch(r"[A-Za-z_]\w*", first_line):
+        return _Asked(first_line, query.text)
+    return _Asked(strategy[1] if strategy else None, query.text)
+
+
+def _find(text: str, named: dict[str, _Asked]) -> _Asked:
+    """The query that a text names or is."""
+    stripped = text.strip()
+    if stripped in named:
+        return named[stripped]
+    if re.fullmatch(r"[A-Za-z_]\w*", stripped):
+        names = ", ".join(sorted(named)) or "none"
+        raise InputError(
+            f"there is no query with the name {stripped}\nhint: the model's named queries: {names}"
+        )
+    return _Asked(None, stripped)
+
+
+def _record(answer: Answer, query: _Asked) -> dict[str, object]:
+    """The answer as the JSON object that the command line promises."""
+    return {
+        "query": query.text,
+        "name": query.name,
+        "verdict": answer.verdict,
+        "value": None,
+        "message": answer.message,
+        "stop": answer.stop,
+        "explored": answer.explored,
+        "stored": answer.stored,
+        "seconds": answer.seconds,
+        "load_seconds": answer.load_seconds,
+        "peak_bytes": answer.peak_bytes,
+        "plans": answer.plan_count,
+    }
+
+
+def _header(path: Path, model: Model) -> None:
+    click.echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
+
+
+def _row(answer: Answer, query: _Asked, notes: Sequence[str]) -> None:
+    mark, colour = _MARK[answer.verdict]
+    label = f"{query.name}: {query.text}" if query.name else query.text
+    click.echo(f"  {click.style(f'{mark:<8}', fg=colour, bold=True)}{label}")
+    facts = [f"{answer.explored} states explored", f"{answer.stored} stored"]
+    facts.append(f"{1000 * answer.seconds:.1f} ms")
+    facts.append(f"{answer.peak_bytes / 2**20:.1f} MiB")
+    if answer.stop:
+        facts.insert(0, f"stopped by the limit of {answer.stop}")
+    for line in [", ".join(facts), *([answer.message] if answer.message else []), *notes]:
+        click.echo(f"          {line}")
+
+
+@contextlib.contextmanager
+def _progress(as_json: bool) -> Iterator[Any]:
+    """What is shown while a query takes long: a line that is overwritten, on a terminal only."""
+    if as_json or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("searching …") as status:
+
+        def show(explored: int, stored: int, waiting: int, size: int) -> None:
+            status.update(
+                f"{explored:,} explored, {stored:,} stored, {waiting:,} waiting, "
+                f"{size / 2**20:.0f} MiB"
+            )
+
+        yield show
+
+
+def _write_evidence(
+    answer: Answer, query: _Asked, outputs: _Outputs, scene: Scene | None
+) -> list[str]:
+    """Writes what was asked for; returns a line for each thing that the user should hear of."""
+    notes: list[str] = []
+    if outputs.trace:
+        notes += _write_trace(answer, query, outputs.trace)
+    strategy = answer.strategy_json() if outputs.strategy else None
+    if outputs.strategy and strategy is not None:
+        write_files({outputs.strategy: strategy + "\n"})
+        notes.append(f"strategy written to {outputs.strategy}")
+    if outputs.plans and answer.plan_count is not None:
+        notes += _write_plans(answer, outputs.plans, outputs.ranking, scene)
+    return notes
+
+
+def _write_trace(answer: Answer, query: _Asked, target: str) -> list[str]:
+    text = answer.trace_text()
+    if text is None:
+        return []
+    if target == "-":
+        click.echo(text)
+        return []
+    path = Path(target)
+    as_json = answer.trace_json() if path.suffix == ".json" else None
+    write_files({path: f"{as_json}\n" if as_json else f"{query.text}\n\n{text}"})
+    return [f"trace written to {path}"]
+
+
+def _write_plans(answer: Answer, path: Path, ranking: str, scene: Scene | None) -> list[str]:
+    if scene is None:
+        write_files({path: f"{answer.plans_json()}\n"})
+        return [f"{answer.plan_count} plans written to {path}"]
+    from ntagen.plan.certify import certify
+    from ntagen.plan.document import document
+    from ntagen.plan.extract import extract
+    from ntagen.plan.rank import Candidate, parse_ranking, rank
+
+    criteria = parse_ranking(ranking)
+    found = [Candidate(plan, certify(plan, scene)) for plan in extract(answer.plans, scene)]
+    ranked = rank(found, criteria)
+    write_files({path: json.dumps(document(scene, ranked, criteria), indent=1) + "\n"})
+    notes = [f"{len(ranked)} plans written to {path}"]
+    for place, candidate in enumerate(ranked[:BEST_SHOWN], start=1):
+        clearance = candidate.certificate.critical_clearance_mm
+        shown = (
+            "no critical region" if clearance == float("inf") else f"clearance {clearance:.2f} mm"
+        )
+        notes.append(f"  {place}. {candidate.plan}  ({shown})")
+    return notes
+
+
+BEST_SHOWN: Final = 3
+"""Plans that the table shows."""
