@@ -59,7 +59,7 @@ const MOST_MISTAKES: usize = 100;
 pub struct Parsed {
     /// The tree.
     pub document: ast::Document,
-    /// What is wrong, in the order of reading.
+    /// What is wrong, by source and place in it.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -74,6 +74,7 @@ pub fn read_model(path: &str, bytes: &[u8], sources: &mut SourceMap) -> Parsed {
         Some(text) => xta::read(path, text, sources, &mut diagnostics),
         None => ast::Document::default(),
     };
+    diagnostics.sort_by_key(|diagnostic| (diagnostic.span.source, diagnostic.span.start));
     limit(&mut diagnostics);
     Parsed {
         document,

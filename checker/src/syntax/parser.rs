@@ -205,7 +205,7 @@ impl<'a> Parser<'a> {
         self.position
     }
 
-    /// Reports, unless the current token was blamed before.
+    /// Reports about the current token, unless it was blamed before.
     pub(super) fn report(&mut self, diagnostic: Diagnostic) {
         if diagnostic.is_error() {
             if self.blamed == Some(self.position) {
@@ -213,6 +213,11 @@ impl<'a> Parser<'a> {
             }
             self.blamed = Some(self.position);
         }
+        self.report_behind(diagnostic);
+    }
+
+    /// Reports about something that was read before.
+    pub(super) fn report_behind(&mut self, diagnostic: Diagnostic) {
         if self.diagnostics.len() <= super::MOST_MISTAKES {
             self.diagnostics.push(diagnostic);
         } else {

@@ -10,6 +10,7 @@ use super::expressions::join_all;
 use super::lexer::TokenKind;
 use super::parser::{Dialect, Parser};
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
+use std::collections::HashMap;
 
 /// Which part of a model a text is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +23,13 @@ pub(super) enum Part {
     System,
     /// A whole textual model.
     Whole,
+}
+
+/// `commit` or `urgent`.
+#[derive(Clone, Copy, Debug)]
+enum Mark {
+    Committed,
+    Urgent,
 }
 
 impl Parser<'_> {
@@ -55,7 +63,7 @@ impl Parser<'_> {
         document.unsupported.append(&mut self.unsupported);
         if !has_system && matches!(part, Part::System | Part::Whole) {
             let end = self.behind_previous();
-            self.report(
+            self.report_behind(
                 Diagnostic::new(codes::MISSING_SYSTEM, end, "no `system` line")
                     .help("name the processes of the system, for example `system P, Q;`"),
             );
@@ -198,17 +206,19 @@ impl Parser<'_> {
             initial: None,
             edges: Vec::new(),
         };
+        let mut marks = Vec::new();
         while !self.at_end() && !self.at(TokenKind::RightBrace) {
             let before = self.progress();
-            self.process_part(&mut template);
+            self.process_part(&mut template, &mut marks);
             if self.progress() == before {
                 self.bump();
             }
         }
         self.expect(TokenKind::RightBrace, "at the end of the process");
+        self.set_marks(marks, &mut template.locations);
         if template.initial.is_none() {
             let message = format!("process `{}` has no initial location", template.name.text);
-            self.report(
+            self.report_behind(
                 Diagnostic::new(codes::MISSING_INITIAL_LOCATION, start, message)
                     .help("add `init L;` after the states"),
             );
@@ -216,13 +226,13 @@ impl Parser<'_> {
         document.templates.push(template);
     }
 
-    fn process_part(&mut self, template: &mut Template) {
+    fn process_part(&mut self, template: &mut Template, marks: &mut Vec<(Mark, Name)>) {
         let before = self.progress();
         match self.word() {
             "state" => self.states(template),
             "branchpoint" => self.branchpoints(template),
-            "commit" => self.mark(template, |location| &mut location.committed),
-            "urgent" => self.mark(template, |location| &mut location.urgent),
+            "commit" => self.marks(Mark::Committed, marks),
+            "urgent" => self.marks(Mark::Urgent, marks),
             "init" => {
                 self.bump();
                 template.initial = Some(self.name("the name of the initial location"));
@@ -316,28 +326,41 @@ impl Parser<'_> {
     }
 
     /// `commit A, B` and `urgent A, B`
-    fn mark(&mut self, template: &mut Template, flag: fn(&mut Location) -> &mut bool) {
+    fn marks(&mut self, mark: Mark, marks: &mut Vec<(Mark, Name)>) {
         self.bump();
         loop {
-            let name = self.name("the name of a location");
-            let found = template.locations.iter_mut().find(|l| l.id == name.text);
-            match found {
-                Some(location) => {
-                    *flag(location) = true;
-                    if location.urgent && location.committed {
-                        let message =
-                            format!("location `{}` is both urgent and committed", name.text);
-                        self.error(codes::URGENT_AND_COMMITTED, name.span, message);
-                    }
-                }
-                None if name.text.is_empty() => {}
-                None => {
-                    let message = format!("`{}` is no location of this process", name.text);
-                    self.error(codes::UNKNOWN_LOCATION, name.span, message);
-                }
-            }
+            marks.push((mark, self.name("the name of a location")));
             if !self.eat(TokenKind::Comma) {
                 return;
+            }
+        }
+    }
+
+    /// Sets the marks once all locations are known.
+    fn set_marks(&mut self, marks: Vec<(Mark, Name)>, locations: &mut [Location]) {
+        let index: HashMap<String, usize> = locations
+            .iter()
+            .enumerate()
+            .map(|(index, location)| (location.id.clone(), index))
+            .collect();
+        for (mark, name) in marks {
+            if name.text.is_empty() {
+                continue;
+            }
+            let Some(&index) = index.get(&name.text) else {
+                let message = format!("`{}` is no location of this process", name.text);
+                self.report_behind(Diagnostic::new(codes::UNKNOWN_LOCATION, name.span, message));
+                continue;
+            };
+            let location = &mut locations[index];
+            match mark {
+                Mark::Committed => location.committed = true,
+                Mark::Urgent => location.urgent = true,
+            }
+            if location.urgent && location.committed {
+                let message = format!("location `{}` is both urgent and committed", name.text);
+                let code = codes::URGENT_AND_COMMITTED;
+                self.report_behind(Diagnostic::new(code, name.span, message));
             }
         }
     }

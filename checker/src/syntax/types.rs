@@ -225,7 +225,7 @@ impl Parser<'_> {
                     dimensions,
                 });
             });
-            if !self.eat(TokenKind::Semicolon) {
+            if !self.eat(TokenKind::Semicolon) || self.at_end() {
                 return;
             }
         }

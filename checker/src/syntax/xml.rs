@@ -31,6 +31,17 @@ const MOST_NODES: u32 = 5_000_000;
 /// How much text the entities that a file declares may expand to.
 const MOST_EXPANDED_BYTES: usize = 1 << 30;
 
+/// The kinds of labels that mean something; the others are notes of people and tools.
+const LABELS: [&str; 7] = [
+    "invariant",
+    "exponentialrate",
+    "select",
+    "guard",
+    "synchronisation",
+    "assignment",
+    "probability",
+];
+
 /// Reads an XML model.
 pub(super) fn read(
     path: &str,
@@ -386,7 +397,6 @@ impl Reader<'_, '_> {
         if let Some(name) = &name
             && is_reserved(&name.text, Dialect::Query)
             && !is_reserved(&name.text, Dialect::Old)
-            && !is_reserved(&name.text, Dialect::New)
         {
             let message = format!("`{}` is a word of the query language", name.text);
             self.diagnostics.push(
@@ -425,7 +435,7 @@ impl Reader<'_, '_> {
         location
     }
 
-    /// The labels of an element, by kind; of two of one kind the last one.
+    /// The labels of an element that are read, by kind; of two of one kind the last one.
     fn labels<'a, 'input>(
         &mut self,
         node: Node<'a, 'input>,
@@ -443,17 +453,17 @@ impl Reader<'_, '_> {
                 .filter(Node::is_text)
                 .filter_map(|child| child.text())
                 .all(|text| text.trim().is_empty());
-            let is_known = !matches!(kind, "comments" | "testcode");
+            if is_blank || !LABELS.contains(&kind) {
+                continue;
+            }
             let earlier = labels.iter_mut().find(|(other, _)| *other == kind);
-            match earlier {
-                Some(earlier) if !is_blank && is_known => {
-                    earlier.1 = label;
-                    let span = self.tag(label, place);
-                    let message = format!("a second `{kind}` label replaces the first one");
-                    self.error(codes::DUPLICATE_LABEL, span, message);
-                }
-                None if !is_blank => labels.push((kind, label)),
-                _ => {}
+            if let Some(earlier) = earlier {
+                earlier.1 = label;
+                let span = self.tag(label, place);
+                let message = format!("a second `{kind}` label replaces the first one");
+                self.error(codes::DUPLICATE_LABEL, span, message);
+            } else {
+                labels.push((kind, label));
             }
         }
         labels

@@ -8,6 +8,9 @@ use super::parser::{Dialect, Parser};
 use super::processes::{Part, query_texts};
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
 
+/// How many tokens of a parameter list are looked at to tell the syntax.
+const LONGEST_PARAMETER_LIST: usize = 1000;
+
 /// Reads a textual model.
 pub(super) fn read(
     path: &str,
@@ -95,6 +98,7 @@ pub(super) fn is_old_syntax(text: &str, tokens: &[Token]) -> bool {
                     && third.kind == TokenKind::LeftParenthesis
                     && tokens[index + 3..]
                         .iter()
+                        .take(LONGEST_PARAMETER_LIST)
                         .find(|t| {
                             matches!(
                                 t.kind,
