@@ -6,8 +6,8 @@
 use super::codes;
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
 
-/// Spans count in 32 bits, and transcoding can double a text.
-const MOST_BYTES: usize = 1 << 30;
+/// Far beyond any model; a file of this size takes about 7 GB. Spans count in 32 bits.
+const MOST_BYTES: usize = 1 << 28;
 
 /// The text of a model; an empty file is refused.
 pub(super) fn decode_model(
@@ -36,7 +36,7 @@ pub(super) fn decode(
         diagnostics.push(about_file(path, code, message, sources));
     };
     if bytes.len() > MOST_BYTES {
-        report(codes::FILE_TOO_LARGE, "the file is larger than 1 GiB");
+        report(codes::FILE_TOO_LARGE, "the file is larger than 256 MiB");
         return None;
     }
     match bytes {

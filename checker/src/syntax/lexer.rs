@@ -10,6 +10,9 @@
 use super::codes;
 use crate::diagnostics::{Diagnostic, SourceId, Span};
 
+/// What bounds the memory for a text that is nothing but tokens: a tree takes up to 100 bytes for each.
+const MOST_TOKENS: usize = 20_000_000;
+
 /// A token and its bytes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Token {
@@ -102,6 +105,12 @@ impl Lexer<'_> {
     fn run(&mut self) {
         while let Some(&byte) = self.text.as_bytes().get(self.position) {
             let start = self.position;
+            if self.tokens.len() >= MOST_TOKENS {
+                let span = self.span_from(start);
+                let message = format!("this text has more than {MOST_TOKENS} tokens");
+                self.report(Diagnostic::new(codes::FILE_TOO_LARGE, span, message));
+                break;
+            }
             match byte {
                 b' ' | b'\t' | b'\r' | b'\n' | 0x0b | 0x0c => self.position += 1,
                 b'/' if self.follows("//") => self.line_comment(),

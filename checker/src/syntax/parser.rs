@@ -45,6 +45,8 @@ pub(super) struct Parser<'a> {
     position: usize,
     nesting: u32,
     blamed: Option<usize>,
+    /// Whether the rest of the text was left unread.
+    gave_up: bool,
 }
 
 /// A place to come back to when a reading turns out to be the wrong one.
@@ -53,6 +55,7 @@ pub(super) struct Checkpoint {
     diagnostics: usize,
     unsupported: usize,
     blamed: Option<usize>,
+    gave_up: bool,
 }
 
 impl<'a> Parser<'a> {
@@ -76,6 +79,7 @@ impl<'a> Parser<'a> {
             position: 0,
             nesting: 0,
             blamed: None,
+            gave_up: false,
         }
     }
 
@@ -184,6 +188,7 @@ impl<'a> Parser<'a> {
             diagnostics: self.diagnostics.len(),
             unsupported: self.unsupported.len(),
             blamed: self.blamed,
+            gave_up: self.gave_up,
         }
     }
 
@@ -193,6 +198,7 @@ impl<'a> Parser<'a> {
         self.diagnostics.truncate(checkpoint.diagnostics);
         self.unsupported.truncate(checkpoint.unsupported);
         self.blamed = checkpoint.blamed;
+        self.gave_up = checkpoint.gave_up;
     }
 
     /// Whether nothing was reported since `checkpoint`.
@@ -218,6 +224,9 @@ impl<'a> Parser<'a> {
 
     /// Reports about something that was read before.
     pub(super) fn report_behind(&mut self, diagnostic: Diagnostic) {
+        if self.gave_up {
+            return;
+        }
         if self.diagnostics.len() <= super::MOST_MISTAKES {
             self.diagnostics.push(diagnostic);
         } else {
@@ -233,6 +242,7 @@ impl<'a> Parser<'a> {
     fn give_up(&mut self) {
         self.position = self.tokens.len() - 1;
         self.blamed = Some(self.position);
+        self.gave_up = true;
     }
 
     /// Reports nothing about the current token: the text was skipped up to here because of an earlier mistake.

@@ -162,12 +162,39 @@ impl Parser<'_> {
         self.closing(TokenKind::RightBrace, "after the progress measures");
     }
 
-    /// `gantt { … }`: only drawn by the editor, so it is skipped.
+    /// `gantt { … }`: only drawn by the editor, so the tree does not keep it.
     fn gantt(&mut self) {
         self.bump();
         self.expect(TokenKind::LeftBrace, "after `gantt`");
-        self.skip_to(&[TokenKind::RightBrace]);
-        self.expect(TokenKind::RightBrace, "after the chart");
+        while !self.at_end() && !self.at(TokenKind::RightBrace) {
+            let before = self.progress();
+            self.gantt_line();
+            self.end_of_declaration("after the line of the chart", before);
+        }
+        self.closing(TokenKind::RightBrace, "after the chart");
+    }
+
+    /// `G(i : T) : condition -> value, for (j : U) condition -> value`
+    fn gantt_line(&mut self) {
+        self.name("the name of a line of the chart");
+        if self.eat(TokenKind::LeftParenthesis) {
+            self.select_list();
+            self.closing(TokenKind::RightParenthesis, "after the bound names");
+        }
+        self.expect(TokenKind::Colon, "before the bars of the line");
+        loop {
+            if self.eat_word("for") {
+                self.expect(TokenKind::LeftParenthesis, "after `for`");
+                self.select_list();
+                self.closing(TokenKind::RightParenthesis, "after the bound names");
+            }
+            self.expression();
+            self.expect(TokenKind::Arrow, "between condition and value of a bar");
+            self.expression();
+            if !self.eat(TokenKind::Comma) {
+                return;
+            }
+        }
     }
 
     /// `query { … }`: the span of the formula.

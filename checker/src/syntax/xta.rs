@@ -9,7 +9,7 @@ use super::processes::{Part, query_texts};
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
 
 /// How many tokens of a parameter list are looked at to tell the syntax.
-const LONGEST_PARAMETER_LIST: usize = 1000;
+const LONGEST_PARAMETER_LIST: usize = 100;
 
 /// Reads a textual model.
 pub(super) fn read(
