@@ -399,7 +399,7 @@ class _Builder:
         distance = math.dist(inner.center_mm, outer.center_mm)
         if distance >= inner.radius_mm + outer.radius_mm:
             return
-        notes = (f"the {outer.kind} region is at {_where(_place_of(other))}",)
+        notes = (f"the {outer.kind} region is at {_place_of(other).place}",)
         if distance + inner.radius_mm <= outer.radius_mm:
             self._report(
                 "target-in-critical",
@@ -515,12 +515,6 @@ def _place_of(sphere: _Sphere) -> Span:
     """Where a region's place in space is written."""
     center = sphere.draft.center
     return sphere.draft.name_span if center is None else center.span
-
-
-def _where(span: Span) -> str:
-    """A place as it is named in a note."""
-    line, column = span.source.position(span.start)
-    return f"{span.source.path}:{line}:{column}"
 
 
 def _dot(a: Vector, b: Vector) -> float:

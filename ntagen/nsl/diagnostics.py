@@ -42,7 +42,8 @@ KINDS: Final = _kinds(
     ("N003", "file-not-text", "error", "The file holds bytes that no text has."),
     ("N004", "file-not-utf-8", "error", "The file is text, but not encoded in UTF-8."),
     ("N005", "file-empty", "error", "The file holds nothing, or comments only."),
-    ("N006", "file-too-large", "error", "Files of more than 4 MiB are refused."),
+    ("N006", "file-too-large", "error", "Files of more than 1 MiB are refused."),
+    ("N007", "too-many-mistakes", "error", "After 1,000 mistakes no more are shown."),
     # Form.
     ("N010", "stray-character", "error", "No word of the language has this character."),
     ("N011", "unclosed-comment", "error", "A comment that begins with /* needs a */."),
@@ -82,7 +83,7 @@ KINDS: Final = _kinds(
     ("N038", "unit-repeated", "error", "The value has a unit already."),
     ("N039", "not-whole", "error", "A whole number must stand here."),
     # Loops, includes, queries.
-    ("N040", "loop-too-long", "error", "A file may make 10,000 rounds of loops in all."),
+    ("N040", "loop-too-long", "error", "All loops together make 10,000 rounds at most."),
     ("N041", "loop-empty", "warning", "The loop makes no round: it counts upwards only."),
     ("N042", "include-cycle", "error", "A file includes itself, perhaps by way of others."),
     ("N043", "query-malformed", "error", "A query has a name, an equals sign and a text."),
@@ -93,6 +94,7 @@ KINDS: Final = _kinds(
     ("N053", "target-missing", "error", "An environment has at least one target."),
     ("N054", "setting-missing", "error", "The needle's radius and speed have no default."),
     ("N055", "statement-repeated", "error", "The statement may be written once."),
+    ("N056", "too-many-regions", "error", "10,000 regions at most, 100 of them targets."),
     # Rules on the values.
     ("N060", "radius-not-positive", "error", "A radius is greater than 0."),
     ("N061", "speed-not-positive", "error", "The insertion speed is greater than 0."),
@@ -123,6 +125,10 @@ KINDS: Final = _kinds(
     ("N081", "tip-in-target", "warning", "The target is reached before the first move."),
 )
 """All kinds of defects by name, in the order of their codes."""
+
+
+MAX_DIAGNOSTICS: Final = 1000
+"""More are not collected: by then the file is no environment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,9 +165,9 @@ class Diagnostic:
         lines = [f"{place}: {self.severity}[{self.code}]: {self.message}"]
         gutter = " " * len(str(self.line))
         if self.line:
-            # A tab stays one column wide, so that the caret stands below the right character.
-            text = "".join(c if c.isprintable() else " " for c in self.source_line)
-            text, column = _clip(text, self.column)
+            # A tab becomes one space, so that the caret stands below the right character.
+            text, column = _clip(self.source_line, self.column)
+            text = "".join(c if c.isprintable() else " " for c in text)
             length = max(1, min(self.length, len(text) - column + 1))
             lines.append(f" {self.line} | {text}".rstrip())
             lines.append(f" {gutter} | {' ' * (column - 1)}{'^' * length}")
@@ -226,6 +232,14 @@ class Reporter:
     def _add(self, diagnostic: Diagnostic) -> None:
         """Adds a diagnostic, unless its kind was reported for the place already."""
         order = self._file_order.setdefault(diagnostic.path, len(self._file_order))
+        if len(self._found) == MAX_DIAGNOSTICS:
+            kind = KINDS["too-many-mistakes"]
+            message = (
+                f"there are more than {MAX_DIAGNOSTICS:,} mistakes, of which these are the first"
+            )
+            diagnostic = Diagnostic(kind.code, kind.severity, diagnostic.path, 0, 0, 1, message, "")
+        elif len(self._found) > MAX_DIAGNOSTICS:
+            return
         key = (diagnostic.code, diagnostic.path, diagnostic.line, diagnostic.column)
         self._found.setdefault(key, (order, diagnostic))
 

@@ -18,6 +18,7 @@ whoever walks it may recurse.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, cast
@@ -72,6 +73,7 @@ class _Parser:
         self._source = source
         self._reporter = reporter
         self._stray = [t for t in tokens if t.type in STRAY]
+        self._stray_starts = [t.span.start for t in self._stray]
         self._report_stray()
         self._tokens = [t for t in tokens if t.type not in STRAY]
         self._is_cut_short = any(t.type == "UNCLOSED_COMMENT" for t in tokens)
@@ -355,11 +357,18 @@ class _Parser:
     def _has_gap(self, words: Sequence[Token]) -> bool:
         """Whether something that is no token was left out of a statement, or off its last word."""
         start, end = words[0].span.start, words[-1].span.end
-        return any(
-            start < stray.span.start < end
-            or (stray.span.start == end and stray.text not in _SEPARATORS)
-            for stray in self._stray
+        if self._is_stray_between(start, end):
+            return True
+        index = bisect_left(self._stray_starts, end)
+        return (
+            index < len(self._stray)
+            and self._stray_starts[index] == end
+            and self._stray[index].text not in _SEPARATORS
         )
+
+    def _is_stray_between(self, start: int, end: int) -> bool:
+        """Whether something that is no token stands between two places."""
+        return bisect_left(self._stray_starts, start) < bisect_left(self._stray_starts, end)
 
     # ---------------------------------------------------------------------------------- reporting
 
@@ -384,7 +393,7 @@ class _Parser:
                 self._reporter.report(
                     "stray-character",
                     token.span,
-                    f"unexpected character {visible(token.text[0])}",
+                    f"unexpected {visible(token.text)}",
                     hint=STRAY_HINTS.get(token.text[0]),
                 )
 
@@ -410,7 +419,7 @@ class _Parser:
         following = self._peek() if found is None else found
         start = words[0].span.start
         end = following.span.start if following else len(self._source.text)
-        if any(start < stray.span.start < end for stray in self._stray):
+        if self._is_stray_between(start, end):
             return  # What is left out because it is no token explains the gap.
         expected = describe(set(accepts))
         what = "the end" if following is None else quoted(following)

@@ -30,11 +30,20 @@ from ntagen.nsl.quantity import (
 )
 from ntagen.nsl.reading import read_source
 from ntagen.nsl.source import Source, Span
-from ntagen.nsl.tokens import ALLOWED, BlockKind
+from ntagen.nsl.tokens import ALLOWED, BLOCKS, BlockKind
 from ntagen.scene import RegionKind, Vector
 
 MAX_ROUNDS: Final = 10_000
 """Rounds that all loops of an environment may make together."""
+
+MAX_LOOP_STATEMENTS: Final = 100_000
+"""Statements that all these rounds may go through together."""
+
+MAX_REGIONS: Final = 10_000
+"""Regions of an environment."""
+
+MAX_TARGETS: Final = 100
+"""Targets of an environment."""
 
 T = TypeVar("T")
 
@@ -79,6 +88,7 @@ class Draft:
     choices: dict[str, str] = field(default_factory=dict)
     resolution: Placed[float] | None = None
     regions: dict[str, DraftRegion] = field(default_factory=dict)
+    target_count: int = 0
     broken_names: set[str] = field(default_factory=set)
     queries: dict[str, Placed[str]] = field(default_factory=dict)
     has_gaps: bool = False
@@ -115,8 +125,8 @@ class _Resolver:
         self._open_files: list[str] = []
         self._included: set[str] = set()
         self._rounds = 0
+        self._loop_statements = 0
         self._loop_depth = 0
-        self._has_broken_environment = False
 
     def file(self, source: Source) -> Draft | None:
         """The draft of the whole file."""
@@ -131,7 +141,7 @@ class _Resolver:
             )
             return None
         self._statements(file.statements, Scope(), "file")
-        if self._draft is None and not self._has_broken_environment:
+        if self._draft is None:
             self._reporter.report_file(
                 "environment-missing",
                 source.path,
@@ -163,19 +173,22 @@ class _Resolver:
         )
 
     def _broken(self, statement: tree.Broken, scope: Scope) -> None:
-        """Remembers what a statement with a mistake would have given, so that nobody misses it."""
+        """Remembers what a statement with a mistake would have given, and looks into its braces."""
+        name, keyword = statement.name, statement.keyword
         if self._draft is not None:
             self._draft.has_gaps = True
-            self._draft.seen.setdefault(statement.keyword, statement.span)
-        if statement.name is None:
-            if statement.keyword == "environment":
-                self._has_broken_environment = True
-        elif statement.keyword == "let":
-            scope.define(statement.name, statement.span, None)
-        elif statement.keyword == "environment":
-            self._has_broken_environment = True
-        elif self._draft is not None:
-            self._draft.broken_names.add(statement.name)
+            self._draft.seen.setdefault(keyword, statement.span)
+        if keyword == "let" and name is not None:
+            scope.define(name, statement.span, None)
+        elif keyword == "environment" and self._draft is None:
+            self._draft = Draft(statement.span, name or "?", has_gaps=True)
+            self._statements(statement.body, Scope(scope), "environment")
+        elif keyword in ("needle", "motion"):
+            self._statements(statement.body, scope, BLOCKS[keyword])
+        elif keyword == "for" and name is not None:
+            self._round(statement.body, scope, tree.Identifier(statement.span, name), None)
+        elif name is not None and self._draft is not None:
+            self._draft.broken_names.add(name)
 
     def _statement(self, statement: tree.Statement, scope: Scope, place: BlockKind) -> None:
         """One statement that may stand where it stands."""
@@ -223,7 +236,7 @@ class _Resolver:
             statement.span,
             f"`{statement.keyword}` is written a second time",
             hint="remove one of the two",
-            notes=(f"the first is at {_place(first)}",),
+            notes=(f"the first is at {first.place}",),
         )
         return True
 
@@ -237,7 +250,7 @@ class _Resolver:
                 statement.span,
                 f"`{statement.name.text}` is the second environment of this file",
                 hint="write one file for each; share what they have in common with `include`",
-                notes=(f"the first is at {_place(self._draft.span)}",),
+                notes=(f"the first is at {self._draft.span.place}",),
             )
             return
         self._draft = Draft(statement.name.span, statement.name.text)
@@ -291,33 +304,42 @@ class _Resolver:
                 hint=f"write {last}..{first}",
             )
             return
+        is_known = first is not None and last is not None and is_free
         if first is None or last is None or not is_free:
             # One round without a value shows the other mistakes of the body.
             first, last = 0, 0
-            value: Quantity | None = None
-        else:
-            value = scalar(float(first))
         rounds = last - first + 1
-        if self._rounds + rounds > MAX_ROUNDS:
+        statements = rounds * len(statement.body)
+        is_long = self._rounds + rounds > MAX_ROUNDS
+        if is_long or self._loop_statements + statements > MAX_LOOP_STATEMENTS:
+            limit = f"{MAX_ROUNDS:,} rounds" if is_long else f"{MAX_LOOP_STATEMENTS:,} statements"
             self._reporter.report(
                 "loop-too-long",
                 statement.first.span.to(statement.last.span),
-                f"with this loop there are more than {MAX_ROUNDS:,} rounds",
+                f"with this loop there are more than {limit} in loops",
                 hint="lay out fewer regions, or larger ones",
             )
             if self._draft is not None:
                 self._draft.has_gaps = True
-            rounds = 1
+            rounds, statements = 1, 0
         self._rounds += rounds
-        self._loop_depth += 1
+        self._loop_statements += statements
         for number in range(first, first + rounds):
-            inner = Scope(scope)
-            inner.define(
-                statement.variable.text,
-                statement.variable.span,
-                value and scalar(float(number)),
-            )
-            self._statements(statement.body, inner, "for")
+            value = scalar(float(number)) if is_known else None
+            self._round(statement.body, scope, statement.variable, value)
+
+    def _round(
+        self,
+        body: Sequence[tree.Statement],
+        scope: Scope,
+        variable: tree.Identifier,
+        value: Quantity | None,
+    ) -> None:
+        """The body of a loop with a value of its variable."""
+        inner = Scope(scope)
+        inner.define(variable.text, variable.span, value)
+        self._loop_depth += 1
+        self._statements(body, inner, "for")
         self._loop_depth -= 1
 
     # ------------------------------------------------------------------------------------- names
@@ -349,7 +371,7 @@ class _Resolver:
                 name.span,
                 f"`{text}` is defined already",
                 hint="choose another name",
-                notes=(f"the first definition is at {_place(home.spans[text])}",),
+                notes=(f"the first definition is at {home.spans[text].place}",),
             )
             return False
         return True
@@ -369,7 +391,7 @@ class _Resolver:
     def _region(self, statement: tree.Region, scope: Scope, draft: Draft) -> None:
         """A region, whether or not all of it is right."""
         name = self._region_name(statement.name, scope)
-        region = self._shape(statement, name or "", scope)
+        region = self._shape(statement, name or statement.name.identifier.text, scope)
         draft.seen.setdefault(statement.keyword, statement.span)
         if name is None or region is None:
             draft.has_gaps = True
@@ -383,6 +405,8 @@ class _Resolver:
                 hint=f"write for example `{name}[i]`, with the variable of your loop",
             )
             return
+        if self._is_full(statement, draft):
+            return
         first = draft.regions.setdefault(name, region)
         if first is not region:
             self._reporter.report(
@@ -391,8 +415,23 @@ class _Resolver:
                 f"there is a region `{name}` already",
                 hint="choose another name"
                 + (" or another index" if statement.name.indices else ""),
-                notes=(f"the first is at {_place(first.name_span)}",),
+                notes=(f"the first is at {first.name_span.place}",),
             )
+
+    def _is_full(self, statement: tree.Region, draft: Draft) -> bool:
+        """Whether there are as many regions as an environment may hold; reports it if so."""
+        is_last_target = statement.keyword == "target" and draft.target_count == MAX_TARGETS
+        if len(draft.regions) < MAX_REGIONS and not is_last_target:
+            draft.target_count += statement.keyword == "target"
+            return False
+        limit = f"{MAX_TARGETS} targets" if is_last_target else f"{MAX_REGIONS:,} regions"
+        self._reporter.report(
+            "too-many-regions",
+            statement.name.span,
+            f"an environment may hold {limit} at most",
+            hint="lay out fewer, larger ones",
+        )
+        return True
 
     def _shape(self, statement: tree.Region, name: str, scope: Scope) -> DraftRegion | None:
         """A region with its sphere, or with what it lies around."""
@@ -437,7 +476,7 @@ class _Resolver:
                 name.span,
                 f"there is a query `{name.text}` already",
                 hint="choose another name",
-                notes=(f"the first is at {_place(first.span)}",),
+                notes=(f"the first is at {first.span.place}",),
             )
 
     def _setting(self, statement: tree.Setting, scope: Scope, draft: Draft) -> None:
@@ -503,9 +542,3 @@ class _Resolver:
         elif unit is not None and count is not None:
             value = count / unit[0]
         draft.resolution = Placed(value, statement.count.span.to(statement.unit.span))
-
-
-def _place(span: Span) -> str:
-    """A place as it is named in a note."""
-    line, column = span.source.position(span.start)
-    return f"{span.source.path}:{line}:{column}"

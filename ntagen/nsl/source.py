@@ -10,8 +10,9 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Final
 
-MAX_SOURCE_BYTES = 4 * 1024 * 1024
+MAX_SOURCE_BYTES: Final = 1024 * 1024
 """Larger files are refused: 10,000 regions written one a line take about 0.6 MB."""
 
 
@@ -34,8 +35,19 @@ class Source:
         line = bisect_right(self._line_starts, offset)
         return line, offset - self._line_starts[line - 1] + 1
 
+    @cached_property
+    def _shown_lines(self) -> dict[int, str]:
+        """Lines that were asked for, so that many diagnostics on a long one share its text."""
+        return {}
+
     def line(self, number: int) -> str:
         """The text of a line, without its end."""
+        if number not in self._shown_lines:
+            self._shown_lines[number] = self._line(number)
+        return self._shown_lines[number]
+
+    def _line(self, number: int) -> str:
+        """The text of a line, cut out of all the text."""
         start = self._line_starts[number - 1]
         end = self.text.find("\n", start)
         return self.text[start : len(self.text) if end < 0 else end].rstrip("\r")
@@ -57,6 +69,12 @@ class Span:
     def text(self) -> str:
         """The characters themselves."""
         return self.source.text[self.start : self.end]
+
+    @property
+    def place(self) -> str:
+        """Where it begins, as it is named in a note: ``path:line:column``."""
+        line, column = self.source.position(self.start)
+        return f"{self.source.path}:{line}:{column}"
 
     def to(self, other: Span) -> Span:
         """From the beginning of this one to the end of the other."""

@@ -65,6 +65,9 @@ NAMING: Final = REGIONS | {"environment", "let", "for"}
 STRAY: Final = frozenset({"STRAY", "HASH", "UNCLOSED_STRING", "UNCLOSED_COMMENT"})
 """Terminals of what is no word of the language."""
 
+MAX_STRAY: Final = 1000
+"""A text with more of them is none of the language."""
+
 
 @dataclass(frozen=True, slots=True)
 class Token:
@@ -115,8 +118,12 @@ def _cache_file() -> str | None:
 
 
 def tokenise(source: Source) -> list[Token | Comment]:
-    """Every token and comment of a source; together with white space they are all of its text."""
+    """Every token and comment of a source; together with white space they are all of its text.
+
+    After `MAX_STRAY` tokens that are no words of the language the rest of the text is left out.
+    """
     found: list[Token | Comment] = []
+    stray_count = 0
     for token in grammar().lex(source.text, dont_ignore=True):
         start = cast(int, token.start_pos)
         span = source.span(start, start + len(token))
@@ -124,6 +131,9 @@ def tokenise(source: Source) -> list[Token | Comment]:
             found.append(Comment(str(token).rstrip(), span, cast(int, token.line)))
         elif token.type != "SPACE":
             found.append(Token(token.type, str(token), span, cast(int, token.line)))
+            stray_count += token.type in STRAY
+            if stray_count > MAX_STRAY:
+                break
     return found
 
 

@@ -100,6 +100,10 @@ def quoted(token: Token) -> str:
     return f"`{text}`"
 
 
-def visible(character: str) -> str:
-    """A character as it is named in a message, also one that cannot be seen."""
-    return f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
+def visible(text: str) -> str:
+    """Characters as they are named in a message, also one that cannot be seen."""
+    if text.startswith("#"):
+        return "character `#`"
+    if len(text) > 1:
+        return f"characters `{text[:20]}`"
+    return f"character `{text}`" if text.isprintable() else f"character U+{ord(text):04X}"

@@ -80,7 +80,7 @@ def test_file_in_another_encoding_is_refused(tmp_path: Path) -> None:
 def test_huge_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "env.nsl"
     path.write_bytes(b" " * (MAX_SOURCE_BYTES + 1))
-    check_refused(path, "N006", "4 MiB")
+    check_refused(path, "N006", "1 MiB")
 
 
 def test_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
@@ -130,3 +130,11 @@ def test_broken_tables_of_the_grammar_are_made_anew(
         tokens.grammar.cache_clear()
         nsl.loads(SMALLEST)
         assert tables.stat().st_size > 0.9 * len(good)
+
+
+def test_countless_mistakes_are_cut_short() -> None:
+    with pytest.raises(nsl.SourceError) as caught:
+        nsl.loads("environment e {\n" + "tissue rubber;\n" * 2000)
+    codes = [diagnostic.code for diagnostic in caught.value.diagnostics]
+    assert len(codes) == 1001
+    assert codes[0] == "N007"
