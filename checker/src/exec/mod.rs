@@ -9,6 +9,7 @@ pub(crate) mod math;
 mod rounds;
 
 mod interpreter;
+mod optimise;
 
 #[cfg(feature = "jit")]
 mod jit;
@@ -16,6 +17,7 @@ mod jit;
 pub use interpreter::Interpreter;
 #[cfg(feature = "jit")]
 pub use jit::{Jit, JitError};
+pub use optimise::optimise;
 pub use rounds::ROUND_LIMIT;
 
 use crate::ir::{ClockId, FunctionId, RunTimeErrorKind, SiteId};

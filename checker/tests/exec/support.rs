@@ -1,7 +1,7 @@
 //! Engines side by side, and a short way to write code.
 
 use checker::exec::{
-    Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError,
+    Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError, optimise,
 };
 use checker::ir::{
     Address, Base, Block, Function, FunctionId, Instruction, Register, RegisterType, Terminator,
@@ -26,8 +26,10 @@ pub(crate) fn engines(
     constants: &[i32],
 ) -> Vec<(&'static str, Box<dyn Executor>)> {
     let interpreter = Interpreter::new(functions, constants);
+    let optimised = Interpreter::new(&optimise(functions, constants), constants);
     vec![
         ("interpreter", Box::new(interpreter)),
+        ("optimised code", Box::new(optimised)),
         #[cfg(feature = "jit")]
         ("compiled code", Box::new(compiled(functions, constants))),
     ]

@@ -1,6 +1,6 @@
 //! Owns the compiled code and makes more of it on demand.
 //!
-//! Functions are compiled together with everything they call that is not compiled yet. Calls go to absolute addresses, since
+//! Functions are optimised, and compiled together with everything they call that is not compiled yet. Calls go to absolute addresses, since
 //! code that is compiled late may lie anywhere. The memory of the code is freed with the compiler.
 //!
 //! Cost: some 10 to 50 µs, and then about 1 µs an instruction.
@@ -14,17 +14,12 @@ use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Module, default_libcall_names};
 
-use crate::ir::{Function, FunctionId, Instruction, RegisterType};
+use crate::exec::optimise::Optimiser;
+use crate::ir::{Function, FunctionId, RegisterType};
 
 use super::JitError;
+use super::needs::{AllNeeds, callees};
 use super::translate::{entry_signature, native_signature, translate, translate_entry};
-
-/// Larger functions are interpreted: compiling them would take longer than most runs.
-const MAX_INSTRUCTIONS: usize = 20_000;
-/// Chains of functions that may need more native stack than this are interpreted. Half of a small thread's stack.
-const MAX_STACK_BYTES: usize = 1 << 20;
-/// Chains of functions that need larger frames than this are interpreted.
-const MAX_FRAME_WORDS: usize = 1 << 26;
 
 /// A compiled function as it is called from outside.
 #[derive(Clone, Copy, Debug)]
@@ -35,15 +30,6 @@ pub(super) struct NativeEntry {
     pub(super) frame_words: usize,
 }
 
-/// What a function needs with all that it calls.
-#[derive(Clone, Copy, Debug, Default)]
-struct Needs {
-    frame_words: usize,
-    stack_bytes: usize,
-    /// The largest number of instructions of one function.
-    instructions: usize,
-}
-
 /// The compiler.
 pub(super) struct Compiler {
     /// Taken out only to free its memory.
@@ -51,10 +37,13 @@ pub(super) struct Compiler {
     convention: CallConv,
     context: Context,
     builder_context: FunctionBuilderContext,
+    /// The functions as they were given.
     functions: Vec<Function>,
-    /// What each function needs; filled on demand.
-    needs: Vec<Option<Needs>>,
-    /// The declaration of each function; filled on demand. Whatever is declared is compiled.
+    needs: AllNeeds,
+    optimiser: Optimiser,
+    /// What the optimised functions need.
+    optimised_needs: AllNeeds,
+    /// The declarations of the optimised functions; whatever is declared is compiled.
     declared: Vec<Option<FuncId>>,
 }
 
@@ -90,16 +79,18 @@ impl Compiler {
             convention,
             builder_context: FunctionBuilderContext::new(),
             functions: Vec::new(),
-            needs: Vec::new(),
+            needs: AllNeeds::default(),
+            optimiser: Optimiser::default(),
+            optimised_needs: AllNeeds::default(),
             declared: Vec::new(),
         })
     }
 
-    /// Takes over functions that follow those already known.
-    pub(super) fn append(&mut self, functions: Vec<Function>) {
-        self.functions.extend(functions);
-        self.needs.resize(self.functions.len(), None);
-        self.declared.resize(self.functions.len(), None);
+    /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
+    pub(super) fn extend(&mut self, functions: &[Function], constants: &[i32]) {
+        let known = self.functions.len();
+        self.functions.extend_from_slice(&functions[known..]);
+        self.optimiser.extend(functions, constants);
     }
 
     /// Compiles a function that can be called from outside and all that it calls; `None` if it is none or too large.
@@ -107,21 +98,25 @@ impl Compiler {
         &mut self,
         function: FunctionId,
     ) -> Result<Option<NativeEntry>, JitError> {
-        let needs = self.needs_of(function);
-        if !is_callable(&self.functions[function.0 as usize])
-            || needs.instructions > MAX_INSTRUCTIONS
-            || needs.stack_bytes > MAX_STACK_BYTES
-            || needs.frame_words > MAX_FRAME_WORDS
+        let original = function.0 as usize;
+        if !is_callable(&self.functions[original])
+            || !self.needs.of(&self.functions, original).are_modest()
         {
             return Ok(None);
         }
-        for index in self.uncompiled_below(function) {
+        let parameters = self.functions[original].parameters;
+        let index = self.optimiser.optimised(function) as usize;
+        let needs = self.optimised_needs.of(self.optimiser.made(), index);
+        if !needs.are_modest() {
+            return Ok(None);
+        }
+        self.declared.resize(self.optimiser.made().len(), None);
+        for index in self.uncompiled_below(index) {
             self.define(index)?;
         }
-        let index = function.0 as usize;
         let mut entry = self.declare(index)?;
-        if self.functions[index].parameters > 0 {
-            entry = self.define_entry(entry, self.functions[index].parameters)?;
+        if parameters > 0 {
+            entry = self.define_entry(entry, parameters)?;
         }
         self.module.finalize_definitions().map_err(JitError::new)?;
         Ok(Some(NativeEntry {
@@ -130,35 +125,16 @@ impl Compiler {
         }))
     }
 
-    /// The needs of a function, by the needs of what it calls; functions do not call themselves.
-    fn needs_of(&mut self, FunctionId(root): FunctionId) -> Needs {
-        let mut pending = vec![root as usize];
-        while let Some(&index) = pending.last() {
-            let before = pending.len();
-            let mut most = Needs::default();
-            for callee in callees(&self.functions[index]) {
-                match self.needs[callee] {
-                    None => pending.push(callee),
-                    Some(needs) => most = most.or(needs),
-                }
-            }
-            if pending.len() == before {
-                self.needs[index] = Some(most.below(&self.functions[index]));
-                pending.pop();
-            }
-        }
-        self.needs[root as usize].expect("the root was among the pending")
-    }
-
     /// The function and all that it calls, as far as they are not compiled.
-    fn uncompiled_below(&self, FunctionId(root): FunctionId) -> Vec<usize> {
-        let mut found = vec![false; self.functions.len()];
-        let mut pending = vec![root as usize];
+    fn uncompiled_below(&self, root: usize) -> Vec<usize> {
+        let functions = self.optimiser.made();
+        let mut found = vec![false; functions.len()];
+        let mut pending = vec![root];
         let mut order = Vec::new();
         while let Some(index) = pending.pop() {
             if self.declared[index].is_none() && !std::mem::replace(&mut found[index], true) {
                 order.push(index);
-                pending.extend(callees(&self.functions[index]));
+                pending.extend(callees(&functions[index]));
             }
         }
         order
@@ -168,7 +144,7 @@ impl Compiler {
         declare(
             &mut self.module,
             &mut self.declared,
-            &self.functions,
+            self.optimiser.made(),
             self.convention,
             index,
         )
@@ -176,7 +152,7 @@ impl Compiler {
 
     fn define(&mut self, index: usize) -> Result<(), JitError> {
         let id = self.declare(index)?;
-        let function = &self.functions[index];
+        let function = &self.optimiser.made()[index];
         self.context.func.signature = native_signature(function, self.convention);
         self.context.func.name = ir::UserFuncName::user(0, id.as_u32());
         let builder = FunctionBuilder::new(&mut self.context.func, &mut self.builder_context);
@@ -186,7 +162,7 @@ impl Compiler {
             let declared = declare(
                 &mut self.module,
                 &mut self.declared,
-                &self.functions,
+                self.optimiser.made(),
                 self.convention,
                 callee as usize,
             );
@@ -237,51 +213,11 @@ impl Drop for Compiler {
     }
 }
 
-impl Needs {
-    /// The greater needs of two functions of which one runs at a time.
-    fn or(self, other: Needs) -> Needs {
-        Needs {
-            frame_words: self.frame_words.max(other.frame_words),
-            stack_bytes: self.stack_bytes.max(other.stack_bytes),
-            instructions: self.instructions.max(other.instructions),
-        }
-    }
-
-    /// The needs of a function, given the greatest of what it calls.
-    fn below(self, function: &Function) -> Needs {
-        let instructions = function
-            .blocks
-            .iter()
-            .map(|block| block.instructions.len() + 1)
-            .sum::<usize>();
-        // Every register and every instruction may need a place of its own on the native stack.
-        let stack_bytes = 512 + 16 * (instructions + function.registers.len());
-        Needs {
-            frame_words: self
-                .frame_words
-                .saturating_add(function.frame_words as usize),
-            stack_bytes: self.stack_bytes.saturating_add(stack_bytes),
-            instructions: self.instructions.max(instructions),
-        }
-    }
-}
-
 /// Whether a function takes only integers and returns an integer or nothing.
 fn is_callable(function: &Function) -> bool {
     let parameters = &function.registers[..function.parameters as usize];
     let is_integer = |&kind: &RegisterType| kind == RegisterType::Integer;
     parameters.iter().all(is_integer) && function.result.iter().all(is_integer)
-}
-
-fn callees(function: &Function) -> impl Iterator<Item = usize> {
-    function
-        .blocks
-        .iter()
-        .flat_map(|block| &block.instructions)
-        .filter_map(|instruction| match instruction {
-            Instruction::Call { function, .. } => Some(function.0 as usize),
-            _ => None,
-        })
 }
 
 fn declare(

@@ -1,6 +1,6 @@
 //! Native code by Cranelift: the fast engine.
 //!
-//! A function is interpreted until it has run for a while, and then compiled with all that it calls. A model with thousands
+//! A function is interpreted until it has run for a while, and then optimised and compiled with all that it calls. A model with thousands
 //! of small guards pays for the few that matter, and a model that is solved at once for none. As interpreted and compiled
 //! code agree in everything, it makes no difference to results when this happens.
 //!
@@ -11,6 +11,7 @@
 //!   say, indices were checked ([`crate::ir::Instruction::ScaleIndex`]), and functions do not call themselves.
 
 mod compiler;
+mod needs;
 mod runtime;
 mod translate;
 
@@ -22,7 +23,6 @@ use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
 use crate::ir::{Function, FunctionId};
 
-use super::rounds::count_rounds;
 use super::{Context, Executor, Interpreter, RunTimeError};
 
 use compiler::Compiler;
@@ -95,14 +95,11 @@ impl Jit {
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
     /// What is compiled stays so.
     pub fn extend(&mut self, functions: &[Function], constants: &[i32]) {
-        let known = self.entries.len();
-        let mut added = functions[known..].to_vec();
-        added.iter_mut().for_each(count_rounds);
         self.entries.resize_with(functions.len(), Entry::default);
         self.compiler
             .get_mut()
             .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .append(added);
+            .extend(functions, constants);
         self.interpreter.extend(functions, constants);
         self.constants = constants.to_vec();
     }

@@ -1,0 +1,885 @@
+//! Value numbering along the dominator tree: constants are folded, copies followed, and what was computed, read or checked
+//! before is not computed, read or checked again.
+//!
+//! Conventions
+//! * A register that the function writes once is its own value. Every write of another register goes to a new register
+//!   instead; the old one is only kept as the place that carries the value over edges to blocks with several
+//!   predecessors: it is written at the end of such an edge and copied to a new register where it is read behind it. So
+//!   all values are immutable, and what is known of them holds wherever their definition dominates.
+//! * What is known of memory is forgotten in blocks with several predecessors, at calls, and at writes that may concern it.
+//! * No instruction moves in front of another one, and an instruction that can fail goes only if it cannot: the first error
+//!   of a run stays the first. Checking the same values again cannot fail, for the call has ended if it did.
+//!
+//! Method: dominator-based value numbering after Briggs, Cooper and Simpson, "Value Numbering" (1997). Cost: linear in the
+//! code but for copying what is known at branches, which is given up in very large functions.
+
+use rustc_hash::FxHashMap;
+
+use crate::exec::math::{self, MathCode};
+use crate::exec::{arithmetic, rounds::successors};
+use crate::ir::{
+    Address, Base, Block, BlockId, DoubleOperator, Function, Instruction, IntegerOperator,
+    MathFunction, Register, RegisterType, Relation, Terminator,
+};
+
+use super::graph::{dominators, predecessors, targets_mut};
+use super::operands::{
+    each_address_mut, each_clock_mut, each_use_mut, target, target_mut, terminator_use_mut,
+};
+
+/// In larger functions nothing is handed on to blocks with several predecessors.
+const MAX_BLOCKS_TO_HAND_ON: usize = 500;
+/// So many words of memory are remembered.
+const MAX_KNOWN_WORDS: usize = 1024;
+/// Copies of up to so many words become loads and stores, which can be followed.
+const MAX_WORDS_TO_EXPAND: u32 = 9;
+
+/// Numbers the values of a [`super::graph::clean`] function over the given constant memory.
+pub(super) fn number_values(function: &mut Function, constants: &[i32]) {
+    let predecessors = predecessors(function);
+    let dominators = dominators(function, &predecessors);
+    let writes = count_writes(function);
+    let mut numbering = Numbering {
+        constants,
+        replacements: (0..function.registers.len() as u32).map(Register).collect(),
+        is_rewritten: writes.iter().map(|&writes| writes > 1).collect(),
+        registers: std::mem::take(&mut function.registers),
+        literals: FxHashMap::default(),
+        addresses: FxHashMap::default(),
+        sums: FxHashMap::default(),
+        known: Known::default(),
+        output: Vec::new(),
+    };
+    numbering.walk(function, &predecessors, &dominators);
+    function.registers = numbering.registers;
+}
+
+fn count_writes(function: &Function) -> Vec<u32> {
+    let mut writes = vec![0; function.registers.len()];
+    writes[..function.parameters as usize].fill(1);
+    for instruction in function.blocks.iter().flat_map(|block| &block.instructions) {
+        if let Some(Register(target)) = target(instruction) {
+            writes[target as usize] += 1;
+        }
+    }
+    writes
+}
+
+/// A constant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Literal {
+    Integer(i32),
+    Double(f64),
+}
+
+/// An expression over values.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum Expression {
+    Integer(i32),
+    /// The bits of a double.
+    Double(u64),
+    Arithmetic(IntegerOperator, Register, Register),
+    CompareIntegers(Relation, Register, Register),
+    CompareDoubles(Relation, Register, Register),
+    Not(Register),
+    DoubleArithmetic(DoubleOperator, Register, Register),
+    ToDouble(Register),
+    ToInteger(Register),
+    Math(MathFunction, Vec<Register>),
+    Address(Address),
+    Scale(Register, i32, u32, u32),
+    AddIndices(Register, Register),
+}
+
+/// What is known at a place of the function.
+#[derive(Clone, Debug, Default)]
+struct Known {
+    /// The value that a register which is written several times holds, and whether that is not yet in the register itself.
+    current: FxHashMap<Register, (Register, bool)>,
+    expressions: FxHashMap<Expression, Register>,
+    /// The range of an integer value.
+    ranges: FxHashMap<Register, (i32, i32)>,
+    /// The value of a word of memory, or of a double.
+    memory: FxHashMap<Address, Register>,
+}
+
+impl Known {
+    /// What remains behind a join of several ways.
+    fn behind_join(mut self) -> Known {
+        self.current.clear();
+        self.memory
+            .retain(|address, _| address.base == Base::Constants);
+        self
+    }
+}
+
+/// What an instruction comes down to.
+enum Simplified {
+    Nothing,
+    Value(Register),
+    Literal(Literal),
+    Instruction(Instruction),
+}
+
+struct Numbering<'a> {
+    constants: &'a [i32],
+    registers: Vec<RegisterType>,
+    /// The value of a register that is written once.
+    replacements: Vec<Register>,
+    /// The registers that are written several times.
+    is_rewritten: Vec<bool>,
+    /// The values that are constants.
+    literals: FxHashMap<Register, Literal>,
+    /// The values that are known addresses.
+    addresses: FxHashMap<Register, Address>,
+    /// The values that are an index and a constant.
+    sums: FxHashMap<Register, (Register, i32)>,
+    known: Known,
+    output: Vec<Instruction>,
+}
+
+impl Numbering<'_> {
+    fn walk(&mut self, function: &mut Function, predecessors: &[Vec<usize>], dominators: &[usize]) {
+        let count = function.blocks.len();
+        let is_join: Vec<bool> = (0..count)
+            .map(|block| predecessors[block].len() > 1 || block == 0)
+            .collect();
+        let hands_on = count <= MAX_BLOCKS_TO_HAND_ON;
+        let mut heirs = vec![0; count];
+        for block in 1..count {
+            heirs[dominators[block]] += usize::from(hands_on || !is_join[block]);
+        }
+        let mut ends: Vec<Option<Known>> = vec![None; count];
+        let mut reached = vec![false; count];
+        reached[0] = true;
+        for block in 0..count {
+            let mut known = Known::default();
+            if block > 0 && (hands_on || !is_join[block]) {
+                let from = dominators[block];
+                heirs[from] -= 1;
+                if heirs[from] == 0 {
+                    known = ends[from].take().unwrap_or_default();
+                } else if reached[block] {
+                    known = ends[from].clone().unwrap_or_default();
+                }
+            }
+            if !reached[block] {
+                continue;
+            }
+            self.known = if is_join[block] {
+                known.behind_join()
+            } else {
+                known
+            };
+            self.block(function, block, &is_join);
+            for BlockId(target) in successors(function.blocks[block].terminator) {
+                // Blocks beyond the old ones are edges that were split for their copies.
+                match function.blocks.get(target as usize) {
+                    Some(_) if (target as usize) < count => reached[target as usize] = true,
+                    Some(split) => {
+                        for BlockId(target) in successors(split.terminator) {
+                            reached[target as usize] = true;
+                        }
+                    }
+                    None => {}
+                }
+            }
+            if heirs[block] > 0 {
+                ends[block] = Some(std::mem::take(&mut self.known));
+            }
+        }
+    }
+
+    fn block(&mut self, function: &mut Function, index: usize, is_join: &[bool]) {
+        let instructions = std::mem::take(&mut function.blocks[index].instructions);
+        for instruction in instructions {
+            self.instruction(instruction);
+        }
+        let mut terminator = function.blocks[index].terminator;
+        if let Some(register) = terminator_use_mut(&mut terminator) {
+            *register = self.value(*register);
+        }
+        if let Terminator::Branch(condition, then, otherwise) = terminator
+            && let Some(Literal::Integer(condition)) = self.literal(condition)
+        {
+            terminator = Terminator::Jump(if condition != 0 { then } else { otherwise });
+        }
+        let carried = self.carried();
+        if let Terminator::Jump(target) = terminator {
+            if is_join[target.0 as usize] {
+                self.output.extend(carried);
+            }
+        } else if !carried.is_empty() {
+            for target in targets_mut(&mut terminator) {
+                if is_join[target.0 as usize] {
+                    function.blocks.push(Block {
+                        instructions: carried.clone(),
+                        terminator: Terminator::Jump(*target),
+                    });
+                    target.0 = function.blocks.len() as u32 - 1;
+                }
+            }
+        }
+        let block = &mut function.blocks[index];
+        block.instructions = std::mem::take(&mut self.output);
+        block.terminator = terminator;
+    }
+
+    /// The copies that bring registers up to date before a block with several predecessors.
+    fn carried(&self) -> Vec<Instruction> {
+        let mut carried: Vec<(Register, Register)> = self
+            .known
+            .current
+            .iter()
+            .filter(|(_, (_, is_pending))| *is_pending)
+            .map(|(&target, &(source, _))| (target, source))
+            .collect();
+        carried.sort_unstable();
+        carried
+            .into_iter()
+            .map(|(target, source)| Instruction::Copy { target, source })
+            .collect()
+    }
+
+    /// The value that a register holds.
+    fn value(&mut self, register: Register) -> Register {
+        let index = register.0 as usize;
+        if index >= self.is_rewritten.len() {
+            return register;
+        }
+        if !self.is_rewritten[index] {
+            return self.replacements[index];
+        }
+        if let Some(&(value, _)) = self.known.current.get(&register) {
+            return value;
+        }
+        let value = self.new_register(self.registers[index]);
+        self.output.push(Instruction::Copy {
+            target: value,
+            source: register,
+        });
+        self.known.current.insert(register, (value, false));
+        value
+    }
+
+    fn new_register(&mut self, kind: RegisterType) -> Register {
+        self.registers.push(kind);
+        Register(self.registers.len() as u32 - 1)
+    }
+
+    /// Says what a register holds from here on.
+    fn define(&mut self, target: Register, value: Register) {
+        let index = target.0 as usize;
+        if index >= self.is_rewritten.len() {
+            return;
+        }
+        if self.is_rewritten[index] {
+            self.known.current.insert(target, (value, true));
+        } else {
+            self.replacements[index] = value;
+        }
+    }
+
+    fn literal(&self, value: Register) -> Option<Literal> {
+        self.literals.get(&value).copied()
+    }
+
+    fn integer(&self, value: Register) -> Option<i32> {
+        match self.literal(value) {
+            Some(Literal::Integer(value)) => Some(value),
+            _ => None,
+        }
+    }
+
+    fn double(&self, value: Register) -> Option<f64> {
+        match self.literal(value) {
+            Some(Literal::Double(value)) => Some(value),
+            _ => None,
+        }
+    }
+
+    fn range(&self, value: Register) -> (i32, i32) {
+        let known = self.known.ranges.get(&value).copied();
+        match self.integer(value) {
+            Some(value) => (value, value),
+            None => known.unwrap_or((i32::MIN, i32::MAX)),
+        }
+    }
+
+    fn instruction(&mut self, mut instruction: Instruction) {
+        each_use_mut(&mut instruction, &mut |register| {
+            *register = self.value(*register);
+        });
+        each_address_mut(&mut instruction, &mut |address| self.resolve(address));
+        each_clock_mut(&mut instruction, &mut |clock| {
+            if let Some(index) = clock.index.and_then(|index| self.integer(index)) {
+                clock.first.0 = clock.first.0.wrapping_add(index as u32);
+                clock.index = None;
+            }
+        });
+        if let Instruction::CopyWords {
+            target,
+            source,
+            words,
+        } = instruction
+            && words <= MAX_WORDS_TO_EXPAND
+        {
+            self.expand_copy(target, source, words);
+            return;
+        }
+        let target = target(&instruction);
+        let simplified = self.simplify(instruction);
+        let value = match simplified {
+            Simplified::Nothing => return,
+            Simplified::Value(value) => value,
+            Simplified::Literal(literal) => self.literal_value(literal),
+            Simplified::Instruction(instruction) => {
+                let Some(value) = self.emit(instruction) else {
+                    return;
+                };
+                value
+            }
+        };
+        self.define(target.expect("what has a value has a target"), value);
+    }
+
+    fn expand_copy(&mut self, target: Address, source: Address, words: u32) {
+        for word in 0..words {
+            let at = |address: Address| Address {
+                offset: address.offset + word,
+                ..address
+            };
+            let value = self.new_register(RegisterType::Integer);
+            let load = Instruction::LoadInteger {
+                target: value,
+                address: at(source),
+            };
+            let value = match self.simplify(load) {
+                Simplified::Value(value) => value,
+                Simplified::Literal(literal) => self.literal_value(literal),
+                Simplified::Instruction(load) => self.emit(load).expect("a load has a target"),
+                Simplified::Nothing => value,
+            };
+            let store = Instruction::StoreInteger {
+                address: at(target),
+                source: value,
+            };
+            if let Simplified::Instruction(store) = self.simplify(store) {
+                self.emit(store);
+            }
+        }
+    }
+
+    /// The value of a constant.
+    fn literal_value(&mut self, literal: Literal) -> Register {
+        let (kind, expression) = match literal {
+            Literal::Integer(value) => (RegisterType::Integer, Expression::Integer(value)),
+            Literal::Double(value) => (RegisterType::Double, Expression::Double(value.to_bits())),
+        };
+        if let Some(&value) = self.known.expressions.get(&expression) {
+            return value;
+        }
+        let target = self.new_register(kind);
+        self.output.push(match literal {
+            Literal::Integer(value) => Instruction::Integer { target, value },
+            Literal::Double(value) => Instruction::Double { target, value },
+        });
+        self.literals.insert(target, literal);
+        self.known.expressions.insert(expression, target);
+        target
+    }
+
+    /// Puts an instruction out, unless its value is known, and returns the value that it gives.
+    fn emit(&mut self, mut instruction: Instruction) -> Option<Register> {
+        let expression = expression_of(&instruction);
+        if let Some(expression) = &expression
+            && let Some(&value) = self.known.expressions.get(expression)
+        {
+            return Some(value);
+        }
+        let value = target_mut(&mut instruction).map(|target| {
+            let index = target.0 as usize;
+            if self.is_rewritten.get(index) == Some(&true) {
+                *target = Register(self.registers.len() as u32);
+                self.registers.push(self.registers[index]);
+            }
+            *target
+        });
+        if let Some(value) = value {
+            self.learn(&instruction, value);
+            if let Some(expression) = expression {
+                self.known.expressions.insert(expression, value);
+            }
+        }
+        self.output.push(instruction);
+        value
+    }
+
+    /// Notes what is known of the value of an instruction.
+    fn learn(&mut self, instruction: &Instruction, value: Register) {
+        match *instruction {
+            Instruction::LoadInteger { address, .. } | Instruction::LoadDouble { address, .. } => {
+                self.remember(address, value);
+            }
+            Instruction::AddressOf { address, .. } => {
+                self.addresses.insert(value, address);
+            }
+            Instruction::CompareIntegers { .. }
+            | Instruction::CompareDoubles { .. }
+            | Instruction::Not { .. }
+            | Instruction::EqualWords { .. } => {
+                self.known.ranges.insert(value, (0, 1));
+            }
+            Instruction::ScaleIndex { length, stride, .. } => {
+                let last = u64::from(length.saturating_sub(1)) * u64::from(stride);
+                let last = i32::try_from(last).unwrap_or(i32::MAX);
+                self.known.ranges.insert(value, (0, last));
+            }
+            Instruction::AddIndices { left, right, .. } => {
+                if let Some(increment) = self.integer(right) {
+                    self.sums.insert(value, (left, increment));
+                }
+                self.learn_sum(value, left, right);
+            }
+            Instruction::Arithmetic {
+                operator,
+                left,
+                right,
+                ..
+            } => match operator {
+                IntegerOperator::Add => self.learn_sum(value, left, right),
+                IntegerOperator::And => {
+                    let mask = self.integer(left).or(self.integer(right));
+                    if let Some(mask) = mask.filter(|&mask| mask >= 0) {
+                        self.known.ranges.insert(value, (0, mask));
+                    }
+                }
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+
+    fn learn_sum(&mut self, value: Register, left: Register, right: Register) {
+        let (left, right) = (self.range(left), self.range(right));
+        if let (Some(low), Some(high)) = (left.0.checked_add(right.0), left.1.checked_add(right.1))
+        {
+            self.known.ranges.insert(value, (low, high));
+        }
+    }
+
+    /// Follows addresses in registers, and takes constants out of the index.
+    fn resolve(&self, address: &mut Address) {
+        if let Base::Register(register) = address.base
+            && let Some(known) = self.addresses.get(&register)
+            && (known.index.is_none() || address.index.is_none())
+        {
+            *address = Address {
+                base: known.base,
+                offset: known.offset + address.offset,
+                index: known.index.or(address.index),
+            };
+        }
+        while let Some(index) = address.index {
+            if let Some(index) = self.integer(index) {
+                address.offset = address.offset.wrapping_add(index as u32);
+                address.index = None;
+            } else if let Some(&(rest, increment)) = self.sums.get(&index)
+                && increment >= 0
+                && self.range(rest).0 >= 0
+            {
+                address.offset += increment as u32;
+                address.index = Some(rest);
+            } else {
+                break;
+            }
+        }
+    }
+
+    fn simplify(&mut self, instruction: Instruction) -> Simplified {
+        match instruction {
+            Instruction::Integer { value, .. } => Simplified::Literal(Literal::Integer(value)),
+            Instruction::Double { value, .. } => Simplified::Literal(Literal::Double(value)),
+            Instruction::Copy { source, .. } => Simplified::Value(source),
+            Instruction::Arithmetic { .. } => self.simplify_arithmetic(instruction),
+            Instruction::CompareIntegers {
+                relation,
+                left,
+                right,
+                ..
+            } => match self.relate(relation, left, right) {
+                Some(holds) => Simplified::Literal(Literal::Integer(holds.into())),
+                None => Simplified::Instruction(instruction),
+            },
+            Instruction::CheckRange {
+                value, low, high, ..
+            } => {
+                let range = self.range(value);
+                if low <= range.0 && range.1 <= high {
+                    return Simplified::Nothing;
+                }
+                let range = (range.0.max(low), range.1.min(high));
+                if range.0 <= range.1 {
+                    self.known.ranges.insert(value, range);
+                }
+                Simplified::Instruction(instruction)
+            }
+            Instruction::Require { condition, .. }
+                if self.integer(condition).is_some_and(|value| value != 0) =>
+            {
+                Simplified::Nothing
+            }
+            Instruction::AddIndices { left, right, .. } => {
+                match (self.integer(left), self.integer(right)) {
+                    (Some(left), Some(right)) => {
+                        Simplified::Literal(Literal::Integer(left.wrapping_add(right)))
+                    }
+                    (Some(0), _) => Simplified::Value(right),
+                    (_, Some(0)) => Simplified::Value(left),
+                    _ => Simplified::Instruction(instruction),
+                }
+            }
+            Instruction::ScaleIndex {
+                index,
+                first,
+                length,
+                stride,
+                ..
+            } => {
+                let value = self
+                    .integer(index)
+                    .and_then(|index| arithmetic::scale_index(index, first, length, stride).ok());
+                let (low, high) = self.range(index);
+                match value {
+                    Some(value) => Simplified::Literal(Literal::Integer(value)),
+                    None if first == 0 && stride == 1 && low >= 0 && (high as u32) < length => {
+                        Simplified::Value(index)
+                    }
+                    None => Simplified::Instruction(instruction),
+                }
+            }
+            Instruction::LoadInteger { .. }
+            | Instruction::LoadDouble { .. }
+            | Instruction::StoreInteger { .. }
+            | Instruction::StoreDouble { .. }
+            | Instruction::CopyWords { .. }
+            | Instruction::Call { .. } => self.simplify_access(instruction),
+            other => match self.fold(&other) {
+                Some(literal) => Simplified::Literal(literal),
+                None => Simplified::Instruction(other),
+            },
+        }
+    }
+
+    /// The value of an expression over constants.
+    fn fold(&self, instruction: &Instruction) -> Option<Literal> {
+        let integer = |register: &Register| self.integer(*register);
+        let double = |register: &Register| self.double(*register);
+        Some(match instruction {
+            Instruction::Not { source, .. } => Literal::Integer((integer(source)? == 0).into()),
+            Instruction::CompareDoubles {
+                relation,
+                left,
+                right,
+                ..
+            } => {
+                let holds = arithmetic::doubles_relate(*relation, double(left)?, double(right)?);
+                Literal::Integer(holds.into())
+            }
+            Instruction::DoubleArithmetic {
+                operator,
+                left,
+                right,
+                ..
+            } => Literal::Double(arithmetic::double(*operator, double(left)?, double(right)?)),
+            Instruction::IntegerToDouble { source, .. } => {
+                Literal::Double(f64::from(integer(source)?))
+            }
+            Instruction::DoubleToInteger { source, .. } => {
+                Literal::Integer(arithmetic::truncate(double(source)?).ok()?)
+            }
+            Instruction::Math {
+                function,
+                arguments,
+                ..
+            } => match math::code_of(*function) {
+                MathCode::Abs => Literal::Integer(math::abs(integer(&arguments[0])?).ok()?),
+                MathCode::Ilogb => Literal::Integer(math::ilogb(double(&arguments[0])?).ok()?),
+                MathCode::Classify(code) => Literal::Integer(code(double(&arguments[0])?)),
+                MathCode::Unary(code) => Literal::Double(code(double(&arguments[0])?)),
+                MathCode::Binary(code) => {
+                    Literal::Double(code(double(&arguments[0])?, double(&arguments[1])?))
+                }
+                MathCode::Scale(code) => {
+                    Literal::Double(code(double(&arguments[0])?, integer(&arguments[1])?))
+                }
+                MathCode::Ternary(code) => Literal::Double(code(
+                    double(&arguments[0])?,
+                    double(&arguments[1])?,
+                    double(&arguments[2])?,
+                )),
+            },
+            _ => return None,
+        })
+    }
+
+    fn simplify_arithmetic(&self, instruction: Instruction) -> Simplified {
+        use IntegerOperator::{Add, Divide, Multiply, Subtract};
+        let Instruction::Arithmetic {
+            operator,
+            target,
+            left,
+            right,
+            ..
+        } = instruction
+        else {
+            return Simplified::Instruction(instruction);
+        };
+        match (operator, self.integer(left), self.integer(right)) {
+            (_, Some(left), Some(right)) => match arithmetic::integer(operator, left, right) {
+                Ok(value) => Simplified::Literal(Literal::Integer(value)),
+                Err(_) => Simplified::Instruction(instruction),
+            },
+            (Add | Subtract, _, Some(0)) | (Multiply | Divide, _, Some(1)) => {
+                Simplified::Value(left)
+            }
+            (Add, Some(0), _) | (Multiply, Some(1), _) => Simplified::Value(right),
+            (Add, ..) => {
+                let (left_range, right_range) = (self.range(left), self.range(right));
+                let fits = left_range.0.checked_add(right_range.0).is_some()
+                    && left_range.1.checked_add(right_range.1).is_some();
+                if fits {
+                    // A sum that cannot overflow needs no check.
+                    Simplified::Instruction(Instruction::AddIndices {
+                        target,
+                        left,
+                        right,
+                    })
+                } else {
+                    Simplified::Instruction(instruction)
+                }
+            }
+            _ => Simplified::Instruction(instruction),
+        }
+    }
+
+    /// Whether two integers stand in a relation, if their ranges tell.
+    fn relate(&self, relation: Relation, left: Register, right: Register) -> Option<bool> {
+        if left == right {
+            return Some(arithmetic::integers_relate(relation, 0, 0));
+        }
+        let (left, right) = (self.range(left), self.range(right));
+        // The relation holds for all pairs, or for none, if it does so at both ends.
+        match relation {
+            Relation::Less | Relation::GreaterEqual => {
+                let less = if left.1 < right.0 {
+                    true
+                } else if left.0 >= right.1 {
+                    false
+                } else {
+                    return None;
+                };
+                Some(less == (relation == Relation::Less))
+            }
+            Relation::LessEqual | Relation::Greater => {
+                let less_equal = if left.1 <= right.0 {
+                    true
+                } else if left.0 > right.1 {
+                    false
+                } else {
+                    return None;
+                };
+                Some(less_equal == (relation == Relation::LessEqual))
+            }
+            Relation::Equal | Relation::NotEqual => {
+                let equal = if left.1 < right.0 || right.1 < left.0 {
+                    false
+                } else if left.0 == left.1 && left == right {
+                    true
+                } else {
+                    return None;
+                };
+                Some(equal == (relation == Relation::Equal))
+            }
+        }
+    }
+
+    fn simplify_access(&mut self, instruction: Instruction) -> Simplified {
+        match instruction {
+            Instruction::LoadInteger { address, .. } => {
+                self.simplify_load(address, RegisterType::Integer, instruction)
+            }
+            Instruction::LoadDouble { address, .. } => {
+                self.simplify_load(address, RegisterType::Double, instruction)
+            }
+            Instruction::StoreInteger { address, source } => {
+                if self.remembered(address, RegisterType::Integer) == Some(source) {
+                    return Simplified::Nothing;
+                }
+                self.forget(address, 1);
+                self.remember(address, source);
+                Simplified::Instruction(instruction)
+            }
+            Instruction::StoreDouble { address, source } => {
+                self.forget(address, 2);
+                self.remember(address, source);
+                Simplified::Instruction(instruction)
+            }
+            Instruction::CopyWords { target, words, .. } => {
+                self.forget(target, words);
+                Simplified::Instruction(instruction)
+            }
+            _ => {
+                self.known
+                    .memory
+                    .retain(|address, _| address.base == Base::Constants);
+                Simplified::Instruction(instruction)
+            }
+        }
+    }
+
+    fn simplify_load(
+        &mut self,
+        address: Address,
+        kind: RegisterType,
+        instruction: Instruction,
+    ) -> Simplified {
+        if let Some(value) = self.remembered(address, kind) {
+            return Simplified::Value(value);
+        }
+        if address.base == Base::Constants && address.index.is_none() {
+            let offset = address.offset as usize;
+            return Simplified::Literal(match kind {
+                RegisterType::Double => Literal::Double(arithmetic::double_of_words(
+                    self.constants[offset],
+                    self.constants[offset + 1],
+                )),
+                _ => Literal::Integer(self.constants[offset]),
+            });
+        }
+        Simplified::Instruction(instruction)
+    }
+
+    /// The value of the word at an address, or of the double.
+    fn remembered(&self, address: Address, kind: RegisterType) -> Option<Register> {
+        let value = *self.known.memory.get(&address)?;
+        (self.registers[value.0 as usize] == kind).then_some(value)
+    }
+
+    fn remember(&mut self, address: Address, value: Register) {
+        if self.known.memory.len() < MAX_KNOWN_WORDS {
+            self.known.memory.insert(address, value);
+        }
+    }
+
+    /// Forgets what a write of so many words may change.
+    fn forget(&mut self, written: Address, words: u32) {
+        let mut memory = std::mem::take(&mut self.known.memory);
+        memory.retain(|&address, &mut value| {
+            let width = match self.registers[value.0 as usize] {
+                RegisterType::Double => 2,
+                _ => 1,
+            };
+            self.are_disjoint(written, words, address, width)
+        });
+        self.known.memory = memory;
+    }
+
+    fn are_disjoint(
+        &self,
+        left: Address,
+        left_words: u32,
+        right: Address,
+        right_words: u32,
+    ) -> bool {
+        let is_register = |base| matches!(base, Base::Register(_));
+        if left.base != right.base {
+            // Constants are never written; an address in a register may lie in the state or in any frame.
+            return left.base == Base::Constants
+                || right.base == Base::Constants
+                || !(is_register(left.base) || is_register(right.base));
+        }
+        let (left_first, left_last) = self.extent(left, left.index != right.index);
+        let (right_first, right_last) = self.extent(right, left.index != right.index);
+        left_last + u64::from(left_words) <= right_first
+            || right_last + u64::from(right_words) <= left_first
+    }
+
+    /// The least and the greatest offset that an address may have, leaving out the index if it does not matter.
+    fn extent(&self, address: Address, with_index: bool) -> (u64, u64) {
+        let offset = u64::from(address.offset);
+        match address.index.filter(|_| with_index) {
+            None => (offset, offset),
+            Some(index) => {
+                let (low, high) = self.range(index);
+                (offset + low.max(0) as u64, offset + high.max(0) as u64)
+            }
+        }
+    }
+}
+
+/// The expression that an instruction computes, if computing it again gives the same; operands of commutative operators
+/// are sorted.
+fn expression_of(instruction: &Instruction) -> Option<Expression> {
+    let sorted = |left: Register, right: Register| (left.min(right), left.max(right));
+    Some(match instruction {
+        &Instruction::Arithmetic {
+            operator,
+            left,
+            right,
+            ..
+        } => {
+            use IntegerOperator::{Add, And, Maximum, Minimum, Multiply, Or, Xor};
+            let (left, right) = match operator {
+                Add | Multiply | And | Or | Xor | Minimum | Maximum => sorted(left, right),
+                _ => (left, right),
+            };
+            Expression::Arithmetic(operator, left, right)
+        }
+        &Instruction::CompareIntegers {
+            relation,
+            left,
+            right,
+            ..
+        } => Expression::CompareIntegers(relation, left, right),
+        &Instruction::CompareDoubles {
+            relation,
+            left,
+            right,
+            ..
+        } => Expression::CompareDoubles(relation, left, right),
+        &Instruction::Not { source, .. } => Expression::Not(source),
+        &Instruction::DoubleArithmetic {
+            operator,
+            left,
+            right,
+            ..
+        } => {
+            let (left, right) = match operator {
+                DoubleOperator::Add | DoubleOperator::Multiply => sorted(left, right),
+                _ => (left, right),
+            };
+            Expression::DoubleArithmetic(operator, left, right)
+        }
+        &Instruction::IntegerToDouble { source, .. } => Expression::ToDouble(source),
+        &Instruction::DoubleToInteger { source, .. } => Expression::ToInteger(source),
+        Instruction::Math {
+            function,
+            arguments,
+            ..
+        } => Expression::Math(*function, arguments.clone()),
+        &Instruction::AddressOf { address, .. } => Expression::Address(address),
+        &Instruction::ScaleIndex {
+            index,
+            first,
+            length,
+            stride,
+            ..
+        } => Expression::Scale(index, first, length, stride),
+        &Instruction::AddIndices { left, right, .. } => {
+            let (left, right) = sorted(left, right);
+            Expression::AddIndices(left, right)
+        }
+        _ => return None,
+    })
+}
