@@ -37,10 +37,9 @@ pub(super) struct Compiler {
     convention: CallConv,
     context: Context,
     builder_context: FunctionBuilderContext,
-    /// The functions as they were given.
-    functions: Vec<Function>,
-    needs: AllNeeds,
     optimiser: Optimiser,
+    /// What the functions need as they were given.
+    needs: AllNeeds,
     /// What the optimised functions need.
     optimised_needs: AllNeeds,
     /// The declarations of the optimised functions; whatever is declared is compiled.
@@ -78,9 +77,8 @@ impl Compiler {
             module: ManuallyDrop::new(module),
             convention,
             builder_context: FunctionBuilderContext::new(),
-            functions: Vec::new(),
-            needs: AllNeeds::default(),
             optimiser: Optimiser::default(),
+            needs: AllNeeds::default(),
             optimised_needs: AllNeeds::default(),
             declared: Vec::new(),
         })
@@ -88,8 +86,6 @@ impl Compiler {
 
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
     pub(super) fn extend(&mut self, functions: &[Function], constants: &[i32]) {
-        let known = self.functions.len();
-        self.functions.extend_from_slice(&functions[known..]);
         self.optimiser.extend(functions, constants);
     }
 
@@ -98,13 +94,13 @@ impl Compiler {
         &mut self,
         function: FunctionId,
     ) -> Result<Option<NativeEntry>, JitError> {
-        let original = function.0 as usize;
-        if !is_callable(&self.functions[original])
-            || !self.needs.of(&self.functions, original).are_modest()
-        {
+        let given = self.optimiser.given();
+        let code = &given[function.0 as usize];
+        let needs = self.needs.of(given, function.0 as usize);
+        if !is_callable(code) || !needs.are_modest() {
             return Ok(None);
         }
-        let parameters = self.functions[original].parameters;
+        let parameters = code.parameters;
         let index = self.optimiser.optimised(function) as usize;
         let needs = self.optimised_needs.of(self.optimiser.made(), index);
         if !needs.are_modest() {

@@ -96,6 +96,12 @@ impl Optimiser {
         self.constants.extend_from_slice(constants);
     }
 
+    /// The functions as they were given.
+    #[cfg(feature = "jit")]
+    pub(super) fn given(&self) -> &[Function] {
+        &self.functions
+    }
+
     /// The functions that were made so far.
     #[cfg(feature = "jit")]
     pub(super) fn made(&self) -> &[Function] {
@@ -161,14 +167,15 @@ impl Optimiser {
         }
     }
 
-    /// Cleans up: twice, for branches that fall away the first time leave blocks that can be joined.
+    /// Numbers the values and removes what is dead; once more if branches fell away, for then blocks can be joined.
     fn tidy(&self, function: &mut Function) {
-        for _ in 0..2 {
+        graph::clean(function);
+        if numbering::number_values(function, &self.constants) {
             graph::clean(function);
             numbering::number_values(function, &self.constants);
-            graph::clean(function);
-            dead::remove_dead_code(function);
         }
+        graph::clean(function);
+        dead::remove_dead_code(function);
     }
 
     /// Lets calls refer to optimised functions, made for the arguments that are constants.

@@ -34,8 +34,9 @@ const MAX_KNOWN_WORDS: usize = 1024;
 /// Copies of up to so many words become loads and stores, which can be followed.
 const MAX_WORDS_TO_EXPAND: u32 = 9;
 
-/// Numbers the values of a [`super::graph::clean`] function over the given constant memory.
-pub(super) fn number_values(function: &mut Function, constants: &[i32]) {
+/// Numbers the values of a [`super::graph::clean`] function over the given constant memory. Says whether branches fell
+/// away, so that cleaning up and numbering once more may find more.
+pub(super) fn number_values(function: &mut Function, constants: &[i32]) -> bool {
     let predecessors = predecessors(function);
     let dominators = dominators(function, &predecessors);
     let writes = count_writes(function);
@@ -49,9 +50,11 @@ pub(super) fn number_values(function: &mut Function, constants: &[i32]) {
         sums: FxHashMap::default(),
         known: Known::default(),
         output: Vec::new(),
+        has_decided: false,
     };
     numbering.walk(function, &predecessors, &dominators);
     function.registers = numbering.registers;
+    numbering.has_decided
 }
 
 fn count_writes(function: &Function) -> Vec<u32> {
@@ -135,7 +138,10 @@ struct Numbering<'a> {
     /// The values that are an index and a constant.
     sums: FxHashMap<Register, (Register, i32)>,
     known: Known,
+    /// The block under construction.
     output: Vec<Instruction>,
+    /// Whether a branch was found to go only one way.
+    has_decided: bool,
 }
 
 impl Numbering<'_> {
@@ -203,6 +209,7 @@ impl Numbering<'_> {
             && let Some(Literal::Integer(condition)) = self.literal(condition)
         {
             terminator = Terminator::Jump(if condition != 0 { then } else { otherwise });
+            self.has_decided = true;
         }
         let carried = self.carried();
         if let Terminator::Jump(target) = terminator {

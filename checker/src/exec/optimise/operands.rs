@@ -23,25 +23,32 @@ pub(super) fn target_mut(instruction: &mut Instruction) -> Option<&mut Register>
         | Instruction::ScaleIndex { target, .. }
         | Instruction::AddIndices { target, .. } => Some(target),
         Instruction::Call { target, .. } => target.as_mut(),
-        Instruction::StoreInteger { .. }
-        | Instruction::StoreDouble { .. }
-        | Instruction::CopyWords { .. }
-        | Instruction::CheckRange { .. }
-        | Instruction::CountRound { .. }
-        | Instruction::Constrain { .. }
-        | Instruction::SetClock { .. }
-        | Instruction::CopyClock { .. }
-        | Instruction::Require { .. } => None,
+        _ => None,
     }
 }
 
 /// The register that an instruction writes.
 pub(super) fn target(instruction: &Instruction) -> Option<Register> {
     match instruction {
+        Instruction::Integer { target, .. }
+        | Instruction::Double { target, .. }
+        | Instruction::Copy { target, .. }
+        | Instruction::Arithmetic { target, .. }
+        | Instruction::CompareIntegers { target, .. }
+        | Instruction::CompareDoubles { target, .. }
+        | Instruction::Not { target, .. }
+        | Instruction::DoubleArithmetic { target, .. }
+        | Instruction::IntegerToDouble { target, .. }
+        | Instruction::DoubleToInteger { target, .. }
+        | Instruction::Math { target, .. }
+        | Instruction::LoadInteger { target, .. }
+        | Instruction::LoadDouble { target, .. }
+        | Instruction::EqualWords { target, .. }
+        | Instruction::AddressOf { target, .. }
+        | Instruction::ScaleIndex { target, .. }
+        | Instruction::AddIndices { target, .. } => Some(*target),
         Instruction::Call { target, .. } => *target,
-        // The others hold their target in place, and a copy is cheap where no list of registers is in it.
-        Instruction::Math { target, .. } => Some(*target),
-        other => target_mut(&mut other.clone()).copied(),
+        _ => None,
     }
 }
 
