@@ -15,8 +15,8 @@ from ntagen.errors import InputError
 from ntagen.plan.actions import Plan
 from ntagen.plan.certify import Certificate
 
-USEFUL_CLEARANCE_MM: Final = 8.0
-"""Clearance that needs no more: several times the error of a needle in a phantom (2 to 3 mm)."""
+USEFUL_CLEARANCE_MM: Final = 5.0
+"""Clearance that needs no more: twice the error of a needle in a phantom (2 to 3 mm)."""
 
 _CLEARANCE_STEP_MM: Final = 0.1
 """Clearances are compared in steps of this size: no sensor sees a smaller difference."""

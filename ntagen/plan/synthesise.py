@@ -1,0 +1,131 @@
+"""From a scene to its plans: model, strategy synthesis, certificates, ranking.
+
+The model decides which plans exist; the certificate in exact kinematics decides which of them may be driven. A plan of
+the model can fail its certificate, since the model checks regions at the ends of its steps and with integers: such a
+plan is refused, and if none is left there is no strategy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from ntagen.errors import LimitError, ModelError
+from ntagen.plan.actions import Plan
+from ntagen.plan.certify import certify
+from ntagen.plan.extract import extract
+from ntagen.plan.rank import DEFAULT_RANKING, Candidate, rank
+from ntagen.scene import Scene
+
+STRATEGY_QUERY: Final = "control: A<> Checker.Final_TR_Reached"
+"""The paper's second query, whose strategy holds the plans."""
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """By how much a plan must hold in exact kinematics.
+
+    Attributes:
+        clearance_mm: The path's distance to every critical region is greater than this.
+        depth_mm: The path's end lies at least this deep in the last target.
+    """
+
+    clearance_mm: float = 0.0
+    depth_mm: float = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Synthesis:
+    """The answer for one scene.
+
+    Attributes:
+        scene: The scene that was asked about.
+        model_xml: The model that was checked; empty if the plans have another origin.
+        found: How many plans the model has.
+        candidates: Those that hold in exact kinematics, best first.
+        seconds: How long the engine took.
+    """
+
+    scene: Scene
+    model_xml: str
+    found: int
+    candidates: tuple[Candidate, ...]
+    seconds: float
+
+    @property
+    def best(self) -> Candidate | None:
+        """The plan to be driven, or None if there is no strategy."""
+        return self.candidates[0] if self.candidates else None
+
+
+class Synthesiser(Protocol):
+    """Whatever can find the plans of a scene."""
+
+    def __call__(self, scene: Scene) -> Synthesis:
+        """The plans of a scene; equal scenes have equal answers, but for the seconds."""
+
+
+def select(
+    plans: Iterable[Plan],
+    scene: Scene,
+    margins: Margins,
+    ranking: Sequence[str] = DEFAULT_RANKING,
+) -> tuple[Candidate, ...]:
+    """The plans that hold by these margins, best first."""
+    candidates = (Candidate(plan, certify(plan, scene)) for plan in plans)
+    return rank(
+        (c for c in candidates if c.certificate.holds(margins.clearance_mm, margins.depth_mm)),
+        ranking,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class EngineSynthesiser:
+    """The synthesiser that renders the model of a scene and asks the engine.
+
+    Attributes:
+        margins: What a plan must hold by.
+        ranking: The criteria, the weightiest first.
+        max_plans: At most this many plans are listed.
+        timeout_s: The engine stops after this time.
+        memory_bytes: The engine stops when its states take this much.
+    """
+
+    margins: Margins = Margins()
+    ranking: tuple[str, ...] = DEFAULT_RANKING
+    max_plans: int = 100_000
+    timeout_s: float | None = 60.0
+    memory_bytes: int | None = 2 << 30
+
+    def __call__(self, scene: Scene) -> Synthesis:
+        """The plans of a scene.
+
+        Raises:
+            InputError: The scene does not fit the model's numbers.
+            LimitError: The engine stopped at a limit before it had an answer.
+            ModelError: The model ran into a run-time error.
+        """
+        from ntagen import checker
+        from ntagen.render import render
+
+        model_xml = render(scene)
+        answer = checker.load(model_xml).check(
+            STRATEGY_QUERY,
+            plans="all",
+            max_plans=self.max_plans,
+            timeout_s=self.timeout_s,
+            memory_bytes=self.memory_bytes,
+        )
+        if answer.verdict == "error":
+            raise ModelError(f"the model of the scene fails: {answer.message}")
+        if answer.verdict not in ("satisfied", "not satisfied"):
+            raise LimitError(f"no answer from the engine: stopped by {answer.stop}")
+        plans = extract(answer.plans, scene) if answer.verdict == "satisfied" else ()
+        return Synthesis(
+            scene=scene,
+            model_xml=model_xml,
+            found=len(plans),
+            candidates=select(plans, scene, self.margins, self.ranking),
+            seconds=answer.seconds,
+        )

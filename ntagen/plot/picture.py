@@ -1,0 +1,257 @@
+"""A picture of a scene: two projections and a view in space, with plans and paths.
+
+The two projections hold the direction of insertion, drawn from top to bottom, and one of the two other
+axes each; all lengths are in mm and all axes have one scale. A path that crosses a region in one projection may pass in
+front of it: what is true of distances stands in the certificate, whose numbers the caption repeats.
+
+Nothing here computes anything of a needle: the curves come as points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from ntagen.scene import Region, Scene, Vector
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_AXES: Final = "xyz"
+_COLOURS: Final = {"target": "#2a9d4a", "critical": "#c8283c", "detection": "#e8890c"}
+_LABELS: Final = {"target": "target", "critical": "critical", "detection": "detection"}
+_NEEDLE: Final = "#1f5fbf"
+_OTHER: Final = "#8a94a6"
+_TRUE: Final = "#0b2545"
+_MEASURED: Final = "#111111"
+
+Curve = Sequence[Vector]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """What is to be drawn.
+
+    Attributes:
+        scene: The regions and the needle's pose.
+        best: The path of the best plan.
+        others: The paths of other plans.
+        true_path: Where the tip really was (simulation only).
+        measured: Measured positions of the tip.
+        learned: Names of regions that the driver learned; they are hatched.
+        unknown: Names of regions that the driver was not told about.
+        title: The line above.
+        caption: The lines below.
+    """
+
+    scene: Scene
+    best: Curve = ()
+    others: Sequence[Curve] = ()
+    true_path: Sequence[Curve] = ()
+    measured: Curve = ()
+    learned: frozenset[str] = frozenset()
+    unknown: frozenset[str] = frozenset()
+    title: str = ""
+    caption: str = ""
+
+
+def draw(picture: Picture) -> Figure:
+    """The figure; the caller saves it (`save`)."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 6.4), dpi=150, layout="constrained")
+    grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.35))
+    depth = _depth_axis(picture.scene)
+    bounds = _bounds(picture)
+    across = [axis for axis in range(3) if axis != depth]
+    flat = [
+        _draw_projection(figure.add_subplot(grid[0, i]), picture, (axis, depth), bounds)
+        for i, axis in enumerate(across)
+    ]
+    _draw_space(figure.add_subplot(grid[0, 2], projection="3d"), picture, depth, bounds)
+    handles, labels = flat[0].get_legend_handles_labels()
+    unique = dict(zip(labels, handles, strict=True))
+    figure.legend(
+        unique.values(),
+        unique.keys(),
+        loc="outside lower center",
+        ncols=len(unique),
+        frameon=False,
+        fontsize=9,
+    )
+    figure.suptitle(_heading(picture), fontsize=11)
+    return figure
+
+
+def _heading(picture: Picture) -> str:
+    title = picture.title or picture.scene.name
+    return f"{title}\n{picture.caption}" if picture.caption else title
+
+
+def _depth_axis(scene: Scene) -> int:
+    """The coordinate axis along which insertion makes most progress."""
+    return max(range(3), key=lambda i: abs(scene.axis[i]))
+
+
+def _bounds(picture: Picture) -> list[tuple[float, float]]:
+    """The range of each coordinate that holds everything, with a little room."""
+    room_mm = 2.0
+    curves = [picture.best, *picture.others, *picture.true_path]
+    points = [point for curve in curves for point in curve]
+    points += [*picture.measured, picture.scene.needle.tip.position_mm]
+    bounds = []
+    for axis in range(3):
+        low = min(point[axis] for point in points)
+        high = max(point[axis] for point in points)
+        for region in picture.scene.regions:
+            low = min(low, region.center_mm[axis] - region.radius_mm)
+            high = max(high, region.center_mm[axis] + region.radius_mm)
+        bounds.append((low - room_mm, high + room_mm))
+    across = [i for i in range(3) if i != _depth_axis(picture.scene)]
+    # One width for both projections lets them stand side by side on one scale.
+    half = max(bounds[i][1] - bounds[i][0] for i in across) / 2.0
+    for i in across:
+        middle = sum(bounds[i]) / 2.0
+        bounds[i] = (middle - half, middle + half)
+    return bounds
+
+
+def _draw_projection(
+    axes: Any,  # noqa: ANN401  matplotlib's own stubs leave axes open
+    picture: Picture,
+    shown: tuple[int, int],
+    bounds: list[tuple[float, float]],
+) -> Any:  # noqa: ANN401
+    from matplotlib.patches import Circle
+
+    across, depth = shown
+    for region in _back_to_front(picture.scene.regions, shown):
+        center = (region.center_mm[across], region.center_mm[depth])
+        axes.add_patch(Circle(center, region.radius_mm, **_face(region, picture)))
+    for style, curves in _curves(picture):
+        for curve in curves:
+            axes.plot([p[across] for p in curve], [p[depth] for p in curve], **style)
+            style = {**style, "label": None}
+    entry = picture.scene.needle.tip.position_mm
+    axes.plot(entry[across], entry[depth], **_TIP_STYLE)
+    axes.set_xlim(bounds[across])
+    low, high = bounds[depth]
+    # Insertion goes down the page, whichever sign it has.
+    axes.set_ylim((low, high) if picture.scene.axis[depth] <= 0.0 else (high, low))
+    axes.set_aspect("equal")
+    axes.set_xlabel(f"{_AXES[across]} [mm]")
+    axes.set_ylabel(f"{_AXES[depth]} [mm]")
+    axes.grid(True, color="#e6e8ec", linewidth=0.6)
+    axes.set_axisbelow(True)
+    return axes
+
+
+_TIP_STYLE: Final[dict[str, Any]] = {
+    "marker": "o",
+    "markersize": 5,
+    "color": _NEEDLE,
+    "markeredgecolor": "white",
+    "linestyle": "none",
+    "label": "start",
+    "zorder": 8,
+}
+
+
+def _back_to_front(regions: Sequence[Region], shown: tuple[int, int]) -> list[Region]:
+    """Large ones first, and targets before the rest, so that nothing is hidden."""
+    del shown
+    return sorted(regions, key=lambda r: (r.kind != "target", -r.radius_mm))
+
+
+def _face(region: Region, picture: Picture) -> dict[str, Any]:
+    """How a region's disc is drawn."""
+    colour = _COLOURS[region.kind]
+    label = _LABELS[region.kind]
+    style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.2, "zorder": 2}
+    if region.kind == "detection":
+        style |= {"facecolor": "none", "linestyle": (0, (4, 2)), "zorder": 3}
+    else:
+        style |= {"facecolor": (*_rgb(colour), 0.22)}
+    if region.name in picture.learned:
+        label += " (learned)"
+        style |= {"hatch": "//////" if region.kind == "critical" else None, "linewidth": 0.9}
+    elif region.name in picture.unknown:
+        label += " (not told)"
+        style |= {"linestyle": ":"}
+    return style | {"label": label}
+
+
+def _rgb(colour: str) -> tuple[float, float, float]:
+    red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return (red, green, blue)
+
+
+def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
+    """The curves in the order of drawing, with their style."""
+    alpha = max(0.12, min(0.5, 12.0 / max(1, len(picture.others))))
+    measured = [picture.measured] if picture.measured else []
+    best = [picture.best] if picture.best else []
+    dots = {"marker": ".", "markersize": 2.0, "linestyle": "none"}
+    other = {"color": _OTHER, "linewidth": 0.7, "alpha": alpha, "label": "other plans"}
+    plan = {"color": _NEEDLE, "linewidth": 2.2, "label": "best plan"}
+    true = {"color": _TRUE, "linewidth": 1.0, "label": "true path"}
+    if picture.true_path:
+        # Under the path that was driven the plan is a light band, so that both can be seen.
+        plan |= {"linewidth": 4.0, "alpha": 0.45, "label": "last plan"}
+    return [
+        (other | {"zorder": 4}, picture.others),
+        (plan | {"zorder": 5}, best),
+        (true | {"zorder": 6}, picture.true_path),
+        ({"color": _MEASURED, **dots, "label": "measured", "zorder": 7}, measured),
+    ]
+
+
+def _draw_space(
+    axes: Any,  # noqa: ANN401
+    picture: Picture,
+    depth: int,
+    bounds: list[tuple[float, float]],
+) -> None:
+    """The view in space; its vertical axis is the direction of insertion."""
+    order = [*(i for i in range(3) if i != depth), depth]
+    for region in picture.scene.regions:
+        _draw_sphere(axes, region, order)
+    for style, curves in _curves(picture):
+        for curve in curves:
+            axes.plot(*([p[i] for p in curve] for i in order), **style)
+    entry = picture.scene.needle.tip.position_mm
+    axes.plot(*([entry[i]] for i in order), **_TIP_STYLE)
+    limits = [bounds[i] for i in order]
+    axes.set_xlim(limits[0])
+    axes.set_ylim(limits[1])
+    axes.set_zlim(limits[2] if picture.scene.axis[depth] <= 0.0 else limits[2][::-1])
+    axes.set_box_aspect([high - low for low, high in limits], zoom=0.95)
+    for name, i in zip("xyz", order, strict=True):
+        getattr(axes, f"set_{name}label")(f"{_AXES[i]} [mm]", fontsize=8, labelpad=1)
+    axes.tick_params(labelsize=7, pad=0)
+    for pane in (axes.xaxis, axes.yaxis, axes.zaxis):
+        pane.set_pane_color((0.97, 0.975, 0.98, 1.0))
+        pane.set_major_locator(_ticks())
+    axes.view_init(elev=14.0, azim=-58.0)
+
+
+def _ticks() -> Any:  # noqa: ANN401
+    from matplotlib.ticker import MultipleLocator
+
+    return MultipleLocator(10.0)
+
+
+def _draw_sphere(axes: Any, region: Region, order: list[int]) -> None:  # noqa: ANN401
+    import numpy as np
+
+    around, over = np.mgrid[0.0 : 2.0 * math.pi : 25j, 0.0 : math.pi : 13j]  # type: ignore[misc]
+    unit = (np.cos(around) * np.sin(over), np.sin(around) * np.sin(over), np.cos(over))
+    center = [region.center_mm[i] for i in order]
+    surface = [c + region.radius_mm * u for c, u in zip(center, unit, strict=True)]
+    colour = _COLOURS[region.kind]
+    if region.kind == "detection":
+        axes.plot_wireframe(*surface, color=colour, linewidth=0.35, alpha=0.45, linestyle="--")
+    else:
+        axes.plot_surface(*surface, color=colour, alpha=0.22, linewidth=0, shade=True)

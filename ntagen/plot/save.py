@@ -1,0 +1,52 @@
+"""Saving figures: the format by the file's ending, and nothing half written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS: Final = ("png", "pdf", "svg")
+
+
+def format_of(path: Path) -> str:
+    """The format that a file's ending asks for.
+
+    Raises:
+        InputError: No picture is written with this ending.
+    """
+    ending = path.suffix.lower().removeprefix(".")
+    if ending not in FORMATS:
+        known = ", ".join(f".{name}" for name in FORMATS)
+        raise InputError(f"cannot draw {path}: unknown kind of picture\nhint: end it with {known}")
+    return ending
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Writes a figure whole; equal figures give equal files.
+
+    Raises:
+        InputError: The file cannot be written, or its ending is unknown.
+    """
+    import matplotlib as mpl
+
+    kind = format_of(path)
+    # Fixed salt and no dates: the same picture is the same file, byte for byte.
+    metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
+    part = path.with_name(f".{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_dir():
+            raise InputError(f"cannot write {path}: it is a folder")
+        with mpl.rc_context({"svg.hashsalt": "ntagen"}):
+            figure.savefig(part, format=kind, metadata=metadata[kind])
+        part.replace(path)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"cannot write {path}: {reason}\nhint: choose another -o") from error
+    finally:
+        part.unlink(missing_ok=True)
