@@ -1,8 +1,8 @@
 """From a scene to its plans: model, strategy synthesis, certificates, ranking.
 
-The model decides which plans exist; the certificate in exact kinematics decides which of them may be driven. A plan of
-the model can fail its certificate, since the model checks regions at the ends of its steps and with integers: such a
-plan is refused, and if none is left there is no strategy.
+The model decides which plans exist; the certificate in exact kinematics decides which of them may
+be driven. A plan of the model can fail its certificate, since the model checks regions at the ends
+of its steps and with integers: such a plan is refused, and if none is left there is no strategy.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """A picture of a scene: two projections and a view in space, with plans and paths.
 
-The two projections hold the direction of insertion, drawn from top to bottom, and one of the two other
-axes each; all lengths are in mm and all axes have one scale. A path that crosses a region in one projection may pass in
+The two projections hold the direction of insertion, drawn from top to bottom, and one of the two
+other axes each; all lengths are in mm and all axes have one scale. A path that crosses a region in
+one projection may pass in
 front of it: what is true of distances stands in the certificate, whose numbers the caption repeats.
 
 Nothing here computes anything of a needle: the curves come as points.
@@ -246,7 +247,7 @@ def _ticks() -> Any:  # noqa: ANN401
 def _draw_sphere(axes: Any, region: Region, order: list[int]) -> None:  # noqa: ANN401
     import numpy as np
 
-    around, over = np.mgrid[0.0 : 2.0 * math.pi : 25j, 0.0 : math.pi : 13j]  # type: ignore[misc]
+    around, over = np.mgrid[0.0 : 2.0 * math.pi : 25j, 0.0 : math.pi : 13j]
     unit = (np.cos(around) * np.sin(over), np.sin(around) * np.sin(over), np.cos(over))
     center = [region.center_mm[i] for i in order]
     surface = [c + region.radius_mm * u for c, u in zip(center, unit, strict=True)]

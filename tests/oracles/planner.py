@@ -42,12 +42,14 @@ def plans(scene: Scene) -> list[Steps]:
         reached, alive = _classified(positions, headings, scene)
         step_mm = _step_mm(scene)
         for row, column in zip(*np.nonzero(reached), strict=True):
-            found.append((*family.ways[row], ("push", column * step_mm)))
+            found.append((*family.ways[row], ("push", float(column * step_mm))))
         if rolls == scene.limits.max_rolls:
             break
         if rolls > 0:
             least = math.ceil(scene.limits.min_roll_distance_mm / step_mm - 1e-9)
             alive[:, :least] = False
+        if not alive.any():
+            break
         family = _rolled(family, positions, headings, bevels, alive, scene)
     return found
 
@@ -105,7 +107,7 @@ def _rolled(
     step_mm = _step_mm(scene)
     turned = [math.cos(angle) * bevel + math.sin(angle) * side for angle in angles]
     ways = [
-        (*family.ways[row], ("push", column * step_mm), ("roll", angle))
+        (*family.ways[row], ("push", float(column * step_mm)), ("roll", angle))
         for angle in angles
         for row, column in zip(rows, columns, strict=True)
     ]

@@ -1,0 +1,1 @@
+"""The online controller: measure, estimate, synthesise, steer; its devices, log and replay."""

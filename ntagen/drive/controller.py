@@ -1,0 +1,434 @@
+"""The online controller: the paper's workflow (section 3) on any device.
+
+A run is a walk through the state machine of `ntagen.drive.states`; each state has one task here.
+What the driver decides depends on its settings, the a-priori scene, the measurements and the
+synthesiser alone: it reads no clock but the device's and draws nothing at random, so that the same
+measurements lead to the same decisions again (`ntagen.drive.replay`).
+
+Safety rules, in one place:
+
+* every end of a run, and every alarm, stops the needle first;
+* the needle is pulled back only along its channel, rolls being undone where they were made, and no
+  alarm is looked for meanwhile (paper, section 3.2);
+* a plan is driven only if its certificate holds, from the pose and radius that were just estimated.
+
+Where no plan is left the needle is not pulled back in the hope of one: the driver first asks from
+which place behind the tip, on the channel that it knows, there would be a strategy. If there is
+none back to the entry, the run ends where it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from ntagen.drive.device import Device
+from ntagen.drive.knowledge import Knowledge
+from ntagen.drive.records import (
+    Command,
+    Ended,
+    Estimated,
+    Journal,
+    Learned,
+    Measured,
+    Predicted,
+    Record,
+    Synthesised,
+    Timed,
+    Transition,
+    Visited,
+)
+from ntagen.drive.settings import Settings
+from ntagen.drive.states import ABORTS, ENDS, Event, State, next_state
+from ntagen.errors import DeviceError
+from ntagen.needle.estimate import Estimate, Estimator
+from ntagen.needle.kinematics import orthonormal
+from ntagen.needle.measurement import Measurement
+from ntagen.needle.path import Path
+from ntagen.needle.vectors import distance
+from ntagen.plan.actions import Push, Roll
+from ntagen.plan.synthesise import Synthesis, Synthesiser
+from ntagen.scene import Pose, Scene
+
+_SMALL_MM: Final = 1e-9
+_NO_REGION_MM: Final = 1e9
+_ROLL_NEGLIGIBLE_RAD: Final = 1e-9
+
+
+class Controller:
+    """One run.
+
+    Args:
+        scene: The a-priori scene: what the driver is told.
+        device: The needle.
+        synthesise: Where plans come from.
+        settings: How to drive.
+        journal: Who is told what happens.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        device: Device,
+        synthesise: Synthesiser,
+        settings: Settings,
+        journal: Journal,
+    ) -> None:
+        self._device = device
+        self._synthesise = synthesise
+        self._settings = settings
+        self._journal = journal
+        self._knowledge = Knowledge(scene)
+        self._estimator = Estimator(scene.needle.tip, scene.needle.radius_mm, settings.priors)
+        self._path = Path(scene.needle.tip)
+        self._estimate: Estimate | None = None
+        self._measurement: Measurement | None = None
+        self._moves: Iterator[tuple[Push | Roll, Pose]] = iter(())
+        self._predicted: Pose = scene.needle.tip
+        self._deviating = 0
+        self._retreat_mm: float | None = None
+        self._adjustments = 0
+        self._syntheses = 0
+        self._started_s = 0.0
+        self._reason = ""
+        self._tasks: dict[State, Callable[[], Event]] = {
+            State.ARM: self._arm,
+            State.INITIAL_PUSH: self._initial_push,
+            State.ESTIMATE: self._make_estimate,
+            State.SYNTHESISE: self._find_strategy,
+            State.EXECUTE: self._execute,
+            State.MONITOR: self._monitor,
+            State.STOP: self._stop,
+            State.PULL_BACK: self._pull_back,
+            State.PUSH: self._push_again,
+        }
+
+    def run(self) -> Ended:
+        """Drives to an end, with the needle stopped; the last record of the run is returned."""
+        self._journal.started(self._knowledge.a_priori)
+        state = State.ARM
+        while state not in ENDS:
+            event = self._perform(state)
+            following = next_state(state, event)
+            self._note(Transition(self._now_s(), state.value, event.value, following.value))
+            state = following
+        self._halt(state)
+        ended = Ended(
+            time_s=self._now_s(),
+            outcome=state.value,
+            reason=self._reason,
+            depth_mm=self._path.depth_mm,
+            adjustments=self._adjustments,
+            syntheses=self._syntheses,
+        )
+        self._note(ended)
+        return ended
+
+    def _perform(self, state: State) -> Event:
+        """The event with which a state's task ended; what goes wrong in it is an event too."""
+        if self._is_late():
+            self._reason = f"the limit of {self._settings.timeout_s:g} s is over"
+            return Event.TIMED_OUT
+        try:
+            return self._tasks[state]()
+        except DeviceError as error:
+            self._reason = str(error)
+            return Event.FAULT
+        except KeyboardInterrupt:
+            self._reason = "interrupted by the operator"
+            return Event.INTERRUPT
+
+    # The tasks, in the order of the workflow.
+
+    def _arm(self) -> Event:
+        self._started_s = self._device.now_s()
+        self._measure()
+        return Event.ARMED
+
+    def _initial_push(self) -> Event:
+        return self._push_watching(self._settings.initial_push_mm)
+
+    def _make_estimate(self) -> Event:
+        estimate = self._estimator.estimate()
+        self._estimate = estimate
+        self._path = estimate.path
+        tip = estimate.tip
+        self._note(
+            Estimated(
+                self._now_s(),
+                tip.position_mm,
+                tip.heading,
+                tip.bevel,
+                estimate.radius_mm,
+                estimate.radius_std_mm,
+                estimate.rms_mm,
+            )
+        )
+        self._visit(tip.position_mm, last_too=True)
+        if self._knowledge.visited == len(self._knowledge.a_priori.targets):
+            self._reason = "the tip is in the last target"
+            return Event.IN_TARGET
+        return Event.ESTIMATED
+
+    def _find_strategy(self) -> Event:
+        here = self._ask(self._known_estimate().tip, self._path.depth_mm)
+        if here.best is not None:
+            self._adopt(here)
+            return Event.STRATEGY_FOUND
+        return self._look_back()
+
+    def _look_back(self) -> Event:
+        """Looks for the nearest place behind the tip from which there is a strategy."""
+        stride_mm = self._settings.pull_mm - self._settings.push_mm
+        depth_mm = self._path.depth_mm
+        while depth_mm > _SMALL_MM:
+            if self._is_late():
+                self._reason = f"the limit of {self._settings.timeout_s:g} s is over"
+                return Event.TIMED_OUT
+            depth_mm = max(0.0, depth_mm - stride_mm)
+            behind = self._path.pull(self._path.depth_mm - depth_mm)
+            if self._ask(_unrolled(behind), depth_mm).best is not None:
+                self._retreat_mm = depth_mm
+                return Event.STRATEGY_BEHIND
+        self._reason = "no plan is left, even from the entry"
+        return Event.NO_STRATEGY
+
+    def _execute(self) -> Event:
+        move = next(self._moves, None)
+        if move is None:
+            return Event.PLAN_DONE
+        action, self._predicted = move
+        if isinstance(action, Roll):
+            self._roll(action.angle_rad)
+        else:
+            self._push(action.length_mm)
+        return Event.ACTED
+
+    def _monitor(self) -> Event:
+        measurement = self._measure()
+        deviation_mm = distance(measurement.position_mm, self._predicted.position_mm)
+        predicted = self._predicted
+        self._note(
+            Predicted(
+                self._now_s(),
+                predicted.position_mm,
+                predicted.heading,
+                predicted.bevel,
+                deviation_mm,
+            )
+        )
+        if self._feels(measurement):
+            return Event.FORCE
+        self._visit(measurement.position_mm, last_too=False)
+        self._deviating = self._deviating + 1 if deviation_mm > self._settings.deviation_mm else 0
+        if self._deviating >= self._settings.deviation_count:
+            self._deviating = 0
+            return Event.DEVIATION
+        return Event.AS_PREDICTED
+
+    def _stop(self) -> Event:
+        self._note(Command(self._now_s(), "stop", 0.0))
+        self._device.stop()
+        if self._measurement is not None and self._feels(self._measurement):
+            self._learn()
+        return Event.STOPPED
+
+    def _pull_back(self) -> Event:
+        """Goes back in the channel to where the next push starts: by the fixed length, or to the place looked for."""
+        self._adjustments += 1
+        depth_mm = self._path.depth_mm
+        goal_mm = self._retreat_mm
+        if goal_mm is None:
+            goal_mm = max(0.0, depth_mm - self._settings.pull_mm + self._settings.push_mm)
+        # At the entry there is no channel to push in: the next plan starts right there.
+        self._retreat_mm = goal_mm
+        start_mm = max(0.0, goal_mm - self._settings.push_mm) if goal_mm > 0.0 else 0.0
+        while self._path.depth_mm > start_mm + _SMALL_MM:
+            self._undo_roll()
+            last_mm = self._path.stretches[-1].arc.length_mm
+            self._pull(min(last_mm, self._path.depth_mm - start_mm))
+        self._undo_roll()
+        return Event.PULLED
+
+    def _push_again(self) -> Event:
+        goal_mm = self._retreat_mm if self._retreat_mm is not None else self._path.depth_mm
+        self._retreat_mm = None
+        return self._push_watching(goal_mm - self._path.depth_mm)
+
+    # Knowledge.
+
+    def _learn(self) -> None:
+        """Turns the contact at the present place into a region."""
+        tip = self._estimator.estimate().tip
+        before = set(self._knowledge.learned)
+        self._knowledge = self._knowledge.with_contact(
+            tip, self._settings.sensing_margin_mm, self._settings.learned_radius_mm
+        )
+        for region in self._knowledge.learned:
+            if region not in before:
+                self._note(Learned.of(self._now_s(), region))
+
+    def _visit(self, position_mm: tuple[float, float, float], *, last_too: bool) -> None:
+        """Counts targets that the tip is in; the last one only where that is asked for."""
+        targets = self._knowledge.a_priori.targets
+        while self._knowledge.visited < len(targets):
+            target = targets[self._knowledge.visited]
+            is_last = self._knowledge.visited == len(targets) - 1
+            if is_last and not last_too:
+                return
+            if distance(position_mm, target.center_mm) > target.radius_mm:
+                return
+            self._knowledge = self._knowledge.visiting()
+            self._note(Visited(self._now_s(), target.name))
+
+    def _ask(self, tip: Pose, depth_mm: float) -> Synthesis:
+        """The synthesis from a pose with all that is known now."""
+        scene = self._knowledge.scene(tip, self._known_estimate().radius_mm)
+        synthesis = self._synthesise(scene)
+        self._syntheses += 1
+        number, best = self._syntheses, synthesis.best
+        self._journal.synthesised(number, synthesis)
+        clearance_mm = best.certificate.critical_clearance_mm if best else -1.0
+        self._note(
+            Synthesised(
+                time_s=self._now_s(),
+                number=number,
+                depth_mm=depth_mm,
+                found=synthesis.found,
+                accepted=len(synthesis.candidates),
+                plan=str(best.plan) if best else "",
+                clearance_mm=min(clearance_mm, _NO_REGION_MM),
+                model_sha256=hashlib.sha256(synthesis.model_xml.encode()).hexdigest(),
+            )
+        )
+        self._note(Timed(self._now_s(), number, synthesis.seconds))
+        return synthesis
+
+    def _adopt(self, synthesis: Synthesis) -> None:
+        """Makes the best plan the one to be driven."""
+        best = synthesis.best
+        if best is None:
+            raise AssertionError("a synthesis without a plan was adopted")
+        self._moves = _moves(synthesis.scene, best.plan.actions, self._settings.spacing_mm)
+        self._deviating = 0
+
+    def _known_estimate(self) -> Estimate:
+        if self._estimate is None:
+            raise AssertionError("a strategy was asked for before the first estimate")
+        return self._estimate
+
+    # The device: every command and every reading goes through here, to estimator and journal.
+
+    def _push_watching(self, length_mm: float) -> Event:
+        """Pushes in pieces, with an eye on the force but without a prediction."""
+        for piece_mm in _pieces(length_mm, self._settings.spacing_mm):
+            if self._is_late():
+                self._reason = f"the limit of {self._settings.timeout_s:g} s is over"
+                return Event.TIMED_OUT
+            self._push(piece_mm)
+            if self._feels(self._measure()):
+                return Event.FORCE
+        return Event.PUSHED
+
+    def _push(self, length_mm: float) -> None:
+        self._note(Command(self._now_s(), "push", length_mm))
+        self._device.push(length_mm)
+        self._estimator.push(length_mm)
+        self._path = self._path.push(self._radius_mm(), length_mm)
+
+    def _roll(self, angle_rad: float) -> None:
+        self._note(Command(self._now_s(), "roll", angle_rad))
+        self._device.roll(angle_rad)
+        self._estimator.roll(angle_rad)
+        self._path = self._path.roll(angle_rad)
+
+    def _pull(self, length_mm: float) -> None:
+        self._note(Command(self._now_s(), "pull", length_mm))
+        self._device.pull(length_mm)
+        self._estimator.pull(length_mm)
+        self._path = self._path.pull(length_mm)
+
+    def _undo_roll(self) -> None:
+        """Rolls back what was rolled at or beyond the present place, so that the tip fits its channel."""
+        angle_rad = math.remainder(self._path.pending_roll_rad, 2.0 * math.pi)
+        if abs(angle_rad) > _ROLL_NEGLIGIBLE_RAD:
+            self._roll(-angle_rad)
+
+    def _measure(self) -> Measurement:
+        measurement = self._device.measure()
+        _require_finite(measurement)
+        self._measurement = measurement
+        self._estimator.measure(measurement)
+        self._note(
+            Measured(
+                time_s=measurement.time_s,
+                depth_mm=self._path.depth_mm,
+                position_mm=measurement.position_mm,
+                force_n=measurement.force_n,
+                heading=measurement.heading or (),
+                bevel=measurement.bevel or (),
+            )
+        )
+        return measurement
+
+    def _halt(self, state: State) -> None:
+        """The safe state at the end of a run, whatever led to it."""
+        self._note(Command(self._now_s(), "stop", 0.0))
+        try:
+            self._device.stop()
+        except DeviceError as error:
+            # The run ends here anyway; a device that cannot even stop must be in the report.
+            self._reason = f"{self._reason}; and then: {error}" if state in ABORTS.values() else ""
+
+    def _feels(self, measurement: Measurement) -> bool:
+        return measurement.force_n > self._settings.force_n
+
+    def _is_late(self) -> bool:
+        return self._device.now_s() - self._started_s >= self._settings.timeout_s
+
+    def _radius_mm(self) -> float:
+        if self._estimate is None:
+            return self._knowledge.a_priori.needle.radius_mm
+        return self._estimate.radius_mm
+
+    def _now_s(self) -> float:
+        return self._device.now_s()
+
+    def _note(self, record: Record) -> None:
+        self._journal.record(record)
+
+
+def _moves(
+    scene: Scene, actions: tuple[Push | Roll, ...], spacing_mm: float
+) -> Iterator[tuple[Push | Roll, Pose]]:
+    """A plan in pieces that can be watched, each with the pose that is expected after it."""
+    path = Path(scene.needle.tip)
+    for action in actions:
+        if isinstance(action, Roll):
+            path = path.roll(action.angle_rad)
+            yield action, path.tip
+            continue
+        for piece_mm in _pieces(action.length_mm, spacing_mm):
+            path = path.push(scene.needle.radius_mm, piece_mm)
+            yield Push(piece_mm), path.tip
+
+
+def _pieces(length_mm: float, spacing_mm: float) -> list[float]:
+    """Equal pieces of a length, none longer than the spacing."""
+    if length_mm <= _SMALL_MM:
+        return []
+    count = math.ceil(length_mm / spacing_mm - _SMALL_MM)
+    return [length_mm / count] * count
+
+
+def _unrolled(path: Path) -> Pose:
+    """The pose at the end of a channel with the rolls beyond it undone."""
+    return orthonormal(Path(path.entry, path.stretches).tip)
+
+
+def _require_finite(measurement: Measurement) -> None:
+    numbers = (*measurement.position_mm, measurement.force_n, measurement.time_s)
+    if not all(math.isfinite(number) for number in numbers):
+        raise DeviceError(f"the sensor reported {measurement}: not a number")

@@ -1,0 +1,189 @@
+"""What the driver knows, in three kinds that never mix (paper, section 3).
+
+*Actual* knowledge is what is true; only a simulation has it, and it stays in the virtual needle.
+*A-priori* knowledge is the scene that the driver is given. *Learned* knowledge is what it concludes
+from contacts, always an assumption. This module divides a scene into what is told and what is kept
+back, and turns contacts into learned regions.
+
+A contact says: here the force begins to rise, so the surface of something critical is one sensing
+margin away, and it lies ahead, since there was no force on the way here. It becomes a ball straight
+ahead whose shell just touches the tip. Nothing is known of its size. When another contact gives a
+ball whose shell overlaps an earlier one's, no plan could pass between the two, and the smallest
+ball around both takes their place: so learned regions grow with every contact, and the driver
+cannot try the same way for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from ntagen.errors import InputError
+from ntagen.needle.vectors import add, combine, distance, scale
+from ntagen.scene import Pose, Region, Scene
+
+_EXPLAINED_MM = 1.0
+"""A contact this near to a known detection region is put down to that region."""
+
+_GROWTH_MM = 1.0
+"""How much farther than thought a known region is taken to be felt, after a contact outside its shell."""
+
+
+def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, ...]:
+    """The detection regions of a critical region: those made around it, and those that contain it."""
+    return tuple(
+        shell
+        for shell in detections
+        if shell.around == critical.name
+        or distance(shell.center_mm, critical.center_mm) + critical.radius_mm <= shell.radius_mm
+    )
+
+
+def sensing_margin_mm(critical: Region, detections: Iterable[Region], otherwise_mm: float) -> float:
+    """How far from its surface a critical region is felt: the depth of its thinnest shell."""
+    return min(
+        (
+            shell.radius_mm - distance(shell.center_mm, critical.center_mm) - critical.radius_mm
+            for shell in shells_of(critical, detections)
+        ),
+        default=otherwise_mm,
+    )
+
+
+def told(scene: Scene, known: str) -> Scene:
+    """The scene with only the critical regions that the driver is told about.
+
+    Args:
+        scene: The actual scene.
+        known: ``all``, ``none``, or names of critical regions with commas between them.
+
+    Raises:
+        InputError: A name is not that of a critical region of the scene.
+    """
+    if known == "all":
+        return scene
+    names = [] if known == "none" else [name.strip() for name in known.split(",")]
+    existing = [region.name for region in scene.criticals]
+    for name in names:
+        if name not in existing:
+            choice = ", ".join(["all", "none", *existing])
+            raise InputError(f"unknown critical region '{name}' in --known\nhint: one of {choice}")
+    kept_back = [region for region in scene.criticals if region.name not in names]
+    hidden = {shell for region in kept_back for shell in shells_of(region, scene.detections)}
+    return replace(
+        scene,
+        criticals=tuple(region for region in scene.criticals if region.name in names),
+        detections=tuple(region for region in scene.detections if region not in hidden),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """A-priori and learned knowledge; immutable.
+
+    Attributes:
+        a_priori: The scene that the driver was given.
+        learned: Critical and detection regions from contacts.
+        visited: How many of the targets have been reached.
+        contacts: How many contacts there were.
+    """
+
+    a_priori: Scene
+    learned: tuple[Region, ...] = ()
+    visited: int = 0
+    contacts: int = 0
+
+    def scene(self, tip: Pose, radius_mm: float) -> Scene:
+        """All that is known, for a needle that is where it is now."""
+        scene = self.a_priori.with_needle(tip, radius_mm).with_regions(*self.learned)
+        return scene.with_targets(scene.targets[self.visited :])
+
+    def visiting(self) -> Knowledge:
+        """The knowledge that one more target was reached."""
+        return replace(self, visited=self.visited + 1)
+
+    def with_contact(self, tip: Pose, margin_mm: float, radius_mm: float) -> Knowledge:
+        """The knowledge after the force rose.
+
+        Args:
+            tip: The tip's pose at the contact.
+            margin_mm: How far from a region the force is expected to rise.
+            radius_mm: The radius that an unknown region is given at first.
+        """
+        counted = replace(self, contacts=self.contacts + 1)
+        felt = self._felt(tip, margin_mm)
+        if felt is not None:
+            return counted._with_wider_shell(felt, tip, margin_mm)
+        center = combine(1.0, tip.position_mm, margin_mm + radius_mm, tip.heading)
+        name = f"learned {counted.contacts}"
+        return counted._with_learned(Region(name, "critical", center, radius_mm), margin_mm)
+
+    def _felt(self, tip: Pose, margin_mm: float) -> Region | None:
+        """The a-priori critical region that explains a contact, if there is one."""
+        for region in self.a_priori.criticals:
+            shells = shells_of(region, self.a_priori.detections + self.learned)
+            reach_mm = max((s.radius_mm for s in shells), default=region.radius_mm + margin_mm)
+            if distance(tip.position_mm, region.center_mm) <= reach_mm + _EXPLAINED_MM:
+                return region
+        return None
+
+    def _with_wider_shell(self, felt: Region, tip: Pose, margin_mm: float) -> Knowledge:
+        """A known region is felt where it should not be: its shell is wider than was thought."""
+        shells = shells_of(felt, self.a_priori.detections + self.learned)
+        reach_mm = max((s.radius_mm for s in shells), default=felt.radius_mm + margin_mm)
+        reach_mm = max(reach_mm, distance(tip.position_mm, felt.center_mm)) + _GROWTH_MM
+        name = f"{felt.name} felt"
+        shell = Region(name, "detection", felt.center_mm, reach_mm, around=felt.name)
+        others = tuple(region for region in self.learned if region.name != name)
+        return replace(self, learned=(*others, shell))
+
+    def _with_learned(self, ball: Region, margin_mm: float) -> Knowledge:
+        """Adds a ball and its shell; balls whose shells overlap become one."""
+        balls = [region for region in self.learned if region.kind == "critical"]
+        apart: list[Region] = []
+        pending = [ball]
+        while pending:
+            current = pending.pop()
+            near = [other for other in balls if _overlap(current, other, margin_mm)]
+            balls = [other for other in balls if other not in near]
+            if near:
+                pending.append(_around([current, *near]))
+            else:
+                apart.append(current)
+        known = [r for r in self.learned if r.kind == "detection" and r.name.endswith(" felt")]
+        kept = [*balls, *apart]
+        shells = [
+            Region(f"{b.name} shell", "detection", b.center_mm, b.radius_mm + margin_mm, b.name)
+            for b in kept
+        ]
+        return replace(self, learned=(*kept, *shells, *known))
+
+
+def _overlap(one: Region, other: Region, margin_mm: float) -> bool:
+    reach_mm = one.radius_mm + other.radius_mm + 2.0 * margin_mm
+    return distance(one.center_mm, other.center_mm) < reach_mm
+
+
+def _around(balls: Sequence[Region]) -> Region:
+    """A ball around all of these, as small as pairwise merging makes it; named after the oldest."""
+    result = balls[0]
+    for ball in balls[1:]:
+        result = replace(_around_two(result, ball), name=min(result.name, ball.name, key=_age))
+    return result
+
+
+def _age(name: str) -> int:
+    return int(name.split()[-1])
+
+
+def _around_two(one: Region, other: Region) -> Region:
+    """The smallest ball around two."""
+    apart_mm = distance(one.center_mm, other.center_mm)
+    if apart_mm + other.radius_mm <= one.radius_mm:
+        return one
+    if apart_mm + one.radius_mm <= other.radius_mm:
+        return other
+    radius_mm = 0.5 * (apart_mm + one.radius_mm + other.radius_mm)
+    share = (radius_mm - one.radius_mm) / apart_mm
+    center = add(scale(1.0 - share, one.center_mm), scale(share, other.center_mm))
+    return replace(one, center_mm=center, radius_mm=radius_mm)

@@ -1,0 +1,77 @@
+"""The driver's settings, all in one value: what a run depends on beside the scene, the device and the seed.
+
+Where a source gives no figure the default is ours, and said to be.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any
+
+from ntagen.errors import InputError
+from ntagen.needle.estimate import Priors
+from ntagen.plan.rank import DEFAULT_RANKING
+from ntagen.plan.synthesise import Margins
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What the driver does how.
+
+    Attributes:
+        initial_push_mm: Length of the first push, before there is a plan. The paper's virtual runs
+            take 5.1 s for it and its fit, at 1 mm/s.
+        spacing_mm: A push is made in pieces of this length, with a measurement after each. Ours:
+            small against a detection margin of 2 to 3 mm.
+        deviation_mm: The measured position may differ this much from the prediction. The authors
+            tried 0 to 10 mm; ours.
+        deviation_count: So many measurements in a row must differ, so that one bad reading is no
+            alarm.
+        force_n: A force above this is an alarm. The authors used rises of 0.1 to 0.2 of an unknown
+            unit.
+        pull_mm: How far the needle is pulled back to readjust; fixed, as in the paper, the figure
+            ours.
+        push_mm: How far it is pushed again before the next estimate; less than `pull_mm`; ours.
+        timeout_s: A run ends after this time (paper, section 4).
+        sensing_margin_mm: How far from a region that is not known the force is expected to rise;
+            ours.
+        learned_radius_mm: The radius of a learned critical region; ours.
+        margins: What a plan must hold by in exact kinematics.
+        ranking: The criteria by which the plan is chosen.
+        priors: What the estimator takes for granted, and how much.
+    """
+
+    initial_push_mm: float = 5.0
+    spacing_mm: float = 0.25
+    deviation_mm: float = 1.5
+    deviation_count: int = 3
+    force_n: float = 0.1
+    pull_mm: float = 10.0
+    push_mm: float = 2.0
+    timeout_s: float = 120.0
+    sensing_margin_mm: float = 3.0
+    learned_radius_mm: float = 2.0
+    margins: Margins = field(default_factory=Margins)
+    ranking: tuple[str, ...] = DEFAULT_RANKING
+    priors: Priors = field(default_factory=Priors)
+
+    def to_json(self) -> dict[str, Any]:
+        """The settings as JSON."""
+        return dataclasses.asdict(self)
+
+    @staticmethod
+    def from_json(document: dict[str, Any]) -> Settings:
+        """The settings of such a document.
+
+        Raises:
+            InputError: The document has unknown or missing settings.
+        """
+        try:
+            known = dict(document)
+            known["margins"] = Margins(**known["margins"])
+            known["priors"] = Priors(**known["priors"])
+            known["ranking"] = tuple(known["ranking"])
+            return Settings(**known)
+        except (KeyError, TypeError) as error:
+            raise InputError(f"the settings of the run cannot be read: {error}") from error

@@ -1,0 +1,111 @@
+"""A run with the virtual needle: what is true on one side, what the driver is told on the other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+from ntagen.drive.controller import Controller
+from ntagen.drive.knowledge import sensing_margin_mm, told
+from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
+from ntagen.drive.settings import Settings
+from ntagen.needle.kinematics import Arc
+from ntagen.needle.vectors import distance
+from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
+from ntagen.plan.synthesise import Synthesis, Synthesiser
+from ntagen.scene import Scene
+
+_NO_REGION_MM: Final = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """How a simulated run ended, and what was true of it.
+
+    Attributes:
+        ended: The driver's own last record.
+        clearance_mm: Smallest distance of everything that was pierced to any actual critical
+            region; infinite without one, negative if one was pierced.
+        target_distance_mm: Distance of the true tip to the surface of the last target; negative
+            inside.
+        pierced: Every arc that was truly cut.
+    """
+
+    ended: Ended
+    clearance_mm: float
+    target_distance_mm: float
+    pierced: tuple[Arc, ...]
+
+
+def simulate(
+    scene: Scene,
+    synthesise: Synthesiser,
+    settings: Settings,
+    journal: Journal,
+    *,
+    known: str = "all",
+    errors: Errors | None = None,
+    seed: int = 0,
+) -> Result:
+    """Drives the virtual needle through the scene.
+
+    Args:
+        scene: The actual scene.
+        synthesise: Where plans come from.
+        settings: How to drive.
+        journal: Who is told what happens.
+        known: Which critical regions the driver is told about (`ntagen.drive.knowledge.told`).
+        errors: The needle's errors; none by default.
+        seed: What they are drawn from.
+    """
+    obstacles = tuple(
+        Obstacle(
+            region,
+            sensing_margin_mm(region, scene.detections, settings.sensing_margin_mm),
+        )
+        for region in scene.criticals
+    )
+    needle = VirtualNeedle(scene.needle, obstacles, errors or Errors(), seed, SimulatedClock())
+    witness = _Witness(needle, journal)
+    controller = Controller(
+        told(scene, known), needle, synthesise, settings, Journals(journal, witness)
+    )
+    ended = controller.run()
+    last = scene.targets[-1]
+    tip_mm = needle.true_tip.position_mm
+    return Result(
+        ended=ended,
+        clearance_mm=needle.true_clearance_mm(),
+        target_distance_mm=distance(tip_mm, last.center_mm) - last.radius_mm,
+        pierced=needle.pierced,
+    )
+
+
+def settings_for(settings: Settings, errors: Errors) -> Settings:
+    """The settings with priors that fit the needle's errors, as a calibration would find them."""
+    priors = settings.priors
+    roll_rad = max(priors.roll_rad, errors.roll_rad)
+    noise_mm = max(priors.noise_mm, errors.noise_mm)
+    return replace(settings, priors=replace(priors, roll_rad=roll_rad, noise_mm=noise_mm))
+
+
+class _Witness:
+    """Adds to a journal what is true at each measurement and at the end."""
+
+    def __init__(self, needle: VirtualNeedle, journal: Journal) -> None:
+        self._needle = needle
+        self._journal = journal
+
+    def record(self, record: Record) -> None:
+        if isinstance(record, Measured | Ended):
+            clearance_mm = self._needle.true_clearance_mm()
+            shown_mm = clearance_mm if math.isfinite(clearance_mm) else _NO_REGION_MM
+            tip_mm = self._needle.true_tip.position_mm
+            self._journal.record(Truth(record.time_s, tip_mm, shown_mm))
+
+    def started(self, scene: Scene) -> None:
+        """Nothing is true of a scene that the needle does not know."""
+
+    def synthesised(self, number: int, synthesis: Synthesis) -> None:
+        """Nothing is true of a plan before it is driven."""

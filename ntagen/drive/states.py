@@ -1,0 +1,122 @@
+"""The driver's state machine: the paper's workflow (section 3.1) as a table.
+
+::
+
+    arm ─▶ initial push ─▶ estimate ─▶ synthesise ─▶ execute ⇄ monitor
+                              ▲            │             │  deviation, force
+                              │            │ from farther back             ▼
+                              └── push ◀── pull back ◀─────────────────── stop
+
+Each state is a task that ends with one of its events; the table says which state follows. `EVENTS`
+lists what each state can report, and `TRANSITIONS` has exactly one entry for each of these pairs:
+nothing is undefined. Time-out, device fault and interruption can end every task, and each leads to
+its own end with the needle stopped.
+"""
+
+from __future__ import annotations
+
+from enum import Enum, unique
+from typing import Final
+
+
+@unique
+class State(Enum):
+    """What the driver is doing, or how it ended."""
+
+    ARM = "arm"
+    INITIAL_PUSH = "initial push"
+    ESTIMATE = "estimate"
+    SYNTHESISE = "synthesise"
+    EXECUTE = "execute"
+    MONITOR = "monitor"
+    STOP = "stop"
+    PULL_BACK = "pull back"
+    PUSH = "push"
+
+    TARGET_REACHED = "target reached"
+    NO_STRATEGY = "no strategy"
+    TIMED_OUT = "time-out"
+    FAULTED = "device fault"
+    INTERRUPTED = "interrupted"
+
+
+@unique
+class Event(Enum):
+    """How a task ended."""
+
+    ARMED = "armed"
+    PUSHED = "pushed"
+    ESTIMATED = "estimated"
+    IN_TARGET = "in the last target"
+    STRATEGY_FOUND = "strategy found"
+    STRATEGY_BEHIND = "strategy from farther back"
+    NO_STRATEGY = "no strategy, even from the entry"
+    ACTED = "acted"
+    PLAN_DONE = "plan done"
+    AS_PREDICTED = "as predicted"
+    DEVIATION = "deviation"
+    FORCE = "force"
+    STOPPED = "stopped"
+    PULLED = "pulled"
+
+    TIMED_OUT = "time-out"
+    FAULT = "device fault"
+    INTERRUPT = "interrupt"
+
+
+ENDS: Final = frozenset(
+    {
+        State.TARGET_REACHED,
+        State.NO_STRATEGY,
+        State.TIMED_OUT,
+        State.FAULTED,
+        State.INTERRUPTED,
+    }
+)
+"""The states in which the run is over."""
+
+ABORTS: Final = {
+    Event.TIMED_OUT: State.TIMED_OUT,
+    Event.FAULT: State.FAULTED,
+    Event.INTERRUPT: State.INTERRUPTED,
+}
+"""The events that can end every task, and where they lead."""
+
+_WORKFLOW: Final = {
+    (State.ARM, Event.ARMED): State.INITIAL_PUSH,
+    (State.INITIAL_PUSH, Event.PUSHED): State.ESTIMATE,
+    (State.INITIAL_PUSH, Event.FORCE): State.STOP,
+    (State.ESTIMATE, Event.ESTIMATED): State.SYNTHESISE,
+    (State.ESTIMATE, Event.IN_TARGET): State.TARGET_REACHED,
+    (State.SYNTHESISE, Event.STRATEGY_FOUND): State.EXECUTE,
+    (State.SYNTHESISE, Event.STRATEGY_BEHIND): State.PULL_BACK,
+    (State.SYNTHESISE, Event.NO_STRATEGY): State.NO_STRATEGY,
+    (State.EXECUTE, Event.ACTED): State.MONITOR,
+    (State.EXECUTE, Event.PLAN_DONE): State.ESTIMATE,
+    (State.MONITOR, Event.AS_PREDICTED): State.EXECUTE,
+    (State.MONITOR, Event.DEVIATION): State.STOP,
+    (State.MONITOR, Event.FORCE): State.STOP,
+    (State.STOP, Event.STOPPED): State.PULL_BACK,
+    (State.PULL_BACK, Event.PULLED): State.PUSH,
+    (State.PUSH, Event.PUSHED): State.ESTIMATE,
+    (State.PUSH, Event.FORCE): State.STOP,
+}
+
+TRANSITIONS: Final = _WORKFLOW | {
+    (state, event): end for state in State if state not in ENDS for event, end in ABORTS.items()
+}
+"""The state that follows, for each pair of a state and an event that it can report."""
+
+EVENTS: Final = {
+    state: frozenset(event for source, event in TRANSITIONS if source is state) for state in State
+}
+"""The events that each state can report; none for the ends."""
+
+
+def next_state(state: State, event: Event) -> State:
+    """The state that follows.
+
+    Raises:
+        KeyError: The state cannot report this event: a mistake in the driver.
+    """
+    return TRANSITIONS[state, event]
