@@ -41,8 +41,8 @@ from ntagen.drive.records import (
     Visited,
 )
 from ntagen.drive.settings import Settings
-from ntagen.drive.states import ABORTS, ENDS, Event, State, next_state
-from ntagen.errors import DeviceError
+from ntagen.drive.states import ENDS, Event, State, next_state
+from ntagen.errors import DeviceError, LimitError
 from ntagen.needle.estimate import Estimate, Estimator
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
@@ -109,12 +109,17 @@ class Controller:
         """Drives to an end, with the needle stopped; the last record of the run is returned."""
         self._journal.started(self._knowledge.a_priori)
         state = State.ARM
-        while state not in ENDS:
-            event = self._perform(state)
-            following = next_state(state, event)
-            self._note(Transition(self._now_s(), state.value, event.value, following.value))
-            state = following
-        self._halt(state)
+        try:
+            while state not in ENDS:
+                event = self._perform(state)
+                following = next_state(state, event)
+                self._note(Transition(self._now_s(), state.value, event.value, following.value))
+                state = following
+        except BaseException:
+            # A mistake of ours or a log that cannot be written: the needle must not move on.
+            self._device.stop()
+            raise
+        self._halt()
         ended = Ended(
             time_s=self._now_s(),
             outcome=state.value,
@@ -128,14 +133,15 @@ class Controller:
 
     def _perform(self, state: State) -> Event:
         """The event with which a state's task ended; what goes wrong in it is an event too."""
-        if self._is_late():
-            self._reason = f"the limit of {self._settings.timeout_s:g} s is over"
-            return Event.TIMED_OUT
         try:
+            self._require_time()
             return self._tasks[state]()
         except DeviceError as error:
             self._reason = str(error)
             return Event.FAULT
+        except LimitError as error:
+            self._reason = str(error)
+            return Event.TIMED_OUT
         except KeyboardInterrupt:
             self._reason = "interrupted by the operator"
             return Event.INTERRUPT
@@ -184,9 +190,7 @@ class Controller:
         stride_mm = self._settings.pull_mm - self._settings.push_mm
         depth_mm = self._path.depth_mm
         while depth_mm > _SMALL_MM:
-            if self._is_late():
-                self._reason = f"the limit of {self._settings.timeout_s:g} s is over"
-                return Event.TIMED_OUT
+            self._require_time()
             depth_mm = max(0.0, depth_mm - stride_mm)
             behind = self._path.pull(self._path.depth_mm - depth_mm)
             if self._ask(_unrolled(behind), depth_mm).best is not None:
@@ -236,7 +240,7 @@ class Controller:
         return Event.STOPPED
 
     def _pull_back(self) -> Event:
-        """Goes back in the channel to where the next push starts: by the fixed length, or to the place looked for."""
+        """Goes back in the channel to where the next push starts."""
         self._adjustments += 1
         depth_mm = self._path.depth_mm
         goal_mm = self._retreat_mm
@@ -324,9 +328,7 @@ class Controller:
     def _push_watching(self, length_mm: float) -> Event:
         """Pushes in pieces, with an eye on the force but without a prediction."""
         for piece_mm in _pieces(length_mm, self._settings.spacing_mm):
-            if self._is_late():
-                self._reason = f"the limit of {self._settings.timeout_s:g} s is over"
-                return Event.TIMED_OUT
+            self._require_time()
             self._push(piece_mm)
             if self._feels(self._measure()):
                 return Event.FORCE
@@ -351,7 +353,7 @@ class Controller:
         self._path = self._path.pull(length_mm)
 
     def _undo_roll(self) -> None:
-        """Rolls back what was rolled at or beyond the present place, so that the tip fits its channel."""
+        """Rolls back what was rolled at or beyond this place: the tip fits its channel again."""
         angle_rad = math.remainder(self._path.pending_roll_rad, 2.0 * math.pi)
         if abs(angle_rad) > _ROLL_NEGLIGIBLE_RAD:
             self._roll(-angle_rad)
@@ -373,20 +375,21 @@ class Controller:
         )
         return measurement
 
-    def _halt(self, state: State) -> None:
+    def _halt(self) -> None:
         """The safe state at the end of a run, whatever led to it."""
         self._note(Command(self._now_s(), "stop", 0.0))
         try:
             self._device.stop()
         except DeviceError as error:
-            # The run ends here anyway; a device that cannot even stop must be in the report.
-            self._reason = f"{self._reason}; and then: {error}" if state in ABORTS.values() else ""
+            # The run ends here anyway; that the device does not even stop must be in the report.
+            self._reason = f"{self._reason}; it cannot be stopped: {error}"
 
     def _feels(self, measurement: Measurement) -> bool:
         return measurement.force_n > self._settings.force_n
 
-    def _is_late(self) -> bool:
-        return self._device.now_s() - self._started_s >= self._settings.timeout_s
+    def _require_time(self) -> None:
+        if self._now_s() - self._started_s >= self._settings.timeout_s:
+            raise LimitError(f"the limit of {self._settings.timeout_s:g} s is over")
 
     def _radius_mm(self) -> float:
         if self._estimate is None:

@@ -30,7 +30,7 @@ _GROWTH_MM = 1.0
 
 
 def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, ...]:
-    """The detection regions of a critical region: those made around it, and those that contain it."""
+    """The detection regions of a critical region: made around it, or containing it."""
     return tuple(
         shell
         for shell in detections
@@ -110,13 +110,15 @@ class Knowledge:
             margin_mm: How far from a region the force is expected to rise.
             radius_mm: The radius that an unknown region is given at first.
         """
-        counted = replace(self, contacts=self.contacts + 1)
+        contacts = self.contacts + 1
         felt = self._felt(tip, margin_mm)
         if felt is not None:
-            return counted._with_wider_shell(felt, tip, margin_mm)
-        center = combine(1.0, tip.position_mm, margin_mm + radius_mm, tip.heading)
-        name = f"learned {counted.contacts}"
-        return counted._with_learned(Region(name, "critical", center, radius_mm), margin_mm)
+            learned = self._with_wider_shell(felt, tip, margin_mm)
+        else:
+            center = combine(1.0, tip.position_mm, margin_mm + radius_mm, tip.heading)
+            ball = Region(f"learned {contacts}", "critical", center, radius_mm)
+            learned = self._with_ball(ball, margin_mm)
+        return replace(self, learned=learned, contacts=contacts)
 
     def _felt(self, tip: Pose, margin_mm: float) -> Region | None:
         """The a-priori critical region that explains a contact, if there is one."""
@@ -127,17 +129,16 @@ class Knowledge:
                 return region
         return None
 
-    def _with_wider_shell(self, felt: Region, tip: Pose, margin_mm: float) -> Knowledge:
+    def _with_wider_shell(self, felt: Region, tip: Pose, margin_mm: float) -> tuple[Region, ...]:
         """A known region is felt where it should not be: its shell is wider than was thought."""
         shells = shells_of(felt, self.a_priori.detections + self.learned)
         reach_mm = max((s.radius_mm for s in shells), default=felt.radius_mm + margin_mm)
         reach_mm = max(reach_mm, distance(tip.position_mm, felt.center_mm)) + _GROWTH_MM
         name = f"{felt.name} felt"
         shell = Region(name, "detection", felt.center_mm, reach_mm, around=felt.name)
-        others = tuple(region for region in self.learned if region.name != name)
-        return replace(self, learned=(*others, shell))
+        return (*(region for region in self.learned if region.name != name), shell)
 
-    def _with_learned(self, ball: Region, margin_mm: float) -> Knowledge:
+    def _with_ball(self, ball: Region, margin_mm: float) -> tuple[Region, ...]:
         """Adds a ball and its shell; balls whose shells overlap become one."""
         balls = [region for region in self.learned if region.kind == "critical"]
         apart: list[Region] = []
@@ -156,7 +157,7 @@ class Knowledge:
             Region(f"{b.name} shell", "detection", b.center_mm, b.radius_mm + margin_mm, b.name)
             for b in kept
         ]
-        return replace(self, learned=(*kept, *shells, *known))
+        return (*kept, *shells, *known)
 
 
 def _overlap(one: Region, other: Region, margin_mm: float) -> bool:

@@ -38,7 +38,7 @@ class Transition(Record):
 
 @dataclass(frozen=True, slots=True)
 class Command(Record):
-    """The device was told something: ``push`` or ``pull`` with mm, ``roll`` with rad, or ``stop``."""
+    """A command to the device: ``push`` or ``pull`` with mm, ``roll`` with rad, or ``stop``."""
 
     kind: str
     value: float

@@ -1,4 +1,4 @@
-"""The driver's settings, all in one value: what a run depends on beside the scene, the device and the seed.
+"""The driver's settings: what a run depends on beside scene, device and seed.
 
 Where a source gives no figure the default is ours, and said to be.
 """

@@ -295,7 +295,7 @@ def _positions(start: Pose, curvature: float, offsets_mm: _Array) -> _Array:
 def pose_from_points(
     points_mm: _Array, noise_mm: float, prior: CurvaturePrior | None = None
 ) -> tuple[Pose, float]:
-    """The pose and the radius that the points of one push imply, without any knowledge of the entry.
+    """The pose and the radius that the points of one push imply, whatever the entry was.
 
     The position is that of the circle nearest to the last point, the heading the tangent there.
 

@@ -1,0 +1,125 @@
+"""The message types of the log: protobuf, one for each kind of record, built at run time.
+
+A record is a flat dataclass, and its message type follows from its annotations: a number becomes a
+``double`` or ``int64``, a text a ``string``, a vector a repeated ``double``. Fields are numbered in
+the order of the dataclass, base class first, after the record's sequence number (1). So no compiler
+is needed, and the log carries the descriptors itself.
+
+Compatibility: new fields go to the end of a record, none is ever removed or changes its type.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import Any, Final, get_args, get_type_hints
+
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from google.protobuf.message import Message
+
+from ntagen.drive import records
+from ntagen.drive.records import Record
+
+PACKAGE: Final = "ntagen"
+SEQUENCE: Final = "sequence"
+"""The field with a record's place in the run, from 0: it tells the order where times are equal."""
+
+KINDS: Final[tuple[type[Record], ...]] = (
+    records.Transition,
+    records.Command,
+    records.Measured,
+    records.Predicted,
+    records.Estimated,
+    records.Synthesised,
+    records.Timed,
+    records.Learned,
+    records.Visited,
+    records.Ended,
+    records.Truth,
+)
+"""All kinds of records, in the order of the file of descriptors."""
+
+_FIELD: Final = descriptor_pb2.FieldDescriptorProto
+_SCALARS: Final = {
+    float: _FIELD.TYPE_DOUBLE,
+    int: _FIELD.TYPE_INT64,
+    str: _FIELD.TYPE_STRING,
+    bool: _FIELD.TYPE_BOOL,
+}
+
+
+def message_class(kind: type[Record]) -> type[Message]:
+    """The protobuf class for a kind of record."""
+    return _classes()[kind.__name__]
+
+
+def encode(record: Record, sequence: int) -> bytes:
+    """The message of a record."""
+    message: Any = message_class(type(record))()
+    setattr(message, SEQUENCE, sequence)
+    for field in dataclasses.fields(record):
+        value = getattr(record, field.name)
+        if isinstance(value, tuple):
+            getattr(message, field.name).extend(value)
+        else:
+            setattr(message, field.name, value)
+    encoded: bytes = message.SerializeToString()
+    return encoded
+
+
+def decode(name: str, data: bytes) -> tuple[int, Record]:
+    """A record and its sequence number from a message.
+
+    Args:
+        name: The full name of the message type.
+        data: The message.
+
+    Raises:
+        KeyError: No kind of record has this name.
+        google.protobuf.message.DecodeError: The data is no such message.
+    """
+    kind = {f"{PACKAGE}.{kind.__name__}": kind for kind in KINDS}[name]
+    message: Any = message_class(kind)()
+    message.ParseFromString(data)
+    values: dict[str, Any] = {}
+    for field in dataclasses.fields(kind):
+        value = getattr(message, field.name)
+        values[field.name] = value if isinstance(value, float | int | str) else tuple(value)
+    return int(getattr(message, SEQUENCE)), kind(**values)
+
+
+@cache
+def _classes() -> dict[str, type[Message]]:
+    """The protobuf classes by the names of the kinds."""
+    pool = _pool()
+    descriptors = {
+        kind.__name__: pool.FindMessageTypeByName(f"{PACKAGE}.{kind.__name__}") for kind in KINDS
+    }
+    return {
+        name: message_factory.GetMessageClass(descriptor)
+        for name, descriptor in descriptors.items()
+    }
+
+
+def _pool() -> descriptor_pool.DescriptorPool:
+    file = descriptor_pb2.FileDescriptorProto(
+        name="ntagen/records.proto", package=PACKAGE, syntax="proto3"
+    )
+    for kind in KINDS:
+        message = file.message_type.add(name=kind.__name__)
+        message.field.add(
+            name=SEQUENCE, number=1, type=_FIELD.TYPE_INT64, label=_FIELD.LABEL_OPTIONAL
+        )
+        hints = get_type_hints(kind)
+        for number, field in enumerate(dataclasses.fields(kind), start=2):
+            hint = hints[field.name]
+            repeated = bool(get_args(hint))
+            message.field.add(
+                name=field.name,
+                number=number,
+                type=_FIELD.TYPE_DOUBLE if repeated else _SCALARS[hint],
+                label=_FIELD.LABEL_REPEATED if repeated else _FIELD.LABEL_OPTIONAL,
+            )
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    return pool

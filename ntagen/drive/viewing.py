@@ -1,0 +1,223 @@
+"""The run in the messages that common viewers draw: Foxglove's schemas.
+
+The needle is written twice, since no viewer draws everything: as scene entities and transforms, and
+as poses and points. Everything is in metres, as viewers expect, in the frame ``world``, whose axes
+are those of the environment file.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from typing import Any, Final
+
+from foxglove_schemas_protobuf.Color_pb2 import Color
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
+from foxglove_schemas_protobuf.Pose_pb2 import Pose as PoseMessage
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from google.protobuf.message import Message
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from ntagen.drive.records import (
+    Ended,
+    Estimated,
+    Learned,
+    Measured,
+    Predicted,
+    Record,
+    Transition,
+    Visited,
+)
+from ntagen.drive.states import Event
+from ntagen.needle.kinematics import bending_axis
+from ntagen.needle.path import sample_poses
+from ntagen.plan.synthesise import Synthesis
+from ntagen.scene import Pose, Scene, Vector
+
+TOPICS: Final[dict[str, type[Message]]] = {
+    "/tf": FrameTransforms,
+    "/scene": SceneUpdate,
+    "/needle/tip": PoseInFrame,
+    "/needle/plan": PosesInFrame,
+    "/needle/measured": PointCloud,
+    "/log": Log,
+}
+"""The topics for viewers and their message types."""
+
+ROUTINE: Final = frozenset({Event.ACTED.value, Event.AS_PREDICTED.value})
+"""Events of every cycle, which are not worth a line of text."""
+
+_M_PER_MM: Final = 1e-3
+_FRAME: Final = "world"
+_PLAN_SPACING_MM: Final = 1.0
+_COLOURS: Final = {
+    "target": (0.16, 0.62, 0.29, 0.35),
+    "critical": (0.78, 0.16, 0.24, 0.6),
+    "detection": (0.91, 0.54, 0.05, 0.2),
+}
+_PLAN_COLOUR: Final = (0.12, 0.37, 0.75, 1.0)
+
+Shown = Iterator[tuple[str, Message]]
+
+
+def show_scene(scene: Scene) -> Shown:
+    """The regions of a scene."""
+    update = SceneUpdate()
+    for region in scene.regions:
+        _add_ball(update, region.name, region.kind, region.center_mm, region.radius_mm, 0.0)
+    yield "/scene", update
+
+
+def show_plan(synthesis: Synthesis, time_s: float) -> Shown:
+    """The best plan of a synthesis, as a line and as poses."""
+    if synthesis.best is None:
+        return
+    poses = sample_poses(synthesis.best.plan.arcs(synthesis.scene.needle), _PLAN_SPACING_MM)
+    update = SceneUpdate()
+    entity = update.entities.add(id="plan", frame_id=_FRAME, timestamp=_stamp(time_s))
+    line = entity.lines.add(thickness=2.0, scale_invariant=True, color=_colour(_PLAN_COLOUR))
+    line.pose.orientation.w = 1.0
+    message = PosesInFrame(timestamp=_stamp(time_s), frame_id=_FRAME)
+    for pose in poses:
+        x, y, z = (c * _M_PER_MM for c in pose.position_mm)
+        line.points.add(x=x, y=y, z=z)
+        message.poses.append(_pose(pose))
+    yield "/scene", update
+    yield "/needle/plan", message
+
+
+def show_record(record: Record) -> Shown:
+    """What viewers are shown of a record."""
+    match record:
+        case Measured():
+            yield "/needle/measured", _cloud(record)
+        case Predicted() | Estimated():
+            pose = Pose(record.position_mm, record.heading, record.bevel)
+            yield "/needle/tip", _pose_in_frame(pose, record.time_s)
+            yield "/tf", _transform(pose, record.time_s)
+        case Learned():
+            update = SceneUpdate()
+            _add_ball(
+                update, record.name, record.kind, record.center_mm, record.radius_mm, record.time_s
+            )
+            yield "/scene", update
+    text = _text(record)
+    if text:
+        level = Log.WARNING if isinstance(record, Learned) else Log.INFO
+        yield "/log", Log(timestamp=_stamp(record.time_s), level=level, name="ntagen", message=text)
+
+
+def _text(record: Record) -> str:
+    match record:
+        case Transition() if record.event not in ROUTINE:
+            return f"{record.state}: {record.event} -> {record.following}"
+        case Learned():
+            return f"learned {record.kind} region '{record.name}'"
+        case Visited():
+            return f"reached target '{record.target}'"
+        case Ended():
+            return f"{record.outcome}: {record.reason}"
+    return ""
+
+
+def _add_ball(
+    update: Any,  # noqa: ANN401  the generated class has no fields for a type checker
+    name: str,
+    kind: str,
+    center_mm: Vector,
+    radius_mm: float,
+    time_s: float,
+) -> None:
+    entity = update.entities.add(id=f"{kind} {name}", frame_id=_FRAME, timestamp=_stamp(time_s))
+    sphere = entity.spheres.add(color=_colour(_COLOURS[kind]))
+    x, y, z = (c * _M_PER_MM for c in center_mm)
+    sphere.pose.position.x, sphere.pose.position.y, sphere.pose.position.z = x, y, z
+    sphere.pose.orientation.w = 1.0
+    diameter = 2.0 * radius_mm * _M_PER_MM
+    sphere.size.x = sphere.size.y = sphere.size.z = diameter
+
+
+def _cloud(record: Measured) -> PointCloud:
+    names = ("x", "y", "z", "force_n")
+    cloud = PointCloud(
+        timestamp=_stamp(record.time_s),
+        frame_id=_FRAME,
+        point_stride=4 * len(names),
+        data=struct.pack("<4f", *(c * _M_PER_MM for c in record.position_mm), record.force_n),
+    )
+    cloud.pose.orientation.w = 1.0
+    for index, name in enumerate(names):
+        cloud.fields.add(name=name, offset=4 * index, type=PackedElementField.FLOAT32)
+    return cloud
+
+
+def _pose_in_frame(pose: Pose, time_s: float) -> PoseInFrame:
+    return PoseInFrame(timestamp=_stamp(time_s), frame_id=_FRAME, pose=_pose(pose))
+
+
+def _transform(pose: Pose, time_s: float) -> FrameTransforms:
+    message = FrameTransforms()
+    transform = message.transforms.add(
+        timestamp=_stamp(time_s), parent_frame_id=_FRAME, child_frame_id="tip"
+    )
+    own = _pose(pose)
+    transform.rotation.CopyFrom(own.orientation)
+    position = own.position
+    transform.translation.x = position.x
+    transform.translation.y = position.y
+    transform.translation.z = position.z
+    return message
+
+
+def _pose(pose: Pose) -> PoseMessage:
+    message = PoseMessage()
+    x, y, z = (c * _M_PER_MM for c in pose.position_mm)
+    message.position.x, message.position.y, message.position.z = x, y, z
+    qx, qy, qz, qw = quaternion(pose)
+    message.orientation.x, message.orientation.y = qx, qy
+    message.orientation.z, message.orientation.w = qz, qw
+    return message
+
+
+def quaternion(pose: Pose) -> tuple[float, float, float, float]:
+    """The rotation (x, y, z, w) that takes the world's axes to heading, bending axis and bevel.
+
+    Of the four ways to read it off the matrix the one that divides by the largest number is used
+    (Shepperd, 1978).
+    """
+    h, s, b = pose.heading, bending_axis(pose), pose.bevel
+    squares = (
+        h[0] - s[1] - b[2],
+        s[1] - h[0] - b[2],
+        b[2] - h[0] - s[1],
+        h[0] + s[1] + b[2],
+    )
+    largest = max(range(4), key=lambda i: squares[i])
+    # The products 4 q_i q_j, from sums and differences of the matrix's other elements.
+    xy, xz, yz = h[1] + s[0], h[2] + b[0], s[2] + b[1]
+    xw, yw, zw = s[2] - b[1], b[0] - h[2], h[1] - s[0]
+    square = squares[largest] + 1.0
+    rows = (
+        (square, xy, xz, xw),
+        (xy, square, yz, yw),
+        (xz, yz, square, zw),
+        (xw, yw, zw, square),
+    )
+    factor = 0.5 / float(square**0.5)
+    x, y, z, w = (factor * value for value in rows[largest])
+    return (x, y, z, w)
+
+
+def _colour(rgba: tuple[float, float, float, float]) -> Color:
+    red, green, blue, alpha = rgba
+    return Color(r=red, g=green, b=blue, a=alpha)
+
+
+def _stamp(time_s: float) -> Timestamp:
+    nanoseconds = round(time_s * 1e9)
+    return Timestamp(seconds=nanoseconds // 10**9, nanos=nanoseconds % 10**9)
