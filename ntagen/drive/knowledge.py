@@ -26,7 +26,7 @@ _EXPLAINED_MM = 1.0
 """A contact this near to a known detection region is put down to that region."""
 
 _GROWTH_MM = 1.0
-"""How much farther than thought a known region is taken to be felt, after a contact outside its shell."""
+"""How much wider a known region's shell is made by a contact near it."""
 
 
 def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, ...]:

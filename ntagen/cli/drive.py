@@ -1,0 +1,342 @@
+"""`ntagen drive`: steer a needle to the target, and log the run."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ntagen.drive.records import Journal, Record
+    from ntagen.drive.settings import Settings
+    from ntagen.drive.simulate import Result
+    from ntagen.needle.virtual import Errors
+    from ntagen.plan.synthesise import Synthesis
+    from ntagen.scene import Scene
+
+_EPILOG: Final = """\
+Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
+5 device fault, 70 internal error, 130 interrupted."""
+
+
+def _seconds(_ctx: click.Context, _option: click.Parameter, text: str) -> float:
+    """A time with or without a unit; seconds without one."""
+    from ntagen.units import S_PER
+
+    match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([a-z]*)\s*", text)
+    factor = S_PER.get(match[2] or "s") if match else None
+    seconds = float(match[1]) * factor if match and factor else 0.0
+    if not 0.0 < seconds < math.inf:
+        raise click.BadParameter(f"'{text}' is no time; write for example 120s or 2min")
+    return seconds
+
+
+def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float:
+    """A finite number that is not negative."""
+    if not 0.0 <= number < math.inf:
+        raise click.BadParameter(f"{number:g} is not a number from 0 on")
+    return number
+
+
+@click.command("drive", epilog=_EPILOG)
+@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@click.option(
+    "--needle",
+    default="virtual",
+    show_default=True,
+    help="The needle; so far only the virtual one, which moves in simulated time.",
+)
+@click.option(
+    "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the errors."
+)
+@click.option(
+    "--noise",
+    "noise_mm",
+    metavar="MM",
+    default=0.0,
+    callback=_size,
+    help="Standard deviation of each measured coordinate.  [default: 0]",
+)
+@click.option(
+    "--roll-error",
+    "roll_error_deg",
+    metavar="DEG",
+    default=0.0,
+    callback=_size,
+    help="Standard deviation of each roll.  [default: 0]",
+)
+@click.option(
+    "--known",
+    metavar="all|none|NAME,…",
+    default="all",
+    show_default=True,
+    help="Critical regions that the driver is told about; the others it must feel.",
+)
+@click.option(
+    "--rank",
+    "ranking",
+    metavar="CRITERION,…",
+    default="clearance,rolls,length",
+    show_default=True,
+    help="What the best plan is: clearance, rolls, length, target.",
+)
+@click.option(
+    "--timeout",
+    "timeout_s",
+    default="120s",
+    show_default=True,
+    callback=_seconds,
+    help="Of the run, on the needle's clock.",
+)
+@click.option(
+    "--log",
+    "log_path",
+    metavar="RUN.mcap",
+    type=click.Path(path_type=Path),
+    help="Where to log the run; an existing file is replaced.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@click.option("--quiet", is_flag=True, help="Print only how it ended.")
+def command(
+    environment: Path,
+    needle: str,
+    seed: int,
+    noise_mm: float,
+    roll_error_deg: float,
+    known: str,
+    ranking: str,
+    timeout_s: float,
+    log_path: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Steer a needle to the target and log the run.
+
+    Pushes a little, estimates where the needle is and how it bends, finds a safe strategy, and
+    drives its best plan while measuring. If the needle deviates or the force rises, it stops,
+    pulls back, and looks for a new strategy with what it has learned.
+
+    \b
+    Examples:
+      ntagen drive examples/paper.nsl --seed 1 --log run.mcap
+      ntagen drive examples/paper.nsl --seed 1 --noise 0.1 --known none
+    """  # noqa: D301  click wants the control character
+    from ntagen.drive.settings import Settings
+    from ntagen.drive.simulate import settings_for
+    from ntagen.needle.virtual import Errors
+    from ntagen.nsl import load_with_warnings
+    from ntagen.plan.rank import parse_ranking
+    from ntagen.units import rad_from_deg
+
+    _require_virtual(needle)
+    scene, warnings = load_with_warnings(environment)
+    for warning in warnings:
+        click.echo(warning.render(), err=True)
+    errors = Errors(noise_mm=noise_mm, roll_rad=rad_from_deg(roll_error_deg))
+    settings = settings_for(Settings(timeout_s=timeout_s, ranking=parse_ranking(ranking)), errors)
+    speaks = not (as_json or quiet)
+    with _log(log_path, environment, scene, settings, errors, seed, known) as log:
+        result = _drive(scene, settings, errors, seed, known, log, speaks)
+    if as_json:
+        click.echo(json.dumps(_summary(result, seed, noise_mm, roll_error_deg, known, log_path)))
+    else:
+        _report(result, scene, log_path, short=quiet)
+    return _exit_code(result.ended.outcome)
+
+
+def _require_virtual(needle: str) -> None:
+    from ntagen.errors import InputError
+
+    if needle != "virtual":
+        raise InputError(f"no needle '{needle}'\nhint: only `--needle virtual` can be driven")
+
+
+def _drive(
+    scene: Scene,
+    settings: Settings,
+    errors: Errors,
+    seed: int,
+    known: str,
+    log: list[Journal],
+    speaks: bool,
+) -> Result:
+    from ntagen.drive.records import Journals
+    from ntagen.drive.simulate import simulate
+    from ntagen.plan.synthesise import EngineSynthesiser
+
+    synthesise = EngineSynthesiser(margins=settings.margins, ranking=settings.ranking)
+    with contextlib.ExitStack() as stack:
+        terminal = stack.enter_context(_terminal()) if speaks else []
+        return simulate(
+            scene,
+            synthesise,
+            settings,
+            Journals(*log, *terminal),
+            known=known,
+            errors=errors,
+            seed=seed,
+        )
+
+
+@contextlib.contextmanager
+def _log(
+    path: Path | None,
+    environment: Path,
+    scene: Scene,
+    settings: Settings,
+    errors: Errors,
+    seed: int,
+    known: str,
+) -> Iterator[list[Journal]]:
+    """The journal that writes the log, if one is wanted."""
+    if path is None:
+        yield []
+        return
+    from ntagen.drive.knowledge import told
+    from ntagen.drive.log import ACTUAL, SOURCE, Log, metadata_of
+    from ntagen.drive.scene_json import scene_to_json
+    from ntagen.errors import InputError
+
+    # What is wrong with the command line must be found before an earlier log is replaced.
+    told(scene, known)
+    if path.exists() and path.samefile(environment):
+        raise InputError(f"the log would replace {environment}\nhint: choose another --log")
+    metadata = {
+        "program": f"ntagen {_version()}",
+        "environment": environment.name,
+        "seed": seed,
+        "known": known,
+        "noise_mm": errors.noise_mm,
+        "roll_error_rad": errors.roll_rad,
+        "settings": settings.to_json(),
+    }
+    attachments = {
+        ACTUAL: scene_to_json(scene).encode(),
+        SOURCE: environment.read_bytes(),
+    }
+    with Log(path, metadata_of(metadata), attachments) as log:
+        yield [log]
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("ntagen")
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+class _Lines:
+    """Tells the run line by line; on a terminal also what happens right now."""
+
+    def __init__(self, status: Any = None) -> None:  # noqa: ANN401  rich is imported late
+        self._status = status
+
+    def record(self, record: Record) -> None:
+        """Prints what is worth a line, and refreshes the status."""
+        from ntagen.drive.records import Measured, Transition
+        from ntagen.drive.story import tell
+
+        line = tell(record)
+        if line is not None:
+            click.echo(line)
+        if self._status is None:
+            return
+        if isinstance(record, Transition):
+            self._status.update(record.following)
+        elif isinstance(record, Measured):
+            self._status.update(
+                f"{record.time_s:7.2f} s  {record.depth_mm:6.2f} mm deep, "
+                f"force {record.force_n:.2f} N"
+            )
+
+    def started(self, scene: Scene) -> None:
+        """Says what is driven, and what the driver knows."""
+        click.echo(
+            f"{scene.name}: {len(scene.targets)} target(s), "
+            f"{len(scene.criticals)} critical region(s) known"
+        )
+
+    def synthesised(self, number: int, synthesis: Synthesis) -> None:
+        """The line comes with the record."""
+
+
+@contextlib.contextmanager
+def _terminal() -> Iterator[list[Journal]]:
+    """The journal that prints; it draws a moving line only where somebody can see it move."""
+    import sys
+
+    if not sys.stdout.isatty():
+        yield [_Lines()]
+        return
+    from rich.console import Console
+
+    with Console().status("arm") as status:
+        yield [_Lines(status)]
+
+
+def _summary(
+    result: Result,
+    seed: int,
+    noise_mm: float,
+    roll_error_deg: float,
+    known: str,
+    log_path: Path | None,
+) -> dict[str, Any]:
+    ended = result.ended
+    clearance_mm = result.clearance_mm
+    return {
+        "outcome": ended.outcome,
+        "reason": ended.reason,
+        "time_s": ended.time_s,
+        "depth_mm": ended.depth_mm,
+        "adjustments": ended.adjustments,
+        "syntheses": ended.syntheses,
+        "true_clearance_mm": clearance_mm if math.isfinite(clearance_mm) else None,
+        "true_target_distance_mm": result.target_distance_mm,
+        "seed": seed,
+        "noise_mm": noise_mm,
+        "roll_error_deg": roll_error_deg,
+        "known": known,
+        "log": None if log_path is None else str(log_path),
+    }
+
+
+def _report(result: Result, scene: Scene, log_path: Path | None, *, short: bool) -> None:
+    ended = result.ended
+    if short:
+        click.echo(f"{ended.outcome}: {ended.reason}")
+        return
+    clearance_mm, target_mm = result.clearance_mm, result.target_distance_mm
+    where = "inside" if target_mm <= 0.0 else "outside of"
+    click.echo(
+        f"truly, the tip is {abs(target_mm):.2f} mm {where} {scene.targets[-1].name}", nl=False
+    )
+    if math.isfinite(clearance_mm):
+        click.echo(f", and all that was pierced is {clearance_mm:.2f} mm from critical regions")
+    else:
+        click.echo("")
+    count = f"{ended.syntheses} syntheses, {ended.adjustments} adjustments"
+    click.echo(f"{count}, {ended.time_s:.1f} s, {ended.depth_mm:.1f} mm deep")
+    if log_path is not None:
+        click.echo(f"wrote {log_path}")
+
+
+def _exit_code(outcome: str) -> int:
+    from ntagen.drive.states import State
+
+    return {
+        State.TARGET_REACHED: 0,
+        State.NO_STRATEGY: 1,
+        State.TIMED_OUT: 3,
+        State.FAULTED: 5,
+        State.INTERRUPTED: 130,
+    }[State(outcome)]

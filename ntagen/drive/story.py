@@ -1,0 +1,78 @@
+"""A run in words: one line for what a person wants to know of a record, nothing for the rest."""
+
+from __future__ import annotations
+
+from ntagen.drive.records import (
+    Ended,
+    Estimated,
+    Learned,
+    Record,
+    Synthesised,
+    Transition,
+    Visited,
+)
+from ntagen.drive.states import Event, State
+from ntagen.scene import Vector
+
+_FAR_MM = 1e8
+
+
+def tell(record: Record) -> str | None:
+    """The line for a record; None if it is routine."""
+    text = _text(record)
+    return None if text is None else f"{record.time_s:7.2f} s  {text}"
+
+
+def _text(record: Record) -> str | None:
+    match record:
+        case Transition():
+            return _transition(record)
+        case Estimated():
+            return (
+                f"estimate: tip {_point(record.position_mm)} mm, radius "
+                f"{record.radius_mm:.2f} ± {record.radius_std_mm:.2f} mm, "
+                f"residual {record.rms_mm:.3f} mm"
+            )
+        case Synthesised():
+            return _synthesis(record)
+        case Learned():
+            return (
+                f"learned: {record.kind} region '{record.name}' at "
+                f"{_point(record.center_mm)} mm, radius {record.radius_mm:.2f} mm"
+            )
+        case Visited():
+            return f"target {record.target} reached"
+        case Ended():
+            return f"{record.outcome}: {record.reason}"
+    return None
+
+
+def _transition(record: Transition) -> str | None:
+    match record.event:
+        case Event.FORCE.value:
+            return "the force rises: stop"
+        case Event.DEVIATION.value:
+            return "the tip deviates from the plan: stop"
+        case Event.PLAN_DONE.value:
+            return "the plan is done"
+    match record.following:
+        case State.INITIAL_PUSH.value:
+            return "initial push"
+        case State.PULL_BACK.value:
+            return "pull back"
+    return None
+
+
+def _synthesis(record: Synthesised) -> str:
+    place = f"synthesis {record.number} from {record.depth_mm:.2f} mm deep"
+    if not record.plan:
+        refused = f" ({record.found} refused)" if record.found else ""
+        return f"{place}: no plan{refused}"
+    far = record.clearance_mm > _FAR_MM
+    clearance = "" if far else f", {record.clearance_mm:.2f} mm from critical regions"
+    return f"{place}: {record.found} plans, {record.accepted} hold; best: {record.plan}{clearance}"
+
+
+def _point(position_mm: Vector) -> str:
+    # Adding zero turns a rounded -0.00 into 0.00.
+    return "(" + ", ".join(f"{round(c, 2) + 0.0:.2f}" for c in position_mm) + ")"
