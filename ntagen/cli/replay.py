@@ -84,9 +84,9 @@ def _shown(record: Record | None) -> str:
 def _summary(run: RunLog, comparison: Comparison) -> dict[str, Any]:
     from ntagen.drive.records import Ended
 
-    last = run.records[-1] if run.records else None
+    ends = [record for record in run.records if isinstance(record, Ended)]
     return {
-        "outcome": last.outcome if isinstance(last, Ended) else None,
+        "outcome": ends[-1].outcome if ends else None,
         "records": len(run.records),
         "torn_at_byte": run.torn_at_byte,
         "same": comparison.is_same,

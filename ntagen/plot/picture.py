@@ -26,7 +26,8 @@ _LABELS: Final = {"target": "target", "critical": "critical", "detection": "dete
 _NEEDLE: Final = "#1f5fbf"
 _OTHER: Final = "#8a94a6"
 _TRUE: Final = "#0b2545"
-_MEASURED: Final = "#111111"
+_MEASURED: Final = "#7a3e9d"
+_LEGEND_COLUMNS: Final = 6
 
 Curve = Sequence[Vector]
 
@@ -63,7 +64,7 @@ def draw(picture: Picture) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 6.4), dpi=150, layout="constrained")
-    grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.35))
+    grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.3))
     depth = _depth_axis(picture.scene)
     bounds = _bounds(picture)
     across = [axis for axis in range(3) if axis != depth]
@@ -78,7 +79,7 @@ def draw(picture: Picture) -> Figure:
         unique.values(),
         unique.keys(),
         loc="outside lower center",
-        ncols=len(unique),
+        ncols=min(len(unique), _LEGEND_COLUMNS),
         frameon=False,
         fontsize=9,
     )
@@ -128,7 +129,7 @@ def _draw_projection(
     from matplotlib.patches import Circle
 
     across, depth = shown
-    for region in _back_to_front(picture.scene.regions, shown):
+    for region in _back_to_front(picture.scene.regions):
         center = (region.center_mm[across], region.center_mm[depth])
         axes.add_patch(Circle(center, region.radius_mm, **_face(region, picture)))
     for style, curves in _curves(picture):
@@ -160,9 +161,8 @@ _TIP_STYLE: Final[dict[str, Any]] = {
 }
 
 
-def _back_to_front(regions: Sequence[Region], shown: tuple[int, int]) -> list[Region]:
+def _back_to_front(regions: Sequence[Region]) -> list[Region]:
     """Large ones first, and targets before the rest, so that nothing is hidden."""
-    del shown
     return sorted(regions, key=lambda r: (r.kind != "target", -r.radius_mm))
 
 
@@ -191,10 +191,10 @@ def _rgb(colour: str) -> tuple[float, float, float]:
 
 def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     """The curves in the order of drawing, with their style."""
-    alpha = max(0.12, min(0.5, 12.0 / max(1, len(picture.others))))
+    alpha = max(0.25, min(0.6, 15.0 / max(1, len(picture.others))))
     measured = [picture.measured] if picture.measured else []
     best = [picture.best] if picture.best else []
-    dots = {"marker": ".", "markersize": 2.0, "linestyle": "none"}
+    dots = {"marker": ".", "markersize": 2.5, "linestyle": "none"}
     other = {"color": _OTHER, "linewidth": 0.7, "alpha": alpha, "label": "other plans"}
     plan = {"color": _NEEDLE, "linewidth": 2.2, "label": "best plan"}
     true = {"color": _TRUE, "linewidth": 1.0, "label": "true path"}
@@ -204,8 +204,8 @@ def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     return [
         (other | {"zorder": 4}, picture.others),
         (plan | {"zorder": 5}, best),
-        (true | {"zorder": 6}, picture.true_path),
-        ({"color": _MEASURED, **dots, "label": "measured", "zorder": 7}, measured),
+        ({"color": _MEASURED, **dots, "label": "measured", "zorder": 6}, measured),
+        (true | {"zorder": 7}, picture.true_path),
     ]
 
 
@@ -228,7 +228,7 @@ def _draw_space(
     axes.set_xlim(limits[0])
     axes.set_ylim(limits[1])
     axes.set_zlim(limits[2] if picture.scene.axis[depth] <= 0.0 else limits[2][::-1])
-    axes.set_box_aspect([high - low for low, high in limits], zoom=0.95)
+    axes.set_box_aspect([high - low for low, high in limits], zoom=1.15)
     for name, i in zip("xyz", order, strict=True):
         getattr(axes, f"set_{name}label")(f"{_AXES[i]} [mm]", fontsize=8, labelpad=1)
     axes.tick_params(labelsize=7, pad=0)

@@ -12,7 +12,7 @@ from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.kinematics import Arc, circle_center
 from ntagen.needle.vectors import distance
 from ntagen.scene import Pose
-from tests.oracles.scenes import ENTRY
+from tests.steering import ENTRY
 from tests.unit.needle.test_kinematics import poses
 
 

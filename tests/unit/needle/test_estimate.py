@@ -13,7 +13,7 @@ from ntagen.needle.estimate import Estimate, Estimator, Priors, pose_from_points
 from ntagen.needle.vectors import distance, dot
 from ntagen.needle.virtual import Errors, SimulatedClock, VirtualNeedle
 from ntagen.scene import Needle, Pose
-from tests.oracles.scenes import ENTRY
+from tests.steering import ENTRY
 
 Moves = list[tuple[str, float]]
 

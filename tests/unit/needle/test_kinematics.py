@@ -13,7 +13,7 @@ from ntagen.needle.kinematics import Arc, circle_center, orthonormal, push, roll
 from ntagen.needle.path import Path
 from ntagen.needle.vectors import distance, dot, norm, rotate
 from ntagen.scene import Pose, Vector
-from tests.oracles.scenes import ENTRY
+from tests.steering import ENTRY
 
 lengths_mm = st.floats(0.0, 250.0)
 radii_mm = st.floats(5.0, 500.0)

@@ -10,7 +10,7 @@ import pytest
 from ntagen.errors import DeviceError
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.scene import Needle
-from tests.oracles.scenes import ENTRY, sphere
+from tests.steering import ENTRY, sphere
 
 AHEAD = Obstacle(sphere("C1", "critical", (0.0, -10.0, 0.0), 2.0), margin_mm=3.0)
 

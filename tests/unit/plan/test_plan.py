@@ -20,7 +20,7 @@ from ntagen.plan.extract import extract
 from ntagen.plan.rank import Candidate, parse_ranking, rank
 from ntagen.scene import Scene
 from tests.oracles import planner
-from tests.oracles.scenes import CRITICAL, PAPER, TARGET, scene, sphere
+from tests.steering import CRITICAL, PAPER, TARGET, scene, sphere
 
 actions = st.one_of(
     st.builds(Push, st.floats(0.0, 30.0)), st.builds(Roll, st.floats(-math.pi, math.pi))

@@ -1,0 +1,97 @@
+"""`ntagen plot`: a picture of a scene with its plans, or of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+if TYPE_CHECKING:
+    from ntagen.plot.picture import Picture
+
+_MCAP_MAGIC: Final = b"\x89MCAP"
+
+
+@click.command(
+    "plot",
+    epilog="Exit codes: 0 drawn, 2 the input or the name of the picture is wrong, "
+    "3 the engine reached a limit.",
+)
+@click.argument("source", metavar="ENV.nsl|RUN.mcap", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE.png|pdf|svg",
+    type=click.Path(path_type=Path),
+    help="Where to draw to.  [default: the source's name with .png, in the current folder]",
+)
+@click.option(
+    "--plans",
+    "shown",
+    metavar="N",
+    default=60,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="Draw at most so many plans; 0 draws the scene alone and asks the engine nothing.",
+)
+@click.option(
+    "--rank",
+    "ranking",
+    metavar="CRITERION,…",
+    default="clearance,rolls,length",
+    show_default=True,
+    help="What the best plan is: clearance, rolls, length, target.",
+)
+def command(source: Path, output: Path | None, shown: int, ranking: str) -> None:
+    """Draw a scene with its plans, or a run from its log.
+
+    Two projections and a view in space: target green, critical regions red, detection regions
+    dashed orange, the best plan blue, others faint; of a run also the true path, the measurements
+    and what was learned.
+
+    \b
+    Examples:
+      ntagen plot examples/paper.nsl -o scene.pdf --plans 10
+      ntagen plot run.mcap
+    """  # noqa: D301  click wants the control character
+    from ntagen.plan.rank import parse_ranking
+    from ntagen.plot.save import format_of, save
+
+    criteria = parse_ranking(ranking)
+    path = Path(f"{source.stem or source.name}.png") if output is None else output
+    format_of(path)
+    picture = _of_run(source, shown) if _is_log(source) else _of_scene(source, shown, criteria)
+    # Matplotlib takes half a second: it is asked for when everything else is right.
+    from ntagen.plot.picture import draw
+
+    save(draw(picture), path)
+    click.echo(f"wrote {path}")
+
+
+def _is_log(source: Path) -> bool:
+    """Whether a file is a log, by its first bytes or, if it is empty, its name."""
+    try:
+        with source.open("rb") as file:
+            return file.read(len(_MCAP_MAGIC)) == _MCAP_MAGIC or source.suffix == ".mcap"
+    except OSError:
+        return source.suffix == ".mcap"
+
+
+def _of_run(source: Path, shown: int) -> Picture:
+    from ntagen.drive.reading import read_log
+    from ntagen.plot.run import picture_of_run
+
+    return picture_of_run(read_log(source), shown)
+
+
+def _of_scene(source: Path, shown: int, ranking: tuple[str, ...]) -> Picture:
+    from ntagen.nsl import load_with_warnings
+    from ntagen.plan.synthesise import EngineSynthesiser
+    from ntagen.plot.run import picture_of_plans
+
+    scene, warnings = load_with_warnings(source)
+    for warning in warnings:
+        click.echo(warning.render(), err=True)
+    candidates = EngineSynthesiser(ranking=ranking)(scene).candidates if shown > 0 else ()
+    return picture_of_plans(scene, candidates, shown)

@@ -1,0 +1,110 @@
+"""From a scene's plans, or from the log of a run, to the picture of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Final
+
+from ntagen.drive.reading import RunLog
+from ntagen.drive.records import Ended, Measured, Synthesised, Truth
+from ntagen.drive.scene_json import scene_from_json
+from ntagen.needle.path import sample_poses
+from ntagen.plan.actions import Plan
+from ntagen.plan.document import plan_from_json
+from ntagen.plan.rank import Candidate
+from ntagen.plot.picture import Curve, Picture
+from ntagen.scene import Needle, Scene, Vector
+
+_SPACING_MM: Final = 0.5
+_GAP_MM: Final = 1.0
+"""Places of the tip farther apart than this are on different curves: it was pulled back between."""
+
+
+def picture_of_plans(scene: Scene, candidates: tuple[Candidate, ...], shown: int) -> Picture:
+    """The picture of a scene with its best plans, at most `shown` of them."""
+    plans = [candidate.plan for candidate in candidates[:shown]]
+    caption = ""
+    if candidates:
+        caption = f"{_plans(len(candidates))}; best: {candidates[0].plan}"
+        clearance_mm = candidates[0].certificate.critical_clearance_mm
+        if math.isfinite(clearance_mm):
+            caption += f"; {clearance_mm:.1f} mm from critical regions"
+    elif shown > 0:
+        caption = "no plan"
+    return Picture(
+        scene=scene,
+        best=curve(plans[0], scene.needle) if plans else (),
+        others=[curve(plan, scene.needle) for plan in plans[1:]],
+        caption=caption,
+    )
+
+
+def picture_of_run(log: RunLog, shown: int) -> Picture:
+    """The picture of a run: the regions, what was learned, the last plans, where the tip was.
+
+    Raises:
+        InputError: The log holds no scene, or one that cannot be read.
+    """
+    actual, told = log.actual, log.scene
+    names = {region.name for region in actual.regions}
+    learned = tuple(region for region in _last_scene(log).regions if region.name not in names)
+    plans, needle = _last_plans(log, shown)
+    ends = [record for record in log.records if isinstance(record, Ended)]
+    return Picture(
+        scene=actual.with_regions(*learned),
+        best=curve(plans[0], needle) if plans else (),
+        others=[curve(plan, needle) for plan in plans[1:]],
+        true_path=_split([r.position_mm for r in log.records if isinstance(r, Truth)]),
+        measured=[r.position_mm for r in log.records if isinstance(r, Measured)],
+        learned=frozenset(region.name for region in learned),
+        unknown=frozenset(names - {region.name for region in told.regions}),
+        title=f"{actual.name}, a run with seed {log.metadata.get('seed', '?')}",
+        caption=_outcome(ends[-1]) if ends else "the log is torn",
+    )
+
+
+def curve(plan: Plan, needle: Needle) -> Curve:
+    """The points of the path that a plan gives a needle."""
+    poses = sample_poses(plan.arcs(needle), _SPACING_MM)
+    return [pose.position_mm for pose in poses]
+
+
+def _outcome(ended: Ended) -> str:
+    return (
+        f"{ended.outcome} after {ended.time_s:.0f} s; {ended.syntheses} syntheses, "
+        f"{ended.adjustments} adjustments"
+    )
+
+
+def _last_scene(log: RunLog) -> Scene:
+    """What the driver knew at the last synthesis."""
+    scenes = sorted(name for name in log.attachments if name.endswith("/scene.json"))
+    return scene_from_json(log.attachments[scenes[-1]]) if scenes else log.scene
+
+
+def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
+    """The plans of the last synthesis that had any, best first, and the needle they start from."""
+    numbers = [r.number for r in log.records if isinstance(r, Synthesised) and r.plan]
+    for number in reversed(numbers):
+        folder = f"rebuild-{number:04d}"
+        if f"{folder}/plans.json" in log.attachments:
+            document = json.loads(log.attachments[f"{folder}/plans.json"])
+            scene = scene_from_json(log.attachments[f"{folder}/scene.json"])
+            items = document["plans"][:shown]
+            return [plan_from_json(item["actions"]) for item in items], scene.needle
+    return [], log.scene.needle
+
+
+def _split(points: list[Vector]) -> list[Curve]:
+    curves: list[list[Vector]] = []
+    for point in points:
+        if curves and math.dist(curves[-1][-1], point) <= _GAP_MM:
+            curves[-1].append(point)
+        else:
+            curves.append([point])
+    return [curve for curve in curves if len(curve) > 1]
+
+
+def _plans(count: int) -> str:
+    return "1 plan" if count == 1 else f"{count} plans"
