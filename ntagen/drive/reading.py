@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from google.protobuf.message import DecodeError
-from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Footer, McapRecord, Metadata, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
@@ -25,9 +23,6 @@ from ntagen.drive.scene_json import scene_from_json
 from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
 from ntagen.scene import Scene
-
-_DAMAGE = (McapError, EOFError, ValueError, KeyError, IndexError, DecodeError, OSError)
-"""What the library raises on files that end early or hold nonsense."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +137,9 @@ def _read(file: IO[bytes], collected: _Collected) -> int | None:
             collected.add(item)
         except StopIteration:
             return good_byte
-        except _DAMAGE:
+        except Exception:
+            # At a tear the libraries raise whatever their parsers stumble on: errors of their own,
+            # of struct, of the decompressor. All of them mean that the file is good up to here.
             return good_byte
         if isinstance(item, Footer):
             return None

@@ -1,0 +1,117 @@
+"""What is told, what is learned, and that learning converges."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ntagen.drive.knowledge import Knowledge, sensing_margin_mm, shells_of, told
+from ntagen.errors import InputError
+from ntagen.needle.vectors import distance
+from ntagen.scene import Pose, Region
+from tests.steering import CRITICAL, DETECTION, ENTRY, PAPER, scene, sphere
+
+OTHER = sphere("C2", "critical", (20.0, -25.0, 0.0), 2.0)
+PLAIN_SHELL = sphere("D2", "detection", (20.0, -25.0, 0.0), 4.0)
+TWO = scene(CRITICAL, OTHER, DETECTION, PLAIN_SHELL)
+
+
+def pose_at(x: float, y: float, z: float) -> Pose:
+    return Pose((x, y, z), ENTRY.heading, ENTRY.bevel)
+
+
+def check_told(known: str, *names: str) -> None:
+    kept = told(TWO, known)
+    assert [region.name for region in kept.criticals + kept.detections] == list(names)
+    assert kept.targets == TWO.targets
+
+
+def test_all_is_everything() -> None:
+    check_told("all", "C1", "C2", "D1", "D2")
+
+
+def test_none_hides_the_shells_too() -> None:
+    check_told("none")
+
+
+def test_a_shell_belongs_to_the_region_that_it_contains() -> None:
+    check_told("C2", "C2", "D2")
+    check_told(" C1 ", "C1", "D1")
+
+
+def test_an_unknown_name_is_refused_with_the_choice() -> None:
+    with pytest.raises(InputError, match="one of all, none, C1, C2"):
+        told(TWO, "C1,C3")
+
+
+def test_the_sensing_margin_is_the_depth_of_the_shell() -> None:
+    assert shells_of(OTHER, TWO.detections) == (PLAIN_SHELL,)
+    assert sensing_margin_mm(OTHER, TWO.detections, 9.0) == pytest.approx(2.0)
+    assert sensing_margin_mm(CRITICAL, (), 9.0) == pytest.approx(9.0)
+
+
+def test_a_contact_becomes_a_ball_ahead_whose_shell_touches_the_tip() -> None:
+    tip = pose_at(0.0, -10.0, 0.0)
+    learned = Knowledge(scene()).with_contact(tip, 3.0, 2.0).learned
+    ball, shell = learned
+    assert (ball.kind, ball.center_mm, ball.radius_mm) == ("critical", (0.0, -15.0, 0.0), 2.0)
+    assert (shell.kind, shell.around, shell.radius_mm) == ("detection", ball.name, 5.0)
+    assert distance(tip.position_mm, shell.center_mm) == pytest.approx(shell.radius_mm)
+
+
+def test_contacts_far_apart_stay_two_regions() -> None:
+    knowledge = Knowledge(scene()).with_contact(pose_at(0.0, -10.0, 0.0), 3.0, 2.0)
+    knowledge = knowledge.with_contact(pose_at(15.0, -10.0, 0.0), 3.0, 2.0)
+    assert [r.kind for r in knowledge.learned].count("critical") == 2
+
+
+def test_contacts_with_nothing_between_them_become_one_region() -> None:
+    knowledge = Knowledge(scene()).with_contact(pose_at(0.0, -10.0, 0.0), 3.0, 2.0)
+    knowledge = knowledge.with_contact(pose_at(6.0, -10.0, 0.0), 3.0, 2.0)
+    (ball,) = (r for r in knowledge.learned if r.kind == "critical")
+    assert ball.center_mm == pytest.approx((3.0, -15.0, 0.0))
+    assert ball.radius_mm == pytest.approx(5.0)
+
+
+def test_a_contact_near_a_known_region_widens_its_shell() -> None:
+    tip = pose_at(0.0, -20.2, 0.0)
+    knowledge = Knowledge(PAPER).with_contact(tip, 3.0, 2.0)
+    (shell,) = knowledge.learned
+    assert (shell.kind, shell.center_mm) == ("detection", CRITICAL.center_mm)
+    again = knowledge.with_contact(tip, 3.0, 2.0)
+    assert again.learned[0].radius_mm > shell.radius_mm > DETECTION.radius_mm
+    assert len(again.learned) == 1
+
+
+contacts = st.lists(st.tuples(*[st.floats(-20.0, 20.0)] * 3), min_size=1, max_size=12)
+
+
+@given(contacts)
+def test_learned_shells_cover_every_contact_and_never_shrink(
+    places: list[tuple[float, float, float]],
+) -> None:
+    knowledge = Knowledge(scene())
+    for place in places:
+        before = [r for r in knowledge.learned if r.kind == "critical"]
+        knowledge = knowledge.with_contact(pose_at(*place), 3.0, 2.0)
+        after = [r for r in knowledge.learned if r.kind == "critical"]
+        assert all(any(contains(new, old) for new in after) for old in before)
+        assert covered(place, knowledge.learned)
+    assert all(covered(place, knowledge.learned) for place in places)
+
+
+def contains(outer: Region, inner: Region) -> bool:
+    reach_mm = distance(outer.center_mm, inner.center_mm) + inner.radius_mm
+    return reach_mm <= outer.radius_mm + 1e-9
+
+
+def covered(place: tuple[float, float, float], regions: tuple[Region, ...]) -> bool:
+    return any(distance(place, r.center_mm) <= r.radius_mm + 1e-9 for r in regions)
+
+
+def test_visited_targets_are_planned_for_no_more() -> None:
+    near = sphere("near", "target", (0.0, -8.0, 0.0), 3.0)
+    far = sphere("far", "target", (0.0, -20.0, 0.0), 3.0)
+    knowledge = Knowledge(scene(targets=[near, far])).visiting()
+    assert knowledge.scene(ENTRY, 30.0).targets == (far,)

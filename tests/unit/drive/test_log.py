@@ -1,0 +1,149 @@
+"""Log and reading: nothing is changed on the way, and a torn log gives all up to the tear."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import get_args, get_type_hints
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from ntagen.drive.log import ACTUAL, Log, metadata_of, topic_of
+from ntagen.drive.messages import KINDS, decode, encode
+from ntagen.drive.reading import read_log
+from ntagen.drive.records import Command, Record, Transition
+from ntagen.drive.scene_json import scene_from_json, scene_to_json
+from ntagen.drive.settings import Settings
+from ntagen.drive.viewing import quaternion
+from ntagen.errors import InputError
+from ntagen.needle.kinematics import bending_axis
+from ntagen.scene import Pose, Scene
+from tests.scenes import poses
+from tests.steering import PAPER, scene
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@st.composite
+def records(draw: st.DrawFn) -> Record:
+    kind = draw(st.sampled_from(KINDS))
+    values = {}
+    for field, hint in get_type_hints(kind).items():
+        if field not in {f.name for f in dataclasses.fields(kind)}:
+            continue
+        if get_args(hint):
+            values[field] = tuple(draw(numbers) for _ in range(3))
+        else:
+            values[field] = draw(
+                {float: numbers, int: st.integers(0, 10**9), str: st.text(max_size=9)}[hint]
+            )
+    return kind(**values)
+
+
+@given(records(), st.integers(0, 10**9))
+def test_a_record_survives_its_message(record: Record, sequence: int) -> None:
+    name = f"ntagen.{type(record).__name__}"
+    assert decode(name, encode(record, sequence)) == (sequence, record)
+
+
+@pytest.mark.parametrize("of", [PAPER, scene()])
+def test_a_scene_survives_json(of: Scene) -> None:
+    assert scene_from_json(scene_to_json(of)) == of
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"version": 2}', '{"version": 1, "scene": {}}'])
+def test_what_is_no_scene_is_refused(text: str) -> None:
+    with pytest.raises(InputError):
+        scene_from_json(text)
+
+
+def test_settings_survive_json() -> None:
+    settings = Settings(timeout_s=7.0, ranking=("length",))
+    assert Settings.from_json(settings.to_json()) == settings
+
+
+@given(poses())
+def test_the_quaternion_is_the_rotation_of_the_tip(pose: Pose) -> None:
+    x, y, z, w = quaternion(pose)
+    assert math.hypot(x, y, z, w) == pytest.approx(1.0, abs=1e-6)
+    first = (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w))
+    second = (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w))
+    assert first == pytest.approx(pose.heading, abs=1e-6)
+    assert second == pytest.approx(bending_axis(pose), abs=1e-6)
+
+
+MANY = [Command(0.25 * i, "push", 0.25) for i in range(40)]
+ALARM = Transition(10.0, "monitor", "force", "stop")
+
+
+def written(path: Path, *, closed: bool = True) -> Path:
+    settings = metadata_of({"seed": 1, "settings": Settings().to_json()})
+    log = Log(path, settings, {ACTUAL: scene_to_json(PAPER).encode()})
+    log.started(scene())
+    for record in [*MANY, ALARM]:
+        log.record(record)
+    if closed:
+        log.close()
+    return path
+
+
+def test_a_log_is_read_as_it_was_written(tmp_path: Path) -> None:
+    log = read_log(written(tmp_path / "run.mcap"))
+    assert log.records == (*MANY, ALARM)
+    assert log.metadata["seed"] == "1"
+    assert log.torn_at_byte is None
+    assert (log.scene, log.actual) == (scene(), PAPER)
+    assert log.settings == Settings()
+
+
+def test_common_readers_read_the_log(tmp_path: Path) -> None:
+    with written(tmp_path / "run.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        commands = [
+            m for _, c, _, m in reader.iter_decoded_messages() if c.topic == topic_of(Command)
+        ]
+    assert [command.value for command in commands] == [0.25] * len(MANY)
+
+
+def test_equal_runs_give_equal_files(tmp_path: Path) -> None:
+    first, second = written(tmp_path / "a.mcap"), written(tmp_path / "b.mcap")
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_every_record_is_with_the_system_before_the_log_is_closed(tmp_path: Path) -> None:
+    log = read_log(written(tmp_path / "run.mcap", closed=False))
+    assert log.records == (*MANY, ALARM)
+    assert log.torn_at_byte == (tmp_path / "run.mcap").stat().st_size
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9, 0.99])
+def test_a_torn_log_gives_all_before_the_tear(tmp_path: Path, share: float) -> None:
+    data = written(tmp_path / "run.mcap").read_bytes()
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(data[: int(len(data) * share)])
+    log = read_log(torn)
+    assert log.records == (*MANY, ALARM)[: len(log.records)]
+    assert log.torn_at_byte is not None
+    assert 0 < log.torn_at_byte <= len(data) * share
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00" * 100, b"\x89MCAP0\r\n", b"<nta></nta>"])
+def test_what_is_no_log_is_refused(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="not the log of a run"):
+        read_log(path)
+
+
+def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_log(tmp_path / "none.mcap")
+    with pytest.raises(InputError, match="folder"):
+        read_log(tmp_path)
+    with pytest.raises(InputError, match="folder"):
+        Log(tmp_path, {}, {})
