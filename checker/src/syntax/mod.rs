@@ -40,6 +40,8 @@ mod xml_text;
 
 mod xml;
 
+mod xml_template;
+
 mod xta;
 
 mod prelude;
