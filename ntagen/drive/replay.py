@@ -111,12 +111,15 @@ class _Stage:
 
     def push(self, length_mm: float) -> None:
         """Nothing moves; the command was compared as a record."""
+        self._repeat_failure()
 
     def roll(self, angle_rad: float) -> None:
         """Nothing moves."""
+        self._repeat_failure()
 
     def pull(self, length_mm: float) -> None:
         """Nothing moves."""
+        self._repeat_failure()
 
     def stop(self) -> None:
         """Nothing moves."""
@@ -158,6 +161,11 @@ class _Stage:
         if logged is None:
             raise _LogOver
         return logged
+
+    def _repeat_failure(self) -> None:
+        """A motion that did not end well then does not end well now."""
+        if self.next_logged is not None:
+            self._repeat_abort(self.next_logged)
 
     def _repeat_abort(self, logged: Record) -> None:
         """What came from outside then comes from outside now: a fault or the operator."""

@@ -81,15 +81,19 @@ MANY = [Command(0.25 * i, "push", 0.25) for i in range(40)]
 ALARM = Transition(10.0, "monitor", "force", "stop")
 
 
-def written(path: Path, *, closed: bool = True) -> Path:
+def written(path: Path) -> Path:
+    with filled(path):
+        pass
+    return path
+
+
+def filled(path: Path) -> Log:
     settings = metadata_of({"seed": 1, "settings": Settings().to_json()})
     log = Log(path, settings, {ACTUAL: scene_to_json(PAPER).encode()})
     log.started(scene())
     for record in [*MANY, ALARM]:
         log.record(record)
-    if closed:
-        log.close()
-    return path
+    return log
 
 
 def test_a_log_is_read_as_it_was_written(tmp_path: Path) -> None:
@@ -116,9 +120,11 @@ def test_equal_runs_give_equal_files(tmp_path: Path) -> None:
 
 
 def test_every_record_is_with_the_system_before_the_log_is_closed(tmp_path: Path) -> None:
-    log = read_log(written(tmp_path / "run.mcap", closed=False))
+    path = tmp_path / "run.mcap"
+    with filled(path):
+        log = read_log(path)
+        assert log.torn_at_byte == path.stat().st_size
     assert log.records == (*MANY, ALARM)
-    assert log.torn_at_byte == (tmp_path / "run.mcap").stat().st_size
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9, 0.99])

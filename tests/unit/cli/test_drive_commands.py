@@ -1,0 +1,139 @@
+"""The commands drive, replay and plot: messages, exit codes, JSON, files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ntagen.cli import main
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+PAPER = str(EXAMPLES / "paper.nsl")
+LARGE = str(EXAMPLES / "scenarios" / "large_mid_cr.nsl")
+
+
+def check_refused(capsys: pytest.CaptureFixture[str], says: str, *arguments: str) -> None:
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert says in err
+    assert "Traceback" not in err
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("run") / "run.mcap"
+    assert main(["drive", PAPER, "--seed", "1", "--quiet", "--log", str(path)]) == 0
+    return path
+
+
+def test_drive_reaches_the_target_and_tells_how(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", PAPER, "--seed", "1"]) == 0
+    out = capsys.readouterr().out
+    assert "initial push" in out
+    assert "synthesis 1 from 5.00 mm deep" in out
+    assert "target reached: the tip is in the last target" in out
+    assert "mm inside T1" in out
+
+
+def test_drive_says_that_there_is_no_strategy(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", LARGE, "--json"]) == 1
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["outcome"] == "no strategy"
+    assert summary["depth_mm"] == pytest.approx(5.0)
+
+
+def test_drive_ends_at_the_time_limit(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", PAPER, "--timeout", "0.5 min", "--quiet"]) == 3
+    assert capsys.readouterr().out == "time-out: the limit of 30 s is over\n"
+
+
+def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["drive", PAPER, "--json", "--seed", "3", "--known", "none"]) == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    assert out.count("\n") == 1
+    assert err == ""
+    assert summary["outcome"] == "target reached"
+    assert summary["true_clearance_mm"] > 0.0
+    assert (summary["seed"], summary["known"]) == (3, "none")
+
+
+@pytest.mark.parametrize(
+    ("says", "arguments"),
+    [
+        ("nowhere.nsl", ["nowhere.nsl"]),
+        ("no needle 'phantom'", [PAPER, "--needle", "phantom"]),
+        ("unknown critical region 'C9'", [PAPER, "--known", "C9"]),
+        ("unknown ranking criterion 'beauty'", [PAPER, "--rank", "beauty"]),
+        ("is no time", [PAPER, "--timeout", "soon"]),
+        ("is no time", [PAPER, "--timeout", "0"]),
+        ("not a number from 0", [PAPER, "--noise", "-1"]),
+        ("not a number from 0", [PAPER, "--roll-error", "nan"]),
+        ("--seed", [PAPER, "--seed", "-1"]),
+        ("it is a folder", [PAPER, "--log", "."]),
+        ("would replace", [PAPER, "--log", PAPER]),
+    ],
+)
+def test_drive_refuses_bad_input(
+    capsys: pytest.CaptureFixture[str], says: str, arguments: list[str]
+) -> None:
+    check_refused(capsys, says, "drive", *arguments)
+
+
+def test_replay_reaches_the_same_decisions(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(run)]) == 0
+    out = capsys.readouterr().out
+    assert "initial push" in out
+    assert "the same decisions again: all" in out
+
+
+def test_replay_reads_a_torn_log(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    torn = tmp_path / "torn.mcap"
+    torn.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
+    assert main(["replay", str(torn)]) == 0
+    assert "is torn: it can be read up to byte" in capsys.readouterr().out
+    assert main(["replay", str(torn), "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["same"]
+    assert not summary["complete"]
+    assert 0 < summary["torn_at_byte"] <= run.stat().st_size // 2
+
+
+@pytest.mark.parametrize("data", [b"", b"\x89MCAP0\r\n", b"environment"])
+def test_replay_refuses_what_is_no_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], data: bytes
+) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(data)
+    check_refused(capsys, "not the log of a run", "replay", str(path))
+
+
+def test_plot_draws_a_scene_and_a_run(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for source in (PAPER, str(run)):
+        path = tmp_path / f"{Path(source).stem}.svg"
+        assert main(["plot", source, "-o", str(path), "--plans", "3"]) == 0
+        assert capsys.readouterr().out == f"wrote {path}\n"
+        assert "best plan" in path.read_text() or "last plan" in path.read_text()
+
+
+@pytest.mark.parametrize(
+    ("says", "arguments"),
+    [
+        ("nowhere.nsl", ["nowhere.nsl"]),
+        ("no such file", ["nowhere.mcap"]),
+        ("unknown kind of picture", [PAPER, "-o", "scene.bmp"]),
+        ("unknown ranking criterion", [PAPER, "--rank", ""]),
+        ("--plans", [PAPER, "--plans", "-1"]),
+    ],
+)
+def test_plot_refuses_bad_input(
+    capsys: pytest.CaptureFixture[str], says: str, arguments: list[str]
+) -> None:
+    check_refused(capsys, says, "plot", *arguments)
