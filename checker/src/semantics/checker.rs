@@ -44,6 +44,8 @@ pub(super) struct Checker<'a> {
     pub(super) needs_unrolling: bool,
     /// Whether a query is checked.
     pub(super) is_query: bool,
+    /// The name of the function that is being checked.
+    pub(super) function_span: Span,
     /// The process whose declarations are being checked.
     pub(super) process: Option<(ProcessId, String)>,
 }
@@ -83,6 +85,7 @@ impl<'a> Checker<'a> {
             hides_system: false,
             needs_unrolling: false,
             is_query: false,
+            function_span: Span::default(),
             process: None,
         }
     }

@@ -39,6 +39,8 @@ impl Checker<'_> {
     }
 
     fn add_clock_values(&mut self, is_sum: bool, left: Expr, right: Expr, span: Span) -> Expr {
+        // A sum of clocks is one mistake, if it is one.
+        let (left, right) = (Expr { span, ..left }, Expr { span, ..right });
         let (left, right) = (self.clock_value(left), self.clock_value(right));
         let operator = if is_sum {
             BinaryOp::Add

@@ -43,8 +43,6 @@ codes! {
     CONSTANT_OUT_OF_RANGE = "E0215" "constant-out-of-range";
     /// A constant expression that ends in an error.
     CONSTANT_WITHOUT_VALUE = "E0216" "constant-without-value";
-    /// A literal beyond 32 bits.
-    INTEGER_TOO_LARGE = "E0217" "integer-too-large";
     /// Too few or too many initial values.
     INITIALISER_COUNT = "E0218" "initialiser-count";
     /// An initial value of a shape that the type does not have.
@@ -119,8 +117,6 @@ codes! {
     CONDITION_NOT_AN_INVARIANT = "E0253" "condition-not-an-invariant";
     /// An edge or `init` that names no location.
     LOCATION_UNKNOWN = "E0254" "location-unknown";
-    /// A location that is both urgent and committed.
-    LOCATION_URGENT_AND_COMMITTED = "E0255" "location-urgent-and-committed";
     /// An initial location that is none.
     INITIAL_LOCATION = "E0256" "initial-location";
     /// A branch point or a leg of one that breaks the rules.
@@ -161,8 +157,6 @@ codes! {
     QUERY_UNSUPPORTED = "E0274" "query-unsupported";
     /// A strategy that no query defined.
     STRATEGY_UNKNOWN = "E0275" "strategy-unknown";
-    /// A strategy from a query that gives none.
-    STRATEGY_OF_NO_GAME = "E0276" "strategy-of-no-game";
     /// A loaded strategy without a name.
     STRATEGY_WITHOUT_NAME = "E0277" "strategy-without-name";
     /// An expression whose value is dropped and that changes nothing.

@@ -79,6 +79,9 @@ impl Checker<'_> {
 
     fn run_expression(&mut self, expr: &Expr) -> Option<Vec<i32>> {
         if !self.can_lower() {
+            if let Some(kind) = failure(expr) {
+                self.report_failure(kind, expr.span);
+            }
             return None;
         }
         let locals = self.locals.clone();
@@ -150,6 +153,29 @@ impl Checker<'_> {
         );
         false
     }
+}
+
+/// Why an expression has no value, if that can be seen without running code.
+fn failure(expr: &Expr) -> Option<RunTimeErrorKind> {
+    let own = match &expr.kind {
+        Kind::Integer(operator, left, right) => {
+            let operands = left.constant().zip(right.constant());
+            operands.and_then(|(left, right)| arithmetic::integer(*operator, left, right).err())
+        }
+        Kind::Index {
+            index,
+            first,
+            length,
+            ..
+        } => index
+            .constant()
+            .filter(|&i| i < *first || i.abs_diff(*first) >= *length)
+            .map(|_| RunTimeErrorKind::IndexOutOfBounds),
+        _ => None,
+    };
+    let mut found = own;
+    expr.children(&mut |child| found = found.or_else(|| failure(child)));
+    found
 }
 
 /// The value of arithmetic on integer constants, wrapping round.

@@ -383,6 +383,9 @@ impl Checker<'_> {
         ty: &Type,
         parts: Option<Vec<InitialPart>>,
     ) -> Entity {
+        if ty.size().clocks + ty.size().channels > 0 {
+            return Entity::Broken;
+        }
         let Some(parts) = parts else {
             self.error(
                 codes::CONSTANT_NOT_INITIALISED,

@@ -15,7 +15,7 @@ impl Checker<'_> {
     pub(super) fn expression(&mut self, expr: &ast::Expr) -> Expr {
         let span = expr.span;
         match &expr.kind {
-            ExprKind::Int(value) => self.integer_literal(*value, span),
+            ExprKind::Int(value) => Self::integer_literal(*value, span),
             ExprKind::Double(value) => Expr::new(Kind::Double(*value), Type::Double, span),
             ExprKind::Bool(value) => Expr::bool(*value, span),
             ExprKind::String(_) => Expr::new(Kind::Text, Type::String, span),
@@ -71,17 +71,12 @@ impl Checker<'_> {
         }
     }
 
-    fn integer_literal(&mut self, value: i64, span: Span) -> Expr {
-        if let Ok(value) = i32::try_from(value) {
-            return Expr::int(value, Type::ANY_INT, span);
+    /// A literal; the parser has reported those beyond 32 bits.
+    fn integer_literal(value: i64, span: Span) -> Expr {
+        match i32::try_from(value) {
+            Ok(value) => Expr::int(value, Type::ANY_INT, span),
+            Err(_) => Expr::error(span),
         }
-        self.error(
-            codes::INTEGER_TOO_LARGE,
-            span,
-            format!("{value} does not fit into 32 bits"),
-            "the greatest integer is 2147483647",
-        );
-        Expr::error(span)
     }
 
     fn deadlock(&mut self, span: Span) -> Expr {

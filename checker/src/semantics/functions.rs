@@ -20,6 +20,7 @@ impl Checker<'_> {
         let outer_locals = std::mem::take(&mut self.locals);
         let clock_values = self.clock_values.len();
         let result = self.result_type(&function.return_type);
+        self.function_span = function.name.span;
         self.declare(&function.name, Entity::OpenFunction);
         self.scopes.push(Scope::default());
         let parameters: Vec<Parameter> = function
@@ -272,11 +273,14 @@ impl Checker<'_> {
                     .map(|condition| self.condition(condition));
                 let step = step.as_ref().map(|step| self.effect_expression(step));
                 let body = Box::new(self.statement(body, result));
+                let parts = [&condition, &step, &init];
+                let span = parts.into_iter().flatten().map(|part| part.span).next();
                 let repeat = Statement::Loop {
                     condition,
                     step,
                     body,
                     tested_first: true,
+                    span: span.unwrap_or(self.function_span),
                 };
                 Statement::Block(
                     init.map(Statement::Expr)
@@ -290,6 +294,7 @@ impl Checker<'_> {
                 step: None,
                 body: Box::new(self.statement(body, result)),
                 tested_first: true,
+                span: condition.span,
             },
             ast::Statement::DoWhile(body, condition) => {
                 let body = Box::new(self.statement(body, result));
@@ -298,6 +303,7 @@ impl Checker<'_> {
                     step: None,
                     body,
                     tested_first: false,
+                    span: condition.span,
                 }
             }
             ast::Statement::Iterate { name, ty, body } => self.iterate(name, ty, body, result),

@@ -57,32 +57,20 @@ impl Checker<'_> {
     }
 
     fn query_kind(&mut self, query: &ast::Query, strategies: &[String]) -> Option<QueryKind> {
-        if let Some(strategy) = &query.strategy {
-            if strategies.contains(&strategy.text) {
-                self.report(
-                    crate::diagnostics::Diagnostic::new(
-                        codes::STRATEGY_TWICE,
-                        strategy.span,
-                        format!(
-                            "there is a strategy '{}' already; this one takes its place",
-                            strategy.text
-                        ),
-                    )
-                    .help("give it another name"),
-                );
-            }
-            let is_strategy = matches!(
-                query.kind,
-                ast::QueryKind::Control(_) | ast::QueryKind::LoadStrategy { .. }
-            );
-            if !is_strategy {
-                self.error(
-                    codes::STRATEGY_OF_NO_GAME,
+        if let Some(strategy) = &query.strategy
+            && strategies.contains(&strategy.text)
+        {
+            self.report(
+                crate::diagnostics::Diagnostic::new(
+                    codes::STRATEGY_TWICE,
                     strategy.span,
-                    "only game queries give a strategy",
-                    "write strategy S = control: …",
-                );
-            }
+                    format!(
+                        "there is a strategy '{}' already; this one takes its place",
+                        strategy.text
+                    ),
+                )
+                .help("give it another name"),
+            );
         }
         match &query.kind {
             ast::QueryKind::Reachable(p) => Some(QueryKind::Reachable(self.predicate(p, true)?)),
@@ -154,7 +142,9 @@ impl Checker<'_> {
             return None;
         }
         self.expect_pure(&expr, "a query");
-        self.refuse_doubles(&expr);
+        if self.refuse_doubles(&expr) {
+            return None;
+        }
         let text = collapse(self.sources.text(item.span));
         if expr.ty.is_clock() && expr.variable().is_some() {
             let clock = self.clock_choice(&expr)?;
@@ -331,8 +321,9 @@ impl Checker<'_> {
         }
     }
 
-    fn refuse_doubles(&mut self, expr: &Expr) {
-        if expr.any(&|e| e.ty == Type::Double) {
+    fn refuse_doubles(&mut self, expr: &Expr) -> bool {
+        let is_refused = expr.any(&|e| e.ty == Type::Double);
+        if is_refused {
             self.error(
                 codes::DOUBLE_IN_QUERY,
                 expr.span,
@@ -340,6 +331,7 @@ impl Checker<'_> {
                 "let the model put what matters into an integer",
             );
         }
+        is_refused
     }
 
     fn check_deadlock(&mut self, expr: &Expr, allows_deadlock: bool) {

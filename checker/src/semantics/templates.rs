@@ -96,19 +96,12 @@ impl Checker<'_> {
             Some(name) => name.text.clone(),
             None => format!("_{}", location.id),
         };
-        let urgency = match (location.committed, location.urgent) {
-            (true, true) => {
-                self.error(
-                    codes::LOCATION_URGENT_AND_COMMITTED,
-                    location.span,
-                    format!("the location {name} is both urgent and committed"),
-                    "committed includes urgent: leave urgent out",
-                );
-                Urgency::Committed
-            }
-            (true, false) => Urgency::Committed,
-            (false, true) => Urgency::Urgent,
-            (false, false) => Urgency::Normal,
+        let urgency = if location.committed {
+            Urgency::Committed
+        } else if location.urgent {
+            Urgency::Urgent
+        } else {
+            Urgency::Normal
         };
         let place = format!("template {}, location {name}", template.name.text);
         let (invariant, rates) = match &location.invariant {

@@ -248,6 +248,8 @@ pub(super) enum Statement {
         step: Option<Expr>,
         body: Box<Statement>,
         tested_first: bool,
+        /// What is blamed if it runs without end.
+        span: Span,
     },
     /// `for (name : type)`
     Iterate {

@@ -21,7 +21,13 @@ impl Builder<'_> {
                 step,
                 body,
                 tested_first,
-            } => self.repeat(condition.as_ref(), step.as_ref(), body, *tested_first),
+                span,
+            } => self.repeat(
+                condition.as_ref(),
+                step.as_ref(),
+                body,
+                (*tested_first, *span),
+            ),
             Statement::Iterate { local, range, body } => {
                 let place = Expr::bool(true, Span::default());
                 self.count(*local, *range, &place, &mut |builder| {
@@ -78,7 +84,7 @@ impl Builder<'_> {
         condition: Option<&Expr>,
         step: Option<&Expr>,
         body: &Statement,
-        tested_first: bool,
+        (tested_first, span): (bool, Span),
     ) {
         let (test, start, end) = (self.new_block(), self.new_block(), self.new_block());
         self.jump(if tested_first { test } else { start });
@@ -88,6 +94,8 @@ impl Builder<'_> {
             None => self.jump(start),
         }
         self.switch(start);
+        let site = self.site(span);
+        self.emit(Instruction::CountRound { site });
         self.loops += 1;
         self.statement(body);
         if let Some(step) = step {

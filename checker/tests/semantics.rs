@@ -1,0 +1,256 @@
+//! The corpus of `tests/corpus/language`: models with the diagnostics, values and run-time errors that they must give.
+//!
+//! Directives are comments that begin with a word and a colon:
+//! * `// expect: E0201 at 3:5 "part of the message"`: a diagnostic; a file gives exactly those that it expects. With
+//!   `at next:5` or `at this:5` the line is that after, or of, the directive.
+//! * `// run: condition`: the condition holds in the initial state.
+//! * `// fails: condition with DivisionByZero at 1 / n`: evaluating it there ends in that error, in that expression.
+//! * `// accept: query`, `// refuse: query with E0271 "part of the message"`: whether a query can be asked.
+//!
+//! Models below `ok` give no error; those below `err` give at least one.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use checker::diagnostics::{Diagnostic, SourceMap};
+use checker::exec::{Context, Executor, Interpreter, RunTimeError};
+use checker::ir::{self, Predicate, QueryKind};
+use checker::semantics::{self, Model};
+use checker::syntax;
+
+/// A model with its texts.
+struct Loaded {
+    model: Option<Model>,
+    sources: SourceMap,
+    diagnostics: Vec<Diagnostic>,
+}
+
+fn load(path: &str, text: &str) -> Loaded {
+    let mut sources = SourceMap::default();
+    let prelude = syntax::prelude(&mut sources);
+    let parsed = syntax::read_model(path, text.as_bytes(), &mut sources);
+    let (model, found) = semantics::analyse(&parsed.document, &prelude, &sources);
+    let mut diagnostics = parsed.diagnostics;
+    diagnostics.extend(found);
+    Loaded {
+        model,
+        sources,
+        diagnostics,
+    }
+}
+
+/// Compiles a query; the diagnostics as text are the error.
+fn compile(loaded: &mut Loaded, text: &str) -> Result<ir::Query, String> {
+    let span = syntax::add_query_text(text, &mut loaded.sources);
+    let (query, mut diagnostics) = syntax::parse_query(span, &loaded.sources);
+    let model = loaded.model.as_mut().ok_or("the model is refused")?;
+    let compiled = query.and_then(|query| {
+        let strategies = [String::from("known")];
+        let (compiled, found) = model.compile_query(&query, &loaded.sources, &strategies);
+        diagnostics.extend(found);
+        compiled
+    });
+    compiled.ok_or_else(|| rendered(&diagnostics, &loaded.sources))
+}
+
+fn rendered(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
+    diagnostics.iter().map(|d| d.render(sources)).collect()
+}
+
+/// Evaluates a predicate on the words of the initial state.
+fn evaluate(model: &Model, predicate: &Predicate) -> Result<bool, RunTimeError> {
+    let network = &model.network;
+    Ok(match predicate {
+        Predicate::Constant(value) => *value,
+        Predicate::Data(function) => {
+            let interpreter = Interpreter::new(&network.functions, &network.constants);
+            let mut context = Context {
+                state: &mut network.initial.clone(),
+                constraints: &mut Vec::new(),
+                assignments: &mut Vec::new(),
+            };
+            interpreter.call(*function, &[], &mut context)? != 0
+        }
+        Predicate::Location(process, location) => {
+            network.initial[process.0 as usize] == location.0 as i32
+        }
+        Predicate::Not(inner) => !evaluate(model, inner)?,
+        Predicate::And(parts) => parts
+            .iter()
+            .try_fold(true, |all, part| Ok(all && evaluate(model, part)?))?,
+        Predicate::Or(parts) => parts
+            .iter()
+            .try_fold(false, |any, part| Ok(any || evaluate(model, part)?))?,
+        other => panic!("conditions on clocks have no value here: {other:?}"),
+    })
+}
+
+fn run(loaded: &mut Loaded, condition: &str) -> Result<Result<bool, RunTimeError>, String> {
+    let query = compile(loaded, &format!("E<> {condition}"))?;
+    let QueryKind::Reachable(predicate) = &query.kind else {
+        return Err(String::from("it is no condition"));
+    };
+    let model = loaded.model.as_ref().expect("the query was compiled");
+    Ok(evaluate(model, predicate))
+}
+
+/// What a directive finds wrong; empty if nothing.
+fn check_directive(
+    loaded: &mut Loaded,
+    key: &str,
+    value: &str,
+    line: usize,
+    expected: &mut Vec<String>,
+) -> Option<String> {
+    match key {
+        "expect" => {
+            expected.push(
+                value
+                    .replace("next:", &format!("{}:", line + 1))
+                    .replace("this:", &format!("{line}:")),
+            );
+            None
+        }
+        "run" => match run(loaded, value) {
+            Ok(Ok(true)) => None,
+            Ok(Ok(false)) => Some(format!("is false: {value}")),
+            Ok(Err(error)) => Some(format!("ends in {:?}: {value}", error.kind)),
+            Err(message) => Some(format!("cannot be compiled: {value}\n{message}")),
+        },
+        "fails" => {
+            let (condition, wanted) = value.split_once(" with ").expect("fails: … with …");
+            match run(loaded, condition) {
+                Ok(Err(error)) => {
+                    let model = loaded.model.as_ref().expect("the query was compiled");
+                    let span = model.network.sites[error.site.0 as usize].span;
+                    let found = format!("{:?} at {}", error.kind, loaded.sources.text(span));
+                    (found != wanted).then(|| format!("fails with {found}: {condition}"))
+                }
+                Ok(Ok(value)) => Some(format!("is {value} and does not fail: {condition}")),
+                Err(message) => Some(format!("cannot be compiled: {condition}\n{message}")),
+            }
+        }
+        "accept" => compile(loaded, value)
+            .err()
+            .map(|message| format!("is refused: {value}\n{message}")),
+        "refuse" => {
+            let (query, wanted) = value.split_once(" with ").expect("refuse: … with …");
+            let (code, part) = wanted.split_once(' ').unwrap_or((wanted, ""));
+            match compile(loaded, query) {
+                Ok(_) => Some(format!("is accepted: {query}")),
+                Err(message) => {
+                    let fits = message.contains(&format!("[{code}]"))
+                        && message.contains(part.trim_matches('"'))
+                        && message.matches("error[").count() == 1;
+                    (!fits).then(|| format!("is refused otherwise: {query}\n{message}"))
+                }
+            }
+        }
+        other => Some(format!("unknown directive '{other}'")),
+    }
+}
+
+/// Whether a diagnostic is the one that `E0201 at 3:5 "part"` describes.
+fn is_described(diagnostic: &Diagnostic, sources: &SourceMap, wanted: &str) -> bool {
+    let place = sources.position(diagnostic.span);
+    let start = format!(
+        "{} at {}:{}",
+        diagnostic.code.code, place.line, place.column
+    );
+    match wanted.split_once('"') {
+        Some((wanted, part)) => {
+            start == wanted.trim()
+                && diagnostic
+                    .message
+                    .contains(part.trim_end().trim_end_matches('"'))
+        }
+        None => start == wanted.trim(),
+    }
+}
+
+fn check_file(path: &Path, is_legal: bool) -> String {
+    let text = fs::read_to_string(path).expect("the corpus is text");
+    let name = path.file_name().expect("it is a file").to_string_lossy();
+    let mut loaded = load(&name, &text);
+    let mut problems = String::new();
+    let mut expected = Vec::new();
+    let mut directives = 0;
+    for (i, line) in text.lines().enumerate() {
+        let Some((_, comment)) = line.split_once("// ") else {
+            continue;
+        };
+        let Some((key, value)) = comment.split_once(": ") else {
+            continue;
+        };
+        if !key.chars().all(|c| c.is_ascii_lowercase()) {
+            continue;
+        }
+        directives += 1;
+        if let Some(problem) = check_directive(&mut loaded, key, value.trim(), i + 1, &mut expected)
+        {
+            let _ = writeln!(problems, "{name}:{}: {problem}", i + 1);
+        }
+    }
+    if directives == 0 {
+        let _ = writeln!(problems, "{name}: no directive");
+    }
+    if is_legal == loaded.diagnostics.iter().any(Diagnostic::is_error) {
+        let _ = writeln!(problems, "{name}: is in the wrong folder");
+    }
+    for diagnostic in &loaded.diagnostics {
+        match expected
+            .iter()
+            .position(|wanted| is_described(diagnostic, &loaded.sources, wanted))
+        {
+            Some(i) => {
+                expected.remove(i);
+            }
+            None => {
+                let _ = writeln!(
+                    problems,
+                    "unexpected:\n{}",
+                    diagnostic.render(&loaded.sources)
+                );
+            }
+        }
+    }
+    for wanted in expected {
+        let _ = writeln!(problems, "{name}: missing {wanted}");
+    }
+    problems
+}
+
+fn check_folder(folder: &str, is_legal: bool) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/language");
+    let entries = fs::read_dir(root.join(folder)).expect("the corpus is there");
+    let mut paths: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("the corpus can be listed").path())
+        .collect();
+    paths.sort();
+    assert!(!paths.is_empty(), "the corpus is empty");
+    let problems: String = paths
+        .iter()
+        .map(|path| check_file(path, is_legal))
+        .collect();
+    assert!(problems.is_empty(), "\n{problems}");
+}
+
+#[test]
+fn legal_models_are_accepted_and_mean_what_they_say() {
+    check_folder("ok", true);
+}
+
+#[test]
+fn illegal_models_are_refused_with_all_their_mistakes() {
+    check_folder("err", false);
+}
+
+#[test]
+fn every_code_is_unique() {
+    let mut codes: Vec<&str> = semantics::codes::ALL.iter().map(|code| code.code).collect();
+    let count = codes.len();
+    codes.sort_unstable();
+    codes.dedup();
+    assert_eq!(codes.len(), count);
+}
