@@ -106,6 +106,12 @@ impl<'a> Checker<'a> {
         self.report(Diagnostic::new(code, span, message).help(help));
     }
 
+    /// An expression that the parser has reported: nothing can be lowered any more.
+    pub(super) fn reported_by_parser(&mut self, span: Span) -> Expr {
+        self.has_errors = true;
+        Expr::error(span)
+    }
+
     /// Whether code may be made: nothing was wrong so far, and all values are known.
     pub(super) fn can_lower(&mut self) -> bool {
         for span in std::mem::take(&mut self.clock_values) {

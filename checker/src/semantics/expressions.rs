@@ -15,7 +15,7 @@ impl Checker<'_> {
     pub(super) fn expression(&mut self, expr: &ast::Expr) -> Expr {
         let span = expr.span;
         match &expr.kind {
-            ExprKind::Int(value) => Self::integer_literal(*value, span),
+            ExprKind::Int(value) => self.integer_literal(*value, span),
             ExprKind::Double(value) => Expr::new(Kind::Double(*value), Type::Double, span),
             ExprKind::Bool(value) => Expr::bool(*value, span),
             ExprKind::String(_) => Expr::new(Kind::Text, Type::String, span),
@@ -67,15 +67,15 @@ impl Checker<'_> {
                 body,
             } => self.quantifier(*quantifier, name, ty, body, span),
             ExprKind::Deadlock => self.deadlock(span),
-            ExprKind::Error => Expr::error(span),
+            ExprKind::Error => self.reported_by_parser(span),
         }
     }
 
     /// A literal; the parser has reported those beyond 32 bits.
-    fn integer_literal(value: i64, span: Span) -> Expr {
+    fn integer_literal(&mut self, value: i64, span: Span) -> Expr {
         match i32::try_from(value) {
             Ok(value) => Expr::int(value, Type::ANY_INT, span),
-            Err(_) => Expr::error(span),
+            Err(_) => self.reported_by_parser(span),
         }
     }
 
