@@ -22,6 +22,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Final
 
 from ntagen.drive.device import Device
@@ -290,7 +291,7 @@ class Controller:
     def _ask(self, tip: Pose, depth_mm: float) -> Synthesis:
         """The synthesis from a pose with all that is known now."""
         scene = self._knowledge.scene(tip, self._known_estimate().radius_mm)
-        synthesis = self._synthesise(scene)
+        synthesis = self._in_time(self._synthesise(scene))
         self._syntheses += 1
         number, best = self._syntheses, synthesis.best
         self._journal.synthesised(number, synthesis)
@@ -309,6 +310,13 @@ class Controller:
         )
         self._note(Timed(self._now_s(), number, synthesis.seconds))
         return synthesis
+
+    def _in_time(self, synthesis: Synthesis) -> Synthesis:
+        """The synthesis without the plans that the time limit would not let end."""
+        left_s = self._settings.timeout_s - (self._now_s() - self._started_s)
+        longest_mm = left_s * synthesis.scene.needle.speed_mm_per_s
+        kept = tuple(c for c in synthesis.candidates if c.plan.length_mm <= longest_mm)
+        return replace(synthesis, candidates=kept)
 
     def _adopt(self, synthesis: Synthesis) -> None:
         """Makes the best plan the one to be driven."""

@@ -92,7 +92,7 @@ class Synthesised(Record):
         number: The synthesis's number in the run, from 1.
         depth_mm: The depth from which a plan was asked for: less than the tip's when looking back.
         found: How many plans the model has.
-        accepted: How many of them hold in exact kinematics.
+        accepted: How many of them hold in exact kinematics and can be driven in the time left.
         plan: The best of them in words; empty if there is none.
         clearance_mm: Its distance to critical regions; -1 if there is no plan, 1e9 if there is no
             region.

@@ -117,10 +117,18 @@ def test_several_targets_are_visited_in_their_order() -> None:
 
 
 def test_the_time_limit_ends_the_run_with_the_needle_stopped() -> None:
-    result, diary = drive(PAPER, settings=Settings(timeout_s=20.0))
+    result, diary = drive(PAPER, settings=Settings(timeout_s=3.0))
     assert result.ended.outcome == State.TIMED_OUT.value
-    assert result.ended.time_s == pytest.approx(20.0, abs=0.5)
+    assert result.ended.time_s == pytest.approx(3.0, abs=0.5)
     assert diary.of(Command)[-1].kind == "stop"
+
+
+def test_plans_that_the_time_limit_would_cut_are_not_begun() -> None:
+    result, diary = drive(PAPER, settings=Settings(timeout_s=30.0))
+    assert result.ended.outcome == State.NO_STRATEGY.value
+    assert diary.of(Synthesised)[0].found > 0
+    assert diary.of(Synthesised)[0].accepted == 0
+    assert result.ended.depth_mm == pytest.approx(5.0)
 
 
 def test_pulling_back_stays_in_the_channel_and_undoes_rolls() -> None:

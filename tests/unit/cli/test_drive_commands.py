@@ -46,8 +46,8 @@ def test_drive_says_that_there_is_no_strategy(capsys: pytest.CaptureFixture[str]
 
 
 def test_drive_ends_at_the_time_limit(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["drive", PAPER, "--timeout", "0.5 min", "--quiet"]) == 3
-    assert capsys.readouterr().out == "time-out: the limit of 30 s is over\n"
+    assert main(["drive", PAPER, "--timeout", "0.05 min", "--quiet"]) == 3
+    assert capsys.readouterr().out == "time-out: the limit of 3 s is over\n"
 
 
 def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -> None:
