@@ -6,12 +6,14 @@
 
 use std::collections::HashMap;
 
+use super::assigned::assigned_names;
 use super::checker::Checker;
 use super::codes;
 use super::expressions::known_offset;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{DEFAULT_INT, Memory, Size, Type};
+use crate::exec::arithmetic;
 use crate::ir::ProcessId;
 use crate::syntax::ast::{self, Document, Name, Parameter, SystemItem};
 
@@ -276,6 +278,7 @@ impl Checker<'_> {
         let id = ProcessId(self.world.network.processes.len() as u32);
         let outer = self.process.replace((id, full_name));
         self.hides_system = true;
+        let scope = self.own_parameters(&document.templates[template], scope);
         self.scopes.push(scope);
         let process = self.template(&document.templates[template], level);
         let scope = self.scopes.pop().expect("the scope was just opened");
@@ -283,6 +286,36 @@ impl Checker<'_> {
         self.process = outer;
         self.world.processes.scopes.push(scope);
         self.world.network.processes.push(process);
+    }
+
+    /// Makes variables of the parameters by value that the template assigns to.
+    fn own_parameters(&mut self, template: &ast::Template, mut scope: Scope) -> Scope {
+        let assigned = assigned_names(template);
+        for formal in &template.parameters {
+            let is_own = !formal.reference && !formal.ty.prefixes.constant;
+            if !is_own || !assigned.contains(&formal.name.text) {
+                continue;
+            }
+            let (ty, words) = match scope.get(&formal.name.text).map(|(entity, _)| entity) {
+                Some(Entity::Constant { value, .. }) => {
+                    let words = match value.kind {
+                        Kind::Int(value) => vec![value],
+                        Kind::Double(value) => arithmetic::double_words(value).to_vec(),
+                        _ => continue,
+                    };
+                    (value.ty.clone(), words)
+                }
+                Some(Entity::Variable { place, ty }) if place.root == Root::Constants => {
+                    let words = &self.world.network.constants[place.base.words as usize..];
+                    (ty.clone(), words[..ty.size().words as usize].to_vec())
+                }
+                _ => continue,
+            };
+            let place = self.allocate(&formal.name.text, &ty, false, &words);
+            let entity = Entity::Variable { place, ty };
+            scope.set(&formal.name.text, entity, formal.name.span);
+        }
+        scope
     }
 
     /// Follows instantiations down to a template; returns it with the scope of its parameters.
@@ -398,10 +431,12 @@ impl Checker<'_> {
         self.is_generic = true;
         self.hides_system = true;
         self.scopes.push(Scope::default());
+        let assigned = assigned_names(template);
         for formal in &template.parameters {
             let ty = self.dimensioned(&formal.ty, &formal.dimensions);
             self.check_parameter_type(formal, &ty);
-            let entity = if formal.reference && !ty.is_error() {
+            let is_variable = formal.reference || assigned.contains(&formal.name.text);
+            let entity = if is_variable && !ty.is_error() {
                 unknown_variable(ty)
             } else {
                 Entity::Broken

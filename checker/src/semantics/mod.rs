@@ -11,7 +11,7 @@
 //!
 //! Source: UPPAAL's language reference, and the rules of its official parser where that is silent. Where we differ:
 //! * Names that UPPAAL predeclares may be declared again by a model.
-//! * Parameters of templates by value are constants.
+//! * Parameters of templates by value are constants, unless the template assigns to them.
 //! * Mutable doubles are part of the state, with a warning.
 //!
 //! Cost: linear in the trees, times the number of processes of a template.
@@ -45,6 +45,8 @@ mod functions;
 mod lower;
 
 mod labels;
+
+mod assigned;
 
 mod templates;
 
