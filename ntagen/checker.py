@@ -5,13 +5,14 @@ The engine is the Rust crate in ``checker/``; this module only gives its answers
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from ntagen import _checker
-from ntagen.errors import InputError
+from ntagen.errors import InputError, ModelError
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 SearchOrder = Literal["bfs", "dfs", "random"]
@@ -129,11 +130,7 @@ class Answer:
 
     def _plans(self) -> Iterator[EnginePlan]:
         for plan in self._raw.plans():
-            yield EnginePlan(tuple(EngineStep(tuple(self._taken(step))) for step in plan))
-
-    def _taken(self, step: list[tuple[int, int, int, list[int]]]) -> Iterator[EngineEdge]:
-        for process, edge, branch, values in step:
-            yield self._edges[process][edge].taken(branch, values)
+            yield EnginePlan(tuple(_step(self._edges, step) for step in plan))
 
     def plans_json(self) -> str | None:
         """The plans as JSON text with every edge in full; ``None`` without plans."""
@@ -244,11 +241,93 @@ class Model:
             )
         except _checker.RejectedError as error:
             raise RejectedError(error.args[0]) from None
+        return Answer(raw, query, self._edge_table())
+
+    def simulate(self, engine: CodeEngine = "jit") -> Simulation:
+        """Starts a walk through the model from its initial state.
+
+        Args:
+            engine: What runs the code of the model; states do not depend on it.
+
+        Raises:
+            ModelError: The initial state cannot be computed.
+        """
+        with _failing():
+            return Simulation(self._raw.simulate(engine), self._edge_table())
+
+    def _edge_table(self) -> list[list[_EdgeEntry]]:
         if self._edges is None:
-            self._edges = [
-                [_EdgeEntry(*entry[:5]) for entry in process] for process in self._raw.edges()
-            ]
-        return Answer(raw, query, self._edges)
+            processes = self._raw.edges()
+            self._edges = [[_EdgeEntry(*entry[:5]) for entry in process] for process in processes]
+        return self._edges
+
+
+class Simulation:
+    """A walk through a model: a state, its moves, and the state after one of them.
+
+    States are symbolic: `zone` holds all clock values that the moves so far allow.
+    """
+
+    def __init__(self, raw: _checker.Simulation, edges: list[list[_EdgeEntry]]) -> None:
+        self._raw = raw
+        self._edges = edges
+
+    @property
+    def locations(self) -> dict[str, str]:
+        """The location of each process."""
+        return dict(self._raw.locations())
+
+    @property
+    def variables(self) -> dict[str, int | float]:
+        """The value of each variable; parts of arrays and structs by names such as ``a[2].x``."""
+        return dict(self._raw.variables())
+
+    @property
+    def zone(self) -> tuple[str, ...]:
+        """The constraints on the clocks, such as ``x <= 3``."""
+        return tuple(self._raw.zone())
+
+    def moves(self) -> tuple[EngineStep, ...]:
+        """The moves of the state, in a fixed order.
+
+        Raises:
+            ModelError: The model fails in computing one.
+        """
+        with _failing():
+            return tuple(_step(self._edges, step) for step in self._raw.moves())
+
+    def take(self, index: int) -> None:
+        """Takes the move with this index.
+
+        Raises:
+            IndexError: There is no such move.
+            ModelError: The model fails in computing one.
+        """
+        with _failing():
+            self._raw.take(index)
+
+    def settle(self) -> None:
+        """Follows moves as long as there is exactly one.
+
+        Raises:
+            ModelError: The model fails on the way.
+        """
+        with _failing():
+            self._raw.settle()
+
+
+def _step(edges: list[list[_EdgeEntry]], step: list[tuple[int, int, int, list[int]]]) -> EngineStep:
+    taken = (edges[process][edge].taken(branch, values) for process, edge, branch, values in step)
+    return EngineStep(tuple(taken))
+
+
+@contextlib.contextmanager
+def _failing() -> Iterator[None]:
+    """Turns the engine's error about a failing model into ours."""
+    try:
+        yield
+    except _checker.FailedError as error:
+        raise ModelError(error.args[0]) from None
 
 
 def load(text: str, path: str = "") -> Model:

@@ -6,15 +6,18 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::{PyIndexError, PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::engine::limits::Observer;
+use crate::engine::simulation::Point;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, Verdict, describe, json,
 };
 use crate::game::Forced;
+use crate::network::Failure;
 use crate::search::limits::StopReason;
 use crate::search::reach::Order;
 
@@ -24,6 +27,25 @@ pyo3::create_exception!(
     PyValueError,
     "The engine does not accept a model or query; `args[0]` is a list of diagnostics as text."
 );
+
+pyo3::create_exception!(
+    _checker,
+    FailedError,
+    PyRuntimeError,
+    "The model ran into a run-time error; `args[0]` says which, and where."
+);
+
+fn unknown(what: &str, value: &str) -> PyErr {
+    PyValueError::new_err(format!("unknown {what}: {value}"))
+}
+
+fn code_engine(name: &str) -> PyResult<CodeEngine> {
+    match name {
+        "jit" => Ok(CodeEngine::Jit),
+        "interpreter" => Ok(CodeEngine::Interpreter),
+        other => Err(unknown("engine", other)),
+    }
+}
 
 fn rejected(rejection: Rejection) -> PyErr {
     RejectedError::new_err((rejection.rendered,))
@@ -135,6 +157,21 @@ impl Model {
         })
     }
 
+    /// A walk through the model from its initial state.
+    fn simulate(slf: &Bound<'_, Self>, engine: &str) -> PyResult<Simulation> {
+        let code = code_engine(engine)?;
+        let point = slf.get().with(|model| {
+            model.prepare_simulation(code).map_err(rejected)?;
+            model
+                .start()
+                .map_err(|failure| Simulation::failed(model, failure))
+        })?;
+        Ok(Simulation {
+            model: slf.clone().unbind(),
+            point,
+        })
+    }
+
     /// Reads the queries of a `.q` file.
     fn read_queries(&self, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Vec<QueryEntry>> {
         let queries = self
@@ -186,11 +223,7 @@ impl Model {
                 "neutral" => Forced::Neutral,
                 other => return Err(unknown("rule for forced moves", other)),
             },
-            code: match engine {
-                "jit" => CodeEngine::Jit,
-                "interpreter" => CodeEngine::Interpreter,
-                other => return Err(unknown("engine", other)),
-            },
+            code: code_engine(engine)?,
             limits: Limits {
                 states,
                 memory_bytes,
@@ -221,6 +254,109 @@ impl Model {
             inner: answer,
         })
     }
+}
+
+/// A walk through a model.
+#[pyclass(module = "ntagen._checker")]
+struct Simulation {
+    model: Py<Model>,
+    point: Point,
+}
+
+impl Simulation {
+    fn failed(model: &LoadedModel, failure: Failure) -> PyErr {
+        FailedError::new_err(describe::failure_text(model, failure))
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    /// The location of each process, by its name.
+    fn locations(&self) -> Vec<(String, String)> {
+        self.model.get().with(|model| {
+            let network = model.network();
+            let name = |index: usize| {
+                describe::location_name(network, index, &self.point.words).to_owned()
+            };
+            let processes = network.processes.iter().enumerate();
+            processes
+                .map(|(index, process)| (process.name.clone(), name(index)))
+                .collect()
+        })
+    }
+
+    /// The value of each scalar part of each variable, by its name.
+    fn variables(&self, py: Python<'_>) -> PyResult<Vec<(String, Py<PyAny>)>> {
+        self.model.get().with(|model| {
+            let mut values: Vec<PyResult<(String, Py<PyAny>)>> = Vec::new();
+            describe::for_each_value(model.network(), &self.point.words, |name, value| {
+                let value = match value {
+                    describe::Value::Integer(value) => value.into_py_any(py),
+                    describe::Value::Double(value) => value.into_py_any(py),
+                };
+                values.push(value.map(|value| (name.to_owned(), value)));
+            });
+            values.into_iter().collect()
+        })
+    }
+
+    /// The constraints on clock values that the moves so far leave.
+    fn zone(&self) -> Vec<String> {
+        self.model
+            .get()
+            .with(|model| describe::zone_constraints(model.network(), &self.point.zone))
+    }
+
+    /// The moves: of each, process, edge, branch and select values of the edges that are taken.
+    fn moves(&self) -> PyResult<Vec<StepEntry>> {
+        self.model.get().with(|model| {
+            let successors = model
+                .successors(&self.point)
+                .map_err(|failure| Simulation::failed(model, failure))?;
+            let entries = successors
+                .iter()
+                .map(|(parts, _)| step_entry(model.network(), parts));
+            Ok(entries.collect())
+        })
+    }
+
+    /// Takes the move with this index.
+    fn take(&mut self, index: usize) -> PyResult<()> {
+        let point = self.model.get().with(|model| {
+            let successors = model
+                .successors(&self.point)
+                .map_err(|failure| Simulation::failed(model, failure))?;
+            let count = successors.len();
+            let chosen = successors.into_iter().nth(index);
+            chosen.map(|(_, point)| point).ok_or_else(|| {
+                PyIndexError::new_err(format!("there is no move {index}; the state has {count}"))
+            })
+        })?;
+        self.point = point;
+        Ok(())
+    }
+
+    /// Follows moves as long as there is exactly one.
+    fn settle(&mut self) -> PyResult<()> {
+        let point = self.model.get().with(|model| {
+            model
+                .settle(self.point.clone())
+                .map_err(|failure| Simulation::failed(model, failure))
+        })?;
+        self.point = point;
+        Ok(())
+    }
+}
+
+fn step_entry(network: &crate::ir::Network, parts: &[crate::network::Part]) -> StepEntry {
+    let entry = |part: &crate::network::Part| {
+        let values = describe::selects(network, *part)
+            .into_iter()
+            .map(|one| one.1)
+            .collect();
+        (part.process, part.edge, part.branch, values)
+    };
+    parts.iter().map(entry).collect()
 }
 
 /// The answer to a query.
@@ -315,16 +451,7 @@ impl Answer {
                     .steps
                     .iter()
                     .filter(|step| !step.was_committed)
-                    .map(|step| {
-                        let entry = |part: &crate::network::Part| {
-                            let values = describe::selects(network, *part)
-                                .into_iter()
-                                .map(|one| one.1)
-                                .collect();
-                            (part.process, part.edge, part.branch, values)
-                        };
-                        step.parts.iter().map(entry).collect()
-                    });
+                    .map(|step| step_entry(network, &step.parts));
                 steps.collect()
             });
             plans.collect()
@@ -391,6 +518,8 @@ fn load(py: Python<'_>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Model
 fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Model>()?;
     module.add_class::<Answer>()?;
+    module.add_class::<Simulation>()?;
+    module.add("FailedError", module.py().get_type::<FailedError>())?;
     module.add("RejectedError", module.py().get_type::<RejectedError>())?;
     module.add_function(wrap_pyfunction!(load, module)?)
 }

@@ -7,6 +7,7 @@ pub mod answer;
 pub mod describe;
 pub mod json;
 pub mod limits;
+pub mod simulation;
 
 use std::time::Instant;
 
@@ -232,6 +233,19 @@ impl LoadedModel {
         Ok(answer)
     }
 
+    /// What runs the code of the model.
+    ///
+    /// # Panics
+    ///
+    /// If no query was checked and no simulation prepared before.
+    fn executor(&self) -> &dyn Executor {
+        let (_, code) = self
+            .code
+            .as_ref()
+            .expect("code is prepared before it is run");
+        code.executor()
+    }
+
     fn compile(&mut self, span: Span) -> Result<crate::ir::Query, Rejection> {
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
         if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
@@ -245,7 +259,7 @@ impl LoadedModel {
     }
 
     /// Makes the code of the model, or adds what queries brought since.
-    fn prepare_code(&mut self, wanted: CodeEngine, span: Span) -> Result<(), Rejection> {
+    pub(super) fn prepare_code(&mut self, wanted: CodeEngine, span: Span) -> Result<(), Rejection> {
         let network = &self.model.network;
         let result = match (&mut self.code, wanted) {
             (

@@ -330,12 +330,11 @@ impl<'s, 'a> Graph<'s, 'a> {
             if length as usize == LONGEST_CHAIN {
                 break;
             }
-            let Some((effect, entry)) = self.only_move(target, &zone, may_delay)? else {
+            let Some(effect) = self.only_move(target, &mut zone, may_delay)? else {
                 break;
             };
             self.push_step(may_delay, &effect);
             std::mem::swap(target, &mut self.spare);
-            zone = entry;
             invariant = effect.invariant;
             length += 1;
         }
@@ -343,14 +342,14 @@ impl<'s, 'a> Graph<'s, 'a> {
         self.add_edge(node, target, &zone, origin, length)
     }
 
-    /// Takes the only move of a state inside a chain: its effect and the zone on entry, with the words after it in `spare`.
-    /// `None` if the chain ends with the state.
+    /// Takes the only move of a state inside a chain: its effect, with the words after it in `spare` and the zone on entry in
+    /// `zone`. `None`, with the zone as it was, if the chain ends with the state.
     fn only_move(
         &mut self,
         words: &mut [i32],
-        zone: &Zone,
+        zone: &mut Zone,
         may_delay: bool,
-    ) -> Result<Option<(ClockEffect, Zone)>, Failure> {
+    ) -> Result<Option<ClockEffect>, Failure> {
         if may_delay && !self.chains_delays {
             return Ok(None);
         }
@@ -371,12 +370,15 @@ impl<'s, 'a> Graph<'s, 'a> {
         else {
             return Ok(None);
         };
-        effect.entry_zones(zone.bounds(), self.symbolic.dimension(), &mut self.entries);
-        if self.entries.len() != 1 {
-            return Ok(None);
+        if !effect.is_trivial() {
+            let mut entry = zone.clone();
+            if !effect.excluded.is_empty() || !effect.enter(&mut entry) {
+                return Ok(None);
+            }
+            *zone = entry;
         }
         self.explored += 1;
-        Ok(Some((effect, self.entries.swap_remove(0))))
+        Ok(Some(effect))
     }
 
     /// Adds a step to the program at hand. One that changes nothing is left out, unless it is the first or ends an invariant.

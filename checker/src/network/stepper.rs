@@ -51,6 +51,8 @@ pub struct Stepper<'a> {
     arguments: Vec<i32>,
     candidates: Vec<Candidate>,
     chosen: Vec<Choice>,
+    /// By receiving process of a broadcast: the range of its candidates.
+    groups: Vec<(usize, usize)>,
     parts: Vec<Part>,
 }
 
@@ -93,6 +95,7 @@ impl<'a> Stepper<'a> {
             arguments: Vec::new(),
             candidates: Vec::new(),
             chosen: Vec::new(),
+            groups: Vec::new(),
             parts: Vec::new(),
         }
     }
@@ -256,7 +259,8 @@ impl<'a> Stepper<'a> {
         words: &mut [i32],
         out: &mut Moves,
     ) -> Result<(), RunTimeError> {
-        let mut groups: Vec<(usize, usize)> = Vec::new();
+        let mut groups = std::mem::take(&mut self.groups);
+        groups.clear();
         let mut has_committed = !needs_committed;
         for index in 0..self.receivers[channel as usize].len() {
             let receiver = self.receivers[channel as usize][index];
@@ -270,12 +274,12 @@ impl<'a> Stepper<'a> {
                 groups.push((first, self.candidates.len()));
             }
         }
-        if !has_committed {
-            return Ok(());
+        if has_committed {
+            self.chosen.clear();
+            self.chosen.push(Choice::Takes(0));
+            self.combine(&groups, needs_committed, words, out);
         }
-        self.chosen.clear();
-        self.chosen.push(Choice::Takes(0));
-        self.combine(&groups, needs_committed, words, out);
+        self.groups = groups;
         Ok(())
     }
 

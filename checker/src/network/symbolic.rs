@@ -238,22 +238,26 @@ impl ClockEffect {
     pub fn entry_zones(&self, zone: &[Bound], dimension: usize, out: &mut Vec<Zone>) {
         out.clear();
         let mut within = Zone::from_bounds(dimension, zone);
-        if !within.constrain_all(&self.guard) {
+        if self.excluded.is_empty() {
+            if self.enter(&mut within) {
+                out.push(within);
+            }
             return;
         }
-        if self.excluded.is_empty() {
-            out.push(within);
-        } else {
+        if within.constrain_all(&self.guard) {
             let mut rest = Federation::of_zone(dimension, within.bounds());
             self.subtract_excluded(&mut rest);
-            out.extend(
-                rest.zones()
-                    .map(|bounds| Zone::from_bounds(dimension, bounds)),
-            );
+            let pieces = rest.zones();
+            out.extend(pieces.map(|bounds| Zone::from_bounds(dimension, bounds)));
+            out.retain_mut(|piece| self.enter(piece));
         }
-        out.retain_mut(|piece| {
-            piece.assign(&self.assignments) && piece.constrain_all(&self.invariant)
-        });
+    }
+
+    /// Carries a zone of the source over to the target, if no receiver abstains; returns whether something is left.
+    pub fn enter(&self, zone: &mut Zone) -> bool {
+        zone.constrain_all(&self.guard)
+            && zone.assign(&self.assignments)
+            && zone.constrain_all(&self.invariant)
     }
 
     /// The valuations from which the move leads into the federation, as far as guard and assignments say.

@@ -1,0 +1,76 @@
+//! Walking through a model by hand: a state, its moves, the state after one of them.
+//!
+//! A state is symbolic: its zone holds all clock values that the moves so far allow. A move is listed if it is possible at some
+//! of them. Nothing is extrapolated.
+
+use crate::network::{Abstraction, ClockBounds, Failure, Moves, Part, Stepper, Symbolic};
+use crate::zones::Zone;
+
+use super::{CodeEngine, LoadedModel, Rejection};
+
+/// Moves that [`LoadedModel::settle`] takes at most.
+const LONGEST_WAY: usize = 100_000;
+
+/// A state of a simulation.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// The words.
+    pub words: Vec<i32>,
+    /// The clock values that are possible.
+    pub zone: Zone,
+}
+
+impl LoadedModel {
+    /// Makes the code ready to run; needed once before the other functions here.
+    pub fn prepare_simulation(&mut self, code: CodeEngine) -> Result<(), Rejection> {
+        self.prepare_code(code, crate::diagnostics::Span::default())
+    }
+
+    /// The initial state.
+    pub fn start(&self) -> Result<Point, Failure> {
+        let (words, zone) = self.symbolic().initial()?;
+        Ok(Point { words, zone })
+    }
+
+    /// The moves of a state, and where each leads. More than one entry for a move if a receiver abstains.
+    pub fn successors(&self, point: &Point) -> Result<Vec<(Vec<Part>, Point)>, Failure> {
+        let mut symbolic = self.symbolic();
+        let mut words = point.words.clone();
+        let mut moves = Moves::default();
+        symbolic.stepper.moves(&mut words, &mut moves)?;
+        let mut successors = Vec::new();
+        let mut entries = Vec::new();
+        for one in moves.iter() {
+            let mut target = words.clone();
+            let Some(effect) = symbolic.fire(one, &mut target)? else {
+                continue;
+            };
+            effect.entry_zones(point.zone.bounds(), symbolic.dimension(), &mut entries);
+            for mut zone in entries.drain(..) {
+                let may_delay = symbolic.may_delay(&mut target)?;
+                symbolic.delay(&target, may_delay, &effect.invariant, zone.bounds_mut())?;
+                let words = target.clone();
+                successors.push((one.parts.to_vec(), Point { words, zone }));
+            }
+        }
+        Ok(successors)
+    }
+
+    /// Follows moves as long as there is exactly one; the state where there is a choice, or none.
+    pub fn settle(&self, mut point: Point) -> Result<Point, Failure> {
+        for _ in 0..LONGEST_WAY {
+            let mut successors = self.successors(&point)?;
+            if successors.len() != 1 {
+                break;
+            }
+            point = successors.swap_remove(0).1;
+        }
+        Ok(point)
+    }
+
+    fn symbolic(&self) -> Symbolic<'_> {
+        let network = self.network();
+        let bounds = ClockBounds::new(network, &[], Abstraction::Exact);
+        Symbolic::new(Stepper::new(network, self.executor()), bounds)
+    }
+}
