@@ -23,6 +23,9 @@ from typing import Literal
 Vector = tuple[float, float, float]
 """Three numbers along the axes x, y, z."""
 
+DEFAULT_LENGTH_MM = 150.0
+"""The length of a needle that does not say otherwise: a common length of biopsy needles."""
+
 RegionKind = Literal["target", "critical", "detection"]
 
 
@@ -57,11 +60,20 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Needle:
-    """The needle: its pose, the radius of its motion circle and its insertion speed."""
+    """The needle as it is now.
+
+    Attributes:
+        tip: The pose of its tip.
+        radius_mm: The radius of its motion circle.
+        speed_mm_per_s: Its insertion speed.
+        length_mm: How much of it can still be inserted. It bounds every plan: without it, a
+            needle that turned sideways could circle for ever.
+    """
 
     tip: Pose
     radius_mm: float
     speed_mm_per_s: float
+    length_mm: float = DEFAULT_LENGTH_MM
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +144,17 @@ class Scene:
         """Targets, critical and detection regions, in this order."""
         return self.targets + self.criticals + self.detections
 
-    def with_needle(self, tip: Pose, radius_mm: float) -> Scene:
-        """The same scene with the tip's pose and the motion circle's radius measured anew."""
-        return replace(self, needle=replace(self.needle, tip=tip, radius_mm=radius_mm))
+    def with_needle(self, tip: Pose, radius_mm: float, inserted_mm: float = 0.0) -> Scene:
+        """The same scene with the tip's pose and the motion circle's radius measured anew.
+
+        Args:
+            tip: The tip's pose.
+            radius_mm: The radius of the motion circle.
+            inserted_mm: How much more of the needle is inserted than before.
+        """
+        length_mm = max(0.0, self.needle.length_mm - inserted_mm)
+        needle = replace(self.needle, tip=tip, radius_mm=radius_mm, length_mm=length_mm)
+        return replace(self, needle=needle)
 
     def with_targets(self, targets: Sequence[Region]) -> Scene:
         """The same scene with other targets: those that are still to be visited."""

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from hypothesis import assume
 from hypothesis import strategies as st
 
 from ntagen.scene import Limits, Needle, Pose, Region, Scene, Vector
@@ -79,9 +80,14 @@ def scenes(draw: st.DrawFn) -> Scene:
         max_rolls=draw(st.integers(0, 4)),
         min_roll_distance_mm=draw(lengths(0.0, 8.0)),
     )
+    needle = Needle(draw(poses()), draw(lengths(15.0, 120.0)), draw(lengths(0.5, 3.0)))
+    resolution_per_mm = draw(st.sampled_from((100, 1000, 2500, 10_000)))
+    # A push must turn the tip by two units at least: with one, rounding may leave none.
+    angle_rad = limits.step_s * needle.speed_mm_per_s / needle.radius_mm
+    assume(angle_rad * resolution_per_mm >= 2.0)
     return Scene(
         name="drawn",
-        needle=Needle(draw(poses()), draw(lengths(15.0, 120.0)), draw(lengths(0.5, 3.0))),
+        needle=needle,
         axis=(0.0, -1.0, 0.0),
         limits=limits,
         targets=tuple(draw(spheres("target", f"T{i}")) for i in range(draw(st.integers(1, 2)))),
@@ -89,7 +95,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         detections=tuple(
             draw(spheres("detection", f"D{i}")) for i in range(draw(st.integers(0, 1)))
         ),
-        resolution_per_mm=draw(st.sampled_from((100, 1000, 2500, 10_000))),
+        resolution_per_mm=resolution_per_mm,
     )
 
 

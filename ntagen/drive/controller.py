@@ -290,7 +290,7 @@ class Controller:
 
     def _ask(self, tip: Pose, depth_mm: float) -> Synthesis:
         """The synthesis from a pose with all that is known now."""
-        scene = self._knowledge.scene(tip, self._known_estimate().radius_mm)
+        scene = self._knowledge.scene(tip, self._known_estimate().radius_mm, depth_mm)
         synthesis = self._in_time(self._synthesise(scene))
         self._syntheses += 1
         number, best = self._syntheses, synthesis.best

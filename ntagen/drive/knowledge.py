@@ -93,9 +93,10 @@ class Knowledge:
     visited: int = 0
     contacts: int = 0
 
-    def scene(self, tip: Pose, radius_mm: float) -> Scene:
-        """All that is known, for a needle that is where it is now."""
-        scene = self.a_priori.with_needle(tip, radius_mm).with_regions(*self.learned)
+    def scene(self, tip: Pose, radius_mm: float, depth_mm: float = 0.0) -> Scene:
+        """All that is known, for a needle that is where it is now, inserted to a depth."""
+        needle_known = self.a_priori.with_needle(tip, radius_mm, depth_mm)
+        scene = needle_known.with_regions(*self.learned)
         return scene.with_targets(scene.targets[self.visited :])
 
     def visiting(self) -> Knowledge:

@@ -50,6 +50,7 @@ def _scene(fields: dict[str, Any]) -> Scene:
             Pose(**{name: _vector(value) for name, value in needle["tip"].items()}),
             needle["radius_mm"],
             needle["speed_mm_per_s"],
+            needle["length_mm"],
         ),
         axis=_vector(fields["axis"]),
         limits=Limits(**limits),

@@ -16,7 +16,17 @@ from typing import Final, Literal, cast
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.resolve import Draft, DraftRegion, Placed
 from ntagen.nsl.source import Span
-from ntagen.scene import Limits, NamedQuery, Needle, Pose, Region, RegionKind, Scene, Vector
+from ntagen.scene import (
+    DEFAULT_LENGTH_MM,
+    Limits,
+    NamedQuery,
+    Needle,
+    Pose,
+    Region,
+    RegionKind,
+    Scene,
+    Vector,
+)
 from ntagen.units import deg_from_rad, rad_from_deg
 
 DEFAULT_TIP_MM: Final[Vector] = (0.0, 0.0, 0.0)
@@ -188,9 +198,14 @@ class _Builder:
         """The needle, if all of it is right."""
         radius = self._positive("radius", "radius-not-positive", "the radius of the motion circle")
         speed = self._positive("speed", "speed-not-positive", "the insertion speed")
-        if tip is None or radius is None or speed is None:
+        length = (
+            DEFAULT_LENGTH_MM
+            if "length" not in self._draft.seen
+            else self._positive("length", "length-not-positive", "the needle's length")
+        )
+        if tip is None or radius is None or speed is None or length is None:
             return None
-        return Needle(tip, radius, speed)
+        return Needle(tip, radius, speed, length)
 
     def _limits(self) -> Limits | None:
         """What the controller may do, if all of it is right."""
@@ -489,6 +504,8 @@ class _Builder:
             # The centre of the motion circle lies one radius away from the tip.
             reach = needle.radius_mm + max(map(abs, needle.tip.position_mm))
             yield "the motion circle", reach, draft.numbers["radius"].span
+            if "length" in draft.numbers:
+                yield "the needle's length", needle.length_mm, draft.numbers["length"].span
         if needle is not None and limits is not None:
             span = draft.numbers["step" if "step" in draft.numbers else "speed"].span
             yield "a push", needle.speed_mm_per_s * limits.step_s, span

@@ -48,7 +48,7 @@ class TreeBuilder:
                 return tree.Choice(span, keyword, self._identifier(parts[0]))
             case "resolution":
                 return tree.Resolution(span, self.expression(parts[0]), self._identifier(parts[1]))
-            case "tip" | "heading" | "bevel" | "radius" | "speed" | "step":
+            case "tip" | "heading" | "bevel" | "radius" | "speed" | "length" | "step":
                 return tree.Setting(span, keyword, self.expression(parts[0]))
         raise AssertionError(f"the grammar has a statement that the tree has not: {keyword}")
 

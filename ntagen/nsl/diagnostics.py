@@ -123,6 +123,7 @@ KINDS: Final = _kinds(
     ("N079", "tip-in-critical", "error", "The needle would start in a critical region."),
     ("N080", "tip-in-detection", "warning", "Detection counts as critical: there is no plan."),
     ("N081", "tip-in-target", "warning", "The target is reached before the first move."),
+    ("N082", "length-not-positive", "error", "The needle's length is greater than 0."),
 )
 """All kinds of defects by name, in the order of their codes."""
 

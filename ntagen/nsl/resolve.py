@@ -97,6 +97,7 @@ class Draft:
 _NUMBERS: Final = {
     "radius": (LENGTH, "the radius of the motion circle"),
     "speed": (SPEED, "the insertion speed"),
+    "length": (LENGTH, "the needle's length"),
     "step": (TIME, "the step"),
 }
 _VECTORS: Final = {

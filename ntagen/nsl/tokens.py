@@ -21,7 +21,7 @@ BlockKind = Literal["file", "environment", "needle", "motion", "for"]
 """Where a statement stands: at the top of a file or in somebody's braces."""
 
 REGIONS: Final = frozenset({"target", "critical", "detection"})
-_NEEDLE_ITEMS: Final = frozenset({"tip", "heading", "bevel", "radius", "speed"})
+_NEEDLE_ITEMS: Final = frozenset({"tip", "heading", "bevel", "radius", "speed", "length"})
 _MOTION_ITEMS: Final = frozenset({"step", "roll"})
 _BODY_ITEMS: Final = REGIONS | {
     "tissue",

@@ -159,7 +159,7 @@ class Setting:
     """A property with one value: ``speed 1 mm/s``."""
 
     span: Span
-    keyword: Literal["tip", "heading", "bevel", "radius", "speed", "step"]
+    keyword: Literal["tip", "heading", "bevel", "radius", "speed", "length", "step"]
     value: Expression
 
 

@@ -40,6 +40,7 @@ FORMS: Final = {
     "bevel": "write for example `bevel +z` or `bevel (0, 0, 1)`",
     "radius": "write for example `radius 30 mm`",
     "speed": "write for example `speed 1 mm/s`",
+    "length": "write for example `length 150 mm`",
     "step": "write for example `step 2 s`",
     "roll": "write for example `roll by 90, 180 deg at most 2 times at least 2 mm apart`",
     "tissue": "write `tissue static`",

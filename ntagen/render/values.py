@@ -59,6 +59,7 @@ class ModelValues:
     dt: int
     velocity: str
     min_progress: str
+    max_progress: str
     max_rolls: int
     max_actions: int
     angles: tuple[int, ...]
@@ -134,6 +135,7 @@ def model_values(scene: Scene) -> ModelValues:
         dt=dt,
         velocity=writer.number(velocity_mm, "the insertion per unit of time"),
         min_progress=writer.number(limits.min_roll_distance_mm, "the distance between rolls"),
+        max_progress=writer.number(needle.length_mm, "the needle's length"),
         max_rolls=limits.max_rolls,
         max_actions=max(MIN_ACTIONS, 2 * limits.max_rolls + 2),
         angles=tuple(_whole_degrees(angle) for angle in limits.roll_angles_rad),

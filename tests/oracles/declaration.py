@@ -54,6 +54,7 @@ class Instance:
     velocity: int = 1000
     circle_r: int = 30_000
     min_progress: int = 2000
+    max_progress: int = 150_000
     max_rolls: int = 2
     angles: tuple[int, ...] = (90, 180, 270)
     tip: tuple[int, int, int] = (0, 0, 0)
@@ -92,6 +93,7 @@ class Instance:
             velocity=units(scene.needle.speed_mm_per_s),
             circle_r=units(scene.needle.radius_mm),
             min_progress=units(scene.limits.min_roll_distance_mm),
+            max_progress=units(scene.needle.length_mm),
             max_rolls=scene.limits.max_rolls,
             angles=tuple(round(math.degrees(angle)) for angle in scene.limits.roll_angles_rad),
             tip=(units(x), units(y), units(z)),
@@ -197,7 +199,8 @@ class Needle:
 
     def check(self) -> End | None:
         """One round of the Checker: the end of the path, or nothing if it may go on."""
-        self.path_valid = self.vectors[TIP_X][1] <= 0
+        is_in_reach = self.needle_progress <= self.instance.max_progress
+        self.path_valid = self.vectors[TIP_X][1] <= 0 and is_in_reach
         if not self.path_valid:
             return End.PATH_INVALID
         target = self.instance.targets[self.curr_TR_index]
