@@ -11,21 +11,29 @@ mod needle;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::io::Write as _;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use checker::exec::{Context, Executor, Interpreter, Jit};
 use checker::ir::FunctionId;
 
-const ROUNDS: u32 = 20_000;
-/// The fastest of so many repetitions counts.
-const REPETITIONS: u32 = 7;
+const ROUNDS: u32 = 2_000;
+/// The fastest of so many repetitions counts; C and compiled code take turns, so that both see the same load.
+const REPETITIONS: u32 = 40;
 
 /// A run of the rounds.
 struct Run {
     step: f64,
     roll: f64,
     state: Vec<i32>,
+}
+
+impl Run {
+    fn take_faster(&mut self, other: &Run) {
+        self.step = self.step.min(other.step);
+        self.roll = self.roll.min(other.roll);
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -36,8 +44,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         jit.compile_function(function)?;
     }
     println!("compiling step and roll: {:.2?}", begin.elapsed());
-    let c = fastest(&run_c)?;
-    let compiled = fastest(&|| run(&jit))?;
+    let program = CProgram::compile()?;
+    let (mut c, mut compiled) = (program.run()?, run(&jit)?);
+    for _ in 1..REPETITIONS {
+        c.take_faster(&program.run()?);
+        compiled.take_faster(&run(&jit)?);
+    }
     let interpreted = run(&Interpreter::new(&functions, &[]))?;
     assert_eq!(
         compiled.state, c.state,
@@ -61,16 +73,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
     }
     Ok(())
-}
-
-fn fastest(run: &dyn Fn() -> Result<Run, Box<dyn Error>>) -> Result<Run, Box<dyn Error>> {
-    let mut best = run()?;
-    for _ in 1..REPETITIONS {
-        let next = run()?;
-        best.step = best.step.min(next.step);
-        best.roll = best.roll.min(next.roll);
-    }
-    Ok(best)
 }
 
 fn run(engine: &dyn Executor) -> Result<Run, Box<dyn Error>> {
@@ -107,37 +109,51 @@ fn call(
     Ok(begin.elapsed())
 }
 
-/// Compiles and runs the C program.
-fn run_c() -> Result<Run, Box<dyn Error>> {
-    let program = std::env::temp_dir().join(format!("exec-bench-{}", std::process::id()));
-    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/exec.c");
-    let compiled = Command::new("cc")
-        .args(["-O2", "-o"])
-        .arg(&program)
-        .args([source, "-lm"])
-        .status()?;
-    if !compiled.success() {
-        return Err("cc failed".into());
+/// The compiled C program; its file is removed in the end.
+struct CProgram(PathBuf);
+
+impl CProgram {
+    fn compile() -> Result<CProgram, Box<dyn Error>> {
+        let program = std::env::temp_dir().join(format!("exec-bench-{}", std::process::id()));
+        let source = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/exec.c");
+        let compiled = Command::new("cc")
+            .args(["-O2", "-o"])
+            .arg(&program)
+            .args([source, "-lm"])
+            .status()?;
+        if !compiled.success() {
+            return Err("cc failed".into());
+        }
+        Ok(CProgram(program))
     }
-    let mut child = Command::new(&program)
-        .arg(ROUNDS.to_string())
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()?;
-    let mut input = String::new();
-    for word in needle::initial_state() {
-        write!(input, "{word} ")?;
+
+    fn run(&self) -> Result<Run, Box<dyn Error>> {
+        let mut child = Command::new(&self.0)
+            .arg(ROUNDS.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()?;
+        let mut input = String::new();
+        for word in needle::initial_state() {
+            write!(input, "{word} ")?;
+        }
+        let mut stdin = child.stdin.take().ok_or("the program has an input")?;
+        stdin.write_all(input.as_bytes())?;
+        drop(stdin);
+        let output = String::from_utf8(child.wait_with_output()?.stdout)?;
+        let mut fields = output.split_whitespace();
+        let mut time = || -> Result<f64, Box<dyn Error>> {
+            Ok(fields.next().ok_or("the program prints times")?.parse()?)
+        };
+        let (step, roll) = (time()?, time()?);
+        let state = fields.map(str::parse).collect::<Result<_, _>>()?;
+        Ok(Run { step, roll, state })
     }
-    let mut stdin = child.stdin.take().ok_or("the program has an input")?;
-    stdin.write_all(input.as_bytes())?;
-    drop(stdin);
-    let output = String::from_utf8(child.wait_with_output()?.stdout)?;
-    std::fs::remove_file(&program)?;
-    let mut fields = output.split_whitespace();
-    let mut time = || -> Result<f64, Box<dyn Error>> {
-        Ok(fields.next().ok_or("the program prints times")?.parse()?)
-    };
-    let (step, roll) = (time()?, time()?);
-    let state = fields.map(str::parse).collect::<Result<_, _>>()?;
-    Ok(Run { step, roll, state })
+}
+
+impl Drop for CProgram {
+    fn drop(&mut self) {
+        // A file that is left over in the temporary folder does no harm.
+        let _ = std::fs::remove_file(&self.0);
+    }
 }

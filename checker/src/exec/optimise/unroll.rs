@@ -228,7 +228,7 @@ fn write_out(function: &mut Function, found: &Loop, end: &End) {
     let bodies: Vec<Block> = found
         .blocks
         .iter()
-        .map(|&block| function.blocks[block].clone())
+        .map(|&block| without_count(function.blocks[block].clone()))
         .collect();
     for round in 0..end.rounds {
         let is_last = round + 1 == end.rounds;
@@ -258,4 +258,12 @@ fn write_out(function: &mut Function, found: &Loop, end: &End) {
         successors_of(function, found.entry).any(|block| block == found.head),
         "the entry still leads to the first round"
     );
+}
+
+/// A block without the count of rounds: what is written out ends by itself.
+fn without_count(mut block: Block) -> Block {
+    block
+        .instructions
+        .retain(|instruction| !matches!(instruction, Instruction::CountRound { .. }));
+    block
 }
