@@ -262,6 +262,11 @@ impl<'a> Lowering<'a> {
         });
         let before = self.current();
         let head = self.open();
+        if rounds % 2 == 0 {
+            // The front end counts rounds, the engines count where it does not.
+            let site = self.site();
+            self.push(Instruction::CountRound { site });
+        }
         self.push(Instruction::Integer {
             target: limit,
             value: rounds,
