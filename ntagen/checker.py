@@ -307,7 +307,7 @@ class Simulation:
             self._raw.take(index)
 
     def settle(self) -> None:
-        """Follows moves as long as there is exactly one.
+        """Follows moves as long as time cannot pass and there is exactly one.
 
         Raises:
             ModelError: The model fails on the way.

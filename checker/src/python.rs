@@ -336,7 +336,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Follows moves as long as there is exactly one.
+    /// Follows moves as long as time cannot pass and there is exactly one.
     fn settle(&mut self) -> PyResult<()> {
         let point = self.model.get().with(|model| {
             model

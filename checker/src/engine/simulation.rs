@@ -56,9 +56,13 @@ impl LoadedModel {
         Ok(successors)
     }
 
-    /// Follows moves as long as there is exactly one; the state where there is a choice, or none.
+    /// Follows moves as long as time cannot pass and there is exactly one; the state where time can pass, or there is a choice,
+    /// or no move.
     pub fn settle(&self, mut point: Point) -> Result<Point, Failure> {
         for _ in 0..LONGEST_WAY {
+            if self.symbolic().may_delay(&mut point.words)? {
+                break;
+            }
             let mut successors = self.successors(&point)?;
             if successors.len() != 1 {
                 break;
