@@ -1,0 +1,208 @@
+"""`ntagen check`: verdicts, JSON, evidence, exit codes, and what it says of bad input."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ntagen.cli import main
+
+PAPER = Path(__file__).resolve().parents[3] / "examples" / "paper.nsl"
+
+GATE = """
+chan go;
+process Driver() { state Here, There; init Here; trans Here -> There { sync go!; }; }
+process Gate() {
+  clock x;
+  int[0,2] n;
+  state Closed, Open { x <= 5 };
+  init Closed;
+  trans Closed -> Open { sync go?; assign x = 0; },
+        Open -> Closed { guard x >= 2; assign n = n + 1; };
+}
+system Driver, Gate;
+"""
+
+RECORD = {
+    "query",
+    "name",
+    "verdict",
+    "value",
+    "message",
+    "stop",
+    "explored",
+    "stored",
+    "seconds",
+    "load_seconds",
+    "peak_bytes",
+    "plans",
+}
+
+
+@pytest.fixture
+def gate(tmp_path: Path) -> Path:
+    path = tmp_path / "gate.xta"
+    path.write_text(GATE)
+    return path
+
+
+def check_run(
+    capsys: pytest.CaptureFixture[str], code: int, *arguments: str | Path
+) -> tuple[str, str]:
+    """The command ends with the exit code and never with a stack trace; its two outputs."""
+    assert main(["check", *(str(argument) for argument in arguments)]) == code
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.out + captured.err
+    return captured.out, captured.err
+
+
+def test_satisfied_and_not_satisfied_queries(
+    gate: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, _ = check_run(capsys, 0, gate, "--query", "E<> Gate.Open")
+    assert "yes" in out
+    out, _ = check_run(capsys, 1, gate, "--query", "E<> Gate.n > 1", "--query", "E<> Gate.Open")
+    assert "no " in out
+
+
+def test_json_has_the_promised_fields_and_nothing_else_is_printed(
+    gate: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    queries = ["--query", "E<> Gate.Open", "--query", "A[] Gate.Closed"]
+    out, _ = check_run(capsys, 1, gate, "--json", *queries)
+    records = [json.loads(line) for line in out.splitlines()]
+    assert [set(record) for record in records] == [RECORD, RECORD]
+    assert [record["verdict"] for record in records] == ["satisfied", "not satisfied"]
+
+
+def test_queries_of_a_file_and_their_names(
+    gate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "gate.q"
+    file.write_text("// opens\nE<> Gate.Open\n\nA[] \\\nGate.Closed\n")
+    out, _ = check_run(capsys, 1, gate, "--queries", file, "--json")
+    assert [json.loads(line)["query"] for line in out.splitlines()] == [
+        "E<> Gate.Open",
+        "A[] Gate.Closed",
+    ]
+
+
+def test_a_limit_is_an_answer(gate: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    loop = "--query", "E<> Checker.UR_Reached && Checker.Path_Invalid"
+    out, _ = check_run(capsys, 3, PAPER, *loop, "--states", "50", "--json")
+    record = json.loads(out)
+    assert (record["verdict"], record["stop"]) == ("unknown", "states")
+    out, _ = check_run(capsys, 3, PAPER, *loop, "--timeout", "1ms", "--json")
+    assert json.loads(out)["stop"] == "time"
+    out, _ = check_run(capsys, 3, PAPER, *loop, "--memory", "100kB", "--json")
+    assert json.loads(out)["stop"] == "memory"
+
+
+def test_a_run_time_error_is_no_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "overflow.xta"
+    path.write_text(
+        "int[0,3] i = 3;\nprocess P() { state A, B; init A; trans A -> B { assign i++; }; }\n"
+        "system P;\n"
+    )
+    out, _ = check_run(capsys, 4, path, "--query", "E<> P.B", "--json")
+    record = json.loads(out)
+    assert record["verdict"] == "error"
+    assert "out of range" in record["message"]
+    assert "overflow.xta:2" in record["message"]
+
+
+def test_traces_and_strategies_and_plans_are_written(
+    gate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, _ = check_run(capsys, 0, gate, "--query", "E<> Gate.Open", "--trace", "-")
+    assert "Driver.Here->Driver.There { 1, go!, 1 }" in out
+    files = {name: tmp_path / f"{name}.json" for name in ("trace", "strategy", "plans")}
+    options = [word for name, path in files.items() for word in (f"--{name}", str(path))]
+    check_run(capsys, 0, gate, "--query", "E<> Gate.Open", *options)
+    check_run(capsys, 0, gate, "--query", "control: A<> Gate.Open", *options)
+    documents = {name: json.loads(path.read_text()) for name, path in files.items()}
+    assert len(documents["trace"]["states"]) == 2
+    assert documents["plans"]["count"] == 1
+    decisions = documents["strategy"]["states"][0]["decisions"]
+    assert decisions[0]["action"][0]["sync"] == "go!"
+
+
+def test_plans_of_an_environment_are_ranked_and_certified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "plans.json"
+    out, _ = check_run(capsys, 0, PAPER, "--query", "ReachFinalTR", "--plans", path)
+    plans = json.loads(path.read_text())["plans"]
+    assert len(plans) == 129
+    assert "129 plans" in out
+    assert plans[0]["certificate"]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "empty"),
+        (b"\x00\x01\x02\xff\xfe binary", "error"),
+        (b"<html><body>no model</body></html>", "error"),
+        (b"<nta><template>", "error"),
+        (b"process P( {", "error"),
+    ],
+    ids=["empty", "binary", "other XML", "broken XML", "broken XTA"],
+)
+def test_files_that_are_no_model_are_rejected(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: bytes, said: str
+) -> None:
+    path = tmp_path / "model.xml"
+    path.write_bytes(content)
+    _, err = check_run(capsys, 2, path, "--query", "E<> true")
+    assert said in err
+    assert "model.xml" in err
+
+
+def test_missing_files_and_folders_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for path in (tmp_path / "none.xml", tmp_path / "none.nsl", tmp_path):
+        _, err = check_run(capsys, 2, path)
+        assert str(path) in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--query", "Nonsense"),
+        ("--query", "E<> Gate.Nowhere"),
+        ("--query", "E<> Gate.Open +"),
+        ("--query", ""),
+        ("--queries", "none.q"),
+        ("--memory", "4 parsecs"),
+        ("--timeout", "soon"),
+        ("--engine", "steam"),
+        (),
+    ],
+)
+def test_wrong_queries_and_options_are_rejected(
+    gate: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...]
+) -> None:
+    _, err = check_run(capsys, 2, gate, *arguments)
+    assert err
+
+
+def test_an_output_that_cannot_be_written_is_said(
+    gate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("--query", "E<> Gate.Open", "--trace", tmp_path)
+    _, err = check_run(capsys, 2, gate, *options)
+    assert str(tmp_path) in err
+
+
+@pytest.mark.parametrize("engine", ["jit", "interpreter"])
+@pytest.mark.parametrize("search", ["bfs", "dfs", "random"])
+def test_answers_do_not_depend_on_engine_and_order(
+    gate: Path, capsys: pytest.CaptureFixture[str], engine: str, search: str
+) -> None:
+    options = ("--engine", engine, "--search", search, "--json")
+    out, _ = check_run(capsys, 1, gate, "--query", "A[] Gate.x < 7", *options)
+    assert json.loads(out)["verdict"] == "not satisfied"
