@@ -14,11 +14,17 @@
 //! search ends as soon as the initial valuation is winning. Each gain is recorded with a stamp: a strategy that moves from
 //! valuations of one stamp into those of smaller ones makes progress.
 //!
+//! Forward, the solver dives: it follows the first moves of newly made nodes as far as they go, then takes up the oldest node that
+//! waits and dives from there. Ways with few departures from the first moves so come first (W. D. Harvey, M. L. Ginsberg, "Limited
+//! Discrepancy Search", IJCAI 1995), which finds a first win early where wins are spread.
+//!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are.
 //!
 //! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis of Timed
 //! Games", CONCUR 2005; the forced moves are those of G. Behrmann et al., "UPPAAL-TIGA: Time for Playing Games!", CAV 2007,
 //! and the tool's manual, section 3.1.
+
+use std::collections::VecDeque;
 
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
@@ -80,8 +86,11 @@ pub struct Solver<'g, 's, 'a> {
     pub gains: Vec<Vec<Gain>>,
     forced: Forced,
     stamp: u32,
-    waiting: Vec<u32>,
+    /// Nodes to be expanded, the oldest first.
+    waiting: VecDeque<u32>,
     is_waiting: Vec<bool>,
+    /// Whether the last expansion made no node to go on with.
+    is_dive_over: bool,
     updates: Vec<u32>,
     is_updated: Vec<bool>,
 }
@@ -95,7 +104,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             gains: Vec::new(),
             forced,
             stamp: 0,
-            waiting: Vec::new(),
+            waiting: VecDeque::new(),
+            is_dive_over: false,
             is_waiting: Vec::new(),
             updates: Vec::new(),
             is_updated: Vec::new(),
@@ -126,7 +136,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             if extent == Extent::Verdict && self.is_winning()? {
                 return Ok(Answer::Winning);
             }
-            let Some(node) = self.waiting.pop() else {
+            let Some(node) = self.next_waiting() else {
                 break;
             };
             self.is_waiting[node as usize] = false;
@@ -148,6 +158,14 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         } else {
             Answer::NotWinning
         })
+    }
+
+    fn next_waiting(&mut self) -> Option<u32> {
+        if self.is_dive_over {
+            self.waiting.pop_front()
+        } else {
+            self.waiting.pop_back()
+        }
     }
 
     /// Whether the initial valuation is winning.
@@ -191,10 +209,12 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     fn expand(&mut self, node: u32) -> Result<(), Failure> {
         self.graph.expand(node)?;
         self.adopt_new_nodes();
+        let waiting = self.waiting.len();
         for edge in self.graph.edges_of(node).rev() {
             let target = self.graph.edges[edge].target;
             self.wait_for(target);
         }
+        self.is_dive_over = self.waiting.len() == waiting;
         self.mark(node);
         Ok(())
     }
@@ -244,7 +264,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let is_decided = matches!(known.standing, Standing::Goal | Standing::Broken);
         if !known.is_expanded && !is_decided && !self.is_waiting[node as usize] {
             self.is_waiting[node as usize] = true;
-            self.waiting.push(node);
+            self.waiting.push_back(node);
         }
     }
 
