@@ -381,6 +381,12 @@ impl Answer {
         }
     }
 
+    /// The values of a query for them as JSON; `None` for other queries.
+    fn value_json(&self) -> Option<String> {
+        let values = self.inner.value.as_ref()?;
+        Some(json::values(values).to_string())
+    }
+
     /// "states", "memory" or "time" if a limit stopped the search.
     #[getter]
     fn stop(&self) -> Option<&'static str> {
@@ -470,23 +476,28 @@ impl Answer {
         )
     }
 
-    /// The trace in UPPAAL's form; `None` without a trace.
+    /// The trace in UPPAAL's form, and why it never ends if it does not; `None` without a trace.
     fn trace_text(&self) -> Option<String> {
-        let trace = self.inner.evidence.trace.as_ref()?;
-        Some(
-            self.model
-                .get()
-                .with(|model| describe::trace_text(model.network(), trace)),
-        )
+        let evidence = &self.inner.evidence;
+        let trace = evidence.trace.as_ref()?;
+        let text = self
+            .model
+            .get()
+            .with(|model| describe::trace_text(model.network(), trace));
+        let ending = evidence
+            .ending
+            .map_or_else(String::new, describe::ending_text);
+        Some(text + &ending)
     }
 
     /// The trace as JSON; `None` without a trace.
     fn trace_json(&self) -> Option<String> {
-        let trace = self.inner.evidence.trace.as_ref()?;
+        let evidence = &self.inner.evidence;
+        let trace = evidence.trace.as_ref()?;
         Some(
             self.model
                 .get()
-                .with(|model| json::trace(model.network(), trace).to_string()),
+                .with(|model| json::trace(model.network(), trace, evidence.ending).to_string()),
         )
     }
 

@@ -2,14 +2,16 @@
 //!
 //! A file begins with lines `// query: …`, each followed by `// verdict: …` (`// verdict neutral: …` and `// verdict product: …`
 //! where the rule for forced moves matters) and `// origin: …`, which says how the verdict is known. Other comment lines are
-//! prose. Every query is answered with every search order and with the interpreter and compiled code, and must come out
+//! prose. The verdict of a query for values is the values. Every query is answered with every search order and with the interpreter and compiled code, and must come out
 //! the same.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use checker::engine::answer::Values;
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
 use checker::game::Forced;
+use checker::search::extremum::Extreme;
 use checker::search::reach::Order;
 
 struct Case {
@@ -76,13 +78,38 @@ fn verdict_of(path: &Path, bytes: &[u8], query: &str, options: &Options) -> Stri
     match model.check(&text, options) {
         Err(_) => "rejected".to_owned(),
         Ok(answer) => match answer.verdict {
-            Verdict::Satisfied => "satisfied".to_owned(),
+            Verdict::Satisfied => match &answer.value {
+                Some(values) => value_text(values),
+                None => "satisfied".to_owned(),
+            },
             Verdict::NotSatisfied => "not satisfied".to_owned(),
             Verdict::Maybe => "maybe".to_owned(),
             Verdict::Unknown(reason) => format!("stopped: {reason:?}"),
             Verdict::Error(_) => "error".to_owned(),
         },
     }
+}
+
+/// The values of a query for them: `3`, `> 3` and `< 3` for one that is not reached, `inf`, `none`; bounds as `1..3`.
+fn value_text(values: &Values) -> String {
+    let one = |extreme: Option<Extreme>, strict: &str| match extreme {
+        None => "none".to_owned(),
+        Some(Extreme::Infinite) => "inf".to_owned(),
+        Some(Extreme::Value {
+            value,
+            is_reached: true,
+        }) => value.to_string(),
+        Some(Extreme::Value { value, .. }) => format!("{strict} {value}"),
+    };
+    let items = values.items.iter().map(|item| {
+        let (least, greatest) = (one(item.least, ">"), one(item.greatest, "<"));
+        match (values.least, values.greatest) {
+            (true, true) => format!("{least}..{greatest}"),
+            (true, false) => least,
+            _ => greatest,
+        }
+    });
+    items.collect::<Vec<_>>().join(", ")
 }
 
 fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>) {

@@ -169,6 +169,12 @@ def command(
       ntagen check examples/paper.nsl --plans plans.json
       ntagen check model.xml --query "E<> Gate.Open" --trace -
       ntagen check model.xml --queries model.q --json --timeout 60s
+      ntagen check model.xml --query "bounds{Gate.Open}: x"
+
+    \b
+    The value of sup and inf is a number, or "inf" for a clock without limit; of bounds it is the pair
+    of both; of several items the list of their values. It is null if no state counts. The message
+    says where a clock comes near the value without reaching it.
     """  # noqa: D301  click wants the control character
     outputs = _Outputs(trace, strategy, plans, ranking)
     model, scene = _load(model_path)
@@ -269,7 +275,7 @@ def _record(answer: Answer, query: _Asked) -> dict[str, object]:
         "query": query.text,
         "name": query.name,
         "verdict": answer.verdict,
-        "value": None,
+        "value": answer.value,
         "message": answer.message,
         "stop": answer.stop,
         "explored": answer.explored,
@@ -294,7 +300,8 @@ def _row(answer: Answer, query: _Asked, notes: Sequence[str]) -> None:
     facts.append(f"{answer.peak_bytes / 2**20:.1f} MiB")
     if answer.stop:
         facts.insert(0, f"stopped by the limit of {answer.stop}")
-    for line in [", ".join(facts), *([answer.message] if answer.message else []), *notes]:
+    shown = [f"value: {json.dumps(answer.value)}"] if answer.value is not None else []
+    for line in [*shown, ", ".join(facts), *([answer.message] if answer.message else []), *notes]:
         click.echo(f"          {line}")
 
 

@@ -7,9 +7,13 @@ use crate::game::graph::{Graph, Objective as GameObjective};
 use crate::game::plans::{NoPlans, Plan, Plans};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
 use crate::game::strategy::{self, Strategy};
-use crate::ir::{ClockAtom, Network, Objective, Predicate, Query, QueryKind};
+use crate::ir::{ClockAtom, Measure, Network, Objective, Predicate, Query, QueryKind};
+use crate::network::bounds::is_difference;
 use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic, predicate};
+use crate::search::extremum::{self, Extreme, Extremes, Question};
+use crate::search::leads_to::{self, Unanswered};
 use crate::search::limits::{Counters, StopReason};
+use crate::search::liveness::{self, Ending, Liveness};
 use crate::search::reach::{self, Outcome, Trace};
 
 use super::limits::LimitWatch;
@@ -35,6 +39,8 @@ pub enum Verdict {
 pub struct Evidence {
     /// A witness, a counterexample, or the way to a failure.
     pub trace: Option<Trace>,
+    /// Why the run of the trace never ends, if it is one that does not.
+    pub ending: Option<Ending>,
     /// A winning strategy, if it was wanted.
     pub strategy: Option<Strategy>,
     /// Plans, if they were wanted.
@@ -43,11 +49,24 @@ pub struct Evidence {
     pub has_more_plans: bool,
 }
 
+/// The values of the items of a query with `sup`, `inf` or `bounds`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Values {
+    /// Whether the least values were asked for.
+    pub least: bool,
+    /// Whether the greatest values were asked for.
+    pub greatest: bool,
+    /// Of each item.
+    pub items: Vec<Extremes>,
+}
+
 /// The answer to a query.
 #[derive(Clone, Debug)]
 pub struct Answer {
     /// The verdict.
     pub verdict: Verdict,
+    /// The values of a query for them.
+    pub value: Option<Values>,
     /// A remark for the user.
     pub message: Option<String>,
     /// What backs it.
@@ -92,19 +111,39 @@ pub(super) fn answer(
     let mut answer = match &query.kind {
         QueryKind::Reachable(goal) => reachable(network, executor, goal, options, &mut watch),
         QueryKind::Invariantly(invariant) => {
-            let broken = Predicate::Not(Box::new(invariant.clone()));
-            let mut answer = reachable(network, executor, &broken, options, &mut watch);
-            answer.verdict = match answer.verdict {
-                Verdict::Satisfied => Verdict::NotSatisfied,
-                Verdict::NotSatisfied => Verdict::Satisfied,
-                other => other,
+            let broken = negation(invariant);
+            negated(reachable(network, executor, &broken, options, &mut watch))
+        }
+        QueryKind::PotentiallyAlways(keep) => always(network, executor, keep, &mut watch),
+        QueryKind::Eventually(goal) => {
+            let keep = negation(goal);
+            negated(always(network, executor, &keep, &mut watch))
+        }
+        QueryKind::LeadsTo(cause, effect) => {
+            let open = Predicate::And(vec![cause.clone(), negation(effect)]);
+            let keep = negation(effect);
+            leads_to(network, executor, (&open, &keep), options, &mut watch)
+        }
+        QueryKind::Extremum {
+            least,
+            greatest,
+            predicate,
+            items,
+        } => {
+            let question = Question {
+                predicate,
+                items,
+                least: *least,
+                greatest: *greatest,
             };
-            answer
+            extremum(network, executor, question, options, &mut watch)
         }
         QueryKind::Control { objective, .. } => {
             game(network, executor, objective, options, &mut watch)
         }
-        _ => unreachable!("unsupported queries were refused"),
+        QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
+            unreachable!("unsupported queries were refused")
+        }
     };
     answer.seconds = start.elapsed().as_secs_f64();
     answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
@@ -114,6 +153,7 @@ pub(super) fn answer(
 fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counters) -> Answer {
     Answer {
         verdict,
+        value: None,
         message: None,
         evidence,
         counters,
@@ -123,34 +163,198 @@ fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counters) -> Answe
     }
 }
 
-/// Extrapolation that is sound for the network: with differences of clocks in guards there is none.
-fn abstraction(network: &Network, atoms: &[ClockAtom], wanted: Abstraction) -> Abstraction {
-    let is_difference = |atom: &ClockAtom| atom.left.first.0 != 0 && atom.right.first.0 != 0;
-    if network.features.diagonals || atoms.iter().any(is_difference) {
-        Abstraction::Exact
-    } else {
-        wanted
-    }
+fn negation(predicate: &Predicate) -> Predicate {
+    Predicate::Not(Box::new(predicate.clone()))
 }
 
+/// The answer to the negated query.
+fn negated(answer: Answer) -> Answer {
+    let verdict = match answer.verdict {
+        Verdict::Satisfied => Verdict::NotSatisfied,
+        Verdict::NotSatisfied => Verdict::Satisfied,
+        other => other,
+    };
+    Answer { verdict, ..answer }
+}
+
+/// Whether the network or a query compares two clocks.
+fn has_differences(network: &Network, atoms: &[ClockAtom]) -> bool {
+    network.features.diagonals || atoms.iter().any(is_difference)
+}
+
+/// Zones for searches, with an abstraction that is sound for the network and these predicates, and keeps what further
+/// comparisons tell.
 fn symbolic<'a>(
     network: &'a Network,
     executor: &'a dyn Executor,
     predicates: &[&Predicate],
+    further: &[ClockAtom],
     wanted: Abstraction,
 ) -> Symbolic<'a> {
     let atoms: Vec<ClockAtom> = predicates
         .iter()
         .flat_map(|one| predicate::atoms(one))
+        .chain(further.iter().cloned())
         .collect();
-    let needs_maximum = predicates.iter().any(|one| predicate::has_deadlock(one));
-    let wanted = if needs_maximum {
+    let abstraction = if has_differences(network, &atoms) {
+        Abstraction::Differences
+    } else if predicates.iter().any(|one| predicate::has_deadlock(one)) {
         Abstraction::Maximum
     } else {
         wanted
     };
-    let bounds = ClockBounds::new(network, &atoms, abstraction(network, &atoms, wanted));
+    let bounds = ClockBounds::new(network, &atoms, abstraction);
     Symbolic::new(Stepper::new(network, executor), bounds)
+}
+
+/// Zones for games. Their graph does not cut zones, so with comparisons of two clocks there is no abstraction.
+fn game_symbolic<'a>(
+    network: &'a Network,
+    executor: &'a dyn Executor,
+    predicates: &[&Predicate],
+) -> Symbolic<'a> {
+    let atoms = predicates.iter().flat_map(|one| predicate::atoms(one));
+    let atoms: Vec<ClockAtom> = atoms.collect();
+    let abstraction = if has_differences(network, &atoms) {
+        Abstraction::Exact
+    } else {
+        Abstraction::Maximum
+    };
+    let bounds = ClockBounds::new(network, &atoms, abstraction);
+    Symbolic::new(Stepper::new(network, executor), bounds)
+}
+
+/// The verdict on something that was found, in zones that may be too large.
+fn found(is_approximate: bool) -> Verdict {
+    if is_approximate {
+        Verdict::Maybe
+    } else {
+        Verdict::Satisfied
+    }
+}
+
+/// Is there a run inside the predicate that never leaves it?
+fn always(
+    network: &Network,
+    executor: &dyn Executor,
+    keep: &Predicate,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let mut symbolic = symbolic(network, executor, &[keep], &[], Abstraction::Maximum);
+    let mut search = Liveness::new(&symbolic, keep);
+    let mut evidence = Evidence::default();
+    let verdict = match search.from_start(&mut symbolic, watch) {
+        Ok(liveness::Outcome::Found(run)) => {
+            evidence.trace = Some(run.trace);
+            evidence.ending = Some(run.ending);
+            found(symbolic.is_approximate() || search.is_coarse())
+        }
+        Ok(liveness::Outcome::Exhausted) => Verdict::NotSatisfied,
+        Ok(liveness::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
+        Err((failure, trace)) => {
+            evidence.trace = Some(trace);
+            Verdict::Error(failure)
+        }
+    };
+    new_answer(verdict, evidence, search.counters())
+}
+
+/// Does every state of `open` lead out of `keep`?
+fn leads_to(
+    network: &Network,
+    executor: &dyn Executor,
+    (open, keep): (&Predicate, &Predicate),
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let mut symbolic = symbolic(network, executor, &[open, keep], &[], Abstraction::Maximum);
+    let mut goal = Unanswered::new(&symbolic, open, keep);
+    let report = reach::search(&mut symbolic, &mut goal, options.order, watch);
+    let mut evidence = Evidence::default();
+    let verdict = match report.outcome {
+        Ok(Outcome::Found(way)) => {
+            if let Some(run) = goal.run.take() {
+                let (trace, start) = leads_to::joined(way, run.trace);
+                evidence.trace = Some(trace);
+                evidence.ending = Some(run.ending.moved(start));
+            }
+            found(symbolic.is_approximate() || goal.is_coarse())
+        }
+        Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
+        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
+        Err((failure, way)) => {
+            let below = goal.failed.take();
+            evidence.trace = Some(below.map_or(way.clone(), |run| leads_to::joined(way, run).0));
+            Verdict::Error(failure)
+        }
+    };
+    negated(new_answer(verdict, evidence, report.counters))
+}
+
+/// The least and greatest values.
+fn extremum(
+    network: &Network,
+    executor: &dyn Executor,
+    question: Question<'_>,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let mut zones = |further: &[ClockAtom]| {
+        let predicates = [question.predicate];
+        symbolic(
+            network,
+            executor,
+            &predicates,
+            further,
+            Abstraction::LowerUpper,
+        )
+    };
+    let report = extremum::search(question, network, &mut zones, options.order, watch);
+    let mut evidence = Evidence::default();
+    let mut values = None;
+    let verdict = match report.outcome {
+        Ok(extremum::Outcome::Found(items)) => {
+            values = Some(Values {
+                least: question.least,
+                greatest: question.greatest,
+                items,
+            });
+            found(report.is_approximate)
+        }
+        Ok(extremum::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
+        Err((failure, trace)) => {
+            evidence.trace = Some(trace);
+            Verdict::Error(failure)
+        }
+    };
+    let mut answer = new_answer(verdict, evidence, report.counters);
+    answer.message = values
+        .as_ref()
+        .and_then(|values| remark(values, question.items));
+    answer.value = values;
+    answer
+}
+
+/// What the numbers alone do not say: that no state counts, or that a value is not reached.
+fn remark(values: &Values, items: &[(Measure, String)]) -> Option<String> {
+    let mut remarks = Vec::new();
+    for (Extremes { least, greatest }, (_, text)) in values.items.iter().zip(items) {
+        if least.is_none() && greatest.is_none() {
+            return Some("no reachable state satisfies the condition".to_owned());
+        }
+        for (extreme, relation) in [(least, '>'), (greatest, '<')] {
+            if let Some(Extreme::Value {
+                value,
+                is_reached: false,
+            }) = extreme
+            {
+                remarks.push(format!(
+                    "{text} {relation} {value}: the value itself is not reached"
+                ));
+            }
+        }
+    }
+    (!remarks.is_empty()).then(|| remarks.join("; "))
 }
 
 fn reachable(
@@ -160,17 +364,14 @@ fn reachable(
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let mut symbolic = symbolic(network, executor, &[goal], Abstraction::LowerUpper);
-    let report = reach::search(&mut symbolic, goal, options.order, watch);
+    let mut symbolic = symbolic(network, executor, &[goal], &[], Abstraction::LowerUpper);
+    let mut goal = goal;
+    let report = reach::search(&mut symbolic, &mut goal, options.order, watch);
     let mut evidence = Evidence::default();
     let verdict = match report.outcome {
         Ok(Outcome::Found(trace)) => {
             evidence.trace = Some(trace);
-            if network.features.stopwatches {
-                Verdict::Maybe
-            } else {
-                Verdict::Satisfied
-            }
+            found(symbolic.is_approximate())
         }
         Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
         Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
@@ -195,7 +396,7 @@ fn game(
         _ => unreachable!("unsupported objectives were refused"),
     };
     let predicates: Vec<&Predicate> = std::iter::once(goal).chain(keep).collect();
-    let mut symbolic = symbolic(network, executor, &predicates, Abstraction::Maximum);
+    let mut symbolic = game_symbolic(network, executor, &predicates);
     let objective = GameObjective {
         goal: Some(goal),
         keep,

@@ -8,6 +8,7 @@ use super::LoadedModel;
 use crate::ir::{EdgeLabels, Network, RunTimeErrorKind, Shape};
 use crate::network::stepper::{select_count, select_values};
 use crate::network::{Failure, Part};
+use crate::search::liveness::Ending;
 use crate::search::reach::Trace;
 use crate::zones::{Bound, Zone};
 
@@ -199,6 +200,17 @@ pub fn trace_text(network: &Network, trace: &Trace) -> String {
         let _ = writeln!(text, "{}", zone_constraints(network, zone).join(" "));
     }
     text
+}
+
+/// Why a run never ends, as a line below its trace.
+pub fn ending_text(ending: Ending) -> String {
+    match ending {
+        Ending::Loop(start) => {
+            format!("\nThe last state leads back to state {start} (the first is 0).\n")
+        }
+        Ending::Waits => "\nTime passes for ever in the last state.\n".to_owned(),
+        Ending::Stuck => "\nNothing is possible any more in the last state.\n".to_owned(),
+    }
 }
 
 /// What went wrong in the model, and where.

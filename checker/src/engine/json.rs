@@ -12,9 +12,12 @@ use crate::game::strategy::{Decision, Strategy};
 use crate::ir::Network;
 use crate::network::Part;
 use crate::search::StateStore;
+use crate::search::extremum::{Extreme, Extremes};
+use crate::search::liveness::Ending;
 use crate::search::reach::Trace;
 use crate::zones::Zone;
 
+use super::answer::Values;
 use super::describe::{self, Value};
 
 /// An edge.
@@ -69,8 +72,28 @@ fn variables(network: &Network, words: &[i32]) -> Json {
     Json::Object(values)
 }
 
-/// A trace.
-pub fn trace(network: &Network, trace: &Trace) -> Json {
+/// The values of a query for them: of one item its value, of several a list. A value is a number, or "inf" without a greatest one, or
+/// null if no state counts; for `bounds` it is the pair of the least and the greatest.
+pub fn values(values: &Values) -> Json {
+    let one = |extreme: Option<Extreme>| match extreme {
+        None => Json::Null,
+        Some(Extreme::Infinite) => json!("inf"),
+        Some(Extreme::Value { value, .. }) => json!(value),
+    };
+    let item = |item: &Extremes| match (values.least, values.greatest) {
+        (true, true) if *item == Extremes::default() => Json::Null,
+        (true, true) => json!([one(item.least), one(item.greatest)]),
+        (true, false) => one(item.least),
+        _ => one(item.greatest),
+    };
+    match values.items.as_slice() {
+        [only] => item(only),
+        items => Json::Array(items.iter().map(item).collect()),
+    }
+}
+
+/// A trace; `ending` says why a run never ends: `loop` is the index of the state that its last state leads back to.
+pub fn trace(network: &Network, trace: &Trace, ending: Option<Ending>) -> Json {
     let states = trace.states.iter().map(|(words, zone)| {
         json!({
             "locations": locations(network, words),
@@ -79,7 +102,16 @@ pub fn trace(network: &Network, trace: &Trace) -> Json {
         })
     });
     let moves = trace.moves.iter().map(|one| parts(network, one));
-    json!({ "states": states.collect::<Vec<_>>(), "transitions": moves.collect::<Vec<_>>() })
+    let mut json =
+        json!({ "states": states.collect::<Vec<_>>(), "transitions": moves.collect::<Vec<_>>() });
+    if let Some(ending) = ending {
+        json["ending"] = match ending {
+            Ending::Loop(start) => json!({ "kind": "loop", "loop": start }),
+            Ending::Waits => json!({ "kind": "waits" }),
+            Ending::Stuck => json!({ "kind": "stuck" }),
+        };
+    }
+    json
 }
 
 /// Plans: of each, the transitions that leave a state without committed locations; all others follow from them.

@@ -296,7 +296,12 @@ impl LoadedModel {
     /// Refuses, by name, what there is no algorithm for.
     fn refuse_unsupported(&self, query: &crate::ir::Query) -> Result<(), Rejection> {
         let kind = match &query.kind {
-            QueryKind::Reachable(_) | QueryKind::Invariantly(_) => None,
+            QueryKind::Reachable(_)
+            | QueryKind::Invariantly(_)
+            | QueryKind::PotentiallyAlways(_)
+            | QueryKind::Eventually(_)
+            | QueryKind::LeadsTo(..)
+            | QueryKind::Extremum { .. } => None,
             QueryKind::Control {
                 objective,
                 cooperative,
@@ -308,30 +313,28 @@ impl LoadedModel {
                 time_optimal.is_some(),
                 observations.is_some(),
             ),
-            QueryKind::PotentiallyAlways(_) => Some("E[]"),
-            QueryKind::Eventually(_) => Some("A<>"),
-            QueryKind::LeadsTo(..) => Some("-->"),
-            QueryKind::Extremum { .. } => Some("sup, inf and bounds"),
             QueryKind::SaveStrategy { .. } => Some("saveStrategy"),
             QueryKind::LoadStrategy { .. } => Some("loadStrategy"),
         };
         let under = query.under.as_ref().map(|_| "under a strategy");
         let features = &self.model.network.features;
-        let construct = [
-            (features.priorities, "channel and process priorities"),
-            (
-                features.clock_guarded_urgent,
-                "clock guards on edges of urgent channels",
-            ),
-        ];
-        let construct = construct.into_iter().find(|one| one.0).map(|one| one.1);
+        let is_game = matches!(query.kind, QueryKind::Control { .. });
+        let construct = if !features.clock_guarded_urgent {
+            None
+        } else if is_game {
+            Some("clock guards on edges of urgent channels in a game")
+        } else if features.stopwatches {
+            Some("clock guards on edges of urgent channels together with stopwatches")
+        } else {
+            None
+        };
         let diagnostic = if let Some(kind) = kind.or(under) {
             Diagnostic::new(
                 codes::UNSUPPORTED_QUERY,
                 query.span,
                 format!("queries with {kind} are not supported"),
             )
-            .help("supported are E<>, A[], and control: with A<> or A[ U ]")
+            .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, and control: with A<> or A[ U ]")
         } else if let Some(construct) = construct {
             Diagnostic::new(
                 codes::UNSUPPORTED_CONSTRUCT,

@@ -12,9 +12,13 @@
 //!
 //! Invariant: an assignment counts as a reset only if it is certain (among [`crate::ir::Update::fixed`]).
 
-use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Process, Update};
+use crate::ir::{
+    AssignedValue, ClockAssignment, ClockAtom, ClockRange, Edge, Network, Process, Update,
+};
 use crate::zones::extrapolate::Ceilings;
-use crate::zones::{Bound, extrapolate};
+use crate::zones::{Bound, Federation, extrapolate};
+
+use super::differences::Differences;
 
 /// No comparison: the clock is inactive in this direction.
 const NONE: i32 = i32::MIN;
@@ -28,6 +32,8 @@ pub enum Abstraction {
     Maximum,
     /// Extra-LU+: keeps what reachability of locations needs.
     LowerUpper,
+    /// Extra-M on the parts of a zone on either side of every comparison of two clocks: see [`ClockBounds::split`].
+    Differences,
 }
 
 /// The bounds of all locations.
@@ -38,6 +44,7 @@ pub struct ClockBounds {
     /// Bounds that hold everywhere: those of queries.
     everywhere: Ceilings,
     abstraction: Abstraction,
+    differences: Differences,
 }
 
 /// Lower and upper bounds of all clocks in all locations of a process.
@@ -47,14 +54,23 @@ impl ClockBounds {
     /// The bounds of a network; `atoms` are comparisons of queries, which matter in every location.
     pub fn new(network: &Network, atoms: &[ClockAtom], abstraction: Abstraction) -> ClockBounds {
         let clock_count = network.clocks.len();
+        let (abstraction, differences) = if abstraction == Abstraction::Differences {
+            match Differences::new(network, atoms) {
+                Some(differences) => (abstraction, differences),
+                None => (Abstraction::Exact, Differences::default()),
+            }
+        } else {
+            (abstraction, Differences::default())
+        };
+        let reset = differences.greatest_reset;
         let mut tables: Vec<Table> = network
             .processes
             .iter()
-            .map(|process| fixpoint(process, clock_count))
+            .map(|process| fixpoint(process, clock_count, reset))
             .collect();
         let mut everywhere = vec![(NONE, NONE); clock_count.max(1)];
         for atom in atoms {
-            add_atom(&mut everywhere, atom);
+            add_atom(&mut everywhere, atom, reset);
         }
         if network.features.clock_copies {
             spread_over_copies(network, &mut tables, &mut everywhere);
@@ -68,6 +84,36 @@ impl ClockBounds {
             ceilings,
             everywhere,
             abstraction,
+            differences,
+        }
+    }
+
+    /// Whether zones are to be cut by [`ClockBounds::split`].
+    pub fn splits(&self) -> bool {
+        self.abstraction == Abstraction::Differences
+    }
+
+    /// Cuts a zone along the comparisons of two clocks that matter in the state, and adds the extrapolated parts to `target`.
+    pub fn split(
+        &self,
+        words: &[i32],
+        zone: &[Bound],
+        scratch: &mut Ceilings,
+        target: &mut Federation,
+    ) {
+        self.ceilings_into(words, scratch);
+        let differences = self.differences.of(words);
+        let dimension = target.dimension();
+        extrapolate::split_by_differences(zone, dimension, scratch, &differences, target);
+    }
+
+    /// The ceilings of a state.
+    fn ceilings_into(&self, words: &[i32], scratch: &mut Ceilings) {
+        scratch.clone_from(&self.everywhere);
+        for (locations, &location) in self.ceilings.iter().zip(words) {
+            if let Some(ceilings) = &locations[location as usize] {
+                scratch.raise(ceilings);
+            }
         }
     }
 
@@ -79,17 +125,15 @@ impl ClockBounds {
         dimension: usize,
         scratch: &mut Ceilings,
     ) {
-        if self.abstraction == Abstraction::Exact {
+        if matches!(
+            self.abstraction,
+            Abstraction::Exact | Abstraction::Differences
+        ) {
             return;
         }
-        scratch.clone_from(&self.everywhere);
-        for (locations, &location) in self.ceilings.iter().zip(words) {
-            if let Some(ceilings) = &locations[location as usize] {
-                scratch.raise(ceilings);
-            }
-        }
+        self.ceilings_into(words, scratch);
         match self.abstraction {
-            Abstraction::Exact => {}
+            Abstraction::Exact | Abstraction::Differences => {}
             Abstraction::Maximum => extrapolate::lu_plus(zone, dimension, &scratch.to_maximal()),
             Abstraction::LowerUpper => extrapolate::lu_plus(zone, dimension, scratch),
         }
@@ -117,17 +161,20 @@ fn to_ceilings(bounds: &[(i32, i32)]) -> Ceilings {
 
 /// The least bounds of a process that satisfy: those of a location cover its invariant and the guards of its edges, and those
 /// of every target for the clocks that the edge does not certainly reset.
-fn fixpoint(process: &Process, clock_count: usize) -> Table {
+fn fixpoint(process: &Process, clock_count: usize, reset: i32) -> Table {
     let mut table: Table = vec![vec![(NONE, NONE); clock_count.max(1)]; process.locations.len()];
     for (location, bounds) in process.locations.iter().zip(&mut table) {
         location
             .invariant
             .atoms
             .iter()
-            .for_each(|atom| add_atom(bounds, atom));
+            .for_each(|atom| add_atom(bounds, atom, reset));
         for edge in &location.edges {
             let guard = &process.edges[edge.0 as usize].guard;
-            guard.atoms.iter().for_each(|atom| add_atom(bounds, atom));
+            guard
+                .atoms
+                .iter()
+                .for_each(|atom| add_atom(bounds, atom, reset));
         }
     }
     loop {
@@ -172,21 +219,32 @@ fn is_certain(update: &Update, clock: usize) -> bool {
         .any(|&(target, _)| target.0 as usize == clock)
 }
 
-/// `left - right ≺ b` is an upper bound b on left, and a lower bound -b on right. A difference of two clocks bounds both.
-fn add_atom(bounds: &mut [(i32, i32)], atom: &ClockAtom) {
+/// `left - right ≺ b` is an upper bound b on left, and a lower bound -b on right. A difference of two clocks bounds both, and once
+/// one of them is set to at most `reset`, it compares the other with a constant that lies so much further out.
+fn add_atom(bounds: &mut [(i32, i32)], atom: &ClockAtom, reset: i32) {
+    let is_difference = is_difference(atom);
+    let reset = if is_difference { reset } else { 0 };
     for clock in range(atom.left.first.0, atom.left.count) {
-        bounds[clock].1 = bounds[clock].1.max(atom.high);
-        if atom.right.first.0 != 0 || atom.right.count > 1 {
-            bounds[clock].0 = bounds[clock].0.max(atom.high);
+        let bound = atom.high.saturating_add(reset);
+        bounds[clock].1 = bounds[clock].1.max(bound);
+        if is_difference {
+            bounds[clock].0 = bounds[clock].0.max(bound);
         }
     }
     for clock in range(atom.right.first.0, atom.right.count) {
         let bound = atom.low.checked_neg().unwrap_or(i32::MAX);
+        let bound = bound.saturating_add(reset);
         bounds[clock].0 = bounds[clock].0.max(bound);
-        if atom.left.first.0 != 0 || atom.left.count > 1 {
+        if is_difference {
             bounds[clock].1 = bounds[clock].1.max(bound);
         }
     }
+}
+
+/// Whether a comparison concerns two clocks.
+pub fn is_difference(atom: &ClockAtom) -> bool {
+    let is_clock = |range: ClockRange| range.first.0 != 0 || range.count > 1;
+    is_clock(atom.left) && is_clock(atom.right)
 }
 
 fn range(first: u32, count: u32) -> impl Iterator<Item = usize> {

@@ -9,8 +9,10 @@
 //! enabled receiving edge.
 
 pub mod bounds;
+pub mod differences;
 pub mod failure;
 pub mod moves;
+mod passage;
 pub mod predicate;
 pub mod stepper;
 pub mod symbolic;

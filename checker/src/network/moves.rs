@@ -1,6 +1,7 @@
 //! Moves: one composed transition each, kept in flat buffers that are used again from state to state.
 
 use crate::exec::EmittedConstraint;
+use crate::ir::ChannelId;
 
 /// One process's share in a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -21,6 +22,7 @@ struct Header {
     parts: (u32, u32),
     constraints: (u32, u32),
     excluded: (u32, u32),
+    channel: Option<ChannelId>,
     controllable: bool,
 }
 
@@ -41,6 +43,8 @@ pub struct MoveRef<'a> {
     pub parts: &'a [Part],
     /// The clock constraints of the participants' guards.
     pub constraints: &'a [EmittedConstraint],
+    /// The channel of the synchronisation; `None` for an internal edge.
+    pub channel: Option<ChannelId>,
     /// Whether the controller owns the move: all participating edges are controllable.
     pub controllable: bool,
     moves: &'a Moves,
@@ -88,6 +92,7 @@ impl Moves {
             parts: &self.parts[header.parts.0 as usize..header.parts.1 as usize],
             constraints: &self.constraints
                 [header.constraints.0 as usize..header.constraints.1 as usize],
+            channel: header.channel,
             controllable: header.controllable,
             moves: self,
             excluded: header.excluded,
@@ -105,6 +110,7 @@ impl Moves {
         parts: &[Part],
         constraints: impl IntoIterator<Item = &'c [EmittedConstraint]>,
         excluded: impl IntoIterator<Item = &'c [EmittedConstraint]>,
+        channel: Option<ChannelId>,
         controllable: bool,
     ) {
         let first_part = self.parts.len() as u32;
@@ -124,6 +130,7 @@ impl Moves {
             parts: (first_part, self.parts.len() as u32),
             constraints: (first_constraint, last_constraint),
             excluded: (first_excluded, self.excluded.len() as u32),
+            channel,
             controllable,
         });
     }

@@ -4,7 +4,7 @@
 //! or in none, and cost no zone operation.
 
 use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, Predicate};
-use crate::zones::{Bound, Federation, Zone};
+use crate::zones::{Bound, Federation, Zone, future};
 
 use super::{Failure, Moves, Symbolic};
 
@@ -165,7 +165,12 @@ impl Symbolic<'_> {
         )))
     }
 
-    fn chosen_clock(&mut self, choice: ClockChoice, words: &mut [i32]) -> Result<ClockId, Failure> {
+    /// The clock that a query means in a state with these words.
+    pub fn chosen_clock(
+        &mut self,
+        choice: ClockChoice,
+        words: &mut [i32],
+    ) -> Result<ClockId, Failure> {
         match choice {
             ClockChoice::Fixed(clock) => Ok(clock),
             ClockChoice::Indexed(range, function) => Ok(ClockId(
@@ -177,16 +182,26 @@ impl Symbolic<'_> {
     /// The valuations from which no move is possible, now or after any delay.
     fn deadlock_extent(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Extent, Failure> {
         let mut moves = Moves::default();
-        self.stepper.moves(words, &mut moves)?;
+        self.moves(words, &mut moves)?;
         let may_delay = self.stepper.may_delay(words, &moves);
         let stopped = self.stopped(words)?;
+        let barriers = if may_delay {
+            self.barriers(words, zone)?
+        } else {
+            Federation::empty(self.dimension())
+        };
         let mut alive = Federation::empty(self.dimension());
         let mut target = words.to_vec();
         for one in moves.iter() {
+            if !self.is_enabled(one, zone)? {
+                continue;
+            }
             target.copy_from_slice(words);
             if let Some(effect) = self.fire(one, &mut target)? {
                 let mut before = effect.enabled_part(zone, self.dimension());
-                if may_delay {
+                if !barriers.is_empty() {
+                    before = future::predecessors_within(&before, &barriers);
+                } else if may_delay {
                     before.down(&stopped);
                 }
                 alive.unite(&before);

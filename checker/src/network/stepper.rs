@@ -8,7 +8,7 @@
 //! Cost: proportional to the edges that leave the current locations; no allocation once the buffers have grown.
 
 use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
-use crate::ir::{Edge, FunctionId, Guard, Network, Update, Urgency};
+use crate::ir::{ChannelId, Edge, FunctionId, Guard, Network, Update, Urgency};
 
 use super::moves::{MoveRef, Moves, Part};
 
@@ -50,6 +50,8 @@ pub struct Stepper<'a> {
     assignments: Vec<EmittedAssignment>,
     arguments: Vec<i32>,
     candidates: Vec<Candidate>,
+    /// The channel of the moves that are being put together.
+    channel: Option<ChannelId>,
     chosen: Vec<Choice>,
     /// By receiving process of a broadcast: the range of its candidates.
     groups: Vec<(usize, usize)>,
@@ -94,6 +96,7 @@ impl<'a> Stepper<'a> {
             assignments: Vec::new(),
             arguments: Vec::new(),
             candidates: Vec::new(),
+            channel: None,
             chosen: Vec::new(),
             groups: Vec::new(),
             parts: Vec::new(),
@@ -123,7 +126,7 @@ impl<'a> Stepper<'a> {
 
     /// Whether time may pass as far as locations and urgent channels say. `moves` are the moves of the state.
     ///
-    /// Synchronisations on urgent channels whose guards have clocks do not count here (the front end warns of them).
+    /// Synchronisations on urgent channels whose guards have clocks do not count here: see [`super::Symbolic::barriers`].
     pub fn may_delay(&self, words: &[i32], moves: &Moves) -> bool {
         if self.is_urgent(words) {
             return false;
@@ -131,14 +134,23 @@ impl<'a> Stepper<'a> {
         !self.has_urgent_channels
             || !moves
                 .iter()
-                .any(|one| one.constraints.is_empty() && self.is_on_urgent_channel(one))
+                .any(|one| one.is_unconditional() && self.is_urgent_move(one))
     }
 
     /// Whether the move synchronises on an urgent channel.
-    fn is_on_urgent_channel(&self, one: MoveRef<'_>) -> bool {
-        let edge = self.edge(one.parts[0]);
-        edge.sync
-            .is_some_and(|sync| self.network.channels[sync.channel.0 as usize].urgent)
+    pub fn is_urgent_move(&self, one: MoveRef<'_>) -> bool {
+        one.channel
+            .is_some_and(|channel| self.network.channels[channel.0 as usize].urgent)
+    }
+
+    /// The level of a move: that of its channel, then the greatest of its processes; greater is more urgent.
+    pub fn level(&self, one: MoveRef<'_>) -> (u32, u32) {
+        let default = self.network.features.default_priority;
+        let priority = |channel: ChannelId| self.network.channels[channel.0 as usize].priority;
+        let channel = one.channel.map_or(default, priority);
+        let processes = one.parts.iter();
+        let levels = processes.map(|part| self.network.processes[part.process as usize].priority);
+        (channel, levels.max().unwrap_or(0))
     }
 
     /// The edge of a part.
@@ -176,6 +188,7 @@ impl<'a> Stepper<'a> {
     ) -> Result<(), RunTimeError> {
         self.candidates.clear();
         self.constraints.clear();
+        self.channel = None;
         self.enabled_instances(process, edge, words, None)?;
         for index in 0..self.candidates.len() {
             self.chosen.clear();
@@ -213,6 +226,7 @@ impl<'a> Stepper<'a> {
                 None => 0,
             };
             let channel = sync.channel.0 + offset;
+            self.channel = Some(ChannelId(channel));
             if network.channels[channel as usize].broadcast {
                 self.broadcast(process, channel, needs_committed, words, out)?;
             } else {
@@ -461,6 +475,7 @@ impl<'a> Stepper<'a> {
                 &self.parts,
                 taken,
                 excluded.map(|index| self.constraints_of(index)),
+                self.channel,
                 controllable,
             );
             if !next_branches(network, &mut self.parts) {

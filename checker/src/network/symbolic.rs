@@ -19,6 +19,7 @@ use super::bounds::ClockBounds;
 use super::{Failure, MoveRef, Moves, Part, Stepper};
 
 /// Zones on top of the moves of a network. One per thread.
+#[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
 pub struct Symbolic<'a> {
     /// Moves and their effects on words.
     pub stepper: Stepper<'a>,
@@ -26,8 +27,11 @@ pub struct Symbolic<'a> {
     bounds: ClockBounds,
     has_rates: bool,
     has_urgent_channels: bool,
+    pub(super) has_guarded_urgency: bool,
+    pub(super) has_priorities: bool,
+    is_approximate: bool,
     ceilings: Ceilings,
-    inner_moves: Moves,
+    pub(super) inner_moves: Moves,
 }
 
 /// What a move does to clocks, from the source's zone to the zone on entry.
@@ -56,6 +60,9 @@ impl<'a> Symbolic<'a> {
             dimension,
             has_rates,
             has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
+            has_guarded_urgency: network.features.clock_guarded_urgent,
+            has_priorities: network.features.priorities,
+            is_approximate: false,
             ceilings: bounds.everywhere().clone(),
             bounds,
             inner_moves: Moves::default(),
@@ -68,8 +75,22 @@ impl<'a> Symbolic<'a> {
         self.dimension
     }
 
+    /// Whether some zone so far may contain more than what is reachable: delays of at least two running clocks beside
+    /// stopped ones have no exact zone.
+    pub fn is_approximate(&self) -> bool {
+        self.is_approximate
+    }
+
     /// The initial words and zone.
     pub fn initial(&mut self) -> Result<(Vec<i32>, Zone), Failure> {
+        let (mut words, mut zone, invariant) = self.start()?;
+        let may_delay = self.may_delay(&mut words)?;
+        self.delay(&words, may_delay, &invariant, zone.bounds_mut())?;
+        Ok((words, zone))
+    }
+
+    /// The initial words, the zone before time passes, and the invariants.
+    pub fn start(&mut self) -> Result<(Vec<i32>, Zone, Vec<Constraint>), Failure> {
         let network = self.stepper.network();
         let mut words = network.initial.clone();
         let mut zone = Zone::zero(self.dimension);
@@ -85,9 +106,7 @@ impl<'a> Symbolic<'a> {
         if !dbm::constrain_all(zone.bounds_mut(), self.dimension, &invariant) {
             return Err(Failure::InitialInvariant);
         }
-        let may_delay = self.may_delay(&mut words)?;
-        self.delay(&words, may_delay, &invariant, zone.bounds_mut())?;
-        Ok((words, zone))
+        Ok((words, zone, invariant))
     }
 
     /// Takes a move on `words`, and gives its effect on clocks; `None` if the target's invariants or the guards forbid it
@@ -167,6 +186,7 @@ impl<'a> Symbolic<'a> {
         }
         if self.has_rates {
             let stopped = self.stopped(words)?;
+            self.is_approximate |= !stopped.is_empty() && self.dimension - 1 > stopped.len() + 1;
             clocks::up_stopped(zone, self.dimension, &stopped);
         } else {
             clocks::up(zone, self.dimension);
@@ -205,6 +225,27 @@ impl<'a> Symbolic<'a> {
         if self.dimension > 1 {
             self.bounds
                 .extrapolate(words, zone, self.dimension, &mut self.ceilings);
+        }
+    }
+
+    /// Extrapolates each of the zones of a state; where guards compare clocks, one may become several.
+    pub fn extrapolate_all(&mut self, words: &[i32], zones: &mut Vec<Zone>) {
+        if self.bounds.splits() {
+            let mut parts = Federation::empty(self.dimension);
+            for zone in &*zones {
+                self.bounds
+                    .split(words, zone.bounds(), &mut self.ceilings, &mut parts);
+            }
+            zones.clear();
+            zones.extend(
+                parts
+                    .zones()
+                    .map(|part| Zone::from_bounds(self.dimension, part)),
+            );
+            return;
+        }
+        for zone in zones {
+            self.extrapolate(words, zone.bounds_mut());
         }
     }
 
@@ -297,7 +338,9 @@ fn check_limit(value: i32) -> Result<(), Failure> {
 }
 
 /// Emitted constraints as constraints on zones; `None` if one of them never holds (a clock compared with itself).
-fn to_constraints(emitted: &[EmittedConstraint]) -> Result<Option<Vec<Constraint>>, Failure> {
+pub(super) fn to_constraints(
+    emitted: &[EmittedConstraint],
+) -> Result<Option<Vec<Constraint>>, Failure> {
     let mut constraints = Vec::with_capacity(emitted.len());
     for one in emitted {
         let bound = if one.strict {

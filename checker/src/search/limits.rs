@@ -15,6 +15,19 @@ pub struct Counters {
     pub bytes: u64,
 }
 
+impl std::ops::Add for Counters {
+    type Output = Counters;
+
+    fn add(self, other: Counters) -> Counters {
+        Counters {
+            explored: self.explored + other.explored,
+            stored: self.stored + other.stored,
+            waiting: self.waiting + other.waiting,
+            bytes: self.bytes + other.bytes,
+        }
+    }
+}
+
 /// Why a search stopped before it had an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {

@@ -1,6 +1,10 @@
-//! Search over symbolic states: stores, orders, limits, reachability and traces.
+//! Search over symbolic states: stores, orders, limits, reachability, liveness, extrema and traces.
 
+pub mod extremum;
+pub mod goal;
+pub mod leads_to;
 pub mod limits;
+pub mod liveness;
 pub mod reach;
 pub mod store;
 pub mod zone_table;

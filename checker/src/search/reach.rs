@@ -1,4 +1,4 @@
-//! Reachability: is there a state in which a predicate holds?
+//! Reachability: is there a state that a [`Goal`] finds, for example one in which a predicate holds?
 //!
 //! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one with the same words contains
 //! its zone, and stored ones that a new one contains are dropped from the waiting list. States with a committed location
@@ -12,10 +12,11 @@
 
 use std::collections::VecDeque;
 
-use crate::ir::Predicate;
-use crate::network::{Extent, Failure, Moves, Part, Symbolic};
+use crate::network::{Failure, Moves, Part, Symbolic};
+use crate::zones::dbm::Constraint;
 use crate::zones::{Zone, dbm};
 
+use super::goal::{Goal, Look, Visited};
 use super::limits::{Counters, StopReason, Watch};
 use super::store::{DiscreteId, StateStore};
 use super::zone_table::{ZoneId, ZoneTable};
@@ -69,12 +70,8 @@ pub struct Trace {
     pub moves: Vec<Vec<Part>>,
 }
 
-/// A move of a state: its index, and which of the zones on entry (more than one only for abstaining receivers).
-#[derive(Clone, Copy, Debug)]
-struct Step {
-    ordinal: u32,
-    piece: u32,
-}
+/// A move of a state: its index.
+type Step = u32;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -100,19 +97,20 @@ struct Frame {
 enum Visit {
     Done,
     Found,
+    Stopped(StopReason),
 }
 
-/// Searches for a state in which `goal` holds.
+/// Searches for a state that `goal` finds.
 pub fn search(
     symbolic: &mut Symbolic<'_>,
-    goal: &Predicate,
+    goal: &mut dyn Goal,
     order: Order,
     watch: &mut dyn Watch,
 ) -> Report {
-    let mut search = Search::new(symbolic, goal, order);
-    let outcome = match search.run(watch) {
+    let mut search = Search::new(symbolic, goal, order, watch);
+    let outcome = match search.run() {
         Ok(outcome) => Ok(outcome),
-        Err(failure) => Err((failure, search.trace())),
+        Err(failure) => Err((failure, search.trace(false))),
     };
     Report {
         outcome,
@@ -122,7 +120,8 @@ pub fn search(
 
 struct Search<'s, 'a> {
     symbolic: &'s mut Symbolic<'a>,
-    goal: &'s Predicate,
+    goal: &'s mut dyn Goal,
+    watch: &'s mut dyn Watch,
     order: Order,
     store: StateStore,
     zones: ZoneTable,
@@ -141,7 +140,12 @@ struct Search<'s, 'a> {
 }
 
 impl<'s, 'a> Search<'s, 'a> {
-    fn new(symbolic: &'s mut Symbolic<'a>, goal: &'s Predicate, order: Order) -> Search<'s, 'a> {
+    fn new(
+        symbolic: &'s mut Symbolic<'a>,
+        goal: &'s mut dyn Goal,
+        order: Order,
+        watch: &'s mut dyn Watch,
+    ) -> Search<'s, 'a> {
         let network = symbolic.stepper.network();
         Search {
             store: StateStore::new(network),
@@ -162,11 +166,16 @@ impl<'s, 'a> Search<'s, 'a> {
             },
             symbolic,
             goal,
+            watch,
             order,
         }
     }
 
     fn counters(&self) -> Counters {
+        self.own_counters() + self.goal.counters()
+    }
+
+    fn own_counters(&self) -> Counters {
         let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
         let paths = self.paths.capacity() * size_of::<Step>() + self.waiting.capacity() * 4;
         Counters {
@@ -177,17 +186,22 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    fn run(&mut self, watch: &mut dyn Watch) -> Result<Outcome, Failure> {
-        let (mut words, mut zone) = self.symbolic.initial()?;
-        if self.holds(&mut words, &zone)? {
-            let states = vec![(words, zone)];
-            return Ok(Outcome::Found(Trace {
-                states,
-                moves: Vec::new(),
-            }));
+    fn run(&mut self) -> Result<Outcome, Failure> {
+        let (mut words, zone, invariant) = self.symbolic.start()?;
+        let mut zones = vec![zone];
+        self.symbolic
+            .let_time_pass(&mut words, &invariant, &mut zones)?;
+        for zone in &zones {
+            match self.look(&mut words, zone)? {
+                Look::Continue => {}
+                Look::Found => return Ok(Outcome::Found(self.trace(true))),
+                Look::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
+            }
         }
-        self.symbolic.extrapolate(&words, zone.bounds_mut());
-        self.add(&words, &zone);
+        self.symbolic.extrapolate_all(&words, &mut zones);
+        for zone in &zones {
+            self.add(&words, zone);
+        }
         let mut next_look = LOOK_EVERY;
         while let Some(node) = self.next_node() {
             if self.nodes[node as usize].is_covered {
@@ -195,13 +209,16 @@ impl<'s, 'a> Search<'s, 'a> {
             }
             self.current = node;
             let first = self.waiting.len();
-            if let Visit::Found = self.visit(node)? {
-                return Ok(Outcome::Found(self.trace()));
+            match self.visit(node)? {
+                Visit::Done => {}
+                Visit::Found => return Ok(Outcome::Found(self.trace(true))),
+                Visit::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
             }
             self.shuffle_from(first);
             if self.explored >= next_look {
                 next_look = self.explored + LOOK_EVERY;
-                if let Some(reason) = watch.look(&self.counters()) {
+                let counters = self.counters();
+                if let Some(reason) = self.watch.look(&counters) {
                     return Ok(Outcome::Stopped(reason));
                 }
             }
@@ -234,11 +251,15 @@ impl<'s, 'a> Search<'s, 'a> {
         self.random >> 16
     }
 
-    fn holds(&mut self, words: &mut [i32], zone: &Zone) -> Result<bool, Failure> {
-        Ok(!matches!(
-            self.symbolic.extent(self.goal, words, zone.bounds())?,
-            Extent::Nowhere
-        ))
+    fn look(&mut self, words: &mut [i32], zone: &Zone) -> Result<Look, Failure> {
+        let counters = self.own_counters();
+        self.goal.look(Visited {
+            symbolic: self.symbolic,
+            words,
+            zone,
+            counters,
+            watch: self.watch,
+        })
     }
 
     /// Explores a stored state and, below it, all committed states.
@@ -287,6 +308,7 @@ impl<'s, 'a> Search<'s, 'a> {
             match self.take_next(&mut above[depth], &mut below[0], depth)? {
                 Taken::Nothing => {}
                 Taken::Found => return Ok(Visit::Found),
+                Taken::Stopped(reason) => return Ok(Visit::Stopped(reason)),
                 Taken::Down => {
                     depth += 1;
                     self.open(&mut frames[depth])?;
@@ -298,10 +320,7 @@ impl<'s, 'a> Search<'s, 'a> {
     fn open(&mut self, frame: &mut Frame) -> Result<(), Failure> {
         self.explored += 1;
         frame.next = 0;
-        self.symbolic
-            .stepper
-            .moves(&mut frame.words, &mut frame.moves)?;
-        Ok(())
+        self.symbolic.moves(&mut frame.words, &mut frame.moves)
     }
 
     /// Takes the next move of `source`; a committed target is left in `target` to be explored at once.
@@ -315,6 +334,9 @@ impl<'s, 'a> Search<'s, 'a> {
         source.next += 1;
         target.words.copy_from_slice(&source.words);
         let one = source.moves.get(ordinal as usize);
+        if !self.symbolic.is_enabled(one, source.zone.bounds())? {
+            return Ok(Taken::Nothing);
+        }
         let Some(effect) = self.symbolic.fire(one, &mut target.words)? else {
             return Ok(Taken::Nothing);
         };
@@ -324,37 +346,44 @@ impl<'s, 'a> Search<'s, 'a> {
             self.symbolic.dimension(),
             &mut entries,
         );
-        let descends = entries.len() == 1
-            && depth < LONGEST_CHAIN
-            && self.symbolic.stepper.is_committed(&target.words);
-        let may_delay = !entries.is_empty() && self.symbolic.may_delay(&mut target.words)?;
-        let mut taken = Taken::Nothing;
-        for (piece, entry) in entries.iter_mut().enumerate() {
-            self.symbolic.delay(
-                &target.words,
-                may_delay,
-                &effect.invariant,
-                entry.bounds_mut(),
-            )?;
-            self.path.push(Step {
-                ordinal,
-                piece: piece as u32,
-            });
-            if self.holds(&mut target.words, entry)? {
-                taken = Taken::Found;
-                break;
-            }
-            self.symbolic.extrapolate(&target.words, entry.bounds_mut());
-            if descends {
-                target.zone.bounds_mut().copy_from_slice(entry.bounds());
-                taken = Taken::Down;
-                break;
-            }
-            self.add(&target.words, entry);
+        self.path.push(ordinal);
+        let taken = self.enter(&effect.invariant, &mut entries, target, depth);
+        self.entries = entries;
+        if let Ok(Taken::Nothing) = taken {
             self.path.pop();
         }
-        self.entries = entries;
-        Ok(taken)
+        taken
+    }
+
+    /// Looks at the target of a move, whose words are in `target`, and stores it or leaves it there with its zone.
+    fn enter(
+        &mut self,
+        invariant: &[Constraint],
+        entries: &mut Vec<Zone>,
+        target: &mut Frame,
+        depth: usize,
+    ) -> Result<Taken, Failure> {
+        self.symbolic
+            .let_time_pass(&mut target.words, invariant, entries)?;
+        for entry in &*entries {
+            match self.look(&mut target.words, entry)? {
+                Look::Continue => {}
+                Look::Found => return Ok(Taken::Found),
+                Look::Stopped(reason) => return Ok(Taken::Stopped(reason)),
+            }
+        }
+        self.symbolic.extrapolate_all(&target.words, entries);
+        let descends = depth < LONGEST_CHAIN && self.symbolic.stepper.is_committed(&target.words);
+        if let [entry] = entries.as_slice()
+            && descends
+        {
+            target.zone.bounds_mut().copy_from_slice(entry.bounds());
+            return Ok(Taken::Down);
+        }
+        for entry in &*entries {
+            self.add(&target.words, entry);
+        }
+        Ok(Taken::Nothing)
     }
 
     /// Stores a state and lets it wait, unless a stored one contains it.
@@ -410,7 +439,7 @@ impl<'s, 'a> Search<'s, 'a> {
 
     /// The way to the state at hand: the parents of the current node, then the moves below it. The states are computed anew;
     /// what fails on the way is left out.
-    fn trace(&mut self) -> Trace {
+    fn trace(&mut self, is_found: bool) -> Trace {
         let mut steps: Vec<Step> = self.path.iter().rev().copied().collect();
         let mut node = self.current;
         while node != NONE {
@@ -418,51 +447,83 @@ impl<'s, 'a> Search<'s, 'a> {
             steps.extend(self.paths[path.0 as usize..path.1 as usize].iter().rev());
             node = parent;
         }
+        steps.reverse();
         let mut trace = Trace::default();
-        let Ok((words, zone)) = self.symbolic.initial() else {
-            return trace;
-        };
-        trace.states.push((words, zone));
-        for step in steps.iter().rev() {
-            if self.retrace(*step, &mut trace).is_err() {
-                break;
-            }
-        }
+        // What cannot be computed again is the failure that the trace leads to.
+        let _ = self.retrace(&steps, is_found, &mut trace);
         trace
     }
 
-    fn retrace(&mut self, step: Step, trace: &mut Trace) -> Result<(), Failure> {
-        let Some((words, zone)) = trace.states.last() else {
-            return Ok(());
-        };
-        let (mut words, mut moves) = (words.clone(), Moves::default());
-        self.symbolic.stepper.moves(&mut words, &mut moves)?;
-        let one = moves.get(step.ordinal as usize);
+    /// Takes the steps from the initial state. Where a state has several zones, the first is taken from which the rest of the way
+    /// is possible, up to a state that the goal confirms if it found it.
+    fn retrace(
+        &mut self,
+        steps: &[Step],
+        is_found: bool,
+        trace: &mut Trace,
+    ) -> Result<(), Failure> {
+        let (mut words, zone, invariant) = self.symbolic.start()?;
+        let mut zones = vec![zone];
+        self.symbolic
+            .let_time_pass(&mut words, &invariant, &mut zones)?;
+        zones.reverse();
+        let mut open = vec![(words, zones)];
+        while let Some((words, zones)) = open.last_mut() {
+            let Some(zone) = zones.pop() else {
+                open.pop();
+                continue;
+            };
+            let mut words = words.clone();
+            trace.states.truncate(open.len() - 1);
+            trace.states.push((words.clone(), zone.clone()));
+            let Some(&step) = steps.get(open.len() - 1) else {
+                if !is_found || self.goal.confirms(self.symbolic, &mut words, &zone)? {
+                    return Ok(());
+                }
+                continue;
+            };
+            trace.moves.truncate(open.len() - 1);
+            if let Some((parts, next)) = self.retake(step, words, &zone)? {
+                trace.moves.push(parts);
+                open.push(next);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes one step again: the parts of the move, the words after it, and the zones that it leads to, last first.
+    fn retake(
+        &mut self,
+        step: Step,
+        mut words: Vec<i32>,
+        zone: &Zone,
+    ) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
+        let mut moves = Moves::default();
+        self.symbolic.moves(&mut words, &mut moves)?;
+        let one = moves.get(step as usize);
         let Some(effect) = self.symbolic.fire(one, &mut words)? else {
-            return Ok(());
+            return Ok(None);
         };
         let mut entries = Vec::new();
         effect.entry_zones(zone.bounds(), self.symbolic.dimension(), &mut entries);
-        let may_delay = self.symbolic.may_delay(&mut words)?;
-        // Extrapolation can split a zone in more pieces than the exact one has.
-        let piece = (step.piece as usize).min(entries.len().saturating_sub(1));
-        let Some(mut entry) = entries.into_iter().nth(piece) else {
-            return Ok(());
-        };
         self.symbolic
-            .delay(&words, may_delay, &effect.invariant, entry.bounds_mut())?;
-        trace.moves.push(one.parts.to_vec());
-        trace.states.push((words, entry));
-        Ok(())
+            .let_time_pass(&mut words, &effect.invariant, &mut entries)?;
+        entries.reverse();
+        Ok(Some((one.parts.to_vec(), (words, entries))))
     }
 }
+
+/// The words of a state that was entered, and its zones.
+type Entered = (Vec<i32>, Vec<Zone>);
 
 /// What became of a move.
 enum Taken {
     /// Nothing more to do: impossible, stored, or covered.
     Nothing,
-    /// The goal holds in the target.
+    /// The goal was found in the target.
     Found,
+    /// A limit came first.
+    Stopped(StopReason),
     /// The target is committed and is explored at once.
     Down,
 }

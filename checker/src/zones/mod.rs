@@ -12,7 +12,8 @@
 //! * [`minimal`]: zones stored by their fewest constraints;
 //! * [`extrapolate`]: the abstractions that make the zone graph finite;
 //! * [`federation`]: finite unions of zones, with exact subtraction and inclusion;
-//! * [`past`]: the safe timed predecessors of timed games.
+//! * [`past`]: the safe timed predecessors of timed games;
+//! * [`future`]: their mirror image, and delays that something stops.
 //!
 //! Sources: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, for the operations on zones;
 //! the others are named where they are used.
@@ -31,6 +32,7 @@ pub mod minimal;
 pub mod extrapolate;
 
 pub mod federation;
+pub mod future;
 pub mod past;
 
 pub use bound::Bound;

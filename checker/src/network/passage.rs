@@ -1,0 +1,181 @@
+//! How time passes where more than invariants decide: barriers, and delays of several zones at once.
+//!
+//! A *barrier* is where a synchronisation on an urgent channel is enabled and its guards have clocks: time runs up to it and
+//! not on. If it lies everywhere or nowhere, whatever the clocks say, [`Symbolic::may_delay`] knows it; else the future of a
+//! zone within its barriers is a federation ([`crate::zones::future`]). A guard with a strict lower bound has no first moment:
+//! time stops before it, and the synchronisation never happens, as the definition of urgency has it.
+
+use crate::exec::EmittedConstraint;
+use crate::ir::ClockId;
+use crate::zones::dbm::{self, Constraint};
+use crate::zones::{Bound, Federation, Zone, future, minimal};
+
+use super::symbolic::to_constraints;
+use super::{Failure, MoveRef, Moves, Symbolic};
+
+impl Symbolic<'_> {
+    /// The part of the zone in which time cannot pass because of a clock-guarded urgent synchronisation.
+    pub fn barriers(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Federation, Failure> {
+        let mut barriers = Federation::empty(self.dimension());
+        if !self.has_guarded_urgency {
+            return Ok(barriers);
+        }
+        let mut moves = std::mem::take(&mut self.inner_moves);
+        let result = self.stepper.moves(words, &mut moves);
+        if result.is_ok() {
+            for one in moves.iter().filter(|one| self.stepper.is_urgent_move(*one)) {
+                barriers.unite(&guarded_part(one, zone, self.dimension())?);
+            }
+        }
+        self.inner_moves = moves;
+        result?;
+        Ok(barriers)
+    }
+
+    /// Lets time pass in each of the zones on entry of a state; a zone with barriers in its future may become several.
+    pub fn let_time_pass(
+        &mut self,
+        words: &mut [i32],
+        invariant: &[Constraint],
+        zones: &mut Vec<Zone>,
+    ) -> Result<(), Failure> {
+        let may_delay = !zones.is_empty() && self.may_delay(words)?;
+        if !may_delay {
+            return Ok(());
+        }
+        let mut entries = Vec::new();
+        if self.has_guarded_urgency {
+            entries.clone_from(zones);
+        }
+        for zone in zones.iter_mut() {
+            self.delay(words, may_delay, invariant, zone.bounds_mut())?;
+        }
+        for index in 0..entries.len() {
+            let whole = zones[index].clone();
+            let barriers = self.barriers(words, whole.bounds())?;
+            if barriers.is_empty() {
+                continue;
+            }
+            let mut reached = self.within(&entries[index], &whole, &barriers);
+            reached.reduce();
+            let mut parts = reached.zones();
+            let first = parts
+                .next()
+                .expect("the zone on entry is reached without delay");
+            zones[index] = Zone::from_bounds(self.dimension(), first);
+            zones.extend(parts.map(|part| Zone::from_bounds(self.dimension(), part)));
+        }
+        Ok(())
+    }
+
+    /// What `entry` reaches in `whole`, its future within the invariant, without passing a barrier.
+    fn within(&self, entry: &Zone, whole: &Zone, barriers: &Federation) -> Federation {
+        let from = Federation::of_zone(self.dimension(), entry.bounds());
+        let nothing = Federation::empty(self.dimension());
+        let mut reached = future::successors(&from, &nothing, barriers);
+        reached.intersect_zone(whole.bounds());
+        reached
+    }
+
+    /// All moves of a state, as far as the words decide, with those that priorities forbid cut down to what is left of them.
+    ///
+    /// A move is forbidden where one of a higher level is possible, its target's invariants included. Levels are those of
+    /// channels first, then the greatest of the participating processes.
+    pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
+        self.stepper.moves(words, out)?;
+        if self.has_priorities && out.len() > 1 {
+            self.apply_priorities(words, out)?;
+        }
+        Ok(())
+    }
+
+    fn apply_priorities(&mut self, words: &[i32], moves: &mut Moves) -> Result<(), Failure> {
+        let levels: Vec<(u32, u32)> = moves.iter().map(|one| self.stepper.level(one)).collect();
+        let lowest = levels.iter().min().copied();
+        let mut possible = Vec::with_capacity(levels.len());
+        let mut target = words.to_vec();
+        for (one, level) in moves.iter().zip(&levels) {
+            // Nothing is below the lowest level, so it forbids nothing.
+            if Some(*level) == lowest {
+                possible.push(Vec::new());
+                continue;
+            }
+            target.copy_from_slice(words);
+            let effect = self.fire(one, &mut target)?;
+            possible.push(effect.map_or_else(Vec::new, |effect| {
+                let universe = Zone::universe(self.dimension());
+                conjunctions(&effect.enabled_part(universe.bounds(), self.dimension()))
+            }));
+        }
+        let mut allowed = Moves::default();
+        for (one, level) in moves.iter().zip(&levels) {
+            let above = levels
+                .iter()
+                .zip(&possible)
+                .filter(|(other, _)| *other > level);
+            let forbidden =
+                above.flat_map(|(_, conjunctions)| conjunctions.iter().map(Vec::as_slice));
+            let excluded = one.excluded().chain(forbidden);
+            allowed.push(
+                one.parts,
+                [one.constraints],
+                excluded,
+                one.channel,
+                one.controllable,
+            );
+        }
+        *moves = allowed;
+        Ok(())
+    }
+
+    /// Whether the guards of a move leave anything of the zone. Asked before a move is taken, so that no update runs that
+    /// cannot happen.
+    pub fn is_enabled(&self, one: MoveRef<'_>, zone: &[Bound]) -> Result<bool, Failure> {
+        if one.is_unconditional() {
+            return Ok(true);
+        }
+        let Some(guard) = to_constraints(one.constraints)? else {
+            return Ok(false);
+        };
+        let is_near = |constraint| dbm::satisfies(zone, self.dimension(), constraint);
+        if !guard.iter().all(is_near) {
+            return Ok(false);
+        }
+        if guard.len() <= 1 && one.excluded().next().is_none() {
+            return Ok(true);
+        }
+        Ok(!guarded_part(one, zone, self.dimension())?.is_empty())
+    }
+}
+
+/// The part of a zone in which the guards of a move hold.
+fn guarded_part(one: MoveRef<'_>, zone: &[Bound], dimension: usize) -> Result<Federation, Failure> {
+    let mut part = Federation::of_zone(dimension, zone);
+    match to_constraints(one.constraints)? {
+        Some(guard) => part.constrain_all(&guard),
+        None => part.clear(),
+    }
+    for conjunction in one.excluded() {
+        if let Some(excluded) = to_constraints(conjunction)? {
+            part.subtract_zone(Zone::of_constraints(dimension, &excluded).bounds());
+        }
+    }
+    Ok(part)
+}
+
+/// The zones of a federation as conjunctions of constraints.
+fn conjunctions(federation: &Federation) -> Vec<Vec<EmittedConstraint>> {
+    let conjunction = |zone: &[Bound]| {
+        let mut constraints = Vec::new();
+        minimal::for_each_minimal(zone, federation.dimension(), |one| {
+            constraints.push(EmittedConstraint {
+                left: ClockId(one.left as u32),
+                right: ClockId(one.right as u32),
+                bound: one.bound.value(),
+                strict: one.bound.is_strict(),
+            });
+        });
+        constraints
+    };
+    federation.zones().map(conjunction).collect()
+}

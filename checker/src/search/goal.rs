@@ -1,0 +1,75 @@
+//! What a search looks for.
+
+use crate::ir::Predicate;
+use crate::network::{Extent, Failure, Symbolic};
+use crate::zones::Zone;
+
+use super::limits::{Counters, StopReason, Watch};
+
+/// A state that a search has come to, before extrapolation.
+pub struct Visited<'v, 'a> {
+    /// Zones of the network.
+    pub symbolic: &'v mut Symbolic<'a>,
+    /// The words of the state.
+    pub words: &'v mut [i32],
+    /// Its zone.
+    pub zone: &'v Zone,
+    /// What the search has done so far.
+    pub counters: Counters,
+    /// Who is asked whether to go on, should looking at the state take long.
+    pub watch: &'v mut dyn Watch,
+}
+
+/// What a look at a state comes to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// The search goes on.
+    Continue,
+    /// This is what was looked for.
+    Found,
+    /// A limit came first.
+    Stopped(StopReason),
+}
+
+/// Looks at every state that a search comes to.
+pub trait Goal {
+    /// Looks at a state.
+    fn look(&mut self, visited: Visited<'_, '_>) -> Result<Look, Failure>;
+
+    /// Whether a state in which the search ended, computed again without extrapolation, is what was looked for.
+    fn confirms(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<bool, Failure>;
+
+    /// What looking has cost beyond the search itself.
+    fn counters(&self) -> Counters {
+        Counters::default()
+    }
+}
+
+/// A predicate is looked for: some valuation of the zone satisfies it.
+impl Goal for &Predicate {
+    fn look(&mut self, visited: Visited<'_, '_>) -> Result<Look, Failure> {
+        let Visited {
+            symbolic,
+            words,
+            zone,
+            ..
+        } = visited;
+        let holds = self.confirms(symbolic, words, zone)?;
+        Ok(if holds { Look::Found } else { Look::Continue })
+    }
+
+    fn confirms(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<bool, Failure> {
+        let extent = symbolic.extent(self, words, zone.bounds())?;
+        Ok(!matches!(extent, Extent::Nowhere))
+    }
+}

@@ -1,0 +1,583 @@
+//! Is there a run that stays inside a predicate for ever?
+//!
+//! A run counts if the predicate holds at all its moments and it cannot leave: it has infinitely many moves (in however little
+//! time), or from some moment on time can pass without limit inside predicate and invariants, or at some moment neither a move nor
+//! any wait that the invariants allow leads to a move or out of the predicate.
+//!
+//! The nodes of the search are words with a zone of valuations that lie inside the predicate and that some delay inside it reaches from
+//! the entry of the state. Where the predicate holds in a part of a zone only, that part is cut out exactly
+//! ([`crate::zones::future`]), so that a delay never crosses its outside. Every node is accepting, so one depth-first search is
+//! enough: there is a run with infinitely many moves exactly if the search comes back to a node on its stack, or to one that contains the zone of
+//! such a node (every valuation of that has a predecessor in itself, around and around, and the regions are finitely many). A
+//! node that was left without success starts no such run, nor does any that it contains.
+//!
+//! Extrapolation must keep all that comparisons can tell (Extra-M+), with those of the predicate among them.
+//!
+//! Source: S. Tripakis, "Checking Timed Büchi Automata Emptiness on Simulation Graphs", ACM TOCL 10, 2009 (cycles of zones are
+//! cycles of runs); A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G. Larsen, J. van de Pol, "Multi-Core Emptiness Checking of Timed Büchi
+//! Automata using Inclusion Abstraction", CAV 2013 (which inclusions are sound).
+//! Where we differ: with stopped clocks the cut is left out and every doubt counts as a run, so that only the absence of one is certain.
+
+use crate::ir::Predicate;
+use crate::network::{Extent, Failure, Moves, Part, Symbolic};
+use crate::zones::dbm::{self, Constraint};
+use crate::zones::{ClockSet, Federation, Zone, future};
+
+use super::limits::{Counters, StopReason, Watch};
+use super::reach::Trace;
+use super::store::{DiscreteId, StateStore};
+use super::zone_table::{ZoneId, ZoneTable};
+
+/// States between two looks at the limits.
+const LOOK_EVERY: u64 = 256;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// Why a run inside a predicate never leaves it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Its last state leads back to the state with this index by the last move.
+    Loop(usize),
+    /// Time passes for ever in its last state.
+    Waits,
+    /// No move is possible any more, and time cannot take it out of the predicate.
+    Stuck,
+}
+
+impl Ending {
+    /// The same for a trace with so many more states before it.
+    #[must_use]
+    pub fn moved(self, before: usize) -> Ending {
+        match self {
+            Ending::Loop(start) => Ending::Loop(start + before),
+            other => other,
+        }
+    }
+}
+
+/// A run inside a predicate that never leaves it.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Its states and moves; the zones are those of the search.
+    pub trace: Trace,
+    /// Why it never leaves.
+    pub ending: Ending,
+}
+
+/// What a search found.
+#[derive(Debug)]
+pub enum Outcome {
+    /// A run.
+    Found(Run),
+    /// There is none.
+    Exhausted,
+    /// A limit came first.
+    Stopped(StopReason),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    discrete: DiscreteId,
+    zone: ZoneId,
+    /// The next node with the same words.
+    next: u32,
+    /// Its place on the stack, [`NONE`] once it was left.
+    depth: u32,
+}
+
+/// A node on the stack.
+struct Frame {
+    node: u32,
+    words: Vec<i32>,
+    zone: Zone,
+    moves: Moves,
+    next_move: usize,
+    /// The target of the move at hand, and its nodes that are still to be visited.
+    target: Vec<i32>,
+    pending: Vec<Zone>,
+    /// The move at hand.
+    parts: Vec<Part>,
+}
+
+/// Searches for runs inside `keep`; remembers over several searches from which nodes there is none.
+pub struct Liveness<'p> {
+    keep: &'p Predicate,
+    store: StateStore,
+    zones: ZoneTable,
+    nodes: Vec<Node>,
+    /// By discrete state: its first node.
+    heads: Vec<u32>,
+    frames: Vec<Frame>,
+    explored: u64,
+    next_look: u64,
+    is_coarse: bool,
+}
+
+/// The part of a state that a run inside the predicate can reach.
+struct Inside {
+    /// Its zones before extrapolation; those in which a run can end, if one can.
+    zones: Vec<Zone>,
+    /// Whether a run can end in it.
+    ending: Option<Ending>,
+}
+
+impl<'p> Liveness<'p> {
+    /// Searches in the network of `symbolic` for runs inside `keep`.
+    pub fn new(symbolic: &Symbolic<'_>, keep: &'p Predicate) -> Liveness<'p> {
+        Liveness {
+            keep,
+            store: StateStore::new(symbolic.stepper.network()),
+            zones: ZoneTable::new(symbolic.dimension()),
+            nodes: Vec::new(),
+            heads: Vec::new(),
+            frames: Vec::new(),
+            explored: 0,
+            next_look: LOOK_EVERY,
+            is_coarse: false,
+        }
+    }
+
+    /// Whether a doubt was counted as a run: what was found is certain only if not.
+    pub fn is_coarse(&self) -> bool {
+        self.is_coarse
+    }
+
+    /// What was done so far.
+    pub fn counters(&self) -> Counters {
+        let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
+        let words = self
+            .frames
+            .first()
+            .map_or(0, |frame| 2 * frame.words.len() * 4);
+        let frames = self.frames.len() * (size_of::<Frame>() + words);
+        Counters {
+            explored: self.explored,
+            stored: self.nodes.len() as u64,
+            waiting: self.frames.len() as u64,
+            bytes: (self.store.bytes() + self.zones.bytes() + nodes + frames) as u64,
+        }
+    }
+
+    /// Searches for a run from the initial state.
+    pub fn from_start(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        watch: &mut dyn Watch,
+    ) -> Result<Outcome, (Failure, Trace)> {
+        let start = symbolic.start();
+        let (words, zone, _) = start.map_err(|failure| (failure, Trace::default()))?;
+        self.from_entry(symbolic, &words, &zone, Counters::default(), watch)
+    }
+
+    /// Searches for a run that begins with some valuation of a zone. `before` is what was done outside this search, for the limits.
+    pub fn from_entry(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &[i32],
+        zone: &Zone,
+        before: Counters,
+        watch: &mut dyn Watch,
+    ) -> Result<Outcome, (Failure, Trace)> {
+        let mut words = words.to_vec();
+        let outcome = self.run(symbolic, &mut words, zone, before, watch);
+        let outcome = outcome.map_err(|failure| (failure, self.stack_trace()));
+        self.frames.clear();
+        outcome
+    }
+
+    fn run(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+        before: Counters,
+        watch: &mut dyn Watch,
+    ) -> Result<Outcome, Failure> {
+        let Some(invariant) = symbolic.invariant(words)? else {
+            return Ok(Outcome::Exhausted);
+        };
+        let mut inside = self.inside(symbolic, words, zone, &invariant)?;
+        if let Some(ending) = inside.ending {
+            let mut trace = Trace::default();
+            push_state(&mut trace, words, &inside.zones);
+            return Ok(Outcome::Found(Run { trace, ending }));
+        }
+        symbolic.extrapolate_all(words, &mut inside.zones);
+        for zone in inside.zones {
+            if self.is_left(words, &zone) {
+                continue;
+            }
+            self.push(symbolic, words, zone)?;
+            while !self.frames.is_empty() {
+                if let Some(ending) = self.step(symbolic)? {
+                    return Ok(Outcome::Found(self.found(ending)));
+                }
+                if self.explored >= self.next_look {
+                    self.next_look = self.explored + LOOK_EVERY;
+                    if let Some(reason) = watch.look(&(self.counters() + before)) {
+                        return Ok(Outcome::Stopped(reason));
+                    }
+                }
+            }
+        }
+        Ok(Outcome::Exhausted)
+    }
+
+    /// Goes one node down, to the next move, or one node up.
+    fn step(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<Ending>, Failure> {
+        let Some(frame) = self.frames.last_mut() else {
+            return Ok(None);
+        };
+        if let Some(zone) = frame.pending.pop() {
+            let words = frame.target.clone();
+            return self.visit(symbolic, &words, zone);
+        }
+        if frame.next_move < frame.moves.len() {
+            return self.take_next(symbolic);
+        }
+        let node = frame.node;
+        self.frames.pop();
+        self.leave(node);
+        Ok(None)
+    }
+
+    /// Takes the next move of the node on top: fills its pending nodes.
+    fn take_next(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<Ending>, Failure> {
+        let mut frame = self.frames.pop().expect("there is a node on top");
+        let result = self.take(symbolic, &mut frame);
+        self.frames.push(frame);
+        result
+    }
+
+    fn take(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        frame: &mut Frame,
+    ) -> Result<Option<Ending>, Failure> {
+        let one = frame.moves.get(frame.next_move);
+        frame.next_move += 1;
+        if !symbolic.is_enabled(one, frame.zone.bounds())? {
+            return Ok(None);
+        }
+        frame.target.copy_from_slice(&frame.words);
+        frame.parts.clear();
+        frame.parts.extend_from_slice(one.parts);
+        let Some(effect) = symbolic.fire(one, &mut frame.target)? else {
+            return Ok(None);
+        };
+        let mut entries = Vec::new();
+        effect.entry_zones(frame.zone.bounds(), symbolic.dimension(), &mut entries);
+        for entry in &entries {
+            let inside = self.inside(symbolic, &mut frame.target, entry, &effect.invariant)?;
+            frame.pending.extend(inside.zones);
+            if inside.ending.is_some() {
+                return Ok(inside.ending);
+            }
+        }
+        symbolic.extrapolate_all(&frame.target, &mut frame.pending);
+        Ok(None)
+    }
+
+    /// Goes to a node, unless it is known to be the start of no run; finds out whether it closes a loop.
+    fn visit(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &[i32],
+        zone: Zone,
+    ) -> Result<Option<Ending>, Failure> {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        let mut node = self.heads[discrete.0 as usize];
+        let mut is_left = false;
+        while node != NONE {
+            let Node {
+                zone: other,
+                next,
+                depth,
+                ..
+            } = self.nodes[node as usize];
+            let other = self.zones.get(other);
+            if depth == NONE {
+                is_left |= dbm::is_subset(zone.bounds(), other);
+            } else if dbm::is_subset(other, zone.bounds()) {
+                let top = self
+                    .frames
+                    .last_mut()
+                    .expect("the move was taken from a node");
+                top.pending = vec![zone];
+                return Ok(Some(Ending::Loop(depth as usize)));
+            }
+            node = next;
+        }
+        if !is_left {
+            self.push(symbolic, words, zone)?;
+        }
+        Ok(None)
+    }
+
+    /// Whether no run starts in the zone, as far as is known.
+    fn is_left(&mut self, words: &[i32], zone: &Zone) -> bool {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        let mut node = self.heads[discrete.0 as usize];
+        while node != NONE {
+            let Node {
+                zone: other,
+                next,
+                depth,
+                ..
+            } = self.nodes[node as usize];
+            if depth == NONE && dbm::is_subset(zone.bounds(), self.zones.get(other)) {
+                return true;
+            }
+            node = next;
+        }
+        false
+    }
+
+    fn push(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &[i32],
+        zone: Zone,
+    ) -> Result<(), Failure> {
+        self.explored += 1;
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        let node = self.nodes.len() as u32;
+        self.nodes.push(Node {
+            discrete,
+            zone: self.zones.intern(zone.bounds()),
+            next: std::mem::replace(&mut self.heads[discrete.0 as usize], node),
+            depth: self.frames.len() as u32,
+        });
+        let mut frame = Frame {
+            node,
+            words: words.to_vec(),
+            zone,
+            moves: Moves::default(),
+            next_move: 0,
+            target: words.to_vec(),
+            pending: Vec::new(),
+            parts: Vec::new(),
+        };
+        let moves = symbolic.moves(&mut frame.words, &mut frame.moves);
+        self.frames.push(frame);
+        moves
+    }
+
+    /// Notes that no run starts in a node, and drops the nodes whose zones it contains from the list of its words.
+    fn leave(&mut self, node: u32) {
+        self.nodes[node as usize].depth = NONE;
+        let Node { discrete, zone, .. } = self.nodes[node as usize];
+        let mut previous = NONE;
+        let mut other = self.heads[discrete.0 as usize];
+        while other != NONE {
+            let Node {
+                zone: inner,
+                next,
+                depth,
+                ..
+            } = self.nodes[other as usize];
+            let is_covered = other != node
+                && depth == NONE
+                && dbm::is_subset(self.zones.get(inner), self.zones.get(zone));
+            if !is_covered {
+                previous = other;
+            } else if previous == NONE {
+                self.heads[discrete.0 as usize] = next;
+            } else {
+                self.nodes[previous as usize].next = next;
+            }
+            other = next;
+        }
+    }
+
+    /// What a run inside the predicate can reach by delay from a zone on entry of a state.
+    fn inside(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        entry: &Zone,
+        invariant: &[Constraint],
+    ) -> Result<Inside, Failure> {
+        let dimension = symbolic.dimension();
+        let may_delay = symbolic.may_delay(words)?;
+        let mut whole = entry.clone();
+        symbolic.delay(words, may_delay, invariant, whole.bounds_mut())?;
+        let outside = match symbolic.extent(self.keep, words, whole.bounds())? {
+            Extent::Nowhere => {
+                return Ok(Inside {
+                    zones: Vec::new(),
+                    ending: None,
+                });
+            }
+            Extent::Everywhere => Federation::empty(dimension),
+            Extent::Part(part) => {
+                let mut outside = Federation::of_zone(dimension, whole.bounds());
+                outside.subtract(&part);
+                outside
+            }
+        };
+        let passage = Passage {
+            barriers: if may_delay {
+                symbolic.barriers(words, whole.bounds())?
+            } else {
+                Federation::empty(dimension)
+            },
+            stopped: symbolic.stopped(words)?,
+            whole,
+            outside,
+            may_delay,
+        };
+        self.is_coarse |= passage.is_coarse();
+        let mut inside = passage.reached(entry);
+        inside.reduce();
+        let end = passage.end(symbolic, words, &inside)?;
+        let (ending, part) = match end {
+            Some((ending, part)) => (Some(ending), part),
+            None => (None, inside),
+        };
+        let zones = part.zones().map(|zone| Zone::from_bounds(dimension, zone));
+        let zones = zones.collect();
+        Ok(Inside { zones, ending })
+    }
+
+    /// The run on the stack, with the state in which it ends.
+    fn found(&self, ending: Ending) -> Run {
+        let mut trace = self.stack_trace();
+        if let Some(top) = self.frames.last() {
+            trace.moves.push(top.parts.clone());
+            push_state(&mut trace, &top.target, &top.pending);
+        }
+        Run { trace, ending }
+    }
+
+    fn stack_trace(&self) -> Trace {
+        let states = self.frames.iter();
+        let states = states.map(|frame| (frame.words.clone(), frame.zone.clone()));
+        let moves = self.frames.iter().map(|frame| frame.parts.clone());
+        let count = self.frames.len().saturating_sub(1);
+        Trace {
+            states: states.collect(),
+            moves: moves.take(count).collect(),
+        }
+    }
+}
+
+fn push_state(trace: &mut Trace, words: &[i32], zones: &[Zone]) {
+    if let Some(zone) = zones.last() {
+        trace.states.push((words.to_vec(), zone.clone()));
+    }
+}
+
+/// How a run inside a predicate passes through a state.
+struct Passage {
+    /// All that delay within the invariants reaches.
+    whole: Zone,
+    /// The part of it in which the predicate does not hold.
+    outside: Federation,
+    /// The part of it in which an urgent synchronisation stops time.
+    barriers: Federation,
+    may_delay: bool,
+    stopped: ClockSet,
+}
+
+impl Passage {
+    /// What delay inside the predicate reaches.
+    fn reached(&self, entry: &Zone) -> Federation {
+        let dimension = self.whole.dimension();
+        let mut reached = Federation::of_zone(dimension, self.whole.bounds());
+        if !self.may_delay || !self.stopped.is_empty() {
+            reached.subtract(&self.outside);
+        } else if !self.outside.is_empty() || !self.barriers.is_empty() {
+            let from = Federation::of_zone(dimension, entry.bounds());
+            reached = future::successors(&from, &self.outside, &self.barriers);
+            reached.intersect_zone(self.whole.bounds());
+        }
+        reached
+    }
+
+    /// Whether the state is treated as if more runs stayed in it than do.
+    fn is_coarse(&self) -> bool {
+        self.may_delay && !self.stopped.is_empty()
+    }
+
+    /// Why a run may end in the part that is reached, and from which valuations of it.
+    fn end(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        inside: &Federation,
+    ) -> Result<Option<(Ending, Federation)>, Failure> {
+        if inside.is_empty() {
+            return Ok(None);
+        }
+        let waiting = self.waiting(inside);
+        if !waiting.is_empty() {
+            return Ok(Some((Ending::Waits, waiting)));
+        }
+        let stuck = self.stuck(symbolic, words, inside)?;
+        Ok((!stuck.is_empty()).then_some((Ending::Stuck, stuck)))
+    }
+
+    /// The valuations of the part that is reached from which time can pass without limit.
+    fn waiting(&self, inside: &Federation) -> Federation {
+        let dimension = self.whole.dimension();
+        let is_bounded = dbm::is_delay_bounded(self.whole.bounds(), dimension, &self.stopped);
+        if !self.may_delay || is_bounded {
+            return Federation::empty(dimension);
+        }
+        let mut waiting = inside.clone();
+        if self.stopped.is_empty() {
+            let mut leaving = self.outside.clone();
+            leaving.unite(&self.barriers);
+            leaving.down(&ClockSet::EMPTY);
+            waiting.subtract(&leaving);
+        }
+        waiting
+    }
+
+    /// The valuations of the part that is reached from which no wait leads to a move or out of the predicate.
+    fn stuck(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        inside: &Federation,
+    ) -> Result<Federation, Failure> {
+        let dimension = self.whole.dimension();
+        let mut moves = Moves::default();
+        symbolic.moves(words, &mut moves)?;
+        let mut exits = self.outside.clone();
+        let mut target = words.to_vec();
+        for one in moves.iter() {
+            if !symbolic.is_enabled(one, self.whole.bounds())? {
+                continue;
+            }
+            target.copy_from_slice(words);
+            if let Some(effect) = symbolic.fire(one, &mut target)? {
+                exits.unite(&effect.enabled_part(self.whole.bounds(), dimension));
+                if inside.is_subset(&exits) {
+                    return Ok(Federation::empty(dimension));
+                }
+            }
+        }
+        let running = dimension - 1 - self.stopped.len();
+        if self.may_delay && self.barriers.is_empty() && (self.stopped.is_empty() || running <= 1) {
+            exits.down(&self.stopped);
+        } else if self.may_delay && self.stopped.is_empty() {
+            exits = future::predecessors_within(&exits, &self.barriers);
+        }
+        // Beside stopped clocks the past of a zone is in general not exact: then a wait counts as being stuck.
+        let mut stuck = inside.clone();
+        stuck.subtract(&exits);
+        Ok(stuck)
+    }
+}
