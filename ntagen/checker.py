@@ -25,8 +25,8 @@ Extreme = int | Literal["inf"] | None
 """A least or greatest value: ``"inf"`` if there is no greatest, ``None`` if no state counts."""
 
 Value = Extreme | list[Extreme] | list[list[Extreme] | None]
-"""What ``sup`` and ``inf`` found: of one item an `Extreme`, for ``bounds`` the pair of the least and
-the greatest; of several items a list of these."""
+"""What ``sup`` and ``inf`` found: of one item an `Extreme`, for ``bounds`` the pair of the least
+and the greatest; of several items a list of these."""
 
 Progress = Callable[[int, int, int, int], object]
 """Is shown explored, stored and waiting states, and bytes."""
@@ -105,8 +105,8 @@ class Answer:
         verdict: ``satisfied``, ``not satisfied``, ``maybe`` (an over-approximation could not
             decide), ``unknown`` (a limit came first: see `stop`) or ``error`` (the model failed:
             see `message`).
-        value: What a query with ``sup``, ``inf`` or ``bounds`` found; ``None`` for other queries, and
-            if no state counts. Whether a clock reaches the value is in `message`.
+        value: What a query with ``sup``, ``inf`` or ``bounds`` found; ``None`` for other queries,
+            and if no state counts. Whether a clock reaches the value is in `message`.
         message: A remark for the user, or what went wrong in the model.
         stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
         explored: States whose successors were computed.

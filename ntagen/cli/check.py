@@ -172,9 +172,9 @@ def command(
       ntagen check model.xml --query "bounds{Gate.Open}: x"
 
     \b
-    The value of sup and inf is a number, or "inf" for a clock without limit; of bounds it is the pair
-    of both; of several items the list of their values. It is null if no state counts. The message
-    says where a clock comes near the value without reaching it.
+    The value of sup and inf is a number, or "inf" for a clock without limit; of bounds it is the
+    pair of both; of several items the list of their values. It is null if no state counts. The
+    message says where a clock comes near the value without reaching it.
     """  # noqa: D301  click wants the control character
     outputs = _Outputs(trace, strategy, plans, ranking)
     model, scene = _load(model_path)
