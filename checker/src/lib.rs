@@ -19,6 +19,8 @@ pub mod search;
 
 pub mod game;
 
+pub mod verify;
+
 pub mod engine;
 
 #[cfg(feature = "python")]

@@ -1,0 +1,14 @@
+//! The independent check: what the engine claims, done again on concrete states.
+//!
+//! Nothing here uses the moves, zones, search or games of the engine. [`concrete`] computes the moves of a state with exact clock
+//! values straight from the definitions, running code on the interpreter; [`regions`] makes the set of valuations finite;
+//! [`strategy`] closes the loop between a strategy and every move of the environment.
+//!
+//! A mistake in the front end or in the interpreter is shared with the engine and not found here; one in moves, zones,
+//! extrapolation, compiled code or the solver is.
+
+pub mod concrete;
+pub mod regions;
+
+pub use concrete::{Error, Move, Part, Semantics, State};
+pub use regions::Regions;

@@ -1,0 +1,164 @@
+//! What the comparisons share: running many cases, asking the engine, counting what was compared.
+
+use std::cell::Cell;
+use std::io::Write as _;
+
+use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Rejection};
+use checker::search::limits::StopReason;
+use checker::engine::Verdict;
+use proptest::strategy::Strategy;
+use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
+
+use crate::explicit::{Graph, NoGraph, explore};
+use checker::verify::{Error, Regions, Semantics};
+
+/// Regions that brute force explores before it gives a case up.
+const MOST_REGIONS: usize = 30_000;
+
+/// States that the engine explores before it gives a case up.
+const MOST_STATES: u64 = 5_000;
+
+/// What became of the cases.
+#[derive(Default)]
+pub(crate) struct Tally {
+    compared: Cell<u32>,
+    satisfied: Cell<u32>,
+    too_large: Cell<u32>,
+    stopped: Cell<u32>,
+    rejected: Cell<u32>,
+}
+
+fn count(cell: &Cell<u32>) {
+    cell.set(cell.get() + 1);
+}
+
+fn from_environment(name: &str, otherwise: u64) -> u64 {
+    let value = std::env::var(name).ok();
+    value.map_or(otherwise, |value| value.parse().expect("a number"))
+}
+
+/// Runs a comparison on random cases, and shrinks the first that fails.
+pub(crate) fn run<S: Strategy>(
+    name: &str,
+    cases: u32,
+    strategy: &S,
+    compare: impl Fn(&S::Value, &Tally) -> Result<(), TestCaseError>,
+) {
+    let cases = from_environment("NTAGEN_CASES", u64::from(cases)) as u32;
+    let mut seed = [7_u8; 32];
+    seed[..8].copy_from_slice(&from_environment("NTAGEN_SEED", 0).to_le_bytes());
+    let config = Config {
+        cases,
+        max_shrink_iters: 20_000,
+        failure_persistence: None,
+        ..Config::default()
+    };
+    let random = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+    let tally = Tally::default();
+    let result =
+        TestRunner::new_with_rng(config, random).run(strategy, |case| compare(&case, &tally));
+    let summary = format!(
+        "{name}: {cases} networks, {} queries compared ({} satisfied), {} too large, {} stopped, {} rejected",
+        tally.compared.get(),
+        tally.satisfied.get(),
+        tally.too_large.get(),
+        tally.stopped.get(),
+        tally.rejected.get()
+    );
+    writeln!(std::io::stderr(), "{summary}").expect("standard error can be written");
+    match result {
+        Ok(()) => {}
+        Err(TestError::Fail(reason, _)) => panic!("{reason}"),
+        Err(TestError::Abort(reason)) => panic!("given up: {reason}"),
+    }
+    assert!(
+        tally.compared.get() >= cases / 2,
+        "too few networks were compared: {summary}"
+    );
+}
+
+/// Loads a model that must be accepted.
+pub(crate) fn load(text: &str) -> LoadedModel {
+    LoadedModel::load("random.xta", text.as_bytes())
+        .unwrap_or_else(|rejection| panic!("{text}\n{}", rejection.rendered.join("\n")))
+}
+
+/// The options for a small case.
+pub(crate) fn options() -> Options {
+    Options {
+        code: CodeEngine::Interpreter,
+        limits: Limits {
+            states: Some(MOST_STATES),
+            ..Limits::default()
+        },
+        ..Options::default()
+    }
+}
+
+/// The regions of a model; `None`, counted, if there are too many.
+pub(crate) fn regions(
+    model: &LoadedModel,
+    constant: i64,
+    has_differences: bool,
+    tally: &Tally,
+) -> Result<Option<Graph>, Error> {
+    let network = model.network();
+    let semantics = Semantics::new(network, Regions::ticks_per_unit(network));
+    let regions = Regions::new(network, constant, has_differences)?;
+    match explore(&semantics, &regions, MOST_REGIONS) {
+        Ok(graph) => Ok(Some(graph)),
+        Err(NoGraph::TooLarge) => {
+            count(&tally.too_large);
+            Ok(None)
+        }
+        Err(NoGraph::Failed(error)) => Err(error),
+    }
+}
+
+/// Compares an answer of the engine with what brute force says.
+pub(crate) fn check(
+    answer: &Result<Answer, Rejection>,
+    expected: Result<bool, Error>,
+    tally: &Tally,
+    describe: impl Fn() -> String,
+) -> Result<(), TestCaseError> {
+    let answer = match answer {
+        Ok(answer) => answer,
+        Err(rejection) => {
+            count(&tally.rejected);
+            let known = ["deadlock cannot be decided"];
+            let text = rejection.rendered.join("\n");
+            return if known.iter().any(|part| text.contains(part)) {
+                Ok(())
+            } else {
+                Err(TestCaseError::fail(format!("{}\nrejected: {text}", describe())))
+            };
+        }
+    };
+    if let Verdict::Unknown(StopReason::States) = answer.verdict {
+        count(&tally.stopped);
+        return Ok(());
+    }
+    let is_right = match expected {
+        Ok(expected) => {
+            count(&tally.compared);
+            if expected {
+                count(&tally.satisfied);
+            }
+            answer.verdict == if expected { Verdict::Satisfied } else { Verdict::NotSatisfied }
+        }
+        Err(Error::InitialInvariant) => {
+            answer.verdict == Verdict::Error(checker::network::Failure::InitialInvariant)
+        }
+        Err(Error::RunTime(_)) => matches!(answer.verdict, Verdict::Error(_)),
+        Err(Error::Unsupported(what)) => panic!("{what} is not generated"),
+    };
+    if is_right {
+        return Ok(());
+    }
+    Err(TestCaseError::fail(format!(
+        "{}\nbrute force says {expected:?}, the engine {:?}",
+        describe(),
+        answer.verdict
+    )))
+}

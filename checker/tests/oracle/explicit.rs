@@ -1,0 +1,212 @@
+//! The graph of regions of a network, and games on it by fixpoints.
+
+use std::collections::HashMap;
+
+use checker::verify::{Error, Regions, Semantics, State};
+
+/// A move, as far as games need it.
+#[derive(Clone, Debug)]
+pub(crate) struct Step {
+    pub target: usize,
+    pub controllable: bool,
+    pub processes: Vec<u32>,
+}
+
+/// What stops time in a state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Stopper {
+    /// The location or the invariant of a process.
+    Process(u32),
+    /// A synchronisation on an urgent channel.
+    Channel,
+}
+
+/// A region with its successors.
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    pub state: State,
+    pub steps: Vec<Step>,
+    /// The next region, if time may pass; the node itself if the region has no end.
+    pub later: Option<usize>,
+    /// What stops time, if it is stopped.
+    pub stoppers: Vec<Stopper>,
+}
+
+/// All regions that can be reached; the first is the initial one.
+pub(crate) struct Graph {
+    pub nodes: Vec<Node>,
+    pub ticks: i64,
+}
+
+/// Why there is no graph.
+pub(crate) enum NoGraph {
+    TooLarge,
+    Failed(Error),
+}
+
+impl From<Error> for NoGraph {
+    fn from(error: Error) -> NoGraph {
+        NoGraph::Failed(error)
+    }
+}
+
+#[derive(Default)]
+struct Known {
+    index: HashMap<State, usize>,
+    states: Vec<State>,
+}
+
+impl Known {
+    fn id(&mut self, state: State) -> usize {
+        if let Some(&id) = self.index.get(&state) {
+            return id;
+        }
+        self.states.push(state.clone());
+        self.index.insert(state, self.states.len() - 1);
+        self.states.len() - 1
+    }
+}
+
+/// Explores all regions, up to a number.
+pub(crate) fn explore(
+    semantics: &Semantics<'_>,
+    regions: &Regions,
+    most: usize,
+) -> Result<Graph, NoGraph> {
+    let mut known = Known::default();
+    let mut initial = semantics.initial()?;
+    regions.represent_state(&mut initial);
+    known.id(initial);
+    let mut nodes = Vec::new();
+    while nodes.len() < known.states.len() {
+        if known.states.len() > most {
+            return Err(NoGraph::TooLarge);
+        }
+        let state = known.states[nodes.len()].clone();
+        let node = successors(semantics, regions, state, &mut known)?;
+        nodes.push(node);
+    }
+    Ok(Graph {
+        nodes,
+        ticks: semantics.ticks_per_unit(),
+    })
+}
+
+fn successors(
+    semantics: &Semantics<'_>,
+    regions: &Regions,
+    state: State,
+    known: &mut Known,
+) -> Result<Node, Error> {
+    let moves = semantics.moves(&state)?;
+    let mut steps = Vec::new();
+    for one in &moves {
+        if let Some(mut target) = semantics.take(&state, &one.parts)? {
+            regions.represent_state(&mut target);
+            steps.push(Step {
+                target: known.id(target),
+                controllable: one.controllable,
+                processes: one.parts.iter().map(|part| part.process).collect(),
+            });
+        }
+    }
+    let mut next = state.clone();
+    regions.pass(&mut next.clocks);
+    let mut stoppers = Vec::new();
+    for process in 0..semantics.network().processes.len() {
+        if semantics.is_urgent(process, &state) || !semantics.invariant_holds(process, &next)? {
+            stoppers.push(Stopper::Process(process as u32));
+        }
+    }
+    if moves.iter().any(|one| one.is_urgent) {
+        stoppers.push(Stopper::Channel);
+    }
+    let later = stoppers.is_empty().then(|| known.id(next));
+    Ok(Node {
+        state,
+        steps,
+        later,
+        stoppers,
+    })
+}
+
+impl Graph {
+    /// Whether no move is possible in a node, now or after any delay.
+    pub(crate) fn is_deadlock(&self, node: usize) -> bool {
+        let mut seen = vec![node];
+        loop {
+            let current = &self.nodes[seen[seen.len() - 1]];
+            match current.later {
+                _ if !current.steps.is_empty() => return false,
+                Some(later) if !seen.contains(&later) => seen.push(later),
+                _ => return true,
+            }
+        }
+    }
+}
+
+/// What the controller is to enforce, node by node.
+pub(crate) struct Objective<'a> {
+    /// Play ends, won, where this holds.
+    pub goal: &'a [bool],
+    /// Where this does not hold, play is lost (goals excepted).
+    pub keep: &'a [bool],
+    /// Whether the goal must be reached; otherwise keeping is enough.
+    pub must_reach: bool,
+}
+
+/// The rule for forced moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Rule {
+    Tiga,
+    Product,
+    Neutral,
+}
+
+/// The nodes from which the controller wins: the least fixpoint if the goal must be reached, else the greatest.
+pub(crate) fn winning(graph: &Graph, objective: &Objective<'_>, rule: Rule) -> Vec<bool> {
+    let mut win = vec![!objective.must_reach; graph.nodes.len()];
+    loop {
+        let mut changed = false;
+        for node in (0..graph.nodes.len()).rev() {
+            let wins = objective.goal[node]
+                || (objective.keep[node] && is_won(graph, node, &win, objective.must_reach, rule));
+            changed |= wins != win[node];
+            win[node] = wins;
+        }
+        if !changed {
+            return win;
+        }
+    }
+}
+
+fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule) -> bool {
+    let node = &graph.nodes[node];
+    let (own, others): (Vec<&Step>, Vec<&Step>) =
+        node.steps.iter().partition(|step| step.controllable);
+    if others.iter().any(|step| !win[step.target]) {
+        return false;
+    }
+    if own.iter().any(|step| win[step.target]) || node.later.is_some_and(|later| win[later]) {
+        return true;
+    }
+    if node.later.is_some() {
+        return false;
+    }
+    if must_reach {
+        !others.is_empty() && is_forced(&node.stoppers, &own, rule)
+    } else {
+        own.is_empty() || !others.is_empty()
+    }
+}
+
+/// Whether the environment must move where time is stopped: something stops time to which the controller has no move.
+fn is_forced(stoppers: &[Stopper], own: &[&Step], rule: Rule) -> bool {
+    stoppers.iter().any(|stopper| match (rule, stopper) {
+        (Rule::Neutral, _) => true,
+        (Rule::Product, _) | (Rule::Tiga, Stopper::Channel) => own.is_empty(),
+        (Rule::Tiga, Stopper::Process(process)) => {
+            own.iter().all(|step| !step.processes.contains(process))
+        }
+    })
+}

@@ -1,0 +1,579 @@
+//! Random networks and formulas, as trees of small numbers that shrink well, and their text.
+//!
+//! Numbers are taken modulo what there is (clocks, locations, …) when the text is written, so every tree is a model.
+
+use std::fmt::Write as _;
+
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::strategy::Union;
+
+/// Values that variables and selects take.
+pub(crate) const VALUES: i32 = 3;
+
+/// A network.
+#[derive(Clone, Debug)]
+pub(crate) struct Network {
+    pub clocks: usize,
+    pub variables: usize,
+    pub processes: Vec<Process>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Process {
+    pub locations: Vec<Location>,
+    pub edges: Vec<Edge>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Location {
+    urgency: Urgency,
+    invariants: Vec<Invariant>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Urgency {
+    Normal,
+    Urgent,
+    Committed,
+}
+
+#[derive(Clone, Debug)]
+enum Invariant {
+    Upper { clock: usize, bound: i32, strict: bool },
+    /// `x <= v + c`
+    UpperByVariable { clock: usize, variable: usize, bound: i32 },
+    /// `v == c imply x <= b`
+    Conditional { variable: usize, value: i32, clock: usize, bound: i32 },
+    Variable { variable: usize, bound: i32 },
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Edge {
+    source: usize,
+    target: usize,
+    /// A second target behind a branch point.
+    branch: Option<usize>,
+    select: bool,
+    sync: Sync,
+    guards: Vec<Atom>,
+    updates: Vec<Update>,
+    controllable: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Sync {
+    None,
+    /// One of [`CHANNELS`].
+    Channel { channel: usize, send: bool },
+    /// `d[v]`, or `d[s]` on an edge with a select.
+    Indexed { variable: usize, send: bool },
+}
+
+/// The channels with their declarations. Edges on urgent ones have no clock guards.
+const CHANNELS: [(&str, &str); 5] = [
+    ("a", "chan"),
+    ("b", "chan"),
+    ("c", "broadcast chan"),
+    ("u", "urgent chan"),
+    ("w", "urgent broadcast chan"),
+];
+
+/// A comparison.
+#[derive(Clone, Debug)]
+pub(crate) enum Atom {
+    Clock { clock: usize, relation: Relation, bound: i32 },
+    /// `x ≺ v + c`
+    ClockByVariable { clock: usize, relation: Relation, variable: usize, bound: i32 },
+    Difference { left: usize, right: usize, relation: Relation, bound: i32 },
+    Variable { variable: usize, relation: Relation, bound: i32 },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Relation {
+    GreaterEqual,
+    LessEqual,
+    Greater,
+    Less,
+    Equal,
+}
+
+impl Relation {
+    fn text(self) -> &'static str {
+        match self {
+            Relation::GreaterEqual => ">=",
+            Relation::LessEqual => "<=",
+            Relation::Greater => ">",
+            Relation::Less => "<",
+            Relation::Equal => "==",
+        }
+    }
+
+    pub(crate) fn holds(self, left: i64, right: i64) -> bool {
+        match self {
+            Relation::GreaterEqual => left >= right,
+            Relation::LessEqual => left <= right,
+            Relation::Greater => left > right,
+            Relation::Less => left < right,
+            Relation::Equal => left == right,
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+enum Update {
+    Reset { clock: usize, value: i32 },
+    ResetToVariable { clock: usize, variable: usize },
+    Copy { target: usize, source: usize },
+    Set { variable: usize, value: i32 },
+    Increment { variable: usize },
+    /// `v = s` on an edge with a select.
+    Select { variable: usize },
+}
+
+/// A state formula.
+#[derive(Clone, Debug)]
+pub(crate) enum Formula {
+    Location { process: usize, location: usize },
+    Atom(Atom),
+    Deadlock,
+    Not(Box<Formula>),
+    And(Vec<Formula>),
+    Or(Vec<Formula>),
+}
+
+/// How rich the networks are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    pub clocks: usize,
+    pub(crate) constant: i32,
+    pub strict_invariants: bool,
+    pub uncontrollable: bool,
+    pub deadlock: bool,
+}
+
+fn any_index() -> impl Strategy<Value = usize> {
+    0..12_usize
+}
+
+fn relation() -> impl Strategy<Value = Relation> {
+    prop_oneof![
+        3 => Just(Relation::GreaterEqual),
+        3 => Just(Relation::LessEqual),
+        2 => Just(Relation::Greater),
+        2 => Just(Relation::Less),
+        1 => Just(Relation::Equal),
+    ]
+}
+
+fn atom(shape: Shape) -> impl Strategy<Value = Atom> {
+    let bound = 0..=shape.constant;
+    prop_oneof![
+        12 => (any_index(), relation(), bound.clone())
+            .prop_map(|(clock, relation, bound)| Atom::Clock { clock, relation, bound }),
+        1 => (any_index(), relation(), any_index(), 0..=shape.constant - (VALUES - 1)).prop_map(
+            |(clock, relation, variable, bound)| Atom::ClockByVariable { clock, relation, variable, bound }
+        ),
+        1 => (any_index(), any_index(), relation(), bound).prop_map(
+            |(left, right, relation, bound)| Atom::Difference { left, right, relation, bound }
+        ),
+        6 => variable_atom(),
+    ]
+}
+
+fn variable_atom() -> impl Strategy<Value = Atom> {
+    (any_index(), relation(), 0..VALUES).prop_map(|(variable, relation, bound)| Atom::Variable {
+        variable,
+        relation,
+        bound,
+    })
+}
+
+fn update(shape: Shape) -> impl Strategy<Value = Update> {
+    prop_oneof![
+        8 => any_index().prop_map(|clock| Update::Reset { clock, value: 0 }),
+        2 => (any_index(), 0..=shape.constant).prop_map(|(clock, value)| Update::Reset { clock, value }),
+        1 => (any_index(), any_index())
+            .prop_map(|(clock, variable)| Update::ResetToVariable { clock, variable }),
+        1 => (any_index(), any_index()).prop_map(|(target, source)| Update::Copy { target, source }),
+        4 => (any_index(), 0..VALUES).prop_map(|(variable, value)| Update::Set { variable, value }),
+        4 => any_index().prop_map(|variable| Update::Increment { variable }),
+        2 => any_index().prop_map(|variable| Update::Select { variable }),
+    ]
+}
+
+fn invariant(shape: Shape) -> impl Strategy<Value = Invariant> {
+    let bound = 0..=shape.constant;
+    let strict = if shape.strict_invariants { 0.2 } else { 0.0 };
+    prop_oneof![
+        12 => (any_index(), bound.clone(), prop::bool::weighted(strict)).prop_map(
+            |(clock, bound, strict)| Invariant::Upper { clock, bound, strict }
+        ),
+        1 => (any_index(), any_index(), 0..=shape.constant - (VALUES - 1)).prop_map(
+            |(clock, variable, bound)| Invariant::UpperByVariable { clock, variable, bound }
+        ),
+        1 => (any_index(), 0..VALUES, any_index(), bound).prop_map(
+            |(variable, value, clock, bound)| Invariant::Conditional { variable, value, clock, bound }
+        ),
+        1 => (any_index(), 0..VALUES)
+            .prop_map(|(variable, bound)| Invariant::Variable { variable, bound }),
+    ]
+}
+
+fn location(shape: Shape) -> impl Strategy<Value = Location> {
+    let urgency = prop_oneof![
+        12 => Just(Urgency::Normal),
+        1 => Just(Urgency::Urgent),
+        2 => Just(Urgency::Committed),
+    ];
+    let invariants = prop_oneof![
+        3 => Just(0_usize),
+        3 => Just(1_usize),
+        1 => Just(2_usize),
+    ]
+    .prop_flat_map(move |count| vec(invariant(shape), count));
+    (urgency, invariants).prop_map(|(urgency, invariants)| Location {
+        urgency,
+        invariants,
+    })
+}
+
+fn sync() -> impl Strategy<Value = Sync> {
+    prop_oneof![
+        8 => Just(Sync::None),
+        8 => (0..CHANNELS.len(), any::<bool>())
+            .prop_map(|(channel, send)| Sync::Channel { channel, send }),
+        1 => (any_index(), any::<bool>()).prop_map(|(variable, send)| Sync::Indexed { variable, send }),
+    ]
+}
+
+fn edge(shape: Shape) -> impl Strategy<Value = Edge> {
+    let owner = if shape.uncontrollable { 0.5 } else { 1.0 };
+    (
+        (any_index(), any_index()),
+        prop::option::weighted(0.05, any_index()),
+        prop::bool::weighted(0.1),
+        sync(),
+        vec(atom(shape), 0..=2),
+        vec(update(shape), 0..=2),
+        prop::bool::weighted(owner),
+    )
+        .prop_map(
+            |((source, target), branch, select, sync, guards, updates, controllable)| Edge {
+                source,
+                target,
+                branch,
+                select,
+                sync,
+                guards,
+                updates,
+                controllable,
+            },
+        )
+}
+
+fn process(shape: Shape) -> impl Strategy<Value = Process> {
+    (vec(location(shape), 1..=4), vec(edge(shape), 0..=5))
+        .prop_map(|(locations, edges)| Process { locations, edges })
+}
+
+/// Networks.
+pub(crate) fn network(shape: Shape) -> impl Strategy<Value = Network> {
+    (1..=shape.clocks, 1..=2_usize, vec(process(shape), 1..=3)).prop_map(
+        |(clocks, variables, processes)| Network {
+            clocks,
+            variables,
+            processes,
+        },
+    )
+}
+
+/// State formulas.
+pub(crate) fn formula(shape: Shape) -> impl Strategy<Value = Formula> {
+    let location = (any_index(), any_index())
+        .prop_map(|(process, location)| Formula::Location { process, location })
+        .boxed();
+    let atom = atom(shape).prop_map(Formula::Atom).boxed();
+    let mut leaves = vec![(6, location.clone()), (3, atom.clone())];
+    if shape.deadlock {
+        leaves.push((3, Just(Formula::Deadlock).boxed()));
+    }
+    let leaf = Union::new_weighted(leaves).boxed();
+    let inner = leaf.clone();
+    prop_oneof![
+        4 => location,
+        3 => leaf,
+        2 => vec(inner.clone(), 2..=3).prop_map(Formula::And),
+        1 => vec(inner.clone(), 2..=2).prop_map(Formula::Or),
+        1 => inner.prop_map(|formula| Formula::Not(Box::new(formula))),
+    ]
+}
+
+impl Network {
+    /// The model as XTA.
+    pub(crate) fn text(&self) -> String {
+        let mut text = String::new();
+        for clock in 0..self.clocks {
+            writeln!(text, "clock x{clock};").expect("strings take everything");
+        }
+        for variable in 0..self.variables {
+            writeln!(text, "int[0,{}] v{variable};", VALUES - 1).expect("strings take everything");
+        }
+        for (name, declaration) in CHANNELS {
+            writeln!(text, "{declaration} {name};").expect("strings take everything");
+        }
+        writeln!(text, "chan d[{VALUES}];").expect("strings take everything");
+        for (index, process) in self.processes.iter().enumerate() {
+            self.process(index, process, &mut text);
+        }
+        let names: Vec<String> = (0..self.processes.len()).map(|p| format!("P{p}")).collect();
+        writeln!(text, "system {};", names.join(", ")).expect("strings take everything");
+        text
+    }
+
+    fn process(&self, index: usize, process: &Process, text: &mut String) {
+        let count = process.locations.len();
+        let states = process.locations.iter().enumerate().map(|(index, location)| {
+            let parts: Vec<String> = location
+                .invariants
+                .iter()
+                .map(|invariant| self.invariant(invariant))
+                .collect();
+            if parts.is_empty() {
+                format!("L{index}")
+            } else {
+                format!("L{index} {{ {} }}", parts.join(" && "))
+            }
+        });
+        let states: Vec<String> = states.collect();
+        let mut lines = vec![format!("state {};", states.join(", "))];
+        let branches = process.edges.iter().enumerate();
+        let points: Vec<String> = branches
+            .filter(|(_, edge)| edge.branch.is_some())
+            .map(|(index, _)| format!("B{index}"))
+            .collect();
+        if !points.is_empty() {
+            lines.push(format!("branchpoint {};", points.join(", ")));
+        }
+        for (word, urgency) in [("commit", Urgency::Committed), ("urgent", Urgency::Urgent)] {
+            let locations = process.locations.iter().enumerate();
+            let names: Vec<String> = locations
+                .filter(|(_, location)| location.urgency == urgency)
+                .map(|(index, _)| format!("L{index}"))
+                .collect();
+            if !names.is_empty() {
+                lines.push(format!("{word} {};", names.join(", ")));
+            }
+        }
+        lines.push("init L0;".to_owned());
+        let mut edges = Vec::new();
+        for (index, edge) in process.edges.iter().enumerate() {
+            let arrow = if edge.controllable { "->" } else { "-u->" };
+            let source = format!("L{}", edge.source % count);
+            let target = format!("L{}", edge.target % count);
+            let labels = self.labels(edge);
+            if let Some(branch) = edge.branch {
+                edges.push(format!("{source} {arrow} B{index} {{ {labels} }}"));
+                edges.push(format!("B{index} -> {target} {{ }}"));
+                edges.push(format!("B{index} -> L{} {{ }}", branch % count));
+            } else {
+                edges.push(format!("{source} {arrow} {target} {{ {labels} }}"));
+            }
+        }
+        if !edges.is_empty() {
+            lines.push(format!("trans {};", edges.join(",\n    ")));
+        }
+        writeln!(text, "process P{index}() {{\n  {}\n}}", lines.join("\n  "))
+            .expect("strings take everything");
+    }
+
+    fn labels(&self, edge: &Edge) -> String {
+        let mut labels = Vec::new();
+        if edge.select {
+            labels.push(format!("select s : int[0,{}];", VALUES - 1));
+        }
+        let (sync, is_urgent) = match edge.sync {
+            Sync::None => (None, false),
+            Sync::Channel { channel, send } => {
+                let (name, declaration) = CHANNELS[channel];
+                (Some((name.to_owned(), send)), declaration.starts_with("urgent"))
+            }
+            Sync::Indexed { variable, send } => {
+                let index = if edge.select { "s".to_owned() } else { self.variable(variable) };
+                (Some((format!("d[{index}]"), send)), false)
+            }
+        };
+        let guards: Vec<String> = edge
+            .guards
+            .iter()
+            .filter(|atom| !is_urgent || matches!(atom, Atom::Variable { .. }))
+            .map(|atom| self.atom(atom))
+            .collect();
+        if !guards.is_empty() {
+            labels.push(format!("guard {};", guards.join(" && ")));
+        }
+        if let Some((name, send)) = sync {
+            labels.push(format!("sync {name}{};", if send { "!" } else { "?" }));
+        }
+        let updates: Vec<String> = edge
+            .updates
+            .iter()
+            .map(|update| self.update(update, edge.select))
+            .collect();
+        if !updates.is_empty() {
+            labels.push(format!("assign {};", updates.join(", ")));
+        }
+        labels.join(" ")
+    }
+
+    fn clock(&self, clock: usize) -> String {
+        format!("x{}", clock % self.clocks)
+    }
+
+    fn variable(&self, variable: usize) -> String {
+        format!("v{}", variable % self.variables)
+    }
+
+    fn invariant(&self, invariant: &Invariant) -> String {
+        match *invariant {
+            Invariant::Upper { clock, bound, strict } => {
+                let relation = if strict { "<" } else { "<=" };
+                format!("{} {relation} {bound}", self.clock(clock))
+            }
+            Invariant::UpperByVariable { clock, variable, bound } => {
+                format!("{} <= {} + {bound}", self.clock(clock), self.variable(variable))
+            }
+            Invariant::Conditional { variable, value, clock, bound } => format!(
+                "({} == {value} imply {} <= {bound})",
+                self.variable(variable),
+                self.clock(clock)
+            ),
+            Invariant::Variable { variable, bound } => {
+                format!("{} <= {bound}", self.variable(variable))
+            }
+        }
+    }
+
+    fn atom(&self, atom: &Atom) -> String {
+        match *atom {
+            Atom::Clock { clock, relation, bound } => {
+                format!("{} {} {bound}", self.clock(clock), relation.text())
+            }
+            Atom::ClockByVariable { clock, relation, variable, bound } => format!(
+                "{} {} {} + {bound}",
+                self.clock(clock),
+                relation.text(),
+                self.variable(variable)
+            ),
+            Atom::Difference { left, right, relation, bound } => format!(
+                "{} - {} {} {bound}",
+                self.clock(left),
+                self.clock(right),
+                relation.text()
+            ),
+            Atom::Variable { variable, relation, bound } => {
+                format!("{} {} {bound}", self.variable(variable), relation.text())
+            }
+        }
+    }
+
+    fn update(&self, update: &Update, has_select: bool) -> String {
+        match *update {
+            Update::Reset { clock, value } => format!("{} = {value}", self.clock(clock)),
+            Update::ResetToVariable { clock, variable } => {
+                format!("{} = {}", self.clock(clock), self.variable(variable))
+            }
+            Update::Copy { target, source } => {
+                format!("{} = {}", self.clock(target), self.clock(source))
+            }
+            Update::Set { variable, value } => format!("{} = {value}", self.variable(variable)),
+            Update::Increment { variable } => {
+                let name = self.variable(variable);
+                format!("{name} = ({name} + 1) % {VALUES}")
+            }
+            Update::Select { variable } => {
+                let value = if has_select { "s" } else { "0" };
+                format!("{} = {value}", self.variable(variable))
+            }
+        }
+    }
+
+    /// A formula as text.
+    pub(crate) fn formula(&self, formula: &Formula) -> String {
+        match formula {
+            Formula::Location { process, location } => {
+                let (process, location) = self.location(*process, *location);
+                format!("P{process}.L{location}")
+            }
+            Formula::Atom(atom) => self.atom(atom),
+            Formula::Deadlock => "deadlock".to_owned(),
+            Formula::Not(inner) => format!("not ({})", self.formula(inner)),
+            Formula::And(parts) => self.formulas(parts, " and "),
+            Formula::Or(parts) => self.formulas(parts, " or "),
+        }
+    }
+
+    fn formulas(&self, parts: &[Formula], between: &str) -> String {
+        let parts: Vec<String> = parts.iter().map(|part| self.formula(part)).collect();
+        format!("({})", parts.join(between))
+    }
+
+    /// The process and location that two numbers mean.
+    fn location(&self, process: usize, location: usize) -> (usize, usize) {
+        let process = process % self.processes.len();
+        (process, location % self.processes[process].locations.len())
+    }
+
+    /// Whether a formula without `deadlock` holds; clock values in ticks, the reference clock first.
+    pub(crate) fn holds(
+        &self,
+        formula: &Formula,
+        words: &[i32],
+        clocks: &[i64],
+        ticks: i64,
+        deadlock: &dyn Fn() -> bool,
+    ) -> bool {
+        let holds = |part: &Formula| self.holds(part, words, clocks, ticks, deadlock);
+        match formula {
+            Formula::Location { process, location } => {
+                let (process, location) = self.location(*process, *location);
+                words[process] == location as i32
+            }
+            Formula::Atom(atom) => self.atom_holds(atom, words, clocks, ticks),
+            Formula::Deadlock => deadlock(),
+            Formula::Not(inner) => !holds(inner),
+            Formula::And(parts) => parts.iter().all(holds),
+            Formula::Or(parts) => parts.iter().any(holds),
+        }
+    }
+
+    fn atom_holds(&self, atom: &Atom, words: &[i32], clocks: &[i64], ticks: i64) -> bool {
+        let clock = |index: usize| clocks[1 + index % self.clocks];
+        let value =
+            |variable: usize| i64::from(words[self.processes.len() + variable % self.variables]);
+        match *atom {
+            Atom::Clock { clock: index, relation, bound } => {
+                relation.holds(clock(index), i64::from(bound) * ticks)
+            }
+            Atom::ClockByVariable { clock: index, relation, variable, bound } => {
+                relation.holds(clock(index), (value(variable) + i64::from(bound)) * ticks)
+            }
+            Atom::Difference { left, right, relation, bound } => {
+                relation.holds(clock(left) - clock(right), i64::from(bound) * ticks)
+            }
+            Atom::Variable { variable, relation, bound } => {
+                relation.holds(value(variable), i64::from(bound))
+            }
+        }
+    }
+}
+
+/// Whether a formula compares differences of clocks.
+pub(crate) fn has_differences(formula: &Formula) -> bool {
+    match formula {
+        Formula::Atom(Atom::Difference { .. }) => true,
+        Formula::Not(inner) => has_differences(inner),
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(has_differences),
+        _ => false,
+    }
+}

@@ -1,0 +1,12 @@
+//! The engine against brute force: small random networks whose queries are answered by an explicit exploration of regions.
+//!
+//! The explicit side knows the definitions only (`checker::verify::concrete`): it shares nothing with the engine's moves, zones,
+//! search and games. Formulas are evaluated on the tree they were generated as, not on compiled queries.
+//!
+//! `NTAGEN_CASES` says how many networks each test tries, `NTAGEN_SEED` from which seed.
+
+mod compare;
+mod explicit;
+mod games;
+mod generate;
+mod reachability;
