@@ -17,6 +17,7 @@ use crate::search::liveness::{self, Ending, Liveness};
 use crate::search::reach::{self, Outcome, Trace};
 
 use super::limits::LimitWatch;
+use super::verification::{self, Verification};
 use super::{Options, PlansWanted};
 
 /// What a query came out as.
@@ -43,6 +44,8 @@ pub struct Evidence {
     pub ending: Option<Ending>,
     /// A winning strategy, if it was wanted.
     pub strategy: Option<Strategy>,
+    /// How the check of the strategy ended, if it was wanted.
+    pub verification: Option<Verification>,
     /// Plans, if they were wanted.
     pub plans: Option<Vec<Plan>>,
     /// Whether there are more plans than were wanted.
@@ -397,12 +400,12 @@ fn game(
     };
     let predicates: Vec<&Predicate> = std::iter::once(goal).chain(keep).collect();
     let mut symbolic = game_symbolic(network, executor, &predicates);
-    let objective = GameObjective {
+    let wanted = GameObjective {
         goal: Some(goal),
         keep,
         must_progress: true,
     };
-    let mut graph = match Graph::new(&mut symbolic, objective) {
+    let mut graph = match Graph::new(&mut symbolic, wanted) {
         Ok(graph) => graph,
         Err(failure) => {
             return new_answer(
@@ -421,7 +424,18 @@ fn game(
     let result = solver.solve(extent, watch);
     let counters = solver.counters();
     match result {
-        Ok(GameAnswer::Winning) => won(&mut solver, options, counters),
+        Ok(GameAnswer::Winning) => {
+            let mut answer = won(&mut solver, options, counters);
+            if options.verify
+                && let Some(strategy) = &answer.evidence.strategy
+            {
+                let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
+                let verification =
+                    verification::verify(network, objective, strategy, options.forced, most);
+                answer.evidence.verification = Some(verification);
+            }
+            answer
+        }
         Ok(GameAnswer::NotWinning) => {
             let evidence = Evidence {
                 plans: no_plans(options),
@@ -443,7 +457,7 @@ fn no_plans(options: &Options) -> Option<Vec<Plan>> {
 /// The answer for a won game, with the evidence that is wanted.
 fn won(solver: &mut Solver<'_, '_, '_>, options: &Options, counters: Counters) -> Answer {
     let mut answer = new_answer(Verdict::Satisfied, Evidence::default(), counters);
-    if options.strategy {
+    if options.strategy || options.verify {
         match strategy::extract(solver) {
             Ok(strategy) => answer.evidence.strategy = Some(strategy),
             Err(failure) => answer.verdict = Verdict::Error(failure),

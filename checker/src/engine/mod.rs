@@ -8,6 +8,7 @@ pub mod describe;
 pub mod json;
 pub mod limits;
 pub mod simulation;
+pub mod verification;
 
 use std::time::Instant;
 
@@ -84,6 +85,8 @@ pub struct Options {
     pub plans: PlansWanted,
     /// Whether a strategy is wanted.
     pub strategy: bool,
+    /// Whether the strategy is to be checked in closed loop.
+    pub verify: bool,
 }
 
 impl Default for Options {
@@ -95,6 +98,7 @@ impl Default for Options {
             limits: Limits::default(),
             plans: PlansWanted::default(),
             strategy: false,
+            verify: false,
         }
     }
 }

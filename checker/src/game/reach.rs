@@ -515,7 +515,6 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
         if stops.is_empty() && !self.graph.nodes[node as usize].delays {
             stops.push((None, whole));
-            return Ok(stops);
         }
         let stopped = self.graph.symbolic.stopped(words)?;
         for (process, bound) in self.graph.symbolic.upper_bounds(words)? {

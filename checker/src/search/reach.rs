@@ -3,7 +3,7 @@
 //! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one with the same words contains
 //! its zone, and stored ones that a new one contains are dropped from the waiting list. States with a committed location
 //! are explored where they arise and not stored: no time passes in them, and chains of them are short. A chain that is not
-//! short ([`LONGEST_CHAIN`]) is stored after all, so that loops of committed locations end.
+//! short ([`LONGEST_CHAIN`]) or fans out ([`MOST_UNSTORED`]) is stored after all, so that loops of committed locations end.
 //!
 //! Each stored state remembers its parent and the moves from it, so that a trace is found by taking the moves again.
 //!
@@ -23,6 +23,10 @@ use super::zone_table::{ZoneId, ZoneTable};
 
 /// Committed states that are explored one below the other without being stored.
 const LONGEST_CHAIN: usize = 64;
+
+/// Committed states that are explored below one stored state without being stored; those that follow are stored, so that
+/// choices in loops of committed locations do not multiply.
+const MOST_UNSTORED: u64 = 256;
 
 /// States between two looks at the limits.
 const LOOK_EVERY: u64 = 256;
@@ -136,6 +140,8 @@ struct Search<'s, 'a> {
     current: u32,
     entries: Vec<Zone>,
     explored: u64,
+    /// The value of `explored` when the exploration of the current node began.
+    explored_before: u64,
     random: u64,
 }
 
@@ -159,6 +165,7 @@ impl<'s, 'a> Search<'s, 'a> {
             current: NONE,
             entries: Vec::new(),
             explored: 0,
+            explored_before: 0,
             random: if let Order::Random(seed) = order {
                 seed | 1
             } else {
@@ -265,6 +272,7 @@ impl<'s, 'a> Search<'s, 'a> {
     /// Explores a stored state and, below it, all committed states.
     fn visit(&mut self, node: u32) -> Result<Visit, Failure> {
         self.path.clear();
+        self.explored_before = self.explored;
         let Node { discrete, zone, .. } = self.nodes[node as usize];
         let mut frames = std::mem::take(&mut self.frames);
         if frames.is_empty() {
@@ -373,7 +381,9 @@ impl<'s, 'a> Search<'s, 'a> {
             }
         }
         self.symbolic.extrapolate_all(&target.words, entries);
-        let descends = depth < LONGEST_CHAIN && self.symbolic.stepper.is_committed(&target.words);
+        let descends = depth < LONGEST_CHAIN
+            && self.explored - self.explored_before < MOST_UNSTORED
+            && self.symbolic.stepper.is_committed(&target.words);
         if let [entry] = entries.as_slice()
             && descends
         {

@@ -193,8 +193,7 @@ impl<'a> Semantics<'a> {
                 }
             }
         }
-        let is_committed =
-            |process: usize| self.urgency(process, state) == Urgency::Committed;
+        let is_committed = |process: usize| self.urgency(process, state) == Urgency::Committed;
         if (0..enabled.len()).any(is_committed) {
             moves.retain(|one| {
                 let mut parts = one.parts.iter();
@@ -314,7 +313,11 @@ impl<'a> Semantics<'a> {
             let edge = self.edge(part);
             let values = &combinations(edge)[part.select as usize];
             self.update(&edge.update, values, &mut next)?;
-            self.update(&edge.branches[part.branch as usize].update, values, &mut next)?;
+            self.update(
+                &edge.branches[part.branch as usize].update,
+                values,
+                &mut next,
+            )?;
         }
         for &part in parts {
             let target = self.edge(part).branches[part.branch as usize].target;
@@ -343,8 +346,8 @@ impl<'a> Semantics<'a> {
 
     fn guard_holds(&self, guard: &Guard, values: &[i32], state: &State) -> Result<bool, Error> {
         let fixed = guard.fixed.iter();
-        let mut fixed =
-            fixed.map(|one| self.constraint_holds(one.left, one.right, one.bound, one.strict, state));
+        let mut fixed = fixed
+            .map(|one| self.constraint_holds(one.left, one.right, one.bound, one.strict, state));
         if let Some(function) = guard.function {
             let is_true = self.call(function, values, &mut state.words.clone())? != 0;
             let emitted = &self.emitted.borrow().0;
@@ -407,9 +410,9 @@ impl<'a> Semantics<'a> {
     fn chosen_clock(&self, choice: ClockChoice, state: &State) -> Result<ClockId, Error> {
         match choice {
             ClockChoice::Fixed(clock) => Ok(clock),
-            ClockChoice::Indexed(range, offset) => Ok(ClockId(
-                range.first.0 + self.value(offset, state)? as u32,
-            )),
+            ClockChoice::Indexed(range, offset) => {
+                Ok(ClockId(range.first.0 + self.value(offset, state)? as u32))
+            }
         }
     }
 

@@ -9,6 +9,7 @@
 
 pub mod concrete;
 pub mod regions;
+pub mod strategy;
 
 pub use concrete::{Error, Move, Part, Semantics, State};
 pub use regions::Regions;

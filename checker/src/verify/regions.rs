@@ -113,7 +113,11 @@ impl Regions {
             return false;
         };
         // From integers into the open; or on until the clock with the greatest fractional part is an integer.
-        let ticks = if fractions.contains(&0) { 1 } else { unit - greatest };
+        let ticks = if fractions.contains(&0) {
+            1
+        } else {
+            unit - greatest
+        };
         for clock in &mut clocks[1..] {
             if is_running(*clock) {
                 *clock += ticks;

@@ -3,13 +3,15 @@
 use std::cell::Cell;
 use std::io::Write as _;
 
+use checker::engine::Verdict;
+use checker::engine::verification;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Rejection};
 use checker::search::limits::StopReason;
-use checker::engine::Verdict;
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
 use crate::explicit::{Graph, NoGraph, explore};
+use checker::verify::strategy::Outcome;
 use checker::verify::{Error, Regions, Semantics};
 
 /// Regions that brute force explores before it gives a case up.
@@ -26,6 +28,8 @@ pub(crate) struct Tally {
     too_large: Cell<u32>,
     stopped: Cell<u32>,
     rejected: Cell<u32>,
+    verified: Cell<u32>,
+    unverified: Cell<u32>,
 }
 
 fn count(cell: &Cell<u32>) {
@@ -58,12 +62,15 @@ pub(crate) fn run<S: Strategy>(
     let result =
         TestRunner::new_with_rng(config, random).run(strategy, |case| compare(&case, &tally));
     let summary = format!(
-        "{name}: {cases} networks, {} queries compared ({} satisfied), {} too large, {} stopped, {} rejected",
+        "{name}: {cases} networks, {} queries compared ({} satisfied), {} too large, {} stopped, {} rejected; \
+         {} strategies verified, {} too large",
         tally.compared.get(),
         tally.satisfied.get(),
         tally.too_large.get(),
         tally.stopped.get(),
-        tally.rejected.get()
+        tally.rejected.get(),
+        tally.verified.get(),
+        tally.unverified.get()
     );
     writeln!(std::io::stderr(), "{summary}").expect("standard error can be written");
     match result {
@@ -131,7 +138,10 @@ pub(crate) fn check(
             return if known.iter().any(|part| text.contains(part)) {
                 Ok(())
             } else {
-                Err(TestCaseError::fail(format!("{}\nrejected: {text}", describe())))
+                Err(TestCaseError::fail(format!(
+                    "{}\nrejected: {text}",
+                    describe()
+                )))
             };
         }
     };
@@ -145,7 +155,12 @@ pub(crate) fn check(
             if expected {
                 count(&tally.satisfied);
             }
-            answer.verdict == if expected { Verdict::Satisfied } else { Verdict::NotSatisfied }
+            answer.verdict
+                == if expected {
+                    Verdict::Satisfied
+                } else {
+                    Verdict::NotSatisfied
+                }
         }
         Err(Error::InitialInvariant) => {
             answer.verdict == Verdict::Error(checker::network::Failure::InitialInvariant)
@@ -161,4 +176,36 @@ pub(crate) fn check(
         describe(),
         answer.verdict
     )))
+}
+
+/// A strategy must pass the closed loop.
+pub(crate) fn check_strategy(
+    model: &LoadedModel,
+    answer: &Result<Answer, Rejection>,
+    tally: &Tally,
+    describe: impl Fn() -> String,
+) -> Result<(), TestCaseError> {
+    let Ok(Answer { evidence, .. }) = answer else {
+        return Ok(());
+    };
+    match &evidence.verification {
+        None => Ok(()),
+        Some(Ok(Outcome::Verified(_))) => {
+            count(&tally.verified);
+            Ok(())
+        }
+        Some(Ok(Outcome::TooLarge(_))) => {
+            count(&tally.unverified);
+            Ok(())
+        }
+        Some(verification) => {
+            let lines = verification::describe(model.network(), verification).join("\n");
+            let strategy = evidence.strategy.as_ref();
+            let strategy = strategy.map(|one| verification::decisions(model.network(), one));
+            Err(TestCaseError::fail(format!(
+                "{}\n{lines}\n{strategy:#?}",
+                describe()
+            )))
+        }
+    }
 }

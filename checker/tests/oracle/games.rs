@@ -31,7 +31,11 @@ fn compare(
     };
     let queries = [
         format!("control: A<> {}", network.formula(goal)),
-        format!("control: A[ {} U {} ]", network.formula(keep), network.formula(goal)),
+        format!(
+            "control: A[ {} U {} ]",
+            network.formula(keep),
+            network.formula(goal)
+        ),
     ];
     for (has_keep, query) in [false, true].into_iter().zip(queries) {
         for (rule, forced) in [
@@ -58,11 +62,17 @@ fn compare(
             };
             let options = Options {
                 forced,
+                verify: true,
                 ..compare::options()
             };
             let query_text = model.add_query(&query);
             let answer = model.check(&query_text, &options);
-            compare::check(&answer, expected, tally, || format!("{text}{query}\n{forced:?}"))?;
+            compare::check(&answer, expected, tally, || {
+                format!("{text}{query}\n{forced:?}")
+            })?;
+            compare::check_strategy(&model, &answer, tally, || {
+                format!("{text}{query}\n{forced:?}")
+            })?;
         }
     }
     Ok(())

@@ -40,12 +40,28 @@ enum Urgency {
 
 #[derive(Clone, Debug)]
 enum Invariant {
-    Upper { clock: usize, bound: i32, strict: bool },
+    Upper {
+        clock: usize,
+        bound: i32,
+        strict: bool,
+    },
     /// `x <= v + c`
-    UpperByVariable { clock: usize, variable: usize, bound: i32 },
+    UpperByVariable {
+        clock: usize,
+        variable: usize,
+        bound: i32,
+    },
     /// `v == c imply x <= b`
-    Conditional { variable: usize, value: i32, clock: usize, bound: i32 },
-    Variable { variable: usize, bound: i32 },
+    Conditional {
+        variable: usize,
+        value: i32,
+        clock: usize,
+        bound: i32,
+    },
+    Variable {
+        variable: usize,
+        bound: i32,
+    },
 }
 
 #[derive(Clone, Debug)]
@@ -65,9 +81,15 @@ pub(crate) struct Edge {
 enum Sync {
     None,
     /// One of [`CHANNELS`].
-    Channel { channel: usize, send: bool },
+    Channel {
+        channel: usize,
+        send: bool,
+    },
     /// `d[v]`, or `d[s]` on an edge with a select.
-    Indexed { variable: usize, send: bool },
+    Indexed {
+        variable: usize,
+        send: bool,
+    },
 }
 
 /// The channels with their declarations. Edges on urgent ones have no clock guards.
@@ -82,11 +104,29 @@ const CHANNELS: [(&str, &str); 5] = [
 /// A comparison.
 #[derive(Clone, Debug)]
 pub(crate) enum Atom {
-    Clock { clock: usize, relation: Relation, bound: i32 },
+    Clock {
+        clock: usize,
+        relation: Relation,
+        bound: i32,
+    },
     /// `x ≺ v + c`
-    ClockByVariable { clock: usize, relation: Relation, variable: usize, bound: i32 },
-    Difference { left: usize, right: usize, relation: Relation, bound: i32 },
-    Variable { variable: usize, relation: Relation, bound: i32 },
+    ClockByVariable {
+        clock: usize,
+        relation: Relation,
+        variable: usize,
+        bound: i32,
+    },
+    Difference {
+        left: usize,
+        right: usize,
+        relation: Relation,
+        bound: i32,
+    },
+    Variable {
+        variable: usize,
+        relation: Relation,
+        bound: i32,
+    },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,13 +162,29 @@ impl Relation {
 
 #[derive(Clone, Debug)]
 enum Update {
-    Reset { clock: usize, value: i32 },
-    ResetToVariable { clock: usize, variable: usize },
-    Copy { target: usize, source: usize },
-    Set { variable: usize, value: i32 },
-    Increment { variable: usize },
+    Reset {
+        clock: usize,
+        value: i32,
+    },
+    ResetToVariable {
+        clock: usize,
+        variable: usize,
+    },
+    Copy {
+        target: usize,
+        source: usize,
+    },
+    Set {
+        variable: usize,
+        value: i32,
+    },
+    Increment {
+        variable: usize,
+    },
     /// `v = s` on an edge with a select.
-    Select { variable: usize },
+    Select {
+        variable: usize,
+    },
 }
 
 /// A state formula.
@@ -333,18 +389,22 @@ impl Network {
 
     fn process(&self, index: usize, process: &Process, text: &mut String) {
         let count = process.locations.len();
-        let states = process.locations.iter().enumerate().map(|(index, location)| {
-            let parts: Vec<String> = location
-                .invariants
-                .iter()
-                .map(|invariant| self.invariant(invariant))
-                .collect();
-            if parts.is_empty() {
-                format!("L{index}")
-            } else {
-                format!("L{index} {{ {} }}", parts.join(" && "))
-            }
-        });
+        let states = process
+            .locations
+            .iter()
+            .enumerate()
+            .map(|(index, location)| {
+                let parts: Vec<String> = location
+                    .invariants
+                    .iter()
+                    .map(|invariant| self.invariant(invariant))
+                    .collect();
+                if parts.is_empty() {
+                    format!("L{index}")
+                } else {
+                    format!("L{index} {{ {} }}", parts.join(" && "))
+                }
+            });
         let states: Vec<String> = states.collect();
         let mut lines = vec![format!("state {};", states.join(", "))];
         let branches = process.edges.iter().enumerate();
@@ -396,10 +456,17 @@ impl Network {
             Sync::None => (None, false),
             Sync::Channel { channel, send } => {
                 let (name, declaration) = CHANNELS[channel];
-                (Some((name.to_owned(), send)), declaration.starts_with("urgent"))
+                (
+                    Some((name.to_owned(), send)),
+                    declaration.starts_with("urgent"),
+                )
             }
             Sync::Indexed { variable, send } => {
-                let index = if edge.select { "s".to_owned() } else { self.variable(variable) };
+                let index = if edge.select {
+                    "s".to_owned()
+                } else {
+                    self.variable(variable)
+                };
                 (Some((format!("d[{index}]"), send)), false)
             }
         };
@@ -436,14 +503,31 @@ impl Network {
 
     fn invariant(&self, invariant: &Invariant) -> String {
         match *invariant {
-            Invariant::Upper { clock, bound, strict } => {
+            Invariant::Upper {
+                clock,
+                bound,
+                strict,
+            } => {
                 let relation = if strict { "<" } else { "<=" };
                 format!("{} {relation} {bound}", self.clock(clock))
             }
-            Invariant::UpperByVariable { clock, variable, bound } => {
-                format!("{} <= {} + {bound}", self.clock(clock), self.variable(variable))
+            Invariant::UpperByVariable {
+                clock,
+                variable,
+                bound,
+            } => {
+                format!(
+                    "{} <= {} + {bound}",
+                    self.clock(clock),
+                    self.variable(variable)
+                )
             }
-            Invariant::Conditional { variable, value, clock, bound } => format!(
+            Invariant::Conditional {
+                variable,
+                value,
+                clock,
+                bound,
+            } => format!(
                 "({} == {value} imply {} <= {bound})",
                 self.variable(variable),
                 self.clock(clock)
@@ -456,22 +540,40 @@ impl Network {
 
     fn atom(&self, atom: &Atom) -> String {
         match *atom {
-            Atom::Clock { clock, relation, bound } => {
+            Atom::Clock {
+                clock,
+                relation,
+                bound,
+            } => {
                 format!("{} {} {bound}", self.clock(clock), relation.text())
             }
-            Atom::ClockByVariable { clock, relation, variable, bound } => format!(
+            Atom::ClockByVariable {
+                clock,
+                relation,
+                variable,
+                bound,
+            } => format!(
                 "{} {} {} + {bound}",
                 self.clock(clock),
                 relation.text(),
                 self.variable(variable)
             ),
-            Atom::Difference { left, right, relation, bound } => format!(
+            Atom::Difference {
+                left,
+                right,
+                relation,
+                bound,
+            } => format!(
                 "{} - {} {} {bound}",
                 self.clock(left),
                 self.clock(right),
                 relation.text()
             ),
-            Atom::Variable { variable, relation, bound } => {
+            Atom::Variable {
+                variable,
+                relation,
+                bound,
+            } => {
                 format!("{} {} {bound}", self.variable(variable), relation.text())
             }
         }
@@ -552,18 +654,28 @@ impl Network {
         let value =
             |variable: usize| i64::from(words[self.processes.len() + variable % self.variables]);
         match *atom {
-            Atom::Clock { clock: index, relation, bound } => {
-                relation.holds(clock(index), i64::from(bound) * ticks)
-            }
-            Atom::ClockByVariable { clock: index, relation, variable, bound } => {
-                relation.holds(clock(index), (value(variable) + i64::from(bound)) * ticks)
-            }
-            Atom::Difference { left, right, relation, bound } => {
-                relation.holds(clock(left) - clock(right), i64::from(bound) * ticks)
-            }
-            Atom::Variable { variable, relation, bound } => {
-                relation.holds(value(variable), i64::from(bound))
-            }
+            Atom::Clock {
+                clock: index,
+                relation,
+                bound,
+            } => relation.holds(clock(index), i64::from(bound) * ticks),
+            Atom::ClockByVariable {
+                clock: index,
+                relation,
+                variable,
+                bound,
+            } => relation.holds(clock(index), (value(variable) + i64::from(bound)) * ticks),
+            Atom::Difference {
+                left,
+                right,
+                relation,
+                bound,
+            } => relation.holds(clock(left) - clock(right), i64::from(bound) * ticks),
+            Atom::Variable {
+                variable,
+                relation,
+                bound,
+            } => relation.holds(value(variable), i64::from(bound)),
         }
     }
 }

@@ -45,7 +45,9 @@ fn compare(
             };
             let query_text = model.add_query(&query);
             let answer = model.check(&query_text, &options);
-            compare::check(&answer, expected, tally, || format!("{text}{query}\n{order:?}"))?;
+            compare::check(&answer, expected, tally, || {
+                format!("{text}{query}\n{order:?}")
+            })?;
         }
     }
     Ok(())
@@ -63,6 +65,9 @@ fn is_somewhere(network: &Network, formula: &Formula, graph: &Graph, is_negated:
 
 #[test]
 fn reachability_equals_brute_force() {
-    let strategy = (generate::network(SHAPE), vec(generate::formula(SHAPE), 3..=3));
+    let strategy = (
+        generate::network(SHAPE),
+        vec(generate::formula(SHAPE), 3..=3),
+    );
     compare::run("reachability", 300, &strategy, compare);
 }

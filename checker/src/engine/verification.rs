@@ -1,0 +1,198 @@
+//! From a strategy of the solver to the independent check, and from its outcome to words.
+
+use crate::game::Forced;
+use crate::game::strategy::{Decision, Strategy};
+use crate::ir::{Network, Objective, Predicate};
+use crate::network::{Part, predicate};
+use crate::search::StateStore;
+use crate::verify::strategy::{
+    self, Claim, Constraint, Decisions, Defect, Forcing, Step, Violation,
+};
+use crate::verify::{self, regions};
+use crate::zones::{Bound, Federation, minimal};
+
+use super::describe;
+
+/// Regions that a check explores before it gives up.
+pub const MOST_REGIONS: u64 = 2_000_000;
+
+/// How the check of a strategy ended; an error says why it could not be done.
+pub type Verification = Result<strategy::Outcome, verify::Error>;
+
+/// Checks a strategy for reachability in closed loop. The network must hold the code of the objective.
+pub fn verify(
+    network: &Network,
+    objective: &Objective,
+    strategy: &Strategy,
+    forced: Forced,
+    most_regions: u64,
+) -> Verification {
+    let (goal, keep) = match objective {
+        Objective::Reach(goal) => (goal, None),
+        Objective::Until(keep, goal) => (goal, Some(keep)),
+        _ => return Err(verify::Error::Unsupported("objectives without a goal")),
+    };
+    let (constant, has_differences) = constants(goal, keep);
+    let claim = Claim {
+        goal,
+        keep,
+        forcing: match forced {
+            Forced::Tiga => Forcing::Component,
+            Forced::Product => Forcing::Network,
+            Forced::Neutral => Forcing::Always,
+        },
+        constant,
+        has_differences,
+    };
+    strategy::verify(network, &decisions(network, strategy), &claim, most_regions)
+}
+
+fn constants(goal: &Predicate, keep: Option<&Predicate>) -> (i64, bool) {
+    let predicates = std::iter::once(goal).chain(keep);
+    let atoms: Vec<_> = predicates.flat_map(predicate::atoms).collect();
+    let constant = atoms.iter().map(regions::greatest_constant).max();
+    let has_differences = atoms
+        .iter()
+        .any(|atom| atom.left.first.0 != 0 && atom.right.first.0 != 0);
+    (constant.unwrap_or(0), has_differences)
+}
+
+/// The decisions of a strategy by words, in the order of their ranks.
+pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
+    let mut store = StateStore::new(network);
+    let mut joined: Vec<(&[i32], Vec<&Decision>)> = Vec::new();
+    for state in &strategy.states {
+        let (id, is_new) = store.intern(&state.words);
+        if is_new {
+            joined.push((&state.words, Vec::new()));
+        }
+        joined[id.0 as usize].1.extend(&state.decisions);
+    }
+    let states = joined.into_iter().map(|(words, mut decisions)| {
+        decisions.sort_by_key(|decision| decision.rank);
+        Decisions {
+            words: words.to_vec(),
+            decisions: decisions.into_iter().map(decision).collect(),
+        }
+    });
+    states.collect()
+}
+
+fn decision(decision: &Decision) -> strategy::Decision {
+    let action = decision.action.as_ref();
+    strategy::Decision {
+        zones: zones(&decision.zones),
+        action: action.map(|parts| parts.iter().map(|&one| part(one)).collect()),
+    }
+}
+
+fn part(part: Part) -> verify::Part {
+    verify::Part {
+        process: part.process,
+        edge: part.edge,
+        branch: part.branch,
+        select: part.select,
+    }
+}
+
+fn zones(federation: &Federation) -> Vec<Vec<Constraint>> {
+    let dimension = federation.dimension();
+    let zones = federation.zones().map(|zone: &[Bound]| {
+        let mut constraints = Vec::new();
+        minimal::for_each_minimal(zone, dimension, |one| {
+            constraints.push(Constraint {
+                left: one.left,
+                right: one.right,
+                bound: one.bound.value(),
+                strict: one.bound.is_strict(),
+            });
+        });
+        constraints
+    });
+    zones.collect()
+}
+
+/// What a check covered, or what is wrong, for the user: one line, then those of the run.
+pub fn describe(network: &Network, verification: &Verification) -> Vec<String> {
+    match verification {
+        Ok(strategy::Outcome::Verified(coverage)) => vec![format!(
+            "strategy verified: {} regions, {} moves of the controller, {} of the environment, {} ends in the goal",
+            coverage.regions, coverage.own_moves, coverage.opponent_moves, coverage.goals
+        )],
+        Ok(strategy::Outcome::TooLarge(coverage)) => vec![format!(
+            "strategy not verified: more than {} regions",
+            coverage.regions
+        )],
+        Ok(strategy::Outcome::Violated(violation, _)) => violation_lines(network, violation),
+        Err(verify::Error::Unsupported(what)) => {
+            vec![format!(
+                "strategy not verified: {what} are not covered by the check"
+            )]
+        }
+        Err(error) => vec![format!("strategy not verified: {error:?}")],
+    }
+}
+
+fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
+    let defect = match violation.defect {
+        Defect::NoDecision => "it has no decision here",
+        Defect::ImpossibleAction => "its action is not possible here",
+        Defect::Broken => "what must be kept does not hold here",
+        Defect::Stuck => "it waits where time cannot pass and nobody must move",
+        Defect::Endless => "the run goes on for ever without the goal",
+    };
+    let mut lines = vec![format!("strategy violated: {defect}")];
+    for (index, state) in violation.states.iter().enumerate() {
+        lines.push(format!(
+            "  {}",
+            state_line(network, state, violation.ticks_per_unit)
+        ));
+        match violation.steps.get(index) {
+            Some(Step::Time) => lines.push("    time passes".to_owned()),
+            Some(Step::Move(one)) => {
+                let edges: Vec<String> = one
+                    .parts
+                    .iter()
+                    .map(|part| part_text(network, *part))
+                    .collect();
+                lines.push(format!("    {}", edges.join(", ")));
+            }
+            None => {}
+        }
+    }
+    lines
+}
+
+fn state_line(network: &Network, state: &verify::State, ticks_per_unit: i64) -> String {
+    let mut parts = Vec::new();
+    for (index, process) in network.processes.iter().enumerate() {
+        let location = describe::location_name(network, index, &state.words);
+        parts.push(format!("{}.{location}", process.name));
+    }
+    describe::for_each_value(network, &state.words, |name, value| {
+        parts.push(match value {
+            describe::Value::Integer(value) => format!("{name}={value}"),
+            describe::Value::Double(value) => format!("{name}={value}"),
+        });
+    });
+    for (clock, value) in network.clocks.iter().zip(&state.clocks).skip(1) {
+        let (units, rest) = (value / ticks_per_unit, value % ticks_per_unit);
+        parts.push(match rest {
+            0 => format!("{}={units}", clock.name),
+            _ => format!("{}={units}+{rest}/{ticks_per_unit}", clock.name),
+        });
+    }
+    parts.join(" ")
+}
+
+fn part_text(network: &Network, part: verify::Part) -> String {
+    let process = &network.processes[part.process as usize];
+    let edge = &process.edges[part.edge as usize];
+    let target = edge.branches[part.branch as usize].target;
+    format!(
+        "{}.{} → {}",
+        process.name,
+        process.locations[edge.source.0 as usize].name,
+        process.locations[target.0 as usize].name
+    )
+}
