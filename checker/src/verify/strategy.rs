@@ -191,7 +191,7 @@ struct Play<'a> {
     coverage: Coverage,
 }
 
-impl Play<'_> {
+impl<'a> Play<'a> {
     fn run(&mut self, most_regions: u64) -> Result<Outcome, Error> {
         let mut initial = self.semantics.initial()?;
         self.regions.represent_state(&mut initial);
@@ -290,9 +290,9 @@ impl Play<'_> {
             .map(|(one, target)| (Step::Move((*one).clone()), target.clone()))
             .collect();
         self.coverage.opponent_moves += successors.len() as u64;
-        if let Some(action) = decision {
+        if let Some(action) = &decision.action {
             let mut own = targets.into_iter();
-            let Some((one, target)) = own.find(|(one, _)| one.controllable && one.parts == action)
+            let Some((one, target)) = own.find(|(one, _)| one.controllable && one.parts == *action)
             else {
                 return Ok(Err(Defect::ImpossibleAction));
             };
@@ -312,8 +312,8 @@ impl Play<'_> {
         Ok(Ok(successors))
     }
 
-    /// The decision that applies: an action, or `Some(None)` to wait.
-    fn decision(&self, state: &State) -> Option<Option<Vec<Part>>> {
+    /// The decision that applies.
+    fn decision(&self, state: &State) -> Option<&'a Decision> {
         let words = identity(self.semantics.network(), &state.words);
         let unit = self.semantics.ticks_per_unit();
         let holds = |one: &Constraint| {
@@ -321,11 +321,10 @@ impl Play<'_> {
             let bound = i64::from(one.bound) * unit;
             difference < bound || (!one.strict && difference == bound)
         };
-        let decisions = &self.strategy.get(words)?.decisions;
+        let decisions: &'a Decisions = self.strategy.get(words)?;
         let applies =
             |decision: &&Decision| decision.zones.iter().any(|zone| zone.iter().all(holds));
-        let decision = decisions.iter().find(applies)?;
-        Some(decision.action.clone())
+        decisions.decisions.iter().find(applies)
     }
 
     /// Whether the environment must move in a state in which time cannot pass.
