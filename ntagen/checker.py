@@ -116,6 +116,9 @@ class Answer:
         peak_bytes: The greatest number of bytes that states and tables took.
         plan_count: How many plans were found; ``None`` if none were asked for, or if the
             environment has choices, so that a strategy is no list of plans.
+        verified: Whether the strategy passed the independent check; ``None`` if none was asked
+            for, or if it came to no end.
+        verification: What that check covered, or the run that shows what is wrong, line by line.
     """
 
     def __init__(self, raw: _checker.Answer, query: str, edges: list[list[_EdgeEntry]]) -> None:
@@ -134,6 +137,8 @@ class Answer:
         self.peak_bytes = raw.peak_bytes
         self.plan_count = raw.plan_count
         self.has_more_plans = raw.has_more_plans
+        self.verified = raw.verified
+        self.verification = tuple(raw.verification())
 
     @property
     def plans(self) -> tuple[EnginePlan, ...]:
@@ -210,6 +215,7 @@ class Model:
         plans: PlansWanted = "none",
         max_plans: int = MAX_PLANS,
         strategy: bool = False,
+        verify: bool = False,
         progress: Progress | None = None,
     ) -> Answer:
         """Answers a query.
@@ -226,6 +232,7 @@ class Model:
             plans: Which winning sequences to list.
             max_plans: At most this many plans are listed.
             strategy: Whether a winning strategy is wanted.
+            verify: Whether the strategy is to be checked against every move of the environment.
             progress: Is called some twenty times a second with the numbers of explored,
                 stored and waiting states and of bytes.
 
@@ -249,6 +256,7 @@ class Model:
                 timeout_s=timeout_s,
                 max_plans=wanted,
                 strategy=strategy,
+                verify=verify,
                 progress=progress,
             )
         except _checker.RejectedError as error:

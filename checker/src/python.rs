@@ -13,6 +13,7 @@ use pyo3::types::PyBytes;
 
 use crate::engine::limits::Observer;
 use crate::engine::simulation::Point;
+use crate::engine::verification;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, Verdict, describe, json,
 };
@@ -20,6 +21,7 @@ use crate::game::Forced;
 use crate::network::Failure;
 use crate::search::limits::StopReason;
 use crate::search::reach::Order;
+use crate::verify::strategy::Outcome;
 
 pyo3::create_exception!(
     _checker,
@@ -184,7 +186,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, progress))]
+    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, progress))]
     #[expect(
         clippy::too_many_arguments,
         reason = "one for each option of the command line"
@@ -201,6 +203,7 @@ impl Model {
         timeout_s: Option<f64>,
         max_plans: Option<usize>,
         strategy: bool,
+        verify: bool,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
         let unknown =
@@ -236,6 +239,7 @@ impl Model {
                 Some(most) => PlansWanted::All(most),
             },
             strategy,
+            verify,
         };
         let model = slf.get();
         let answer = slf.py().detach(|| {
@@ -499,6 +503,27 @@ impl Answer {
                 .get()
                 .with(|model| json::trace(model.network(), trace, evidence.ending).to_string()),
         )
+    }
+
+    /// Whether the strategy passed its check; `None` if none was made or it came to no end.
+    #[getter]
+    fn verified(&self) -> Option<bool> {
+        match self.inner.evidence.verification.as_ref()? {
+            Ok(Outcome::Verified(_)) => Some(true),
+            Ok(Outcome::Violated(..)) => Some(false),
+            Ok(Outcome::TooLarge(_)) | Err(_) => None,
+        }
+    }
+
+    /// What the check of the strategy covered, or what is wrong with it, line by line; empty without a check.
+    fn verification(&self) -> Vec<String> {
+        match &self.inner.evidence.verification {
+            None => Vec::new(),
+            Some(result) => self
+                .model
+                .get()
+                .with(|model| verification::describe(model.network(), result)),
+        }
     }
 
     /// The strategy as JSON; `None` without a strategy.

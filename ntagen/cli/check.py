@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.files import write_files
 from ntagen.errors import InputError
 
@@ -86,7 +87,8 @@ class _Outputs:
 @click.command(
     "check",
     epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected, "
-    "3 stopped by a limit or maybe, 4 run-time error in the model.",
+    "3 stopped by a limit or maybe, 4 run-time error in the model, 70 internal error "
+    "(a strategy that fails --verify is one).",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.option(
@@ -110,6 +112,11 @@ class _Outputs:
     metavar="FILE.json",
     type=click.Path(path_type=Path),
     help="Write the strategy of the (last) satisfied control query.",
+)
+@click.option(
+    "--verify",
+    is_flag=True,
+    help="Check strategies against every move of the environment, independently of the solver.",
 )
 @click.option(
     "--plans",
@@ -149,6 +156,7 @@ def command(
     as_json: bool,
     trace: str | None,
     strategy: Path | None,
+    verify: bool,
     plans: Path | None,
     ranking: str,
     max_plans: int,
@@ -169,6 +177,7 @@ def command(
       ntagen check examples/paper.nsl --plans plans.json
       ntagen check model.xml --query "E<> Gate.Open" --trace -
       ntagen check model.xml --queries model.q --json --timeout 60s
+      ntagen check game.xml --query "control: A<> Main.Won" --verify
       ntagen check model.xml --query "bounds{Gate.Open}: x"
 
     \b
@@ -198,9 +207,13 @@ def command(
                 plans="all" if plans else "none",
                 max_plans=max_plans,
                 strategy=strategy is not None,
+                verify=verify,
                 progress=shown,
             )
-        notes = _write_evidence(answer, query, outputs, scene)
+        if answer.verified is False:
+            click.echo("\n".join([query.text, *answer.verification]), err=True)
+            return INTERNAL_ERROR
+        notes = [*answer.verification, *_write_evidence(answer, query, outputs, scene)]
         if as_json:
             click.echo(json.dumps(_record(answer, query)))
         else:
