@@ -15,7 +15,8 @@ use crate::ir::Predicate;
 use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
 use crate::search::store::{DiscreteId, StateStore};
 use crate::search::zone_table::{ZoneId, ZoneTable};
-use crate::zones::{Bound, Federation, Zone, dbm};
+use crate::zones::dbm::{self, Constraint};
+use crate::zones::{Bound, Federation, Zone};
 
 use super::programs::{ProgramId, ProgramStep, Programs};
 
@@ -315,27 +316,25 @@ impl<'s, 'a> Graph<'s, 'a> {
             &mut self.entries,
         );
         self.steps.clear();
-        self.push_step(false, &effect);
+        self.push_step(false, effect);
         if self.entries.len() != 1 {
-            let mut entries = std::mem::take(&mut self.entries);
-            return self.end_in_pieces(node, target, &mut entries, &effect.invariant, origin);
+            return self.end_in_pieces(node, target, origin);
         }
         let mut zone = self.entries.swap_remove(0);
-        let mut invariant = effect.invariant;
         let mut length = 1;
         loop {
             let may_delay = self.symbolic.may_delay(target)?;
+            let invariant = invariant_of(&self.steps);
             self.symbolic
-                .delay(target, may_delay, &invariant, zone.bounds_mut())?;
+                .delay(target, may_delay, invariant, zone.bounds_mut())?;
             if length as usize == LONGEST_CHAIN {
                 break;
             }
             let Some(effect) = self.only_move(target, &mut zone, may_delay)? else {
                 break;
             };
-            self.push_step(may_delay, &effect);
+            self.push_step(may_delay, effect);
             std::mem::swap(target, &mut self.spare);
-            invariant = effect.invariant;
             length += 1;
         }
         self.symbolic.extrapolate(target, zone.bounds_mut());
@@ -382,16 +381,13 @@ impl<'s, 'a> Graph<'s, 'a> {
     }
 
     /// Adds a step to the program at hand. One that changes nothing is left out, unless it is the first or ends an invariant.
-    fn push_step(&mut self, delays: bool, effect: &ClockEffect) {
+    fn push_step(&mut self, delays: bool, effect: ClockEffect) {
         let is_kept = self
             .steps
             .last()
             .is_none_or(|last| !last.effect.invariant.is_empty());
         if delays || is_kept || !effect.is_trivial() {
-            self.steps.push(ProgramStep {
-                delays,
-                effect: effect.clone(),
-            });
+            self.steps.push(ProgramStep { delays, effect });
         }
     }
 
@@ -400,16 +396,15 @@ impl<'s, 'a> Graph<'s, 'a> {
         &mut self,
         node: u32,
         target: &mut [i32],
-        entries: &mut [Zone],
-        invariant: &[crate::zones::dbm::Constraint],
         origin: (u32, bool),
     ) -> Result<(), Failure> {
-        for zone in entries {
+        for mut zone in std::mem::take(&mut self.entries) {
             let may_delay = self.symbolic.may_delay(target)?;
+            let invariant = invariant_of(&self.steps);
             self.symbolic
                 .delay(target, may_delay, invariant, zone.bounds_mut())?;
             self.symbolic.extrapolate(target, zone.bounds_mut());
-            self.add_edge(node, target, zone, origin, 1)?;
+            self.add_edge(node, target, &zone, origin, 1)?;
         }
         Ok(())
     }
@@ -446,4 +441,9 @@ impl<'s, 'a> Graph<'s, 'a> {
         });
         Ok(())
     }
+}
+
+/// The invariant of the state that the steps lead to: that of the last one, since steps that are left out have none.
+fn invariant_of(steps: &[ProgramStep]) -> &[Constraint] {
+    steps.last().map_or(&[], |last| &last.effect.invariant)
 }

@@ -27,6 +27,8 @@ pub struct ProgramStep {
 #[derive(Debug, Default)]
 pub struct Programs {
     steps: Vec<Vec<ProgramStep>>,
+    /// The index of the program that was asked for last.
+    last: u32,
     index: FxHashMap<Vec<ProgramStep>, u32>,
     /// By program, source zone and target zone: whether every valuation of the source gets into the target.
     totals: FxHashMap<(ProgramId, ZoneId, ZoneId), bool>,
@@ -35,10 +37,20 @@ pub struct Programs {
 impl Programs {
     /// The program with these steps.
     pub fn intern(&mut self, steps: &[ProgramStep]) -> ProgramId {
+        // The last program is the likeliest, and comparing costs less than hashing.
+        if self
+            .steps
+            .get(self.last as usize)
+            .is_some_and(|last| last == steps)
+        {
+            return ProgramId(self.last);
+        }
         if let Some(&id) = self.index.get(steps) {
+            self.last = id;
             return ProgramId(id);
         }
         let id = self.steps.len() as u32;
+        self.last = id;
         self.steps.push(steps.to_vec());
         self.index.insert(steps.to_vec(), id);
         ProgramId(id)

@@ -8,23 +8,56 @@
 //! Cost: proportional to the edges that leave the current locations; no allocation once the buffers have grown.
 
 use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
-use crate::ir::{ChannelId, Edge, FunctionId, Guard, Network, Update, Urgency};
+use crate::ir::{ChannelId, Edge, FunctionId, Guard, Location, Network, Process, Update, Urgency};
 
 use super::moves::{MoveRef, Moves, Part};
 
-/// The edges that leave a location, sorted by what they wait for.
-#[derive(Debug, Default)]
-struct LocationTable {
-    internal: Vec<u32>,
-    sends: Vec<u32>,
-    /// Receiving edges with the channels they may listen to: first, count, edge.
-    receives: Vec<(u32, u32, u32)>,
-    urgency: Option<Urgency>,
+/// An edge with what is asked of it most.
+#[derive(Clone, Copy, Debug)]
+struct EdgeEntry<'a> {
+    index: u32,
+    /// How many combinations of select values it has.
+    instances: u32,
+    edge: &'a Edge,
 }
 
-impl LocationTable {
+/// The edges that leave a location, sorted by what they wait for.
+#[derive(Debug)]
+struct LocationTable<'a> {
+    internal: Vec<EdgeEntry<'a>>,
+    sends: Vec<EdgeEntry<'a>>,
+    receives: Vec<EdgeEntry<'a>>,
+    urgency: Urgency,
+}
+
+impl<'a> LocationTable<'a> {
+    fn new(process: &'a Process, location: &Location) -> LocationTable<'a> {
+        let urgency = location.urgency;
+        let (internal, sends, receives) = (Vec::new(), Vec::new(), Vec::new());
+        let mut table = LocationTable {
+            internal,
+            sends,
+            receives,
+            urgency,
+        };
+        for index in &location.edges {
+            let edge = &process.edges[index.0 as usize];
+            let entry = EdgeEntry {
+                index: index.0,
+                instances: select_count(edge),
+                edge,
+            };
+            match edge.sync {
+                None => table.internal.push(entry),
+                Some(sync) if sync.send => table.sends.push(entry),
+                Some(_) => table.receives.push(entry),
+            }
+        }
+        table
+    }
+
     fn is_committed(&self) -> bool {
-        self.urgency == Some(Urgency::Committed)
+        self.urgency == Urgency::Committed
     }
 }
 
@@ -34,6 +67,7 @@ struct Candidate {
     process: u32,
     edge: u32,
     select: u32,
+    is_controllable: bool,
     constraints: (u32, u32),
 }
 
@@ -41,7 +75,7 @@ struct Candidate {
 pub struct Stepper<'a> {
     network: &'a Network,
     executor: &'a dyn Executor,
-    tables: Vec<Vec<LocationTable>>,
+    tables: Vec<Vec<LocationTable<'a>>>,
     /// By channel: the processes that may receive on it.
     receivers: Vec<Vec<u32>>,
     /// Whether any channel is urgent.
@@ -71,25 +105,15 @@ impl<'a> Stepper<'a> {
     /// A stepper for a network, running its code by `executor`.
     pub fn new(network: &'a Network, executor: &'a dyn Executor) -> Stepper<'a> {
         let tables = network.processes.iter().map(|process| {
-            process.locations.iter().map(|location| {
-                let mut table = LocationTable {
-                    urgency: Some(location.urgency),
-                    ..LocationTable::default()
-                };
-                for edge in &location.edges {
-                    match process.edges[edge.0 as usize].sync {
-                        None => table.internal.push(edge.0),
-                        Some(sync) if sync.send => table.sends.push(edge.0),
-                        Some(sync) => table.receives.push((sync.channel.0, sync.count, edge.0)),
-                    }
-                }
-                table
-            })
+            let locations = process.locations.iter();
+            locations
+                .map(|location| LocationTable::new(process, location))
+                .collect()
         });
         Stepper {
             network,
             executor,
-            tables: tables.map(Iterator::collect).collect(),
+            tables: tables.collect(),
             receivers: receivers(network),
             has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
             constraints: Vec::new(),
@@ -121,7 +145,7 @@ impl<'a> Stepper<'a> {
         self.tables
             .iter()
             .zip(words)
-            .any(|(tables, &location)| tables[location as usize].urgency != Some(Urgency::Normal))
+            .any(|(tables, &location)| tables[location as usize].urgency != Urgency::Normal)
     }
 
     /// Whether time may pass as far as locations and urgent channels say. `moves` are the moves of the state.
@@ -164,16 +188,18 @@ impl<'a> Stepper<'a> {
         let committed = self.is_committed(words);
         for process in 0..self.tables.len() {
             let location = words[process] as usize;
-            let own = self.tables[process][location].is_committed();
+            let table = &self.tables[process][location];
+            let own = table.is_committed();
+            let (internal, sends) = (table.internal.len(), table.sends.len());
             if own || !committed {
-                for index in 0..self.tables[process][location].internal.len() {
-                    let edge = self.tables[process][location].internal[index];
-                    self.internal_moves(process as u32, edge, words, out)?;
+                for index in 0..internal {
+                    let entry = self.tables[process][location].internal[index];
+                    self.internal_moves(process as u32, entry, words, out)?;
                 }
             }
-            for index in 0..self.tables[process][location].sends.len() {
-                let edge = self.tables[process][location].sends[index];
-                self.synchronisations(process as u32, edge, committed && !own, words, out)?;
+            for index in 0..sends {
+                let entry = self.tables[process][location].sends[index];
+                self.synchronisations(process as u32, entry, committed && !own, words, out)?;
             }
         }
         Ok(())
@@ -182,14 +208,14 @@ impl<'a> Stepper<'a> {
     fn internal_moves(
         &mut self,
         process: u32,
-        edge: u32,
+        entry: EdgeEntry<'a>,
         words: &mut [i32],
         out: &mut Moves,
     ) -> Result<(), RunTimeError> {
         self.candidates.clear();
         self.constraints.clear();
         self.channel = None;
-        self.enabled_instances(process, edge, words, None)?;
+        self.enabled_instances(process, entry, words, None)?;
         for index in 0..self.candidates.len() {
             self.chosen.clear();
             self.chosen.push(Choice::Takes(index as u32));
@@ -202,20 +228,19 @@ impl<'a> Stepper<'a> {
     fn synchronisations(
         &mut self,
         process: u32,
-        edge: u32,
+        entry: EdgeEntry<'a>,
         needs_committed: bool,
         words: &mut [i32],
         out: &mut Moves,
     ) -> Result<(), RunTimeError> {
-        let (network, executor) = (self.network, self.executor);
-        let definition = &network.processes[process as usize].edges[edge as usize];
+        let (network, executor, definition) = (self.network, self.executor, entry.edge);
         let Some(sync) = definition.sync else {
             return Ok(());
         };
-        for select in 0..select_count(definition) {
+        for select in 0..entry.instances {
             self.candidates.clear();
             self.constraints.clear();
-            if !self.enabled_instance(process, edge, select, words)? {
+            if !self.enabled_instance(process, entry, select, words)? {
                 continue;
             }
             let offset = match sync.index {
@@ -347,9 +372,12 @@ impl<'a> Stepper<'a> {
     ) -> Result<(), RunTimeError> {
         let location = words[process as usize] as usize;
         for index in 0..self.tables[process as usize][location].receives.len() {
-            let (first, count, edge) = self.tables[process as usize][location].receives[index];
-            if (first..first + count).contains(&channel) {
-                self.enabled_instances(process, edge, words, Some(channel))?;
+            let entry = self.tables[process as usize][location].receives[index];
+            let listens = entry.edge.sync.is_some_and(|sync| {
+                (sync.channel.0..sync.channel.0 + sync.count).contains(&channel)
+            });
+            if listens {
+                self.enabled_instances(process, entry, words, Some(channel))?;
             }
         }
         Ok(())
@@ -359,22 +387,20 @@ impl<'a> Stepper<'a> {
     fn enabled_instances(
         &mut self,
         process: u32,
-        edge: u32,
+        entry: EdgeEntry<'a>,
         words: &mut [i32],
         channel: Option<u32>,
     ) -> Result<(), RunTimeError> {
-        let (network, executor) = (self.network, self.executor);
-        let definition = &network.processes[process as usize].edges[edge as usize];
-        for select in 0..select_count(definition) {
-            if let (Some(channel), Some(sync)) = (channel, definition.sync)
+        for select in 0..entry.instances {
+            if let (Some(channel), Some(sync)) = (channel, entry.edge.sync)
                 && let Some(function) = sync.index
             {
-                select_values(definition, select, &mut self.arguments);
-                if sync.channel.0 + self.call(executor, function, words)? as u32 != channel {
+                select_values(entry.edge, select, &mut self.arguments);
+                if sync.channel.0 + self.call(self.executor, function, words)? as u32 != channel {
                     continue;
                 }
             }
-            self.enabled_instance(process, edge, select, words)?;
+            self.enabled_instance(process, entry, select, words)?;
         }
         Ok(())
     }
@@ -383,24 +409,24 @@ impl<'a> Stepper<'a> {
     fn enabled_instance(
         &mut self,
         process: u32,
-        edge: u32,
+        entry: EdgeEntry<'a>,
         select: u32,
         words: &mut [i32],
     ) -> Result<bool, RunTimeError> {
-        let network = self.network;
-        let definition = &network.processes[process as usize].edges[edge as usize];
+        let guard = &entry.edge.guard;
         let first = self.constraints.len() as u32;
-        if definition.guard.function.is_some() {
-            select_values(definition, select, &mut self.arguments);
+        if guard.function.is_some() {
+            select_values(entry.edge, select, &mut self.arguments);
         }
-        if !self.guard(&definition.guard, words)? {
+        if !guard.is_trivial() && !self.guard(guard, words)? {
             return Ok(false);
         }
         let constraints = (first, self.constraints.len() as u32);
         self.candidates.push(Candidate {
             process,
-            edge,
+            edge: entry.index,
             select,
+            is_controllable: entry.edge.controllable,
             constraints,
         });
         Ok(true)
@@ -450,10 +476,10 @@ impl<'a> Stepper<'a> {
                     process,
                     edge,
                     select,
+                    is_controllable,
                     ..
                 } = self.candidates[index as usize];
-                controllable &=
-                    network.processes[process as usize].edges[edge as usize].controllable;
+                controllable &= is_controllable;
                 self.parts.push(Part {
                     process,
                     edge,
