@@ -379,8 +379,9 @@ def _write_plans(answer: Answer, path: Path, ranking: str, scene: Scene | None) 
     found = [Candidate(plan, certify(plan, scene)) for plan in extract(answer.plans, scene)]
     ranked = rank(found, criteria)
     write_files({path: json.dumps(document(scene, ranked, criteria), indent=1) + "\n"})
-    notes = [f"{len(ranked)} plans written to {path}"]
-    for place, candidate in enumerate(ranked[:BEST_SHOWN], start=1):
+    holding = [candidate for candidate in ranked if candidate.certificate.holds()]
+    notes = [f"{len(ranked)} plans written to {path}; {len(holding)} hold on the exact arc, best:"]
+    for place, candidate in enumerate(holding[:BEST_SHOWN], start=1):
         clearance = candidate.certificate.critical_clearance_mm
         shown = (
             "no critical region" if clearance == float("inf") else f"clearance {clearance:.2f} mm"

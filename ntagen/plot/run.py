@@ -26,7 +26,7 @@ def picture_of_plans(scene: Scene, candidates: tuple[Candidate, ...], shown: int
     plans = [candidate.plan for candidate in candidates[:shown]]
     caption = ""
     if candidates:
-        caption = f"{_plans(len(candidates))}; best: {candidates[0].plan}"
+        caption = f"{_plans(len(candidates))} on the exact arc; best: {candidates[0].plan}"
         clearance_mm = candidates[0].certificate.critical_clearance_mm
         if math.isfinite(clearance_mm):
             caption += f"; {clearance_mm:.1f} mm from critical regions"
