@@ -66,7 +66,8 @@ picture: $(INSTALLED) ## Draw examples/scene.png, the picture of the README
 	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10
 
 .PHONY: bench
-bench: $(INSTALLED) ## Measure the engine
+bench: $(INSTALLED) ## Measure the engine: all plans of the paper's instance, then zones and code
+	$(BIN)/python tests/benchmarks/needle.py
 	source $(RUST) && cd checker && cargo bench --locked
 
 .PHONY: clean
