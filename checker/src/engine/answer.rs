@@ -430,8 +430,9 @@ fn game(
                 && let Some(strategy) = &answer.evidence.strategy
             {
                 let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
+                let decisions = verification::decisions(network, strategy);
                 let verification =
-                    verification::verify(network, objective, strategy, options.forced, most);
+                    verification::verify(network, objective, &decisions, options.forced, most);
                 answer.evidence.verification = Some(verification);
             }
             answer

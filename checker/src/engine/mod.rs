@@ -20,9 +20,11 @@ use crate::exec::Jit;
 use crate::ir::{Network, QueryKind};
 use crate::semantics::{self, Model};
 use crate::syntax::{self, ast::QueryText};
+use crate::verify::{self, strategy::Decisions};
 
 pub use answer::{Answer, Evidence, Verdict};
 pub use limits::Limits;
+pub use verification::Verification;
 
 use crate::game::Forced;
 use crate::search::reach::Order;
@@ -248,6 +250,24 @@ impl LoadedModel {
             .as_ref()
             .expect("code is prepared before it is run");
         code.executor()
+    }
+
+    /// Checks decisions for a control query in closed loop, wherever they come from.
+    pub fn verify_strategy(
+        &mut self,
+        text: &QueryText,
+        strategy: &[Decisions],
+        forced: Forced,
+        most_regions: u64,
+    ) -> Result<Verification, Rejection> {
+        let query = self.compile(text.span)?;
+        let network = &self.model.network;
+        Ok(match &query.kind {
+            QueryKind::Control { objective, .. } => {
+                verification::verify(network, objective, strategy, forced, most_regions)
+            }
+            _ => Err(verify::Error::Unsupported("queries other than control")),
+        })
     }
 
     fn compile(&mut self, span: Span) -> Result<crate::ir::Query, Rejection> {

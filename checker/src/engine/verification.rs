@@ -23,7 +23,7 @@ pub type Verification = Result<strategy::Outcome, verify::Error>;
 pub fn verify(
     network: &Network,
     objective: &Objective,
-    strategy: &Strategy,
+    strategy: &[Decisions],
     forced: Forced,
     most_regions: u64,
 ) -> Verification {
@@ -44,7 +44,7 @@ pub fn verify(
         constant,
         has_differences,
     };
-    strategy::verify(network, &decisions(network, strategy), &claim, most_regions)
+    strategy::verify(network, strategy, &claim, most_regions)
 }
 
 fn constants(goal: &Predicate, keep: Option<&Predicate>) -> (i64, bool) {

@@ -9,4 +9,5 @@ mod compare;
 mod explicit;
 mod games;
 mod generate;
+mod mutations;
 mod reachability;
