@@ -3,7 +3,7 @@
 //! A strategy file has `format` "ntagen-strategy" and `version` 1. Its `states` each have `locations` by process, `variables`
 //! (those that some update writes), and `decisions` in order: the first whose `zones` hold for the clock values applies. A
 //! zone is a list of constraints that all hold; an empty list of constraints always holds. `action` is a list of edges, or null
-//! for waiting. `rank` falls along every play; states inside chains of forced moves have none.
+//! for waiting. `rank` never grows along a play and is 0 at the goal.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -142,13 +142,7 @@ pub fn strategy(network: &Network, strategy: &Strategy, query: &str) -> Json {
         }
         let entry = &mut joined[id.0 as usize];
         entry.1 |= state.is_goal;
-        let is_inner = state
-            .decisions
-            .iter()
-            .any(|decision| decision.rank == u32::MAX);
-        if !is_inner || entry.2.is_empty() {
-            entry.2.extend(&state.decisions);
-        }
+        entry.2.extend(&state.decisions);
     }
     let states = joined.iter_mut().map(|(words, is_goal, decisions)| {
         decisions.sort_by_key(|decision| decision.rank);
@@ -173,6 +167,6 @@ fn decision(network: &Network, decision: &Decision) -> Json {
     json!({
         "zones": zones.collect::<Vec<_>>(),
         "action": decision.action.as_ref().map(|action| parts(network, action)),
-        "rank": (decision.rank != u32::MAX).then_some(decision.rank),
+        "rank": decision.rank,
     })
 }

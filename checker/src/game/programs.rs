@@ -66,9 +66,12 @@ impl Programs {
 
     /// The valuations from which the program leads into the federation.
     pub fn preimage(&self, program: ProgramId, federation: &mut Federation) {
-        for step in self.steps[program.0 as usize].iter().rev() {
+        let steps = &self.steps[program.0 as usize];
+        for (index, step) in steps.iter().enumerate().rev() {
             step.effect.preimage(federation);
             if step.delays {
+                // Waiting ends where the invariant of the state waited in does.
+                federation.constrain_all(&steps[index - 1].effect.invariant);
                 federation.down(&ClockSet::default());
             }
         }

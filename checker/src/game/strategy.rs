@@ -9,10 +9,11 @@
 //!
 //! Source: Cassez et al., CONCUR 2005, section 5 (strategies from the order in which winning states were found).
 
-use crate::network::{Failure, Moves, Part};
-use crate::zones::{Federation, Zone};
+use crate::network::{ClockEffect, Failure, Moves, Part};
+use crate::zones::dbm::Constraint;
+use crate::zones::{ClockSet, Federation};
 
-use super::graph::Standing;
+use super::graph::{Edge, Standing};
 use super::reach::{Gain, Solver, Win};
 
 /// What to do in some part of a state.
@@ -22,7 +23,7 @@ pub struct Decision {
     pub zones: Federation,
     /// The move to take; `None` is to wait.
     pub action: Option<Vec<Part>>,
-    /// The rank of the valuations: the strategy only ever goes to smaller ones. 0 is the goal.
+    /// The rank of the valuations: moves between nodes lead to smaller ones, and inside chains it never grows. 0 is the goal.
     pub rank: u32,
 }
 
@@ -161,7 +162,20 @@ fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
     won.map_or(Win::Nothing, Win::Part)
 }
 
-/// Adds the states inside a chain: each has one move, which is taken as soon as it is possible.
+/// A state inside a chain, with its only move.
+struct Inner {
+    words: Vec<i32>,
+    parts: Vec<Part>,
+    controllable: bool,
+    /// Whether time may pass before the move.
+    delays: bool,
+    /// The invariant of the state.
+    invariant: Vec<Constraint>,
+    effect: ClockEffect,
+}
+
+/// Adds the states inside a chain. Each has one move, which is taken where the rest of the chain leads into valuations of
+/// the end that are won; the smaller their stamp, the better. Until then the strategy waits.
 fn inner_states(
     solver: &mut Solver<'_, '_, '_>,
     edge: u32,
@@ -169,43 +183,71 @@ fn inner_states(
     strategy: &mut Strategy,
 ) -> Result<(), Failure> {
     let edge = solver.graph.edges[edge as usize];
-    let dimension = solver.graph.dimension();
-    let symbolic = &mut *solver.graph.symbolic;
-    let mut words = source.to_vec();
-    let mut moves = Moves::default();
-    symbolic.stepper.moves(&mut words, &mut moves)?;
-    symbolic
-        .stepper
-        .fire(moves.get(edge.ordinal as usize).parts, &mut words)?;
-    for _ in 1..edge.length {
-        symbolic.stepper.moves(&mut words, &mut moves)?;
-        let before = words.clone();
-        let one = moves.get(0);
-        let (parts, controllable) = (one.parts.to_vec(), one.controllable);
-        let Some(effect) = symbolic.fire(one, &mut words)? else {
-            break;
-        };
-        let everything = Zone::universe(dimension);
-        let mut decisions = Vec::new();
-        if controllable {
-            let zones = effect.enabled_part(everything.bounds(), dimension);
+    let inside = walk(solver, &edge, source)?;
+    let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
+    for gain in &solver.gains[edge.target as usize] {
+        let mut won = whole_or_part(solver, edge.target, gain.part.as_ref());
+        for (inner, decisions) in inside.iter().zip(&mut decisions).rev() {
+            inner.effect.preimage(&mut won);
+            won.constrain_all(&inner.invariant);
             decisions.push(Decision {
-                zones,
-                action: Some(parts),
-                rank: u32::MAX,
+                zones: won.clone(),
+                action: inner.controllable.then(|| inner.parts.clone()),
+                rank: gain.stamp,
             });
+            if inner.delays {
+                won.down(&ClockSet::default());
+                won.constrain_all(&inner.invariant);
+                decisions.push(Decision {
+                    zones: won.clone(),
+                    action: None,
+                    rank: gain.stamp,
+                });
+            }
         }
-        let zones = Federation::of_zone(dimension, everything.bounds());
-        decisions.push(Decision {
-            zones,
-            action: None,
-            rank: u32::MAX,
-        });
+    }
+    for (inner, mut decisions) in inside.into_iter().zip(decisions) {
+        decisions.retain(|decision| !decision.zones.is_empty());
         strategy.states.push(StrategyState {
-            words: before,
+            words: inner.words,
             decisions,
             is_goal: false,
         });
     }
     Ok(())
+}
+
+/// The states inside the chain of an edge, in order.
+fn walk(
+    solver: &mut Solver<'_, '_, '_>,
+    edge: &Edge,
+    source: &[i32],
+) -> Result<Vec<Inner>, Failure> {
+    let symbolic = &mut *solver.graph.symbolic;
+    let mut words = source.to_vec();
+    let mut moves = Moves::default();
+    symbolic.stepper.moves(&mut words, &mut moves)?;
+    let mut inside = Vec::new();
+    let Some(first) = symbolic.fire(moves.get(edge.ordinal as usize), &mut words)? else {
+        return Ok(inside);
+    };
+    let mut invariant = first.invariant;
+    for _ in 1..edge.length {
+        let delays = symbolic.may_delay(&mut words)?;
+        symbolic.stepper.moves(&mut words, &mut moves)?;
+        let before = words.clone();
+        let one = moves.get(0);
+        let Some(effect) = symbolic.fire(one, &mut words)? else {
+            break;
+        };
+        inside.push(Inner {
+            words: before,
+            parts: one.parts.to_vec(),
+            controllable: one.controllable,
+            delays,
+            invariant: std::mem::replace(&mut invariant, effect.invariant.clone()),
+            effect,
+        });
+    }
+    Ok(inside)
 }
