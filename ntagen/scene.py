@@ -23,8 +23,9 @@ from typing import Literal
 Vector = tuple[float, float, float]
 """Three numbers along the axes x, y, z."""
 
-DEFAULT_LENGTH_MM = 150.0
-"""The length of a needle that does not say otherwise: a common length of biopsy needles."""
+DEFAULT_LENGTH_MM = 200.0
+"""The length of a needle that does not say otherwise: that of long biopsy needles. The longest path
+of the paper's instance takes 190 mm, so that its model is that of the paper."""
 
 RegionKind = Literal["target", "critical", "detection"]
 

@@ -54,7 +54,7 @@ class Instance:
     velocity: int = 1000
     circle_r: int = 30_000
     min_progress: int = 2000
-    max_progress: int = 150_000
+    max_progress: int = 200_000
     max_rolls: int = 2
     angles: tuple[int, ...] = (90, 180, 270)
     tip: tuple[int, int, int] = (0, 0, 0)

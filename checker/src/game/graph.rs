@@ -125,6 +125,8 @@ pub struct Graph<'s, 'a> {
     moves: Moves,
     chain_moves: Moves,
     steps: Vec<ProgramStep>,
+    /// What the move that was just taken does to clocks.
+    effect: ClockEffect,
     entries: Vec<Zone>,
     chains_delays: bool,
 }
@@ -151,6 +153,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             moves: Moves::default(),
             chain_moves: Moves::default(),
             steps: Vec::new(),
+            effect: ClockEffect::default(),
             entries: Vec::new(),
             chains_delays: objective.must_progress && !network.features.stopwatches,
             objective,
@@ -307,16 +310,16 @@ impl<'s, 'a> Graph<'s, 'a> {
     ) -> Result<(), Failure> {
         let one = moves.get(ordinal as usize);
         let origin = (ordinal, one.controllable);
-        let Some(effect) = self.symbolic.fire(one, target)? else {
+        if !self.symbolic.fire_into(one, target, &mut self.effect)? {
             return Ok(());
-        };
-        effect.entry_zones(
+        }
+        self.effect.entry_zones(
             self.zones.get(self.nodes[node as usize].zone),
             self.symbolic.dimension(),
             &mut self.entries,
         );
         self.steps.clear();
-        self.push_step(false, effect);
+        self.push_step(false);
         if self.entries.len() != 1 {
             return self.end_in_pieces(node, target, origin);
         }
@@ -330,10 +333,10 @@ impl<'s, 'a> Graph<'s, 'a> {
             if length as usize == LONGEST_CHAIN {
                 break;
             }
-            let Some(effect) = self.only_move(target, &mut zone, may_delay)? else {
+            if !self.only_move(target, &mut zone, may_delay)? {
                 break;
-            };
-            self.push_step(may_delay, effect);
+            }
+            self.push_step(may_delay);
             std::mem::swap(target, &mut self.spare);
             length += 1;
         }
@@ -341,52 +344,51 @@ impl<'s, 'a> Graph<'s, 'a> {
         self.add_edge(node, target, &zone, origin, length)
     }
 
-    /// Takes the only move of a state inside a chain: its effect, with the words after it in `spare` and the zone on entry in
-    /// `zone`. `None`, with the zone as it was, if the chain ends with the state.
+    /// Takes the only move of a state inside a chain: leaves its effect in `effect`, the words after it in `spare`, and the zone on
+    /// entry in `zone`. Returns false, with the zone as it was, if the chain ends with the state.
     fn only_move(
         &mut self,
         words: &mut [i32],
         zone: &mut Zone,
         may_delay: bool,
-    ) -> Result<Option<ClockEffect>, Failure> {
+    ) -> Result<bool, Failure> {
         if may_delay && !self.chains_delays {
-            return Ok(None);
+            return Ok(false);
         }
         if !matches!(
             self.extents(words, zone)?,
             (Extent::Nowhere, Extent::Everywhere)
         ) {
-            return Ok(None);
+            return Ok(false);
         }
         self.symbolic.stepper.moves(words, &mut self.chain_moves)?;
         if self.chain_moves.len() != 1 || (may_delay && !self.chain_moves.get(0).controllable) {
-            return Ok(None);
+            return Ok(false);
         }
         self.spare.copy_from_slice(words);
-        let Some(effect) = self
+        let one = self.chain_moves.get(0);
+        if !self
             .symbolic
-            .fire(self.chain_moves.get(0), &mut self.spare)?
-        else {
-            return Ok(None);
-        };
-        if !effect.is_trivial() {
+            .fire_into(one, &mut self.spare, &mut self.effect)?
+        {
+            return Ok(false);
+        }
+        if !self.effect.is_trivial() {
             let mut entry = zone.clone();
-            if !effect.excluded.is_empty() || !effect.enter(&mut entry) {
-                return Ok(None);
+            if !self.effect.excluded.is_empty() || !self.effect.enter(&mut entry) {
+                return Ok(false);
             }
             *zone = entry;
         }
         self.explored += 1;
-        Ok(Some(effect))
+        Ok(true)
     }
 
     /// Adds a step to the program at hand. One that changes nothing is left out, unless it is the first or ends an invariant.
-    fn push_step(&mut self, delays: bool, effect: ClockEffect) {
-        let is_kept = self
-            .steps
-            .last()
-            .is_none_or(|last| !last.effect.invariant.is_empty());
-        if delays || is_kept || !effect.is_trivial() {
+    fn push_step(&mut self, delays: bool) {
+        let is_kept = invariant_is_open(&self.steps);
+        if delays || is_kept || !self.effect.is_trivial() {
+            let effect = self.effect.clone();
             self.steps.push(ProgramStep { delays, effect });
         }
     }
@@ -446,4 +448,11 @@ impl<'s, 'a> Graph<'s, 'a> {
 /// The invariant of the state that the steps lead to: that of the last one, since steps that are left out have none.
 fn invariant_of(steps: &[ProgramStep]) -> &[Constraint] {
     steps.last().map_or(&[], |last| &last.effect.invariant)
+}
+
+/// Whether the next step must be kept even if it changes nothing: it is the first, or ends the invariant of the last one.
+fn invariant_is_open(steps: &[ProgramStep]) -> bool {
+    steps
+        .last()
+        .is_none_or(|last| !last.effect.invariant.is_empty())
 }

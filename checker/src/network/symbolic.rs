@@ -117,19 +117,29 @@ impl<'a> Symbolic<'a> {
         words: &mut [i32],
     ) -> Result<Option<ClockEffect>, Failure> {
         let mut effect = ClockEffect::default();
-        match to_constraints(one.constraints)? {
-            Some(guard) => effect.guard = guard,
-            None => return Ok(None),
+        Ok(self.fire_into(one, words, &mut effect)?.then_some(effect))
+    }
+
+    /// As [`Symbolic::fire`], with the effect in a value that is used again; returns whether the move is possible.
+    pub fn fire_into(
+        &mut self,
+        one: MoveRef<'_>,
+        words: &mut [i32],
+        effect: &mut ClockEffect,
+    ) -> Result<bool, Failure> {
+        effect.excluded.clear();
+        effect.assignments.clear();
+        if !add_constraints(one.constraints, &mut effect.guard)? {
+            return Ok(false);
         }
         for conjunction in one.excluded() {
             effect.excluded.extend(to_constraints(conjunction)?);
         }
         self.fire_parts(one.parts, words, &mut effect.assignments)?;
-        match self.invariant(words)? {
-            Some(invariant) => effect.invariant = invariant,
-            None => return Ok(None),
+        match self.stepper.invariants(words)? {
+            Some(emitted) => add_constraints(emitted, &mut effect.invariant),
+            None => Ok(false),
         }
-        Ok(Some(effect))
     }
 
     fn fire_parts(
@@ -341,7 +351,16 @@ fn check_limit(value: i32) -> Result<(), Failure> {
 pub(super) fn to_constraints(
     emitted: &[EmittedConstraint],
 ) -> Result<Option<Vec<Constraint>>, Failure> {
-    let mut constraints = Vec::with_capacity(emitted.len());
+    let mut constraints = Vec::new();
+    Ok(add_constraints(emitted, &mut constraints)?.then_some(constraints))
+}
+
+/// Replaces `constraints` by the emitted ones; returns false if one of them never holds.
+fn add_constraints(
+    emitted: &[EmittedConstraint],
+    constraints: &mut Vec<Constraint>,
+) -> Result<bool, Failure> {
+    constraints.clear();
     for one in emitted {
         let bound = if one.strict {
             Bound::strict(one.bound)
@@ -356,10 +375,10 @@ pub(super) fn to_constraints(
                 bound,
             });
         } else if bound < Bound::LE_ZERO {
-            return Ok(None);
+            return Ok(false);
         }
     }
-    Ok(Some(constraints))
+    Ok(true)
 }
 
 fn to_assignment(one: &EmittedAssignment) -> Result<Assignment, Failure> {
