@@ -194,14 +194,23 @@ fn symbolic<'a>(
     further: &[ClockAtom],
     wanted: Abstraction,
 ) -> Symbolic<'a> {
-    let atoms: Vec<ClockAtom> = predicates
+    let mut atoms: Vec<ClockAtom> = predicates
         .iter()
         .flat_map(|one| predicate::atoms(one))
         .chain(further.iter().cloned())
         .collect();
+    let mut needs_maximum = predicates.iter().any(|one| predicate::has_deadlock(one));
+    if predicate::depends_on_negations(network) {
+        if further.is_empty() {
+            needs_maximum = true;
+        } else {
+            // What is measured is to be kept from one side only.
+            atoms.extend(predicate::negated_atoms(network));
+        }
+    }
     let abstraction = if has_differences(network, &atoms) {
         Abstraction::Differences
-    } else if predicates.iter().any(|one| predicate::has_deadlock(one)) {
+    } else if needs_maximum {
         Abstraction::Maximum
     } else {
         wanted

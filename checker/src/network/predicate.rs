@@ -3,7 +3,7 @@
 //! The extent of a predicate in a state is the part of the zone in which it holds. Predicates without clocks hold in all of it
 //! or in none, and cost no zone operation.
 
-use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, Predicate};
+use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, Network, Predicate};
 use crate::zones::{Bound, Federation, Zone, future};
 
 use super::{Failure, Moves, Symbolic};
@@ -244,13 +244,7 @@ fn collect_atoms(predicate: &Predicate, atoms: &mut Vec<ClockAtom>) {
                 strict: clock.strict,
             };
             // Under a negation the comparison turns round, so both directions count.
-            atoms.push(ClockAtom {
-                left: atom.right,
-                right: atom.left,
-                low: atom.high.saturating_neg(),
-                high: atom.low.saturating_neg(),
-                strict: !atom.strict,
-            });
+            atoms.push(negated(&atom));
             atoms.push(atom);
         }
         Predicate::Not(inner) => collect_atoms(inner, atoms),
@@ -264,6 +258,33 @@ fn collect_atoms(predicate: &Predicate, atoms: &mut Vec<ClockAtom>) {
         | Predicate::Location(..)
         | Predicate::Deadlock => {}
     }
+}
+
+/// The comparison that holds where this one fails.
+fn negated(atom: &ClockAtom) -> ClockAtom {
+    ClockAtom {
+        left: atom.right,
+        right: atom.left,
+        low: atom.high.saturating_neg(),
+        high: atom.low.saturating_neg(),
+        strict: !atom.strict,
+    }
+}
+
+/// Whether something in the network depends on a guard's being false: what abstains from a broadcast, what priorities leave, and
+/// how long time may pass before something urgent. Then guards must be told apart from both sides.
+pub fn depends_on_negations(network: &Network) -> bool {
+    let features = &network.features;
+    features.guarded_receivers || features.priorities || features.clock_guarded_urgent
+}
+
+/// The negations of all comparisons of a network.
+pub fn negated_atoms(network: &Network) -> Vec<ClockAtom> {
+    let guards = network.processes.iter().flat_map(|process| {
+        let edges = process.edges.iter().map(|edge| &edge.guard);
+        edges.chain(process.locations.iter().map(|location| &location.invariant))
+    });
+    guards.flat_map(|guard| &guard.atoms).map(negated).collect()
 }
 
 fn clock_range(choice: ClockChoice) -> ClockRange {

@@ -92,7 +92,7 @@ pub fn search<'a>(
     let mut explored = 0;
     loop {
         measuring.forget();
-        let mut zones = symbolic(&measuring.atoms());
+        let mut zones = symbolic(&measuring.atoms(question.least));
         let report = reach::search(&mut zones, &mut measuring, order, watch);
         explored += report.counters.explored;
         let outcome = match report.outcome {
@@ -104,10 +104,13 @@ pub fn search<'a>(
                 Ok(()) => continue,
                 Err(failure) => Err((failure, Trace::default())),
             },
-            Ok(reach::Outcome::Found(trace)) => match measuring.exceeded(&mut zones, &trace) {
-                Ok(()) => continue,
-                Err(failure) => Err((failure, trace)),
-            },
+            Ok(reach::Outcome::Found(trace)) => {
+                let mut zones = symbolic(&measuring.atoms(false));
+                match measuring.exceeded(&mut zones, &trace) {
+                    Ok(()) => continue,
+                    Err(failure) => Err((failure, trace)),
+                }
+            }
             Err(failed) => Err(failed),
         };
         return Report {
@@ -147,6 +150,9 @@ struct Item {
     greatest: Option<Measured>,
 }
 
+/// States of a way that are tried as the start of a pump, evenly over it: a way that exceeds a great ceiling has many.
+const MOST_STARTS: usize = 64;
+
 /// A value, and whether it is reached.
 type Measured = (i32, bool);
 
@@ -183,8 +189,8 @@ impl<'q> Measuring<'q> {
         }
     }
 
-    /// The comparisons that the search must keep.
-    fn atoms(&self) -> Vec<ClockAtom> {
+    /// The comparisons that the search must keep; those for the least values only if `least`.
+    fn atoms(&self, least: bool) -> Vec<ClockAtom> {
         let reference = ClockRange {
             first: ClockId(0),
             count: 1,
@@ -208,7 +214,7 @@ impl<'q> Measuring<'q> {
             if self.question.greatest && !item.is_infinite {
                 atoms.push(atom(reference, clock, -item.high_ceiling));
             }
-            if self.question.least {
+            if least {
                 atoms.push(atom(clock, reference, item.low_ceiling));
             }
         }
@@ -251,9 +257,7 @@ impl<'q> Measuring<'q> {
 
     /// Finds out why a clock exceeded its ceiling in the last state of the trace.
     fn exceeded(&mut self, symbolic: &mut Symbolic<'_>, trace: &Trace) -> Result<(), Failure> {
-        let Some((words, zone)) = trace.states.last() else {
-            return Ok(());
-        };
+        let (words, zone) = trace.states.last().expect("the search ended in a state");
         let mut words = words.clone();
         let (Measure::Clock(choice), _) = &self.question.items[self.exceeding] else {
             return Ok(());
@@ -265,7 +269,8 @@ impl<'q> Measuring<'q> {
             |zone: &[Bound]| dbm::clock_bounds(zone, dimension, clock).1.is_infinite();
         let pump = Pump {
             clock,
-            above: self.greatest_constant,
+            // Extrapolation forgets how far a clock is above its constants only beyond them.
+            above: self.greatest_constant.saturating_add(1),
             predicate: self.question.predicate,
         };
         let is_infinite = counting.zones().any(is_unbounded) || pump.is_on(symbolic, trace)?;
@@ -389,7 +394,9 @@ struct Pump<'p> {
 impl Pump<'_> {
     /// Whether there is a pump on the way.
     fn is_on(&self, symbolic: &mut Symbolic<'_>, trace: &Trace) -> Result<bool, Failure> {
-        for start in (0..trace.moves.len()).rev() {
+        let count = trace.moves.len();
+        let starts = (0..count).rev().step_by(count.div_ceil(MOST_STARTS).max(1));
+        for start in starts {
             match self.is_from(symbolic, trace, start)? {
                 Attempt::Pump => return Ok(true),
                 Attempt::IsSet => return Ok(false),
