@@ -41,6 +41,9 @@ impl LoadedModel {
         let mut successors = Vec::new();
         let mut entries = Vec::new();
         for one in moves.iter() {
+            if !symbolic.is_enabled(one, point.zone.bounds())? {
+                continue;
+            }
             let mut target = words.clone();
             let Some(effect) = symbolic.fire(one, &mut target)? else {
                 continue;

@@ -310,14 +310,14 @@ impl<'s, 'a> Graph<'s, 'a> {
     ) -> Result<(), Failure> {
         let one = moves.get(ordinal as usize);
         let origin = (ordinal, one.controllable);
-        if !self.symbolic.fire_into(one, target, &mut self.effect)? {
+        let zone = self.zones.get(self.nodes[node as usize].zone);
+        if !self.symbolic.is_enabled(one, zone)?
+            || !self.symbolic.fire_into(one, target, &mut self.effect)?
+        {
             return Ok(());
         }
-        self.effect.entry_zones(
-            self.zones.get(self.nodes[node as usize].zone),
-            self.symbolic.dimension(),
-            &mut self.entries,
-        );
+        self.effect
+            .entry_zones(zone, self.symbolic.dimension(), &mut self.entries);
         self.steps.clear();
         self.push_step(false);
         if self.entries.len() != 1 {
@@ -367,9 +367,10 @@ impl<'s, 'a> Graph<'s, 'a> {
         }
         self.spare.copy_from_slice(words);
         let one = self.chain_moves.get(0);
-        if !self
-            .symbolic
-            .fire_into(one, &mut self.spare, &mut self.effect)?
+        if !self.symbolic.is_enabled(one, zone.bounds())?
+            || !self
+                .symbolic
+                .fire_into(one, &mut self.spare, &mut self.effect)?
         {
             return Ok(false);
         }
