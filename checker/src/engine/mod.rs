@@ -137,22 +137,22 @@ pub struct LoadedModel {
     pub warnings: Vec<String>,
     /// Seconds that loading took, compilation of code included once a query was checked.
     pub load_seconds: f64,
-    code: Option<(CodeEngine, Code_)>,
+    code: Option<(CodeEngine, PreparedCode)>,
 }
 
 /// The code of the model, ready to run.
-enum Code_ {
+enum PreparedCode {
     Interpreter(Interpreter),
     #[cfg(feature = "jit")]
     Jit(Box<Jit>),
 }
 
-impl Code_ {
+impl PreparedCode {
     fn executor(&self) -> &dyn Executor {
         match self {
-            Code_::Interpreter(interpreter) => interpreter,
+            PreparedCode::Interpreter(interpreter) => interpreter,
             #[cfg(feature = "jit")]
-            Code_::Jit(jit) => jit.as_ref(),
+            PreparedCode::Jit(jit) => jit.as_ref(),
         }
     }
 }
@@ -287,25 +287,25 @@ impl LoadedModel {
         let network = &self.model.network;
         let result = match (&mut self.code, wanted) {
             (
-                Some((CodeEngine::Interpreter, Code_::Interpreter(interpreter))),
+                Some((CodeEngine::Interpreter, PreparedCode::Interpreter(interpreter))),
                 CodeEngine::Interpreter,
             ) => {
                 interpreter.extend(&network.functions, &network.constants);
                 Ok(())
             }
             #[cfg(feature = "jit")]
-            (Some((CodeEngine::Jit, Code_::Jit(jit))), CodeEngine::Jit) => {
+            (Some((CodeEngine::Jit, PreparedCode::Jit(jit))), CodeEngine::Jit) => {
                 jit.extend(&network.functions, &network.constants);
                 Ok(())
             }
             (code, CodeEngine::Interpreter) => {
                 let interpreter = Interpreter::new(&network.functions, &network.constants);
-                *code = Some((wanted, Code_::Interpreter(interpreter)));
+                *code = Some((wanted, PreparedCode::Interpreter(interpreter)));
                 Ok(())
             }
             #[cfg(feature = "jit")]
             (code, CodeEngine::Jit) => Jit::new(&network.functions, &network.constants)
-                .map(|jit| *code = Some((wanted, Code_::Jit(Box::new(jit)))))
+                .map(|jit| *code = Some((wanted, PreparedCode::Jit(Box::new(jit)))))
                 .map_err(|error| error.to_string()),
             #[cfg(not(feature = "jit"))]
             (_, CodeEngine::Jit) => Err("this build of the engine has no compiler".to_owned()),

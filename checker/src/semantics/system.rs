@@ -24,7 +24,7 @@ impl Checker<'_> {
             self.error(
                 codes::CONSTRUCT_UNSUPPORTED,
                 construct.span,
-                format!("{} are not supported", construct.text),
+                format!("not supported: {}", construct.text),
                 "remove them from the model",
             );
         }
