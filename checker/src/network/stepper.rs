@@ -7,6 +7,8 @@
 //!
 //! Cost: proportional to the edges that leave the current locations; no allocation once the buffers have grown.
 
+use std::ops::Range;
+
 use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
 use crate::ir::{ChannelId, Edge, FunctionId, Guard, Location, Network, Process, Update, Urgency};
 
@@ -566,16 +568,7 @@ impl<'a> Stepper<'a> {
         &mut self,
         words: &mut [i32],
     ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
-        let network = self.network;
-        self.constraints.clear();
-        self.arguments.clear();
-        for (index, process) in network.processes.iter().enumerate() {
-            let invariant = &process.locations[words[index] as usize].invariant;
-            if !invariant.is_trivial() && !self.guard(invariant, words)? {
-                return Ok(None);
-            }
-        }
-        Ok(Some(&self.constraints))
+        self.invariants_of(0..self.network.processes.len(), words)
     }
 
     /// Evaluates the invariant of one process: `None` if the words break it.
@@ -584,12 +577,23 @@ impl<'a> Stepper<'a> {
         process: usize,
         words: &mut [i32],
     ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+        self.invariants_of(process..process + 1, words)
+    }
+
+    fn invariants_of(
+        &mut self,
+        processes: Range<usize>,
+        words: &mut [i32],
+    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
         let network = self.network;
         self.constraints.clear();
         self.arguments.clear();
-        let invariant = &network.processes[process].locations[words[process] as usize].invariant;
-        if !self.guard(invariant, words)? {
-            return Ok(None);
+        for index in processes {
+            let location = words[index] as usize;
+            let invariant = &network.processes[index].locations[location].invariant;
+            if !invariant.is_trivial() && !self.guard(invariant, words)? {
+                return Ok(None);
+            }
         }
         Ok(Some(&self.constraints))
     }
