@@ -38,6 +38,8 @@ pub(super) struct Checker<'a> {
     pub(super) free_parameter_seen: bool,
     /// Whether a template is checked without an instance: values of parameters are unknown.
     pub(super) is_generic: bool,
+    /// Whether the scope of the system section stands above that of the global declarations.
+    pub(super) system_is_open: bool,
     /// Whether the declarations of the system section are out of sight.
     pub(super) hides_system: bool,
     /// Set when a quantifier can only be checked value by value, because the members of a process set differ.
@@ -82,6 +84,7 @@ impl<'a> Checker<'a> {
             clock_values: Vec::new(),
             free_parameter_seen: false,
             is_generic: false,
+            system_is_open: false,
             hides_system: false,
             needs_unrolling: false,
             is_query: false,
@@ -156,26 +159,28 @@ impl<'a> Checker<'a> {
             .map(|(_, name)| name.to_owned())
     }
 
-    /// Declares a name in the innermost scope.
+    /// Declares a name in the innermost scope. The system section may not declare what the global declarations do.
     pub(super) fn declare(&mut self, name: &crate::syntax::ast::Name, entity: Entity) {
-        let scope = self
-            .scopes
-            .last_mut()
-            .expect("the prelude's scope is always open");
-        if let Some((_, first)) = scope.get(&name.text) {
-            let place = self.sources.position(*first);
+        let innermost = self.scopes.len() - 1;
+        let outermost = innermost - usize::from(self.system_is_open && innermost == SYSTEM_SCOPE);
+        let mut same = self.scopes[outermost..].iter();
+        if let Some(first) = same
+            .find_map(|scope| scope.get(&name.text))
+            .map(|found| found.1)
+        {
+            let place = self.sources.position(first);
             self.report(
                 Diagnostic::new(
                     codes::NAME_DECLARED_TWICE,
                     name.span,
-                    format!("'{}' is declared twice in the same scope", name.text),
+                    format!("'{}' is declared twice", name.text),
                 )
                 .note(format!("first declared in line {}", place.line))
                 .help("give one of the two another name"),
             );
             return;
         }
-        scope.set(&name.text, entity, name.span);
+        self.scopes[innermost].set(&name.text, entity, name.span);
     }
 
     /// A new local of the body that is being checked.

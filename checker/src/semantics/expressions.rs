@@ -117,6 +117,16 @@ impl Checker<'_> {
 
     /// Reports an unknown name, with the nearest known one.
     pub(super) fn unknown_name(&mut self, name: &str, span: Span) {
+        if name == "cost" {
+            // Priced models use the name without a declaration.
+            self.error(
+                codes::CONSTRUCT_UNSUPPORTED,
+                span,
+                "not supported: the variable `cost` of priced models (CORA)",
+                "declare an integer or a clock of this name, or remove what uses it",
+            );
+            return;
+        }
         let help = match self.similar_name(name) {
             Some(similar) => format!("did you mean '{similar}'?"),
             None => String::from("declare it first"),

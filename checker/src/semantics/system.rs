@@ -35,6 +35,7 @@ impl Checker<'_> {
             self.declare(&template.name, Entity::Template(i));
         }
         self.scopes.push(Scope::default());
+        self.system_is_open = true;
         self.system(document);
         self.whole_system(document);
         self.world.query_scopes = std::mem::take(&mut self.scopes);

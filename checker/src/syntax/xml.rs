@@ -167,15 +167,16 @@ impl Reader<'_, '_> {
         for node in root.children().filter(Node::is_element) {
             match node.tag_name().name() {
                 "declaration" => self.part(node, Part::Declarations, "global declarations"),
-                "template" => self.template(node),
-                "lsc" => self.sequence_chart(node),
-                "instantiation" => self.part(node, Part::Instantiations, "instantiations"),
-                "system" => {
-                    has_system = true;
-                    self.part(node, Part::System, "system declarations");
+                "template" => {
+                    self.template(node);
+                    // Some generators close the last template only behind the system section.
+                    for inner in node.children().filter(Node::is_element) {
+                        has_system |= self.system_section(inner);
+                    }
                 }
+                "lsc" => self.sequence_chart(node),
                 "queries" => self.queries(node),
-                _ => {}
+                _ => has_system |= self.system_section(node),
             }
         }
         if !has_system {
@@ -185,6 +186,19 @@ impl Reader<'_, '_> {
                     .help("name the processes of the system: `<system>system P, Q;</system>`"),
             );
         }
+    }
+
+    /// Reads an element of the system section, if it is one; returns whether it holds the system line.
+    fn system_section(&mut self, node: Node) -> bool {
+        match node.tag_name().name() {
+            "instantiation" => self.part(node, Part::Instantiations, "instantiations"),
+            "system" => {
+                self.part(node, Part::System, "system declarations");
+                return true;
+            }
+            _ => {}
+        }
+        false
     }
 
     /// A source for an element's start tag.
