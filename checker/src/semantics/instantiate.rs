@@ -66,8 +66,12 @@ impl Checker<'_> {
                     self.declarations(std::slice::from_ref(declaration));
                 }
                 SystemItem::Instantiation { name, .. } => {
-                    self.check_instantiation(document, i);
-                    self.declare(name, Entity::Instantiation(i));
+                    // Without its template it is broken: it must not mean a template that is named like it later on.
+                    let entity = match self.check_instantiation(document, i) {
+                        Some(_) => Entity::Instantiation(i),
+                        None => Entity::Broken,
+                    };
+                    self.declare(name, entity);
                 }
             }
         }
@@ -87,8 +91,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks an instantiation without knowing the values of its parameters.
-    fn check_instantiation(&mut self, document: &Document, item: usize) {
+    /// Checks an instantiation without knowing the values of its parameters; returns what it instantiates.
+    fn check_instantiation(&mut self, document: &Document, item: usize) -> Option<Target> {
         let SystemItem::Instantiation {
             parameters,
             template,
@@ -96,7 +100,7 @@ impl Checker<'_> {
             ..
         } = &document.system.items[item]
         else {
-            return;
+            return None;
         };
         self.scopes.push(Scope::default());
         for parameter in parameters {
@@ -114,21 +118,21 @@ impl Checker<'_> {
             self.expect_pure(&argument, "an argument of a template");
         }
         self.scopes.pop();
-        if let Some(target) = self.target(template) {
-            let wanted = formal_parameters(document, target).len();
-            if wanted != arguments.len() {
-                self.error(
-                    codes::ARGUMENT_COUNT,
-                    template.span,
-                    format!(
-                        "'{}' takes {wanted} arguments, but {} are given",
-                        template.text,
-                        arguments.len()
-                    ),
-                    "give one argument for each parameter",
-                );
-            }
+        let target = self.target(template)?;
+        let wanted = formal_parameters(document, target).len();
+        if wanted != arguments.len() {
+            self.error(
+                codes::ARGUMENT_COUNT,
+                template.span,
+                format!(
+                    "'{}' takes {wanted} arguments, but {} are given",
+                    template.text,
+                    arguments.len()
+                ),
+                "give one argument for each parameter",
+            );
         }
+        Some(target)
     }
 
     /// The template or instantiation with a name.
