@@ -1,1 +1,46 @@
-"""From the description of a needle-steering task to a verified strategy and a steered needle."""
+"""From the description of a needle-steering task to a verified strategy and a steered needle.
+
+The face for scripts and notebooks::
+
+    import ntagen
+
+    model = ntagen.load("train-gate.xml")
+    model.check("A[] not deadlock").verdict      # "satisfied"
+    model.template("Gate")                       # in a notebook: its picture
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ntagen.checker import Answer, Model, RejectedError
+    from ntagen.errors import InputError, ModelError, NtagenError
+    from ntagen.loading import load
+
+__all__ = ["Answer", "InputError", "Model", "ModelError", "NtagenError", "RejectedError", "load"]
+
+_HOMES = {
+    "Answer": "ntagen.checker",
+    "InputError": "ntagen.errors",
+    "Model": "ntagen.checker",
+    "ModelError": "ntagen.errors",
+    "NtagenError": "ntagen.errors",
+    "RejectedError": "ntagen.checker",
+    "load": "ntagen.loading",
+}
+"""Where the public names are from. They are imported on first use: the command line imports this
+package for every command, and `ntagen --help` does not wait for the engine."""
+
+
+def __getattr__(name: str) -> object:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(home), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

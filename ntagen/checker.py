@@ -14,6 +14,17 @@ from typing import Literal
 
 from ntagen import _checker
 from ntagen.errors import InputError, ModelError
+from ntagen.model.facts import (
+    Channel,
+    Clock,
+    Facts,
+    Process,
+    Query,
+    StateSize,
+    Template,
+    Variable,
+    queries_from,
+)
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 SearchOrder = Literal["bfs", "dfs", "random"]
@@ -34,6 +45,9 @@ Progress = Callable[[int, int, int, int], object]
 MAX_PLANS = 1_000_000
 """Plans that are listed at most, unless the caller says otherwise."""
 
+_PROCESSES_SHOWN = 5
+"""Processes that the short text of a model names."""
+
 
 class RejectedError(InputError):
     """The engine does not accept a model or a query; `diagnostics` say what is wrong and where."""
@@ -41,14 +55,6 @@ class RejectedError(InputError):
     def __init__(self, diagnostics: list[str]) -> None:
         super().__init__("\n".join(text.rstrip() for text in diagnostics))
         self.diagnostics = tuple(diagnostics)
-
-
-@dataclass(frozen=True, slots=True)
-class Query:
-    """A query of a file: its formula and the comment beside it."""
-
-    text: str
-    comment: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,16 +173,89 @@ class Answer:
 
 
 class Model:
-    """A model that the engine has accepted."""
+    """A model that the engine has accepted.
+
+    What is in it are its attributes; `check` answers queries and `simulate` walks through it.
+    """
 
     def __init__(self, raw: _checker.Model) -> None:
         self._raw = raw
         self._edges: list[list[_EdgeEntry]] | None = None
+        self._facts: Facts | None = None
+
+    def __repr__(self) -> str:
+        names = ", ".join(process.name for process in self.processes[:_PROCESSES_SHOWN])
+        more = ", …" if len(self.processes) > _PROCESSES_SHOWN else ""
+        return f"<Model of {len(self.processes)} processes: {names}{more}>"
+
+    def facts_json(self) -> str:
+        """All that is in the model as one JSON object, as ``ntagen info --json`` prints it."""
+        return self._raw.facts_json()
+
+    @property
+    def facts(self) -> Facts:
+        """All that is in the model as one value."""
+        if self._facts is None:
+            self._facts = Facts.from_object(json.loads(self.facts_json()))
+        return self._facts
+
+    @property
+    def templates(self) -> tuple[Template, ...]:
+        """The templates as written, in order; a notebook shows each as a picture."""
+        return self.facts.templates
+
+    def template(self, name: str) -> Template:
+        """The template with this name.
+
+        Raises:
+            KeyError: There is none.
+        """
+        for template in self.templates:
+            if template.name == name:
+                return template
+        known = ", ".join(template.name for template in self.templates)
+        raise KeyError(f"there is no template {name}; the model has {known}")
+
+    @property
+    def processes(self) -> tuple[Process, ...]:
+        """The processes, in the order of the system line."""
+        return self.facts.processes
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables, in the order of their words; constants are none."""
+        return self.facts.variables
+
+    @property
+    def clocks(self) -> tuple[Clock, ...]:
+        """The clocks; arrays part by part."""
+        return self.facts.clocks
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels; arrays part by part."""
+        return self.facts.channels
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """Names of what the model uses beyond plain timed automata, such as ``urgent-channels``."""
+        return self.facts.features
+
+    @property
+    def state(self) -> StateSize:
+        """How large the discrete part of a state is."""
+        return self.facts.state
+
+    @property
+    def state_words(self) -> int:
+        """How many 32-bit words the discrete part of a state takes."""
+        return self.state.words
 
     @property
     def queries(self) -> tuple[Query, ...]:
         """The queries of the file, in order."""
-        return tuple(Query(text, comment) for text, comment in self._raw.queries)
+        # Not by `facts`: of a large model these take a while to put together.
+        return queries_from(json.loads(self._raw.queries_json()))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -196,10 +275,10 @@ class Model:
             OSError: The file cannot be read.
         """
         try:
-            entries = self._raw.read_queries(str(path), path.read_bytes())
+            entries = self._raw.read_queries_json(str(path), path.read_bytes())
         except _checker.RejectedError as error:
             raise RejectedError(error.args[0]) from None
-        return tuple(Query(text, comment) for text, comment in entries)
+        return queries_from(json.loads(entries))
 
     def check(
         self,

@@ -15,7 +15,8 @@ use crate::engine::limits::Observer;
 use crate::engine::simulation::Point;
 use crate::engine::verification;
 use crate::engine::{
-    self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, Verdict, describe, json,
+    self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, Verdict, describe,
+    facts, json,
 };
 use crate::game::Forced;
 use crate::network::Failure;
@@ -36,6 +37,10 @@ pyo3::create_exception!(
     PyRuntimeError,
     "The model ran into a run-time error; `args[0]` says which, and where."
 );
+
+fn json_list(entries: Vec<serde_json::Value>) -> String {
+    serde_json::Value::Array(entries).to_string()
+}
 
 fn unknown(what: &str, value: &str) -> PyErr {
     PyValueError::new_err(format!("unknown {what}: {value}"))
@@ -91,9 +96,6 @@ impl Model {
     }
 }
 
-/// A query as it stands in a file: its formula and its comment.
-type QueryEntry = (String, String);
-
 /// An edge as it stands in the model: process, source, targets of the branches, select names, synchronisation, whether
 /// controllable.
 type EdgeEntry = (String, String, Vec<String>, Vec<String>, String, bool);
@@ -103,18 +105,6 @@ type StepEntry = Vec<(u32, u32, u32, Vec<i32>)>;
 
 #[pymethods]
 impl Model {
-    /// The queries of the file.
-    #[getter]
-    fn queries(&self) -> Vec<QueryEntry> {
-        self.with(|model| {
-            model
-                .queries
-                .iter()
-                .map(|one| (one.text.clone(), one.comment.clone()))
-                .collect()
-        })
-    }
-
     /// The warnings of loading.
     #[getter]
     fn warnings(&self) -> Vec<String> {
@@ -125,6 +115,16 @@ impl Model {
     #[getter]
     fn load_seconds(&self) -> f64 {
         self.with(|model| model.load_seconds)
+    }
+
+    /// What is in the model, as JSON; see `engine::facts`.
+    fn facts_json(&self) -> String {
+        self.with(|model| facts::facts(model).to_string())
+    }
+
+    /// The queries of the file, as JSON.
+    fn queries_json(&self) -> String {
+        self.with(|model| json_list(facts::queries(&model.queries)))
     }
 
     /// By process: its edges.
@@ -174,15 +174,12 @@ impl Model {
         })
     }
 
-    /// Reads the queries of a `.q` file.
-    fn read_queries(&self, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Vec<QueryEntry>> {
+    /// Reads the queries of a `.q` file, as JSON.
+    fn read_queries_json(&self, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<String> {
         let queries = self
             .with(|model| model.read_queries(path, data.as_bytes()))
             .map_err(rejected)?;
-        Ok(queries
-            .into_iter()
-            .map(|one| (one.text, one.comment))
-            .collect())
+        Ok(json_list(facts::queries(&queries)))
     }
 
     /// Answers a query.

@@ -5,6 +5,7 @@
 
 pub mod answer;
 pub mod describe;
+pub mod facts;
 pub mod json;
 pub mod limits;
 pub mod simulation;
@@ -19,7 +20,10 @@ use crate::exec::Interpreter;
 use crate::exec::Jit;
 use crate::ir::{Network, QueryKind};
 use crate::semantics::{self, Model};
-use crate::syntax::{self, ast::QueryText};
+use crate::syntax::{
+    self,
+    ast::{QueryText, Template},
+};
 use crate::verify::{self, strategy::Decisions};
 
 pub use answer::{Answer, Evidence, Verdict};
@@ -131,6 +135,7 @@ impl Rejection {
 pub struct LoadedModel {
     model: Model,
     sources: SourceMap,
+    templates: Vec<Template>,
     /// The queries of the file.
     pub queries: Vec<QueryText>,
     /// Warnings of loading, rendered.
@@ -179,6 +184,7 @@ impl LoadedModel {
         Ok(LoadedModel {
             model,
             sources,
+            templates: parsed.document.templates,
             queries,
             warnings,
             load_seconds,

@@ -411,6 +411,20 @@ pub struct Point {
     pub y: i32,
 }
 
+/// What a label says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum LabelKind {
+    Name,
+    Invariant,
+    ExponentialRate,
+    Select,
+    Guard,
+    Synchronisation,
+    Update,
+    Probability,
+}
+
 /// A location.
 #[derive(Clone, Debug)]
 pub struct Location {
@@ -428,6 +442,10 @@ pub struct Location {
     pub committed: bool,
     /// Where it is drawn.
     pub position: Option<Point>,
+    /// Where its labels are drawn.
+    pub labels: Vec<(LabelKind, Point)>,
+    /// The colour it is drawn in, as red, green and blue of eight bits each.
+    pub color: Option<u32>,
     /// Where it is declared.
     pub span: Span,
 }
@@ -464,6 +482,10 @@ pub struct Edge {
     pub controllable: bool,
     /// The bends of the arrow.
     pub nails: Vec<Point>,
+    /// Where its labels are drawn.
+    pub labels: Vec<(LabelKind, Point)>,
+    /// The colour it is drawn in, as red, green and blue of eight bits each.
+    pub color: Option<u32>,
     /// Where it stands.
     pub span: Span,
 }

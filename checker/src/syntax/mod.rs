@@ -51,7 +51,7 @@ mod print;
 use crate::diagnostics::{Diagnostic, Source, SourceMap, Span};
 
 pub use prelude::prelude;
-pub use print::{print_expr, print_type};
+pub use print::{print_dimension, print_expr, print_type};
 pub use queries::{add_query_text, parse_query};
 
 /// After this many mistakes the rest of a text is left unread.

@@ -22,6 +22,13 @@ pub fn print_type(ty: &TypeExpr) -> String {
     printer.text
 }
 
+/// The text of one `[…]` after a declared name.
+pub fn print_dimension(dimension: &Dimension) -> String {
+    let mut printer = Printer::default();
+    printer.dimension(dimension);
+    printer.text
+}
+
 #[derive(Default)]
 struct Printer {
     text: String,
@@ -211,16 +218,20 @@ impl Printer {
             self.type_expr(&field.ty);
             self.display(format_args!(" {}", field.name.text));
             for dimension in &field.dimensions {
-                self.push("[");
-                match dimension {
-                    Dimension::Size(size) => self.expr(size, level::ASSIGNMENT, true),
-                    Dimension::Type(ty) => self.type_expr(ty),
-                }
-                self.push("]");
+                self.dimension(dimension);
             }
             self.push("; ");
         }
         self.push("}");
+    }
+
+    fn dimension(&mut self, dimension: &Dimension) {
+        self.push("[");
+        match dimension {
+            Dimension::Size(size) => self.expr(size, level::ASSIGNMENT, true),
+            Dimension::Type(ty) => self.type_expr(ty),
+        }
+        self.push("]");
     }
 }
 

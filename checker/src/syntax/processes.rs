@@ -290,6 +290,8 @@ impl Parser<'_> {
                 urgent: false,
                 committed: false,
                 position: None,
+                labels: Vec::new(),
+                color: None,
             };
             if self.eat(TokenKind::LeftBrace) {
                 if !self.at(TokenKind::Semicolon) {
@@ -434,6 +436,8 @@ impl Parser<'_> {
             probability: None,
             controllable,
             nails: Vec::new(),
+            labels: Vec::new(),
+            color: None,
             span: start,
         };
         if self.expect(TokenKind::LeftBrace, "before the labels of the edge") {

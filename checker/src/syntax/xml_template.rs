@@ -8,7 +8,7 @@
     reason = "the path of a method is not general over the lifetime of the parser"
 )]
 
-use super::ast::{Branchpoint, Edge, Location, Name, Point, Template};
+use super::ast::{Branchpoint, Edge, LabelKind, Location, Name, Point, Template};
 use super::codes;
 use super::keywords::{is_built_in_function, is_reserved};
 use super::lexer::to_u32;
@@ -141,6 +141,12 @@ impl Reader<'_, '_> {
             urgent: child(node, "urgent").is_some(),
             committed: child(node, "committed").is_some(),
             position: point(node),
+            labels: child(node, "name")
+                .and_then(point)
+                .map(|at| (LabelKind::Name, at))
+                .into_iter()
+                .collect(),
+            color: color(node),
             span,
         };
         if location.urgent && location.committed {
@@ -148,6 +154,7 @@ impl Reader<'_, '_> {
             self.error(codes::URGENT_AND_COMMITTED, span, message);
         }
         for (kind, label) in self.labels(node, &place) {
+            location.labels.extend(drawn_label(kind, label));
             match kind {
                 "invariant" => {
                     let place = format!("{place}, invariant");
@@ -262,9 +269,12 @@ impl Reader<'_, '_> {
             probability: None,
             controllable: matches!(node.attribute("controllable"), None | Some("true")),
             nails: Vec::new(),
+            labels: Vec::new(),
+            color: color(node),
             span,
         };
         for (kind, label) in self.labels(node, &place) {
+            edge.labels.extend(drawn_label(kind, label));
             self.edge_label(kind, label, &place, &mut edge);
         }
         let nails = node.children().filter(|n| is_element(*n, "nail"));
@@ -320,6 +330,28 @@ fn point(node: Node) -> Option<Point> {
         x: coordinate("x")?,
         y: coordinate("y")?,
     })
+}
+
+/// A colour as the editor writes it: `#rrggbb`.
+fn color(node: Node) -> Option<u32> {
+    let digits = node.attribute("color")?.trim().strip_prefix('#')?;
+    let is_color = digits.len() == 6 && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
+    is_color.then(|| u32::from_str_radix(digits, 16).ok())?
+}
+
+/// Where a label stands, if the file says so.
+fn drawn_label(kind: &str, label: Node) -> Option<(LabelKind, Point)> {
+    let kind = match kind {
+        "invariant" => LabelKind::Invariant,
+        "exponentialrate" => LabelKind::ExponentialRate,
+        "select" => LabelKind::Select,
+        "guard" => LabelKind::Guard,
+        "synchronisation" => LabelKind::Synchronisation,
+        "assignment" => LabelKind::Update,
+        "probability" => LabelKind::Probability,
+        _ => return None,
+    };
+    Some((kind, point(label)?))
 }
 
 fn names_of_locations(template: &Template) -> HashMap<String, String> {

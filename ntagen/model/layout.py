@@ -1,0 +1,385 @@
+"""Places for the parts of a template: those of the file, and others where it has none.
+
+A template whose locations have no places, as in XTA, is laid out in layers from top to bottom,
+after Sugiyama, Tagawa and Toda, "Methods for visual understanding of hierarchical system
+structures" (1981): edges that would close a circle are turned round, the longest path from the
+start decides the layer, and the order within the layers is improved by sweeps over the means of the
+neighbours. Each edge has a place of its own between the layers that it joins, as wide as its label,
+so that labels and parallel edges do not cover each other.
+
+Labels without a place are put beside what they belong to. Lengths are in the units of UPPAAL's
+editor; everything is deterministic. Cost: linear in edges times the layers that they span.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Final, TypeVar
+
+from ntagen.model.facts import Edge, LabelKind, Location, Point, Template
+
+LOCATION_RADIUS: Final = 11
+BRANCH_POINT_RADIUS: Final = 4
+LINE_HEIGHT: Final = 15
+CHARACTER_WIDTH: Final = 6.7
+"""The mean width of a character of the labels; pictures are made without measuring fonts."""
+
+LOCATION_LABELS: Final[tuple[LabelKind, ...]] = ("name", "invariant", "rate")
+EDGE_LABELS: Final[tuple[LabelKind, ...]] = ("select", "guard", "sync", "update", "weight")
+
+_GAP: Final = 28
+"""The least distance between neighbours of a layer."""
+
+_LABEL_GAP: Final = 8
+"""Between a location and the labels beside it."""
+
+_LAYER_GAP: Final = 44
+"""The least distance between a location and the labels of the edges above or below it."""
+
+_SWEEPS: Final = 12
+
+_Drawn = TypeVar("_Drawn", Location, Edge)
+
+
+def text_width(text: str) -> float:
+    """The width of the widest line of a text."""
+    return CHARACTER_WIDTH * max(len(line) for line in text.split("\n"))
+
+
+def text_height(text: str) -> int:
+    """The height of a text of some lines."""
+    return LINE_HEIGHT * (text.count("\n") + 1)
+
+
+def labels_of(part: Location | Edge) -> list[tuple[LabelKind, str]]:
+    """The labels of a part that say something, in the order in which they are stacked."""
+    kinds = LOCATION_LABELS if isinstance(part, Location) else EDGE_LABELS
+    texts: list[tuple[LabelKind, str]] = [(kind, getattr(part, kind)) for kind in kinds]
+    return [(kind, text) for kind, text in texts if text]
+
+
+def placed(template: Template) -> Template:
+    """The template with a place for every location, branch point and label."""
+    if any(node.position is None for node in template.nodes):
+        template = _layered(template)
+    positions = positions_of(template)
+    return replace(
+        template,
+        locations=tuple(_with_labels(one) for one in template.locations),
+        edges=tuple(_with_path(edge, positions) for edge in template.edges),
+    )
+
+
+def drawn_labels(template: Template) -> Iterator[tuple[Point, LabelKind, str]]:
+    """The labels of a placed template: upper left corner, kind and text."""
+    parts: tuple[Location | Edge, ...] = (*template.locations, *template.edges)
+    for part in parts:
+        for kind, text in labels_of(part):
+            if kind in part.labels:
+                yield part.labels[kind], kind, text
+
+
+def positions_of(template: Template) -> dict[str, Point]:
+    """Where the locations and branch points of a template are, by id."""
+    return {node.id: node.position for node in template.nodes if node.position is not None}
+
+
+def _with_labels(location: Location) -> Location:
+    """The location with a place for each of its labels: right of it, unless the file says."""
+    if location.position is None:
+        return location
+    x, y = location.position
+    stack = [entry for entry in labels_of(location) if entry[0] not in location.labels]
+    top = y - sum(text_height(text) for _, text in stack) // 2
+    return _stacked(location, stack, (x + LOCATION_RADIUS + _LABEL_GAP, top))
+
+
+def _with_path(edge: Edge, positions: dict[str, Point]) -> Edge:
+    """The edge with nails if it is a loop, and with a place for each of its labels."""
+    source, target = positions.get(edge.source), positions.get(edge.target)
+    if source is None or target is None:
+        return edge
+    if source == target and not edge.nails:
+        x, y = source
+        edge = replace(edge, nails=((x - 20, y - 42), (x + 20, y - 42)))
+    stack = [entry for entry in labels_of(edge) if entry[0] not in edge.labels]
+    path = [source, *edge.nails, target]
+    (x1, y1), (x2, y2) = max(pairwise(path), key=lambda ends: _squared_length(*ends))
+    height = sum(text_height(text) for _, text in stack)
+    return _stacked(edge, stack, ((x1 + x2) // 2 + 6, (y1 + y2 - height) // 2))
+
+
+def _squared_length(first: Point, second: Point) -> int:
+    return int((first[0] - second[0]) ** 2 + (first[1] - second[1]) ** 2)
+
+
+def _stacked(part: _Drawn, stack: list[tuple[LabelKind, str]], corner: Point) -> _Drawn:
+    """The part with these labels below each other, from the upper left corner on."""
+    labels = dict(part.labels)
+    x, y = corner
+    for kind, text in stack:
+        labels[kind] = (x, y)
+        y += text_height(text)
+    return replace(part, labels=labels)
+
+
+@dataclass(slots=True)
+class _Box:
+    """A place in a layer: a location with its labels, or a stretch of an edge with its labels.
+
+    `left` and `right` are how far it reaches from its x, `half` up and down from its y.
+    """
+
+    left: float
+    right: float
+    half: float
+    x: float = 0.0
+    y: float = 0.0
+    above: list[int] = field(default_factory=list)
+    below: list[int] = field(default_factory=list)
+
+
+def _layered(template: Template) -> Template:
+    """The template with places in layers."""
+    ids = [node.id for node in template.nodes]
+    index_of = {name: index for index, name in enumerate(ids)}
+    ends = [
+        (index_of[edge.source], index_of[edge.target])
+        if edge.source in index_of and edge.target in index_of
+        else None
+        for edge in template.edges
+    ]
+    start = next((i for i, one in enumerate(template.locations) if one.initial), 0)
+    links = [pair for pair in ends if pair is not None and pair[0] != pair[1]]
+    ranks = _ranks(len(ids), start, links)
+    boxes = [_location_box(template, index, ends) for index in range(len(ids))]
+    layers: dict[int, list[int]] = defaultdict(list)
+    for index, rank in enumerate(ranks):
+        layers[2 * rank].append(index)
+    chains = {
+        number: _chain(pair, edge, ranks, boxes, layers)
+        for number, (pair, edge) in enumerate(zip(ends, template.edges, strict=True))
+        if pair is not None and pair[0] != pair[1]
+    }
+    rows = [layers[number] for number in sorted(layers)]
+    _order(rows, boxes)
+    _spread(rows, boxes)
+    return _with_places(template, boxes, chains)
+
+
+def _ranks(count: int, start: int, links: list[tuple[int, int]]) -> list[int]:
+    """The layer of each node: the longest way to it once circles are cut open.
+
+    A link that leads back to a node that is still being visited is turned round.
+    """
+    following: list[list[int]] = [[] for _ in range(count)]
+    for source, target in links:
+        following[source].append(target)
+    finished: list[int] = []
+    state = [0] * count  # 0 is not seen, 1 being visited, 2 finished
+    for root in [start, *range(count)]:
+        stack = [(root, iter(following[root]))] if count and not state[root] else []
+        if stack:
+            state[root] = 1
+        while stack:
+            node, rest = stack[-1]
+            fresh = next((other for other in rest if not state[other]), None)
+            if fresh is None:
+                stack.pop()
+                state[node] = 2
+                finished.append(node)
+            else:
+                state[fresh] = 1
+                stack.append((fresh, iter(following[fresh])))
+    order = {node: place for place, node in enumerate(reversed(finished))}
+    ranks = [0] * count
+    forward = [(a, b) if order[a] < order[b] else (b, a) for a, b in links]
+    forward.sort(key=lambda link: order[link[0]])
+    for source, target in forward:
+        ranks[target] = max(ranks[target], ranks[source] + 1)
+    return ranks
+
+
+def _location_box(template: Template, index: int, ends: list[tuple[int, int] | None]) -> _Box:
+    """The room of a location or branch point with its labels and loops."""
+    if index >= len(template.locations):
+        return _Box(BRANCH_POINT_RADIUS, BRANCH_POINT_RADIUS, BRANCH_POINT_RADIUS)
+    texts = [text for _, text in labels_of(template.locations[index])]
+    right = LOCATION_RADIUS + _LABEL_GAP + max((text_width(text) for text in texts), default=0.0)
+    half = max(LOCATION_RADIUS, sum(text_height(text) for text in texts) / 2)
+    box = _Box(LOCATION_RADIUS, right, half)
+    for pair, edge in zip(ends, template.edges, strict=True):
+        if pair == (index, index):
+            loop = [text for _, text in labels_of(edge)]
+            width = max((text_width(text) for text in loop), default=0.0)
+            height = sum(text_height(text) for text in loop)
+            box.left += _LOOP_REACH + width + 8
+            box.half = max(box.half, height / 2, LOCATION_RADIUS + 8)
+    return box
+
+
+_LOOP_REACH: Final = 34
+"""How far to the left of a location its first loop reaches."""
+
+
+def _chain(
+    pair: tuple[int, int],
+    edge: Edge,
+    ranks: list[int],
+    boxes: list[_Box],
+    layers: dict[int, list[int]],
+) -> list[int]:
+    """Makes the places that an edge takes in the layers between its ends; from its source on."""
+    texts = [text for _, text in labels_of(edge)]
+    width = max((text_width(text) + 8 for text in texts), default=4.0)
+    height = sum(text_height(text) for text in texts)
+    upper, lower = sorted(pair, key=lambda node: ranks[node])
+    top, bottom = 2 * ranks[upper], 2 * ranks[lower]
+    # Labels lie in the layers between those of the locations, as near to the middle as can be.
+    labelled = (top + bottom) // 2 | 1
+    chain = []
+    before = upper
+    for layer in range(top + 1, bottom):
+        box = _Box(4, width, height / 2) if layer == labelled else _Box(4, 4, 0)
+        boxes.append(box)
+        number = len(boxes) - 1
+        layers[layer].append(number)
+        chain.append(number)
+        boxes[before].below.append(number)
+        box.above.append(before)
+        before = number
+    boxes[before].below.append(lower)
+    boxes[lower].above.append(before)
+    return chain if upper == pair[0] else chain[::-1]
+
+
+def _order(rows: list[list[int]], boxes: list[_Box]) -> None:
+    """Orders each layer by the means of the neighbours' places, down and up in turns."""
+    place = {box: index for row in rows for index, box in enumerate(row)}
+    for sweep in range(_SWEEPS):
+        downwards = sweep % 2 == 0
+        for row in rows if downwards else reversed(rows):
+            means = {box: _mean_place(box, boxes, place, downwards=downwards) for box in row}
+            row[:] = [box for _, _, box in sorted((means[box], place[box], box) for box in row)]
+            place.update((box, index) for index, box in enumerate(row))
+
+
+def _mean_place(box: int, boxes: list[_Box], place: dict[int, int], *, downwards: bool) -> float:
+    """The mean of the places of the neighbours above, or of those below; without any its own."""
+    near = boxes[box].above if downwards else boxes[box].below
+    return sum(place[other] for other in near) / len(near) if near else float(place[box])
+
+
+def _spread(rows: list[list[int]], boxes: list[_Box]) -> None:
+    """Gives the boxes coordinates: near to their neighbours, and without overlaps."""
+    y = 0.0
+    for row in rows:
+        half = max(boxes[box].half for box in row)
+        y += half
+        x = 0.0
+        for box in row:
+            x += boxes[box].left
+            boxes[box].x, boxes[box].y = x, y
+            x += boxes[box].right + _GAP
+        y += half + _LAYER_GAP
+    for sweep in range(2 * _SWEEPS):
+        for row in rows if sweep % 2 == 0 else reversed(rows):
+            _pull(row, boxes)
+
+
+def _pull(row: list[int], boxes: list[_Box]) -> None:
+    """Moves a row as near to the means of all neighbours as its order and its widths allow.
+
+    Boxes that would overlap move together, by the mean of what they want.
+    """
+    groups: list[tuple[list[int], float, float]] = []  # members, the first one's x, sum of wishes
+    for box in row:
+        near = [boxes[other].x for other in (*boxes[box].above, *boxes[box].below)]
+        wish = sum(near) / len(near) if near else boxes[box].x
+        group = ([box], wish, wish)
+        while groups:
+            members, first, wishes = groups[-1]
+            offsets = _offsets([*members, *group[0]], boxes)
+            if first + offsets[len(members)] <= group[1]:
+                break
+            groups.pop()
+            joined = [*members, *group[0]]
+            # `wishes` are sums of what the first member would want for each of the group.
+            shift = group[2] - len(group[0]) * offsets[len(members)]
+            group = (joined, (wishes + shift) / len(joined), wishes + shift)
+        groups.append(group)
+    for members, first, _ in groups:
+        for box, offset in zip(members, _offsets(members, boxes), strict=True):
+            boxes[box].x = first + offset
+
+
+def _offsets(members: list[int], boxes: list[_Box]) -> list[float]:
+    """How far each box must lie behind the first one of its group."""
+    offsets = [0.0]
+    for left, right in pairwise(members):
+        offsets.append(offsets[-1] + boxes[left].right + _GAP + boxes[right].left)
+    return offsets
+
+
+def _with_places(template: Template, boxes: list[_Box], chains: dict[int, list[int]]) -> Template:
+    """The template with the places that were found."""
+
+    def place(box: int) -> Point:
+        return round(boxes[box].x), round(boxes[box].y)
+
+    edges = []
+    loops: dict[str, int] = defaultdict(int)
+    index_of = {one.id: index for index, one in enumerate(template.locations)}
+    height_of = {node.id: boxes[index].y for index, node in enumerate(template.nodes)}
+    for number, edge in enumerate(template.edges):
+        if number in chains:
+            upwards = height_of[edge.source] > height_of[edge.target]
+            edges.append(_routed(edge, chains[number], boxes, upwards=upwards))
+        elif edge.source in index_of and edge.source == edge.target:
+            x, y = place(index_of[edge.source])
+            edges.append(_looped(edge, (x - loops[edge.source], y)))
+            widths = [text_width(text) for _, text in labels_of(edge)]
+            loops[edge.source] += _LOOP_REACH + round(max(widths, default=0.0)) + 8
+        else:
+            edges.append(edge)
+    count = len(template.locations)
+    return replace(
+        template,
+        locations=tuple(
+            replace(one, position=place(index), labels={})
+            for index, one in enumerate(template.locations)
+        ),
+        branch_points=tuple(
+            replace(one, position=place(count + index))
+            for index, one in enumerate(template.branch_points)
+        ),
+        edges=tuple(edges),
+    )
+
+
+def _routed(edge: Edge, chain: list[int], boxes: list[_Box], *, upwards: bool) -> Edge:
+    """The edge through its places, and its labels beside the one that was made for them."""
+    nails: list[Point] = []
+    for box in chain:
+        # Along its labels the line is upright, so that it does not run through them.
+        ends = sorted({-boxes[box].half, boxes[box].half}, reverse=upwards)
+        nails += [(round(boxes[box].x), round(boxes[box].y + end)) for end in ends]
+    stack = labels_of(edge)
+    widest = max(chain, key=lambda box: boxes[box].half)
+    height = sum(text_height(text) for _, text in stack)
+    corner = (round(boxes[widest].x) + 6, round(boxes[widest].y) - height // 2)
+    return _stacked(replace(edge, nails=tuple(nails), labels={}), stack, corner)
+
+
+def _looped(edge: Edge, position: Point) -> Edge:
+    """A loop to the left of a place, with its labels beyond it."""
+    x, y = position
+    stack = labels_of(edge)
+    width = max((text_width(text) for _, text in stack), default=0.0)
+    height = sum(text_height(text) for _, text in stack)
+    nails = ((x - _LOOP_REACH, y - 14), (x - _LOOP_REACH, y + 14))
+    corner = (x - _LOOP_REACH - 4 - round(width), y - height // 2)
+    return _stacked(replace(edge, nails=nails, labels={}), stack, corner)

@@ -1,0 +1,225 @@
+"""A template as an SVG picture in the manner of UPPAAL's editor.
+
+Committed locations hold a C, urgent ones a U, the initial one has a second circle. Edges of the
+environment and legs of branch points are dashed. Each kind of label has its colour.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Final
+from xml.sax.saxutils import escape
+
+from ntagen.model.facts import BranchPoint, Edge, LabelKind, Location, Point, Template
+from ntagen.model.layout import (
+    BRANCH_POINT_RADIUS,
+    LINE_HEIGHT,
+    LOCATION_RADIUS,
+    drawn_labels,
+    placed,
+    positions_of,
+    text_height,
+    text_width,
+)
+
+_COLORS: Final[dict[LabelKind, str]] = {
+    "name": "#8b1a1a",
+    "invariant": "#a020a0",
+    "rate": "#c0392b",
+    "select": "#9a7d0a",
+    "guard": "#0b7a3b",
+    "sync": "#0e87a5",
+    "update": "#1f3fbf",
+    "weight": "#8a5a2b",
+}
+_LINE_COLOR: Final = "#303030"
+_FILL: Final = "#dbe7f8"
+_FONT_SIZE: Final = 12
+_MARGIN: Final = 16
+_HEADING_HEIGHT: Final = 26
+_ARROW_LENGTH: Final = 9.0
+_ARROW_HALF_WIDTH: Final = 3.6
+_BEND_RADIUS: Final = 9.0
+_INITIAL_GAP: Final = 3.5
+"""Between the two circles of the initial location."""
+
+_NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that no XML document may hold."""
+
+
+def draw(template: Template) -> str:
+    """Draws a template.
+
+    Returns:
+        An SVG document; lengths are in the units of UPPAAL's editor.
+    """
+    drawn = placed(template)
+    left, top, right, bottom = _bounds(drawn)
+    heading = _heading(template)
+    width = max(right - left, text_width(heading) * 1.2) + 2 * _MARGIN
+    height = bottom - top + 2 * _MARGIN + _HEADING_HEIGHT
+    x, y = left - _MARGIN, top - _MARGIN - _HEADING_HEIGHT
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
+        f'viewBox="{x:.0f} {y:.0f} {width:.0f} {height:.0f}" '
+        f'font-family="Helvetica, Arial, sans-serif" font-size="{_FONT_SIZE}">',
+        f"<title>{_safe(heading)}</title>",
+        f'<rect x="{x:.0f}" y="{y:.0f}" width="{width:.0f}" height="{height:.0f}" fill="#ffffff"/>',
+        f'<text x="{left:.0f}" y="{y + _MARGIN + 6:.0f}" font-weight="bold" font-size="14" '
+        f'fill="#202020">{_safe(heading)}</text>',
+        *_body(drawn),
+        "</svg>",
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _heading(template: Template) -> str:
+    if not template.parameters:
+        return template.name
+    return f"{template.name}({', '.join(template.parameters)})"
+
+
+def _body(template: Template) -> Iterator[str]:
+    """Edges below, then locations, then labels, each on a light ground so that it can be read."""
+    positions = positions_of(template)
+    radii = {one.id: _radius(one) for one in template.locations}
+    radii |= {one.id: float(BRANCH_POINT_RADIUS) for one in template.branch_points}
+    branch_ids = {one.id for one in template.branch_points}
+    for edge in template.edges:
+        if edge.source in positions and edge.target in positions:
+            path = [positions[edge.source], *edge.nails, positions[edge.target]]
+            dashed = not edge.controllable or edge.source in branch_ids
+            yield from _arrow(edge, path, radii[edge.source], radii[edge.target], dashed=dashed)
+    for point in template.branch_points:
+        yield from _branch_point(point)
+    for location in template.locations:
+        yield from _circle(location)
+    labels = [(corner, text, _COLORS[kind]) for corner, kind, text in drawn_labels(template)]
+    yield '<g stroke="#ffffff" stroke-width="3" stroke-linejoin="round">'
+    yield from (_text(corner, text, "#ffffff") for corner, text, _ in labels)
+    yield "</g>"
+    yield from (_text(*label) for label in labels)
+
+
+def _radius(location: Location) -> float:
+    return LOCATION_RADIUS + (_INITIAL_GAP if location.initial else 0.0)
+
+
+def _arrow(
+    edge: Edge, path: Sequence[Point], source_radius: float, target_radius: float, *, dashed: bool
+) -> Iterator[str]:
+    """The line of an edge, cut off at the circles of its ends, and its head."""
+    points = [(float(x), float(y)) for x, y in path]
+    points[0] = _towards(points[0], points[1], source_radius)
+    tip = _towards(points[-1], points[-2], target_radius)
+    back = _towards(tip, points[-2], _ARROW_LENGTH)
+    points[-1] = back
+    color = edge.color or _LINE_COLOR
+    dash = ' stroke-dasharray="5 3"' if dashed else ""
+    yield (f'<path d="{_rounded(points)}" fill="none" stroke="{color}" stroke-width="1.2"{dash}/>')
+    length = math.dist(tip, back) or 1.0
+    across = (
+        (tip[1] - back[1]) / length * _ARROW_HALF_WIDTH,
+        (back[0] - tip[0]) / length * _ARROW_HALF_WIDTH,
+    )
+    head = (
+        tip,
+        (back[0] + across[0], back[1] + across[1]),
+        (back[0] - across[0], back[1] - across[1]),
+    )
+    corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in head)
+    yield f'<polygon points="{corners}" fill="{color}"/>'
+
+
+def _rounded(points: Sequence[tuple[float, float]]) -> str:
+    """The data of a path through the points, with its bends rounded."""
+    first, last = points[0], points[-1]
+    steps = [f"M{first[0]:.1f},{first[1]:.1f}"]
+    for (before, bend), (_, after) in pairwise(pairwise(points)):
+        radius = min(_BEND_RADIUS, math.dist(before, bend) / 2, math.dist(bend, after) / 2)
+        enter, leave = _towards(bend, before, radius), _towards(bend, after, radius)
+        steps.append(
+            f"L{enter[0]:.1f},{enter[1]:.1f} "
+            f"Q{bend[0]:.1f},{bend[1]:.1f} {leave[0]:.1f},{leave[1]:.1f}"
+        )
+    steps.append(f"L{last[0]:.1f},{last[1]:.1f}")
+    return " ".join(steps)
+
+
+def _towards(
+    start: tuple[float, float], end: tuple[float, float], distance: float
+) -> tuple[float, float]:
+    """The point at a distance from the start on the way to the end."""
+    length = math.dist(start, end)
+    if length == 0.0:
+        return start
+    share = distance / length
+    return start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share
+
+
+def _branch_point(point: BranchPoint) -> Iterator[str]:
+    if point.position is None:
+        return
+    x, y = point.position
+    yield (
+        f'<circle cx="{x}" cy="{y}" r="{BRANCH_POINT_RADIUS}" fill="#ffffff" '
+        f'stroke="{_LINE_COLOR}" stroke-width="1.5"/>'
+    )
+
+
+def _circle(location: Location) -> Iterator[str]:
+    if location.position is None:
+        return
+    x, y = location.position
+    if location.initial:
+        yield (
+            f'<circle cx="{x}" cy="{y}" r="{LOCATION_RADIUS + _INITIAL_GAP}" fill="#ffffff" '
+            f'stroke="{_LINE_COLOR}" stroke-width="1.2"/>'
+        )
+    yield (
+        f'<circle cx="{x}" cy="{y}" r="{LOCATION_RADIUS}" fill="{location.color or _FILL}" '
+        f'stroke="{_LINE_COLOR}" stroke-width="1.2"/>'
+    )
+    mark = {"committed": "C", "urgent": "U"}.get(location.kind)
+    if mark:
+        yield (
+            f'<text x="{x}" y="{y + 4.3:.1f}" text-anchor="middle" font-weight="bold" '
+            f'fill="{_LINE_COLOR}">{mark}</text>'
+        )
+
+
+def _text(corner: Point, text: str, color: str) -> str:
+    """A text of some lines."""
+    x, y = corner
+    spans = "".join(
+        f'<tspan x="{x}" y="{y + _FONT_SIZE + LINE_HEIGHT * number}">{_safe(line) or " "}</tspan>'
+        for number, line in enumerate(text.split("\n"))
+    )
+    return f'<text fill="{color}" xml:space="preserve">{spans}</text>'
+
+
+def _safe(text: str) -> str:
+    return escape(_NOT_XML.sub("\ufffd", text))
+
+
+def _bounds(template: Template) -> tuple[float, float, float, float]:
+    """The least rectangle that holds a placed template: left, top, right, bottom."""
+    boxes: list[tuple[float, float, float, float]] = []
+    reach = LOCATION_RADIUS + _INITIAL_GAP
+    for x, y in positions_of(template).values():
+        boxes.append((x - reach, y - reach, x + reach, y + reach))
+    for edge in template.edges:
+        boxes += [(x, y, x, y) for x, y in edge.nails]
+    for (x, y), _, text in drawn_labels(template):
+        boxes.append((x, y, x + text_width(text), y + text_height(text)))
+    if not boxes:
+        return 0.0, 0.0, 0.0, 0.0
+    return (
+        min(box[0] for box in boxes),
+        min(box[1] for box in boxes),
+        max(box[2] for box in boxes),
+        max(box[3] for box in boxes),
+    )
