@@ -29,6 +29,7 @@ __all__ = ["main"]
 COMMANDS: Final = {
     "compile": "Turn an environment into a UPPAAL model and its queries.",
     "check": "Answer the queries of a model or an environment.",
+    "info": "Show what is in a model or an environment.",
     "plot": "Draw a scene, its plans or a run.",
     "drive": "Steer a needle to the target and log the run.",
     "replay": "Run the decisions of a logged run again.",
@@ -94,6 +95,7 @@ def _ntagen() -> None:
       ntagen compile examples/paper.nsl -o demo
       ntagen check examples/paper.nsl
       ntagen check model.xml --query "E<> Gate.Open" --trace -
+      ntagen info model.xml
       ntagen drive examples/paper.nsl --seed 1 --log run.mcap
 
     `ntagen COMMAND --help` tells more about a command.

@@ -15,10 +15,12 @@ import click
 
 from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.files import write_files
+from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer, Model, Query
+    from ntagen.checker import Answer, Model
+    from ntagen.model import Query
     from ntagen.scene import Scene
 
 STOPPED: Final = 3
@@ -186,39 +188,38 @@ def command(
     message says where a clock comes near the value without reaching it.
     """  # noqa: D301  click wants the control character
     outputs = _Outputs(trace, strategy, plans, ranking)
-    model, scene = _load(model_path)
-    todo = _queries(model, asked, query_file)
-    for warning in model.warnings:
-        click.echo(warning.rstrip(), err=True)
     worst = 0
-    if not as_json:
-        _header(model_path, model)
-    for query in todo:
-        with _progress(as_json) as shown:
-            answer = model.check(
-                query.text,
-                search=search,
-                seed=seed,
-                forced=forced,
-                engine=engine,
-                states=states,
-                memory_bytes=None if memory is None else int(memory),
-                timeout_s=timeout,
-                plans="all" if plans else "none",
-                max_plans=max_plans,
-                strategy=strategy is not None,
-                verify=verify,
-                progress=shown,
-            )
-        if answer.verified is False:
-            click.echo("\n".join([query.text, *answer.verification]), err=True)
-            return INTERNAL_ERROR
-        notes = [*answer.verification, *_write_evidence(answer, query, outputs, scene)]
-        if as_json:
-            click.echo(json.dumps(_record(answer, query)))
-        else:
-            _row(answer, query, notes)
-        worst = max(worst, _severity(answer), key=_SEVERITIES.index)
+    with pointing_to_explanations(not as_json):
+        loaded = load_model(model_path)
+        todo = _queries(loaded.model, asked, query_file)
+        if not as_json:
+            _header(model_path, loaded.model)
+        for query in todo:
+            with _progress(as_json) as shown:
+                answer = loaded.model.check(
+                    query.text,
+                    search=search,
+                    seed=seed,
+                    forced=forced,
+                    engine=engine,
+                    states=states,
+                    memory_bytes=None if memory is None else int(memory),
+                    timeout_s=timeout,
+                    plans="all" if plans else "none",
+                    max_plans=max_plans,
+                    strategy=strategy is not None,
+                    verify=verify,
+                    progress=shown,
+                )
+            if answer.verified is False:
+                click.echo("\n".join([query.text, *answer.verification]), err=True)
+                return INTERNAL_ERROR
+            notes = [*answer.verification, *_write_evidence(answer, query, outputs, loaded.scene)]
+            if as_json:
+                click.echo(json.dumps(_record(answer, query)))
+            else:
+                _row(answer, query, notes)
+            worst = max(worst, _severity(answer), key=_SEVERITIES.index)
     return worst
 
 
@@ -229,21 +230,6 @@ _SEVERITIES: Final = (0, 1, STOPPED, MODEL_ERROR)
 def _severity(answer: Answer) -> int:
     codes = {"satisfied": 0, "not satisfied": 1, "maybe": STOPPED, "unknown": STOPPED}
     return codes.get(answer.verdict, MODEL_ERROR)
-
-
-def _load(path: Path) -> tuple[Model, Scene | None]:
-    """The model of a file, and the scene if it is an environment."""
-    from ntagen import checker
-
-    if path.suffix.lower() != ".nsl":
-        return checker.load_file(path), None
-    from ntagen.nsl import load_with_warnings
-    from ntagen.render import render
-
-    scene, warnings = load_with_warnings(path)
-    for warning in warnings:
-        click.echo(warning.render(), err=True)
-    return checker.load(render(scene, source=path.name), path=str(path.with_suffix(".xml"))), scene
 
 
 def _queries(model: Model, asked: Sequence[str], file: Path | None) -> list[_Asked]:

@@ -1,0 +1,210 @@
+"""`ntagen info`: what is in a model or an environment."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from ntagen.cli.files import write_files
+from ntagen.cli.models import load_model, pointing_to_explanations
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ntagen.checker import Model
+    from ntagen.model import Channel, Clock, Process, Template, Variable
+
+ROWS_SHOWN: Final = 40
+"""Rows of a table at most; the JSON object has all."""
+
+_UNBOUNDED_WIDTH: Final = 10_000
+
+
+@click.command("info", epilog="Exit codes: 0 done, 2 the input is wrong.")
+@click.argument("path", metavar="MODEL", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="One JSON object with everything.")
+@click.option(
+    "--svg",
+    "folder",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Write a picture of each template; DIR is made if it is not there.",
+)
+def command(path: Path, as_json: bool, folder: Path | None) -> None:
+    """Show what is in a model: templates, processes, variables, clocks, channels, features.
+
+    MODEL is an environment (.nsl) or a UPPAAL model (.xml, .xta).
+
+    \b
+    Examples:
+      ntagen info model.xml
+      ntagen info model.xml --json | jq .features
+      ntagen info model.xta --svg pictures
+
+    \b
+    The JSON object has "format": "ntagen-model", "version": 1, and
+      templates  as written: name, parameters, locations (id, name, kind, initial, invariant,
+                 rate), branch_points (id), edges (source, target, controllable, select, guard,
+                 sync, update, weight); with position, nails, color and labels (where each is)
+      processes  name, template, priority, and the numbers of their locations and edges
+      variables  name, process (null if global), type, dimensions, meta, words
+      clocks     name, process, hybrid
+      channels   name, broadcast, urgent, priority
+      features   names of what the model uses beyond plain timed automata
+      state      words (of 32 bits) of the discrete state: location_, variable_ and meta_words
+      queries    text, comment, expect (the verdict that the file states, or null)
+      warnings, load_seconds
+    """  # noqa: D301  click wants the control character
+    with pointing_to_explanations(not as_json):
+        model = load_model(path).model
+    if folder is not None:
+        write_files(_pictures(model.templates, folder))
+    if as_json:
+        click.echo(model.facts_json())
+        return
+    _show(path, model)
+    if folder is not None:
+        click.echo(f"{_count(len(model.templates), 'picture')} written to {folder}")
+
+
+def _pictures(templates: Sequence[Template], folder: Path) -> dict[Path, str]:
+    return {folder / f"{template.name}.svg": template.svg() for template in templates}
+
+
+def _show(path: Path, model: Model) -> None:
+    from rich.console import Console
+
+    # Without a terminal there is no width to fit into, and a folded cell cannot be searched.
+    width = None if sys.stdout.isatty() else _UNBOUNDED_WIDTH
+    console = Console(highlight=False, markup=False, width=width)
+    console.print(
+        f"{path}: {_count(len(model.processes), 'process', 'processes')} of "
+        f"{_count(len(model.templates), 'template')}, "
+        f"{_count(len(model.variables), 'variable')}, {_count(len(model.clocks), 'clock')}, "
+        f"{_count(len(model.channels), 'channel')}; loaded in {1000 * model.load_seconds:.1f} ms",
+        soft_wrap=True,
+    )
+    words = [f"{model.state.location_words} for locations"]
+    words.append(f"{model.state.variable_words} for variables")
+    if model.state.meta_words:
+        words.append(f"{model.state.meta_words} for meta variables")
+    console.print(
+        f"state: {_count(model.state_words, 'word')} of 32 bits ({', '.join(words)}), "
+        f"and a zone of {_count(len(model.clocks), 'clock')}",
+        soft_wrap=True,
+    )
+    features = ", ".join(feature.replace("-", " ") for feature in model.features)
+    console.print(f"features: {features or 'plain timed automata'}", soft_wrap=True)
+    for table in _tables(model):
+        console.print()
+        console.print(table)
+
+
+def _tables(model: Model) -> list[Table]:
+    """The tables that have rows."""
+    tables = [
+        _table("template", _template_rows(model.templates), "locations", "edges", "features"),
+        _table("process", _process_rows(model.processes), "template", "priority"),
+        _table("variable", _variable_rows(model.variables), "type", "words"),
+        _table("clock", _clock_rows(model.clocks), "kind"),
+        _table("channel", _channel_rows(model.channels), "kind", "priority"),
+        _table("query", [[query.text, query.comment] for query in model.queries], "comment"),
+    ]
+    return [table for table in tables if table.row_count]
+
+
+def _table(first: str, rows: Iterable[Sequence[str]], *columns: str) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    shown = list(rows)
+    headings = [first, *columns]
+    # A column that is empty everywhere says nothing.
+    used = [i for i in range(len(headings)) if i == 0 or any(row[i] for row in shown)]
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
+    for i in used:
+        is_number = headings[i] in {"locations", "edges", "words", "priority"}
+        table.add_column(headings[i], justify="right" if is_number else "left", overflow="fold")
+    for row in shown[:ROWS_SHOWN]:
+        table.add_row(*(Text(row[i]) for i in used))
+    if len(shown) > ROWS_SHOWN:
+        table.add_row(Text(f"… {len(shown) - ROWS_SHOWN} more (all of them: --json)"))
+    return table
+
+
+def _template_rows(templates: Sequence[Template]) -> Iterable[list[str]]:
+    for template in templates:
+        kinds = [location.kind for location in template.locations]
+        notes = [f"{kinds.count(kind)} {kind}" for kind in ("committed", "urgent") if kind in kinds]
+        if template.branch_points:
+            notes.append(_count(len(template.branch_points), "branch point"))
+        uncontrollable = sum(not edge.controllable for edge in template.edges)
+        if uncontrollable:
+            notes.append(_count(uncontrollable, "uncontrollable edge"))
+        heading = f"{template.name}({', '.join(template.parameters)})"
+        numbers = [str(len(template.locations)), str(len(template.edges))]
+        yield [heading if template.parameters else template.name, *numbers, ", ".join(notes)]
+
+
+def _process_rows(processes: Sequence[Process]) -> Iterable[list[str]]:
+    has_priorities = any(process.priority for process in processes)
+
+    def kind(process: Process) -> tuple[str, str, int]:
+        return _family(process.name), process.template, process.priority
+
+    for (_, template, priority), group in groupby(processes, kind):
+        names = [process.name for process in group]
+        yield [_joined(names), template, str(priority) if has_priorities else ""]
+
+
+def _variable_rows(variables: Sequence[Variable]) -> Iterable[list[str]]:
+    for (_, text), group in groupby(variables, lambda one: (_family(one.name), _type(one))):
+        members = list(group)
+        names = _joined([variable.name for variable in members])
+        yield [names, text, str(sum(variable.words for variable in members))]
+
+
+def _type(variable: Variable) -> str:
+    sizes = "".join(f"[{size}]" for size in variable.dimensions)
+    meta = "meta " if variable.meta else ""
+    kind = variable.type.replace("int[-2147483648,2147483647]", "int32_t")
+    return f"{meta}{kind}{' array ' if sizes else ''}{sizes}"
+
+
+def _clock_rows(clocks: Sequence[Clock]) -> Iterable[list[str]]:
+    for (_, hybrid), group in groupby(clocks, lambda one: (_family(one.name), one.hybrid)):
+        names = [clock.name for clock in group]
+        yield [_joined(names), "hybrid: abstracted away" if hybrid else ""]
+
+
+def _channel_rows(channels: Sequence[Channel]) -> Iterable[list[str]]:
+    has_priorities = any(channel.priority for channel in channels)
+
+    def kind(channel: Channel) -> tuple[str, str, int]:
+        words = ["urgent"] * channel.urgent + ["broadcast" if channel.broadcast else "binary"]
+        return _family(channel.name), " ".join(words), channel.priority
+
+    for (_, words, priority), group in groupby(channels, kind):
+        names = [channel.name for channel in group]
+        yield [_joined(names), words, str(priority) if has_priorities else ""]
+
+
+def _family(name: str) -> str:
+    """What the names of the members of a process set, or the parts of an array, have in common."""
+    return re.sub(r"\([^)]*\)|\[[^\]]*\]", "…", name)
+
+
+def _joined(names: Sequence[str]) -> str:
+    """The names of a family in one cell: ``go[0] … go[5]``."""
+    return names[0] if len(names) == 1 else f"{names[0]} … {names[-1]} ({len(names)})"
+
+
+def _count(number: int, singular: str, plural: str | None = None) -> str:
+    return f"{number} {singular if number == 1 else plural or singular + 's'}"

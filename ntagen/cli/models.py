@@ -1,0 +1,51 @@
+"""What the commands on models share: loading with warnings, and pointing to `ntagen explain`."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from ntagen.loading import Loaded
+
+WARNINGS_SHOWN: Final = 10
+"""Warnings that are printed at most; a model of many templates may have the same in each."""
+
+
+def load_model(path: Path) -> Loaded:
+    """The model of a file; warnings go to standard error.
+
+    Raises:
+        InputError: The file is wrong.
+        OSError: The file cannot be read.
+    """
+    from ntagen.loading import load_file
+
+    loaded = load_file(path)
+    warnings = (*loaded.warnings, *loaded.model.warnings)
+    for warning in warnings[:WARNINGS_SHOWN]:
+        click.echo(warning.rstrip(), err=True)
+    if len(warnings) > WARNINGS_SHOWN:
+        rest = len(warnings) - WARNINGS_SHOWN
+        click.echo(f"… and {rest} more warning{'s' * (rest > 1)}", err=True)
+    return loaded
+
+
+@contextlib.contextmanager
+def pointing_to_explanations(wanted: bool) -> Iterator[None]:
+    """Adds to a rejection which command explains its first diagnostic, if that is wanted."""
+    try:
+        yield
+    except InputError as error:
+        code = re.search(r"\berror\[([A-Z]\d+)\]", str(error))
+        if not (wanted and code):
+            raise
+        pointer = f"for an example and the way out: ntagen explain {code[1]}"
+        raise InputError(f"{error}\n{pointer}") from error

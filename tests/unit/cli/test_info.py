@@ -1,0 +1,122 @@
+"""`ntagen info`: text, JSON, pictures, and what it says of bad input."""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from ntagen.cli import main
+
+PAPER = Path(__file__).resolve().parents[3] / "examples" / "paper.nsl"
+
+MODEL = """
+urgent broadcast chan go[3];
+int32_t total;
+process Worker(int[0,2] id) {
+  clock x; state Idle { x <= 5 }, Busy; commit Busy; init Idle;
+  trans Idle -> Busy { sync go[id]!; }, Busy -u-> Idle { };
+}
+system Worker;
+query { E<> Worker(0).Busy }
+"""
+
+
+@pytest.fixture
+def worker(tmp_path: Path) -> Path:
+    path = tmp_path / "worker.xta"
+    path.write_text(MODEL)
+    return path
+
+
+def info_run(
+    capsys: pytest.CaptureFixture[str], code: int, *arguments: str | Path
+) -> tuple[str, str]:
+    """The command ends with the exit code; its two outputs."""
+    assert main(["info", *(str(argument) for argument in arguments)]) == code
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.out + captured.err
+    return captured.out, captured.err
+
+
+def test_the_text_names_what_is_in_the_model(
+    capsys: pytest.CaptureFixture[str], worker: Path
+) -> None:
+    out, _ = info_run(capsys, 0, worker)
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert lines[0].startswith(
+        f"{worker}: 3 processes of 1 template, 1 variable, 3 clocks, 3 channels; loaded in "
+    )
+    assert "state: 4 words of 32 bits (3 for locations, 1 for variables), " in lines[1]
+    assert "committed locations, uncontrollable edges" in lines[2]
+    for row in (
+        "Worker(int[0, 2] id) 2 2 1 committed, 1 uncontrollable edge",
+        "Worker(0) … Worker(2) (3) Worker",
+        "total int32_t 1",
+        "Worker(0).x … Worker(2).x (3)",
+        "go[0] … go[2] (3) urgent broadcast",
+        "E<> Worker(0).Busy",
+    ):
+        assert row in lines
+
+
+def test_json_is_one_object_and_nothing_else(
+    capsys: pytest.CaptureFixture[str], worker: Path
+) -> None:
+    out, err = info_run(capsys, 0, worker, "--json")
+    found = json.loads(out)
+    assert err == ""
+    assert (found["format"], found["version"]) == ("ntagen-model", 1)
+    assert set(found) == {
+        *("format", "version", "templates", "processes", "variables", "clocks", "channels"),
+        *("features", "state", "queries", "warnings", "load_seconds"),
+    }
+    assert found["templates"][0]["edges"][0]["sync"] == "go[id]!"
+    assert found["queries"] == [{"text": "E<> Worker(0).Busy", "comment": "", "expect": None}]
+
+
+def test_environments_are_models_too(capsys: pytest.CaptureFixture[str]) -> None:
+    out, _ = info_run(capsys, 0, PAPER)
+    assert "4 processes of 4 templates" in out
+
+
+def test_pictures_are_written(
+    capsys: pytest.CaptureFixture[str], worker: Path, tmp_path: Path
+) -> None:
+    out, _ = info_run(capsys, 0, worker, "--svg", tmp_path / "pictures")
+    assert "1 picture written to" in out
+    assert ET.parse(tmp_path / "pictures" / "Worker.svg").getroot().tag.endswith("svg")
+
+
+def test_long_tables_are_cut(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "many.xta"
+    names = "".join(f"int v{i};" for i in range(60))
+    path.write_text(f"{names} process P() {{ state A; init A; }} system P;")
+    out, _ = info_run(capsys, 0, path)
+    assert "… 20 more (all of them: --json)" in out
+
+
+def test_many_warnings_are_counted(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "warned.xta"
+    locations = ", ".join(f"L{i} {{ x < 3 }}" for i in range(15))
+    path.write_text(f"clock x; process P() {{ state {locations}; init L0; }} system P;")
+    _, err = info_run(capsys, 0, path)
+    assert err.count("warning[W0202]") == 10
+    assert "… and 5 more warnings" in err
+
+
+def test_wrong_input_is_rejected_as_by_check(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "wrong.xta"
+    path.write_text("process P() { state A; init A; trans A -> A { guard n > 0; }; } system P;")
+    _, info = info_run(capsys, 2, path)
+    assert f"{path}:1:53: error[E0201]: 'n' is not declared" in info
+    assert info.count("ntagen explain E0201") == 1
+    assert main(["check", str(path)]) == 2
+    assert capsys.readouterr().err == info
+    _, machine = info_run(capsys, 2, path, "--json")
+    assert "ntagen explain" not in machine
+    info_run(capsys, 2, tmp_path / "nothing.xml")
