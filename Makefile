@@ -53,7 +53,7 @@ lint: $(INSTALLED) ## Check formats, lints and types
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest ntagen._checker
 	source $(RUST) && cd checker && cargo fmt --check
-	source $(RUST) && cd checker && cargo clippy --locked --all-targets --quiet -- -D warnings
+	source $(RUST) && cd checker && cargo clippy --locked --all-targets --features python --quiet -- -D warnings
 
 .PHONY: format
 format: $(INSTALLED) ## Format all sources and repair what the linter can
