@@ -6,6 +6,7 @@
 //! * `// run: condition`: the condition holds in the initial state.
 //! * `// fails: condition with DivisionByZero at 1 / n`: evaluating it there ends in that error, in that expression.
 //! * `// accept: query`, `// refuse: query with E0271 "part of the message"`: whether a query can be asked.
+//! * `// warn: query with W0204`: the query can be asked, and gives this warning. There is a strategy with the name `known`.
 //!
 //! Models below `ok` give no error; those below `err` give at least one.
 
@@ -42,6 +43,11 @@ fn load(path: &str, text: &str) -> Loaded {
 
 /// Compiles a query; the diagnostics as text are the error.
 fn compile(loaded: &mut Loaded, text: &str) -> Result<ir::Query, String> {
+    compile_with_warnings(loaded, text).map(|(query, _)| query)
+}
+
+/// Compiles a query; its warnings as text, or the diagnostics if it is refused.
+fn compile_with_warnings(loaded: &mut Loaded, text: &str) -> Result<(ir::Query, String), String> {
     let span = syntax::add_query_text(text, &mut loaded.sources);
     let (query, mut diagnostics) = syntax::parse_query(span, &loaded.sources);
     let model = loaded.model.as_mut().ok_or("the model is refused")?;
@@ -51,7 +57,11 @@ fn compile(loaded: &mut Loaded, text: &str) -> Result<ir::Query, String> {
         diagnostics.extend(found);
         compiled
     });
-    compiled.ok_or_else(|| rendered(&diagnostics, &loaded.sources))
+    let texts = rendered(&diagnostics, &loaded.sources);
+    match compiled {
+        Some(query) => Ok((query, texts)),
+        None => Err(texts),
+    }
 }
 
 fn rendered(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
@@ -145,6 +155,16 @@ fn check_directive(
                         && message.matches("error[").count() == 1;
                     (!fits).then(|| format!("is refused otherwise: {query}\n{message}"))
                 }
+            }
+        }
+        "warn" => {
+            let (query, code) = value.split_once(" with ").expect("warn: … with …");
+            match compile_with_warnings(loaded, query) {
+                Ok((_, warnings)) => {
+                    let fits = warnings.contains(&format!("warning[{code}]"));
+                    (!fits).then(|| format!("gives no such warning: {query}\n{warnings}"))
+                }
+                Err(message) => Some(format!("is refused: {query}\n{message}")),
             }
         }
         other => Some(format!("unknown directive '{other}'")),
@@ -253,4 +273,40 @@ fn every_code_is_unique() {
     codes.sort_unstable();
     codes.dedup();
     assert_eq!(codes.len(), count);
+}
+
+/// Codes of files that no corpus can hold: 256 MiB, a hundred mistakes, nothing at all, other encodings, a thousand brackets.
+/// `tests/syntax/limits.rs`, `models.rs` and the pages of `ntagen explain` have them.
+const OUTSIDE_CORPUS: [&str; 7] = [
+    "E0106", "E0111", "E0122", "E0123", "E0129", "E0144", "W0106",
+];
+
+#[test]
+fn every_code_has_a_line_in_the_corpus() {
+    let mut paths = Vec::new();
+    for folder in ["language/ok", "language/err", "syntax/ok", "syntax/err"] {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus");
+        let entries = fs::read_dir(root.join(folder)).expect("the corpus is there");
+        paths.extend(entries.map(|entry| entry.expect("the corpus can be listed").path()));
+    }
+    let texts = paths
+        .iter()
+        .map(|path| fs::read(path).expect("it is a file"));
+    let lines: Vec<String> = texts
+        .flat_map(|bytes| {
+            let text = String::from_utf8_lossy(&bytes).into_owned();
+            text.lines().map(str::to_owned).collect::<Vec<_>>()
+        })
+        .filter(|line| {
+            ["expect: ", "refuse: ", "warn: "]
+                .iter()
+                .any(|key| line.contains(key))
+        })
+        .collect();
+    let codes = syntax::codes::ALL.iter().chain(semantics::codes::ALL);
+    let missing: Vec<&str> = codes
+        .map(|code| code.code)
+        .filter(|code| !lines.iter().any(|line| line.contains(code)))
+        .collect();
+    assert_eq!(missing, OUTSIDE_CORPUS);
 }
