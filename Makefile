@@ -12,7 +12,7 @@ BIN := .venv/bin
 RUST := .venv/rust.sh
 INSTALLED := .venv/installed
 # What the installed engine is built from. Python files and templates are used in place.
-ENGINE := pyproject.toml checker/Cargo.toml checker/Cargo.lock $(shell find checker/src -name '*.rs')
+ENGINE := pyproject.toml checker/Cargo.toml checker/Cargo.lock $(shell find checker/src checker/pages -name '*.rs' -o -name '*.md')
 
 .PHONY: help
 help: ## Show these targets

@@ -114,6 +114,7 @@ class Answer:
         value: What a query with ``sup``, ``inf`` or ``bounds`` found; ``None`` for other queries,
             and if no state counts. Whether a clock reaches the value is in `message`.
         message: A remark for the user, or what went wrong in the model.
+        warnings: What the user should know about the query, one text a warning.
         stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
         explored: States whose successors were computed.
         stored: States that were stored.
@@ -135,6 +136,7 @@ class Answer:
         value = raw.value_json()
         self.value: Value = None if value is None else json.loads(value)
         self.message = raw.message
+        self.warnings = tuple(raw.warnings)
         self.stop = raw.stop
         self.explored = raw.explored
         self.stored = raw.stored
@@ -259,7 +261,7 @@ class Model:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know about the model, one text a warning."""
+        """What the user should know about the model and files of queries, one text a warning."""
         return tuple(self._raw.warnings)
 
     @property
@@ -450,6 +452,11 @@ def load_file(path: Path) -> Model:
         OSError: The file cannot be read.
     """
     return _load(str(path), path.read_bytes())
+
+
+def diagnostic_pages() -> list[tuple[str, str, str, str]]:
+    """Of every diagnostic of models and queries: code, name, severity, and its page in Markdown."""
+    return _checker.explanations()
 
 
 def _load(path: str, data: bytes) -> Model:

@@ -25,6 +25,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "render": BASE | {"cache"},
     "model": set(),
     "checker": {"errors", "model", "_checker"},
+    "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
@@ -32,7 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "campaign": BASE | {"needle", "nsl", "plan", "render", "checker", "drive"},
     "plot": BASE | {"needle", "plan", "drive"},
     "cli": BASE
-    | {"needle", "nsl", "plan", "render", "model", "checker", "loading"}
+    | {"needle", "nsl", "plan", "render", "model", "checker", "loading", "explanations"}
     | {"drive", "campaign", "plot"},
     "__main__": {"cli"},
 }

@@ -194,6 +194,22 @@ pub struct Code {
     pub name: &'static str,
 }
 
+/// Defines the codes of a layer: a constant each, all of them as `ALL`, and their pages as `PAGES`. The page of a code is
+/// `pages/CODE.md`; without one the crate does not compile.
+macro_rules! codes {
+    ($($(#[$doc:meta])* $constant:ident = $code:literal $name:literal;)*) => {
+        $($(#[$doc])* pub const $constant: $crate::diagnostics::Code =
+            $crate::diagnostics::Code { code: $code, name: $name };)*
+        /// Every code of this layer, in the order of their numbers.
+        pub const ALL: &[$crate::diagnostics::Code] = &[$($constant),*];
+        /// What `ntagen explain` shows of each, in the same order.
+        pub const PAGES: &[&str] = &[$(
+            include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/pages/", $code, ".md"))
+        ),*];
+    };
+}
+pub(crate) use codes;
+
 impl Code {
     /// The severity that the code's letter stands for.
     pub fn severity(self) -> Severity {

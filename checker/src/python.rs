@@ -11,12 +11,13 @@ use pyo3::exceptions::{PyIndexError, PyKeyboardInterrupt, PyRuntimeError, PyValu
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::diagnostics::Severity;
 use crate::engine::limits::Observer;
 use crate::engine::simulation::Point;
 use crate::engine::verification;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, Verdict, describe,
-    facts, json,
+    explain, facts, json,
 };
 use crate::game::Forced;
 use crate::network::Failure;
@@ -412,6 +413,12 @@ impl Answer {
         }
     }
 
+    /// Warnings about the query.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.inner.warnings.clone()
+    }
+
     #[getter]
     fn explored(&self) -> u64 {
         self.inner.counters.explored
@@ -546,6 +553,19 @@ fn load(py: Python<'_>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Model
     })
 }
 
+/// Of every code: the code, its name, its severity ("error" or "warning"), and its page in Markdown.
+#[pyfunction]
+fn explanations() -> Vec<(&'static str, &'static str, &'static str, &'static str)> {
+    let explanations = explain::explanations().map(|(code, page)| {
+        let severity = match code.severity() {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+        };
+        (code.code, code.name, severity, page)
+    });
+    explanations.collect()
+}
+
 /// The engine of ntagen.
 #[pymodule]
 fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -554,5 +574,6 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Simulation>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;
     module.add("RejectedError", module.py().get_type::<RejectedError>())?;
-    module.add_function(wrap_pyfunction!(load, module)?)
+    module.add_function(wrap_pyfunction!(load, module)?)?;
+    module.add_function(wrap_pyfunction!(explanations, module)?)
 }

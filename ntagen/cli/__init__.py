@@ -30,6 +30,7 @@ COMMANDS: Final = {
     "compile": "Turn an environment into a UPPAAL model and its queries.",
     "check": "Answer the queries of a model or an environment.",
     "info": "Show what is in a model or an environment.",
+    "explain": "Explain a diagnostic: what it means and how to mend it.",
     "plot": "Draw a scene, its plans or a run.",
     "drive": "Steer a needle to the target and log the run.",
     "replay": "Run the decisions of a logged run again.",

@@ -15,7 +15,7 @@ import click
 
 from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.files import write_files
-from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.cli.models import load_model, pointing_to_explanations, show_warnings
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
@@ -191,7 +191,9 @@ def command(
     worst = 0
     with pointing_to_explanations(not as_json):
         loaded = load_model(model_path)
+        shown_already = len(loaded.model.warnings)
         todo = _queries(loaded.model, asked, query_file)
+        show_warnings(loaded.model.warnings[shown_already:])
         if not as_json:
             _header(model_path, loaded.model)
         for query in todo:
@@ -214,6 +216,7 @@ def command(
             if answer.verified is False:
                 click.echo("\n".join([query.text, *answer.verification]), err=True)
                 return INTERNAL_ERROR
+            show_warnings(answer.warnings)
             notes = [*answer.verification, *_write_evidence(answer, query, outputs, loaded.scene)]
             if as_json:
                 click.echo(json.dumps(_record(answer, query)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -29,13 +29,17 @@ def load_model(path: Path) -> Loaded:
     from ntagen.loading import load_file
 
     loaded = load_file(path)
-    warnings = (*loaded.warnings, *loaded.model.warnings)
+    show_warnings((*loaded.warnings, *loaded.model.warnings))
+    return loaded
+
+
+def show_warnings(warnings: Sequence[str]) -> None:
+    """Prints warnings to standard error."""
     for warning in warnings[:WARNINGS_SHOWN]:
         click.echo(warning.rstrip(), err=True)
     if len(warnings) > WARNINGS_SHOWN:
         rest = len(warnings) - WARNINGS_SHOWN
         click.echo(f"… and {rest} more warning{'s' * (rest > 1)}", err=True)
-    return loaded
 
 
 @contextlib.contextmanager

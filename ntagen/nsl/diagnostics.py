@@ -4,14 +4,15 @@ A diagnostic is a value. Nothing here stops at the first one: the phases hand th
 `Reporter`, and when all have run, everything is shown at once, sorted by place (`SourceError`).
 
 A diagnostic is known by its defect (``unknown-unit``) and by a code that never changes (``N023``);
-`KINDS` is the table of all of them, with one explanation each. Errors keep the scene from being
-made, warnings do not.
+`KINDS` is the table of all of them, with one explanation each, and ``pages/`` has an example of
+each and how to mend it. Errors keep the scene from being made, warnings do not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Literal
 
 from ntagen.errors import InputError
@@ -126,6 +127,18 @@ KINDS: Final = _kinds(
     ("N082", "length-not-positive", "error", "The needle's length is greater than 0."),
 )
 """All kinds of defects by name, in the order of their codes."""
+
+
+_PAGES: Final = Path(__file__).parent / "pages"
+
+
+def page_of(kind: Kind) -> str:
+    r"""What is to be said of a kind of defect, in Markdown: meaning, example, how to mend it.
+
+    Examples are fenced; the word behind the language says whether one is ``wrong`` or ``right``. In
+    them ``\xE9`` stands for the byte of this number.
+    """
+    return f"{kind.explanation}\n\n{(_PAGES / f'{kind.code}.md').read_text('utf-8')}"
 
 
 MAX_DIAGNOSTICS: Final = 1000

@@ -72,6 +72,8 @@ pub struct Answer {
     pub value: Option<Values>,
     /// A remark for the user.
     pub message: Option<String>,
+    /// Warnings about the query, rendered.
+    pub warnings: Vec<String>,
     /// What backs it.
     pub evidence: Evidence,
     /// What was done.
@@ -158,6 +160,7 @@ fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counters) -> Answe
         verdict,
         value: None,
         message: None,
+        warnings: Vec::new(),
         evidence,
         counters,
         peak_bytes: 0,

@@ -5,6 +5,7 @@
 
 pub mod answer;
 pub mod describe;
+pub mod explain;
 pub mod facts;
 pub mod json;
 pub mod limits;
@@ -13,7 +14,7 @@ pub mod verification;
 
 use std::time::Instant;
 
-use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
+use crate::diagnostics::{Diagnostic, SourceMap, Span};
 use crate::exec::Executor;
 use crate::exec::Interpreter;
 #[cfg(feature = "jit")]
@@ -35,23 +36,14 @@ use crate::search::reach::Order;
 
 /// Codes of what the engine refuses to answer although the model is right.
 pub mod codes {
-    use super::Code;
-
-    /// A kind of query that the engine has no algorithm for.
-    pub const UNSUPPORTED_QUERY: Code = Code {
-        code: "E0801",
-        name: "unsupported-query",
-    };
-    /// A construct of the model that the engine has no algorithm for.
-    pub const UNSUPPORTED_CONSTRUCT: Code = Code {
-        code: "E0802",
-        name: "unsupported-construct",
-    };
-    /// Compiled code was asked for, and this build or machine has none.
-    pub const NO_COMPILED_CODE: Code = Code {
-        code: "E0803",
-        name: "no-compiled-code",
-    };
+    crate::diagnostics::codes! {
+        /// A kind of query that the engine has no algorithm for.
+        UNSUPPORTED_QUERY = "E0801" "unsupported-query";
+        /// A construct of the model that the engine has no algorithm for.
+        UNSUPPORTED_CONSTRUCT = "E0802" "unsupported-construct";
+        /// Compiled code was asked for, and this build or machine has none.
+        NO_COMPILED_CODE = "E0803" "no-compiled-code";
+    }
 }
 
 /// What runs the code of the model.
@@ -138,11 +130,13 @@ pub struct LoadedModel {
     templates: Vec<Template>,
     /// The queries of the file.
     pub queries: Vec<QueryText>,
-    /// Warnings of loading, rendered.
+    /// Warnings of loading the model and files of queries, rendered.
     pub warnings: Vec<String>,
     /// Seconds that loading took, compilation of code included once a query was checked.
     pub load_seconds: f64,
     code: Option<(CodeEngine, PreparedCode)>,
+    /// The names of the strategies that queries so far have defined.
+    strategies: Vec<String>,
 }
 
 /// The code of the model, ready to run.
@@ -189,6 +183,7 @@ impl LoadedModel {
             warnings,
             load_seconds,
             code: None,
+            strategies: Vec::new(),
         })
     }
 
@@ -216,6 +211,8 @@ impl LoadedModel {
         if diagnostics.iter().any(Diagnostic::is_error) {
             return Err(Rejection::new(diagnostics, &self.sources));
         }
+        let warnings = Rejection::new(diagnostics, &self.sources).rendered;
+        self.warnings.extend(warnings);
         Ok(queries)
     }
 
@@ -233,7 +230,7 @@ impl LoadedModel {
     /// Answers a query.
     pub fn check(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
         let start = Instant::now();
-        let query = self.compile(text.span)?;
+        let (query, warnings) = self.compile(text.span)?;
         self.refuse_unsupported(&query)?;
         self.prepare_code(options.code, query.span)?;
         self.load_seconds += start.elapsed().as_secs_f64();
@@ -242,6 +239,13 @@ impl LoadedModel {
         };
         let mut answer = answer::answer(&self.model.network, code.executor(), &query, options);
         answer.load_seconds = self.load_seconds;
+        answer.warnings = warnings;
+        if let Some(name) = query
+            .strategy
+            .filter(|_| answer.verdict == Verdict::Satisfied)
+        {
+            self.strategies.push(name);
+        }
         Ok(answer)
     }
 
@@ -266,7 +270,7 @@ impl LoadedModel {
         forced: Forced,
         most_regions: u64,
     ) -> Result<Verification, Rejection> {
-        let query = self.compile(text.span)?;
+        let (query, _) = self.compile(text.span)?;
         let network = &self.model.network;
         Ok(match &query.kind {
             QueryKind::Control { objective, .. } => {
@@ -276,14 +280,16 @@ impl LoadedModel {
         })
     }
 
-    fn compile(&mut self, span: Span) -> Result<crate::ir::Query, Rejection> {
+    /// The query, and its warnings as text.
+    fn compile(&mut self, span: Span) -> Result<(crate::ir::Query, Vec<String>), Rejection> {
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
         if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
-            let (query, more) = self.model.compile_query(&parsed, &self.sources, &[]);
-            if let Some(query) = query {
-                return Ok(query);
-            }
+            let strategies = &self.strategies;
+            let (query, more) = self.model.compile_query(&parsed, &self.sources, strategies);
             diagnostics.extend(more);
+            if let Some(query) = query {
+                return Ok((query, Rejection::new(diagnostics, &self.sources).rendered));
+            }
         }
         Err(Rejection::new(diagnostics, &self.sources))
     }
@@ -346,7 +352,9 @@ impl LoadedModel {
             QueryKind::SaveStrategy { .. } => Some("saveStrategy"),
             QueryKind::LoadStrategy { .. } => Some("loadStrategy"),
         };
-        let under = query.under.as_ref().map(|_| "under a strategy");
+        let kind = kind.map(|kind| format!("queries with {kind}"));
+        let under = query.under.as_ref();
+        let under = under.map(|_| "queries under a strategy".to_owned());
         let features = &self.model.network.features;
         let is_game = matches!(query.kind, QueryKind::Control { .. });
         let construct = if !features.clock_guarded_urgent {
@@ -362,7 +370,7 @@ impl LoadedModel {
             Diagnostic::new(
                 codes::UNSUPPORTED_QUERY,
                 query.span,
-                format!("queries with {kind} are not supported"),
+                format!("{kind} are not supported"),
             )
             .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, and control: with A<> or A[ U ]")
         } else if let Some(construct) = construct {

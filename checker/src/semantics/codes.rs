@@ -1,14 +1,6 @@
 //! The mistakes that this layer reports: `E02…` and `W02…`, each named by the defect.
 
-use crate::diagnostics::Code;
-
-macro_rules! codes {
-    ($($(#[$doc:meta])* $constant:ident = $code:literal $name:literal;)*) => {
-        $($(#[$doc])* pub const $constant: Code = Code { code: $code, name: $name };)*
-        /// Every code of this layer, in the order of their numbers.
-        pub const ALL: &[Code] = &[$($constant),*];
-    };
-}
+use crate::diagnostics::codes;
 
 codes! {
     /// A name that nothing declares.
@@ -89,8 +81,6 @@ codes! {
     RETURN_MISSING = "E0239" "return-missing";
     /// `return` with a value where none belongs, or without where one does.
     RETURN_MISMATCHED = "E0240" "return-mismatched";
-    /// A declaration in a scope that does not take it.
-    DECLARATION_MISPLACED = "E0241" "declaration-misplaced";
     /// A sum of clocks that is no difference of two.
     CLOCKS_BEYOND_DIFFERENCE = "E0242" "clocks-beyond-difference";
     /// A clock compared with, or set to, a double.
@@ -127,8 +117,6 @@ codes! {
     FREE_PARAMETER_UNBOUNDED = "E0259" "free-parameter-unbounded";
     /// A process that stands twice in the system line.
     PROCESS_TWICE = "E0260" "process-twice";
-    /// A system without processes.
-    SYSTEM_EMPTY = "E0261" "system-empty";
     /// A channel with two priorities.
     PRIORITY_TWICE = "E0262" "priority-twice";
     /// A construct that was read and is not supported.

@@ -167,25 +167,17 @@ impl Checker<'_> {
                 Declaration::Variable(variable) => {
                     statements.extend(self.local_variable(variable));
                 }
-                Declaration::Function(function) => self.misplaced_declaration(function.name.span),
-                Declaration::ChannelPriority { span, .. }
-                | Declaration::BeforeUpdate(_, span)
-                | Declaration::AfterUpdate(_, span) => self.misplaced_declaration(*span),
+                // The parser has refused these.
+                Declaration::Function(_)
+                | Declaration::ChannelPriority { .. }
+                | Declaration::BeforeUpdate(..)
+                | Declaration::AfterUpdate(..) => {}
             }
         }
         for statement in &block.statements {
             statements.push(self.statement(statement, result));
         }
         Statement::Block(statements)
-    }
-
-    fn misplaced_declaration(&mut self, span: Span) {
-        self.error(
-            codes::DECLARATION_MISPLACED,
-            span,
-            "only types and variables can be declared here",
-            "move the declaration out",
-        );
     }
 
     fn local_variable(&mut self, variable: &ast::Variable) -> Option<Statement> {

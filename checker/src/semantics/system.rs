@@ -74,21 +74,11 @@ impl Checker<'_> {
                 _ => {}
             }
         }
-        self.misplaced_hooks(document);
         self.locals.clear();
         for measure in &document.system.progress {
             let measure = self.expression(measure);
             self.expect_pure(&measure, "a progress measure");
             self.expect_integer(&measure, "a progress measure");
-        }
-        let has_templates = !document.templates.is_empty();
-        if has_templates && self.world.network.processes.is_empty() && !self.has_errors() {
-            self.error(
-                codes::SYSTEM_EMPTY,
-                document.templates[0].name.span,
-                "the system has no process",
-                "name the processes in the system line: system P, Q;",
-            );
         }
     }
 
@@ -99,22 +89,6 @@ impl Checker<'_> {
             format!("{what} is declared twice"),
             "join the two declarations",
         );
-    }
-
-    fn misplaced_hooks(&mut self, document: &Document) {
-        for declaration in document.templates.iter().flat_map(|t| &t.declarations) {
-            if let Declaration::ChannelPriority { span, .. }
-            | Declaration::BeforeUpdate(_, span)
-            | Declaration::AfterUpdate(_, span) = declaration
-            {
-                self.error(
-                    codes::DECLARATION_MISPLACED,
-                    *span,
-                    "priorities and update hooks belong to the global declarations",
-                    "move the declaration out of the template",
-                );
-            }
-        }
     }
 
     fn channel_priorities(&mut self, levels: &[Vec<Option<crate::syntax::ast::Expr>>]) {

@@ -1,14 +1,6 @@
 //! The mistakes that the readers report: `E01…` and `W01…`, each named by the defect.
 
-use crate::diagnostics::Code;
-
-macro_rules! codes {
-    ($($(#[$doc:meta])* $constant:ident = $code:literal $name:literal;)*) => {
-        $($(#[$doc])* pub const $constant: Code = Code { code: $code, name: $name };)*
-        /// Every code of this layer, in the order of their numbers.
-        pub const ALL: &[Code] = &[$($constant),*];
-    };
-}
+use crate::diagnostics::codes;
 
 codes! {
     /// A character that no token begins with.

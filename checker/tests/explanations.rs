@@ -1,0 +1,120 @@
+//! Every diagnostic has a page, the wrong example of which gives that diagnostic and the right one none.
+
+use std::collections::BTreeSet;
+
+use checker::engine::explain::{Example, Role, examples, explanations};
+use checker::engine::{CodeEngine, LoadedModel, Options, Rejection};
+use checker::syntax::ast::QueryText;
+
+/// Codes that no short text can give: a file of 256 MiB, and a machine without compiler.
+const WITHOUT_EXAMPLE: [&str; 2] = ["E0129", "E0803"];
+
+/// A code that comes with others only: the hundred mistakes before it.
+const NEVER_ALONE: &str = "E0111";
+
+/// The bytes that an example stands for.
+fn bytes(text: &str) -> Vec<u8> {
+    let mut parts = text.split("\\x");
+    let mut bytes = parts.next().unwrap_or("").as_bytes().to_vec();
+    for part in parts {
+        bytes.push(u8::from_str_radix(&part[..2], 16).expect("two hexadecimal digits"));
+        bytes.extend(&part.as_bytes()[2..]);
+    }
+    bytes
+}
+
+fn codes_of(texts: &[String]) -> BTreeSet<String> {
+    let codes = texts.iter().map(|text| {
+        let start = text.find('[').expect("a diagnostic shows its code") + 1;
+        text[start..start + 5].to_owned()
+    });
+    codes.collect()
+}
+
+/// The codes that an example gives, warnings included.
+fn codes(model: Option<&Example>, example: &Example) -> BTreeSet<String> {
+    let result = match example.language {
+        "query" => ask(model, |loaded| Ok(vec![loaded.add_query(example.text)])),
+        "q" => ask(model, |loaded| {
+            loaded.read_queries("example.q", example.text.as_bytes())
+        }),
+        _ => LoadedModel::load("example", &bytes(example.text)).map(|loaded| loaded.warnings),
+    };
+    codes_of(&result.unwrap_or_else(|rejection| rejection.rendered))
+}
+
+/// All warnings of the queries about a model.
+fn ask(
+    model: Option<&Example>,
+    queries: impl FnOnce(&mut LoadedModel) -> Result<Vec<QueryText>, Rejection>,
+) -> Result<Vec<String>, Rejection> {
+    let model = model.expect("queries are about a model");
+    let mut loaded = LoadedModel::load("example", model.text.as_bytes())?;
+    // What a page about queries says is not about the model.
+    let of_model = loaded.warnings.len();
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        ..Options::default()
+    };
+    let mut warnings = Vec::new();
+    for query in queries(&mut loaded)? {
+        warnings.extend(loaded.check(&query, &options)?.warnings);
+    }
+    warnings.extend(loaded.warnings.split_off(of_model));
+    Ok(warnings)
+}
+
+#[test]
+fn every_page_shows_its_mistake_and_the_way_out() {
+    let mut problems = Vec::new();
+    for (code, page) in explanations() {
+        let examples = examples(page);
+        let of = |role| examples.iter().find(|example| example.role == role);
+        if WITHOUT_EXAMPLE.contains(&code.code) {
+            assert!(
+                examples.is_empty(),
+                "{}: it can be shown after all",
+                code.code
+            );
+            continue;
+        }
+        let (Some(wrong), Some(right)) = (of(Role::Wrong), of(Role::Right)) else {
+            problems.push(format!("{}: an example is missing", code.code));
+            continue;
+        };
+        let found = codes(of(Role::Model), wrong);
+        let is_right = if code.code == NEVER_ALONE {
+            found.contains(code.code)
+        } else {
+            found == BTreeSet::from([code.code.to_owned()])
+        };
+        if !is_right {
+            problems.push(format!("{}: the wrong example gives {found:?}", code.code));
+        }
+        let found = codes(of(Role::Model), right);
+        if !found.is_empty() {
+            problems.push(format!("{}: the right example gives {found:?}", code.code));
+        }
+    }
+    assert!(problems.is_empty(), "\n{}", problems.join("\n"));
+}
+
+#[test]
+fn every_page_begins_with_what_the_code_means() {
+    for (code, page) in explanations() {
+        let first = page.lines().next().unwrap_or("");
+        assert!(first.ends_with(['.', '`']), "{}: {first}", code.code);
+        assert!(
+            page.matches("```").count() % 2 == 0,
+            "{}: a fence is open",
+            code.code
+        );
+    }
+}
+
+#[test]
+fn codes_are_unique() {
+    let codes: Vec<&str> = explanations().map(|(code, _)| code.code).collect();
+    let distinct: BTreeSet<&str> = codes.iter().copied().collect();
+    assert_eq!(codes.len(), distinct.len());
+}
