@@ -33,6 +33,7 @@ class Model:
         max_plans: int | None,
         strategy: bool,
         verify: bool,
+        trace: bool,
         progress: Callable[[int, int, int, int], object] | None,
     ) -> Answer: ...
 

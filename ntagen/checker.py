@@ -123,9 +123,9 @@ class Answer:
         peak_bytes: The greatest number of bytes that states and tables took.
         plan_count: How many plans were found; ``None`` if none were asked for, or if the
             environment has choices, so that a strategy is no list of plans.
-        verified: Whether the strategy passed the independent check; ``None`` if none was asked
-            for, or if it came to no end.
-        verification: What that check covered, or the run that shows what is wrong, line by line.
+        verified: Whether the strategy and the exact runs of the traces passed their independent
+            checks; ``None`` if there was none, or one came to no end.
+        verification: What these checks covered, or what is wrong, line by line.
     """
 
     def __init__(self, raw: _checker.Answer, query: str, edges: list[list[_EdgeEntry]]) -> None:
@@ -162,7 +162,11 @@ class Answer:
         return self._raw.plans_json()
 
     def trace_text(self) -> str | None:
-        """The witness, counterexample or way to the failure as UPPAAL prints it, if any."""
+        """The witness, counterexample or way to the failure as UPPAAL prints it, if any.
+
+        Below it stands the run with exact times: each state with its clock values, how long it is
+        waited there, and the edges that are taken then.
+        """
         return self._raw.trace_text()
 
     def trace_json(self) -> str | None:
@@ -297,6 +301,7 @@ class Model:
         max_plans: int = MAX_PLANS,
         strategy: bool = False,
         verify: bool = False,
+        trace: bool = True,
         progress: Progress | None = None,
     ) -> Answer:
         """Answers a query.
@@ -314,6 +319,8 @@ class Model:
             max_plans: At most this many plans are listed.
             strategy: Whether a winning strategy is wanted.
             verify: Whether the strategy is to be checked against every move of the environment.
+            trace: Whether witnesses and counterexamples get exact times, which an independent
+                replay checks. For ``sup``, ``inf`` and ``bounds`` this takes a second search.
             progress: Is called some twenty times a second with the numbers of explored,
                 stored and waiting states and of bytes.
 
@@ -338,6 +345,7 @@ class Model:
                 max_plans=wanted,
                 strategy=strategy,
                 verify=verify,
+                trace=trace,
                 progress=progress,
             )
         except _checker.RejectedError as error:

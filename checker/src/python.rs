@@ -23,7 +23,6 @@ use crate::game::Forced;
 use crate::network::Failure;
 use crate::search::limits::StopReason;
 use crate::search::reach::Order;
-use crate::verify::strategy::Outcome;
 
 pyo3::create_exception!(
     _checker,
@@ -184,7 +183,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, progress))]
+    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, progress))]
     #[expect(
         clippy::too_many_arguments,
         reason = "one for each option of the command line"
@@ -202,6 +201,7 @@ impl Model {
         max_plans: Option<usize>,
         strategy: bool,
         verify: bool,
+        trace: bool,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
         let unknown =
@@ -238,6 +238,7 @@ impl Model {
             },
             strategy,
             verify,
+            runs: trace,
         };
         let model = slf.get();
         let answer = slf.py().detach(|| {
@@ -484,50 +485,53 @@ impl Answer {
         )
     }
 
-    /// The trace in UPPAAL's form, and why it never ends if it does not; `None` without a trace.
+    /// The traces in UPPAAL's form, with the runs with exact times; `None` without a trace.
     fn trace_text(&self) -> Option<String> {
-        let evidence = &self.inner.evidence;
-        let trace = evidence.trace.as_ref()?;
-        let text = self
-            .model
-            .get()
-            .with(|model| describe::trace_text(model.network(), trace));
-        let ending = evidence
-            .ending
-            .map_or_else(String::new, describe::ending_text);
-        Some(text + &ending)
+        let witnesses = &self.inner.evidence.witnesses;
+        if witnesses.is_empty() {
+            return None;
+        }
+        let texts: Vec<String> = self.model.get().with(|model| {
+            let texts = witnesses.iter();
+            texts
+                .map(|one| describe::witness_text(model.network(), one))
+                .collect()
+        });
+        Some(texts.join("\n"))
     }
 
-    /// The trace as JSON; `None` without a trace.
+    /// The traces as JSON; `None` without a trace.
     fn trace_json(&self) -> Option<String> {
-        let evidence = &self.inner.evidence;
-        let trace = evidence.trace.as_ref()?;
+        let witnesses = &self.inner.evidence.witnesses;
+        if witnesses.is_empty() {
+            return None;
+        }
         Some(
             self.model
                 .get()
-                .with(|model| json::trace(model.network(), trace, evidence.ending).to_string()),
+                .with(|model| json::witnesses(model.network(), witnesses, &self.query).to_string()),
         )
     }
 
-    /// Whether the strategy passed its check; `None` if none was made or it came to no end.
+    /// Whether the strategy and the traces passed their checks; `None` if none was made or one came to no end.
     #[getter]
     fn verified(&self) -> Option<bool> {
-        match self.inner.evidence.verification.as_ref()? {
-            Ok(Outcome::Verified(_)) => Some(true),
-            Ok(Outcome::Violated(..)) => Some(false),
-            Ok(Outcome::TooLarge(_)) | Err(_) => None,
-        }
+        self.inner.evidence.is_verified()
     }
 
-    /// What the check of the strategy covered, or what is wrong with it, line by line; empty without a check.
+    /// What the checks of strategy and traces covered, or what is wrong, line by line; empty without a check.
     fn verification(&self) -> Vec<String> {
-        match &self.inner.evidence.verification {
-            None => Vec::new(),
-            Some(result) => self
-                .model
-                .get()
-                .with(|model| verification::describe(model.network(), result)),
+        let evidence = &self.inner.evidence;
+        let runs = evidence.witnesses.iter().filter_map(|one| one.run.as_ref());
+        let mut lines: Vec<String> = runs.flat_map(describe::proof_lines).collect();
+        if let Some(result) = &evidence.verification {
+            lines.extend(
+                self.model
+                    .get()
+                    .with(|model| verification::describe(model.network(), result)),
+            );
         }
+        lines
     }
 
     /// The strategy as JSON; `None` without a strategy.

@@ -10,6 +10,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+use checker::engine::evidence::Proof;
 use checker::engine::{CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::search::extremum::Extreme;
 
@@ -480,11 +481,21 @@ fn answer(text: &str, query: &str) -> checker::engine::Answer {
             states: Some(MOST_STATES),
             ..Limits::default()
         },
+        runs: true,
         ..Options::default()
     };
-    model
+    let answer = model
         .check(&query_text, &options)
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
+        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
+    for witness in &answer.evidence.witnesses {
+        assert!(
+            matches!(witness.run, Some(Proof::Replayed(..))),
+            "{query}: {:#?}\n{:?}\n{text}",
+            witness.run,
+            witness.ending
+        );
+    }
+    answer
 }
 
 fn check_verdict(text: &str, query: &str, expected: bool) {

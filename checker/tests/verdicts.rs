@@ -2,7 +2,7 @@
 //!
 //! A file begins with lines `// query: …`, each followed by `// verdict: …` (`// verdict neutral: …` and `// verdict product: …`
 //! where the rule for forced moves matters) and `// origin: …`, which says how the verdict is known. Other comment lines are
-//! prose. The verdict of a query for values is the values. Every query is answered with every search order and with the interpreter and compiled code, and must come out
+//! prose. The verdict of a query for values is the values. Every trace must pass its replay. Every query is answered with every search order and with the interpreter and compiled code, and must come out
 //! the same.
 
 use std::fs;
@@ -77,6 +77,13 @@ fn verdict_of(path: &Path, bytes: &[u8], query: &str, options: &Options) -> Stri
     let text = model.add_query(query);
     match model.check(&text, options) {
         Err(_) => "rejected".to_owned(),
+        Ok(answer) if answer.evidence.is_verified() == Some(false) => {
+            let runs = answer.evidence.witnesses.iter().map(|one| &one.run);
+            format!(
+                "a trace that fails its replay: {:?}",
+                runs.collect::<Vec<_>>()
+            )
+        }
         Ok(answer) => match answer.verdict {
             Verdict::Satisfied => match &answer.value {
                 Some(values) => value_text(values),
@@ -121,6 +128,7 @@ fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>
                     code,
                     forced: forced.unwrap_or_default(),
                     strategy: true,
+                    runs: true,
                     ..Options::default()
                 };
                 let found = verdict_of(path, bytes, &case.query, &options);

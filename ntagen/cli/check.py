@@ -90,7 +90,7 @@ class _Outputs:
     "check",
     epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected, "
     "3 stopped by a limit or maybe, 4 run-time error in the model, 70 internal error "
-    "(a strategy that fails --verify is one).",
+    "(a strategy or trace that fails its check is one).",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.option(
@@ -118,7 +118,8 @@ class _Outputs:
 @click.option(
     "--verify",
     is_flag=True,
-    help="Check strategies against every move of the environment, independently of the solver.",
+    help="Check strategies against every move of the environment, and replay traces at exact "
+    "times, independently of the solver.",
 )
 @click.option(
     "--plans",
@@ -183,6 +184,10 @@ def command(
       ntagen check model.xml --query "bounds{Gate.Open}: x"
 
     \b
+    A trace has two parts: symbolic states as UPPAAL prints them, and a run with exact times, which
+    an independent replay has checked. A file that ends in .json has both as JSON.
+
+    \b
     The value of sup and inf is a number, or "inf" for a clock without limit; of bounds it is the
     pair of both; of several items the list of their values. It is null if no state counts. The
     message says where a clock comes near the value without reaching it.
@@ -211,13 +216,15 @@ def command(
                     max_plans=max_plans,
                     strategy=strategy is not None,
                     verify=verify,
+                    trace=verify or trace is not None,
                     progress=shown,
                 )
             if answer.verified is False:
                 click.echo("\n".join([query.text, *answer.verification]), err=True)
                 return INTERNAL_ERROR
             show_warnings(answer.warnings)
-            notes = [*answer.verification, *_write_evidence(answer, query, outputs, loaded.scene)]
+            covered = answer.verification if verify else ()
+            notes = [*covered, *_write_evidence(answer, query, outputs, loaded.scene)]
             if as_json:
                 click.echo(json.dumps(_record(answer, query)))
             else:

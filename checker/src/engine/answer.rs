@@ -15,7 +15,12 @@ use crate::search::leads_to::{self, Unanswered};
 use crate::search::limits::{Counters, StopReason};
 use crate::search::liveness::{self, Ending, Liveness};
 use crate::search::reach::{self, Outcome, Trace};
+use crate::search::schedule::Stays;
+use crate::search::taking::Taking;
+use crate::verify::replay::Shown;
+use crate::verify::strategy::Outcome as StrategyCheck;
 
+use super::evidence::{self, Proof, Shows, Witness};
 use super::limits::LimitWatch;
 use super::verification::{self, Verification};
 use super::{Options, PlansWanted};
@@ -38,10 +43,8 @@ pub enum Verdict {
 /// What backs a verdict.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
-    /// A witness, a counterexample, or the way to a failure.
-    pub trace: Option<Trace>,
-    /// Why the run of the trace never ends, if it is one that does not.
-    pub ending: Option<Ending>,
+    /// Witnesses, counterexamples, or the way to a failure: one, or one a value.
+    pub witnesses: Vec<Witness>,
     /// A winning strategy, if it was wanted.
     pub strategy: Option<Strategy>,
     /// How the check of the strategy ended, if it was wanted.
@@ -50,6 +53,28 @@ pub struct Evidence {
     pub plans: Option<Vec<Plan>>,
     /// Whether there are more plans than were wanted.
     pub has_more_plans: bool,
+}
+
+impl Evidence {
+    /// Whether the strategy and all runs passed their independent checks; `None` if there was none, or one came to no end.
+    pub fn is_verified(&self) -> Option<bool> {
+        let strategy = self.verification.iter().map(|check| match check {
+            Ok(StrategyCheck::Verified(_)) => Some(true),
+            Ok(StrategyCheck::Violated(..)) => Some(false),
+            Ok(StrategyCheck::TooLarge(_)) | Err(_) => None,
+        });
+        let runs = self.witnesses.iter().filter_map(|one| one.run.as_ref());
+        let runs = runs.map(|run| match run {
+            Proof::Replayed(..) => Some(true),
+            Proof::Violated(..) | Proof::Impossible => Some(false),
+            Proof::Missing(_) => None,
+        });
+        let checks: Vec<Option<bool>> = strategy.chain(runs).collect();
+        if checks.contains(&Some(false)) {
+            return Some(false);
+        }
+        (!checks.is_empty() && !checks.contains(&None)).then_some(true)
+    }
 }
 
 /// The values of the items of a query with `sup`, `inf` or `bounds`.
@@ -119,10 +144,10 @@ pub(super) fn answer(
             let broken = negation(invariant);
             negated(reachable(network, executor, &broken, options, &mut watch))
         }
-        QueryKind::PotentiallyAlways(keep) => always(network, executor, keep, &mut watch),
+        QueryKind::PotentiallyAlways(keep) => always(network, executor, keep, options, &mut watch),
         QueryKind::Eventually(goal) => {
             let keep = negation(goal);
-            negated(always(network, executor, &keep, &mut watch))
+            negated(always(network, executor, &keep, options, &mut watch))
         }
         QueryKind::LeadsTo(cause, effect) => {
             let open = Predicate::And(vec![cause.clone(), negation(effect)]);
@@ -253,25 +278,63 @@ fn always(
     network: &Network,
     executor: &dyn Executor,
     keep: &Predicate,
+    options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
     let mut symbolic = symbolic(network, executor, &[keep], &[], Abstraction::Maximum);
     let mut search = Liveness::new(&symbolic, keep);
-    let mut evidence = Evidence::default();
-    let verdict = match search.from_start(&mut symbolic, watch) {
+    let outcome = search.from_start(&mut symbolic, watch);
+    let mut witnesses = Witnesses::new(&mut symbolic, options);
+    let verdict = match outcome {
         Ok(liveness::Outcome::Found(run)) => {
-            evidence.trace = Some(run.trace);
-            evidence.ending = Some(run.ending);
-            found(symbolic.is_approximate() || search.is_coarse())
+            let shows = Shows::Stays(Stays { from: None, keep });
+            witnesses.add(run.trace, Some(run.ending), shows);
+            found(witnesses.symbolic.is_approximate() || search.is_coarse())
         }
         Ok(liveness::Outcome::Exhausted) => Verdict::NotSatisfied,
         Ok(liveness::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, trace)) => {
-            evidence.trace = Some(trace);
+            witnesses.add(trace, None, Shows::Possible);
             Verdict::Error(failure)
         }
     };
-    new_answer(verdict, evidence, search.counters())
+    new_answer(verdict, witnesses.into_evidence(), search.counters())
+}
+
+/// Collects what backs an answer.
+struct Witnesses<'w, 'a> {
+    symbolic: &'w mut Symbolic<'a>,
+    has_runs: bool,
+    found: Vec<Witness>,
+}
+
+impl<'w, 'a> Witnesses<'w, 'a> {
+    fn new(symbolic: &'w mut Symbolic<'a>, options: &Options) -> Witnesses<'w, 'a> {
+        Witnesses {
+            symbolic,
+            has_runs: options.runs,
+            found: Vec::new(),
+        }
+    }
+
+    /// Adds a trace, with its run if runs are wanted.
+    fn add(&mut self, trace: Trace, ending: Option<Ending>, shows: Shows<'_>) {
+        let mut witness = Witness::new(trace, ending);
+        // An initial state that cannot be entered is no run.
+        if self.has_runs && !witness.trace.states.is_empty() {
+            let network = self.symbolic.stepper.network();
+            let proof = evidence::prove(self.symbolic, network, &witness.trace, ending, shows);
+            witness.run = Some(proof);
+        }
+        self.found.push(witness);
+    }
+
+    fn into_evidence(self) -> Evidence {
+        Evidence {
+            witnesses: self.found,
+            ..Evidence::default()
+        }
+    }
 }
 
 /// Does every state of `open` lead out of `keep`?
@@ -285,24 +348,33 @@ fn leads_to(
     let mut symbolic = symbolic(network, executor, &[open, keep], &[], Abstraction::Maximum);
     let mut goal = Unanswered::new(&symbolic, open, keep);
     let report = reach::search(&mut symbolic, &mut goal, options.order, watch);
-    let mut evidence = Evidence::default();
+    let mut witnesses = Witnesses::new(&mut symbolic, options);
     let verdict = match report.outcome {
         Ok(Outcome::Found(way)) => {
             if let Some(run) = goal.run.take() {
                 let (trace, start) = leads_to::joined(way, run.trace);
-                evidence.trace = Some(trace);
-                evidence.ending = Some(run.ending.moved(start));
+                let stays = Stays {
+                    from: Some((start, open)),
+                    keep,
+                };
+                let ending = run.ending.moved(start);
+                witnesses.add(trace, Some(ending), Shows::Stays(stays));
             }
-            found(symbolic.is_approximate() || goal.is_coarse())
+            found(witnesses.symbolic.is_approximate() || goal.is_coarse())
         }
         Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
         Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, way)) => {
             let below = goal.failed.take();
-            evidence.trace = Some(below.map_or(way.clone(), |run| leads_to::joined(way, run).0));
+            let way = match below {
+                None => way,
+                Some(run) => leads_to::joined(way, run).0,
+            };
+            witnesses.add(way, None, Shows::Possible);
             Verdict::Error(failure)
         }
     };
+    let evidence = witnesses.into_evidence();
     negated(new_answer(verdict, evidence, report.counters))
 }
 
@@ -338,16 +410,71 @@ fn extremum(
         }
         Ok(extremum::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, trace)) => {
-            evidence.trace = Some(trace);
+            evidence.witnesses.push(Witness::new(trace, None));
             Verdict::Error(failure)
         }
     };
+    if let Some(values) = &values
+        && options.runs
+        && verdict == Verdict::Satisfied
+    {
+        evidence.witnesses = value_witnesses(question, values, &mut zones, options, watch);
+    }
     let mut answer = new_answer(verdict, evidence, report.counters);
     answer.message = values
         .as_ref()
         .and_then(|values| remark(values, question.items));
     answer.value = values;
     answer
+}
+
+/// A run to a state with each of the values; none for a clock without limit, and none beyond a limit of the search.
+fn value_witnesses<'a>(
+    question: Question<'_>,
+    values: &Values,
+    zones: &mut dyn FnMut(&[ClockAtom]) -> Symbolic<'a>,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Vec<Witness> {
+    let mut found = Vec::new();
+    for ((measure, text), item) in question.items.iter().zip(&values.items) {
+        for (extreme, is_greatest) in [(item.least, false), (item.greatest, true)] {
+            let Some(Extreme::Value { value, is_reached }) = extreme else {
+                continue;
+            };
+            let mut taking = Taking {
+                predicate: question.predicate,
+                measure,
+                value,
+                is_greatest,
+                is_reached,
+            };
+            let mut symbolic = zones(&taking.atoms());
+            let report = reach::search(&mut symbolic, &mut taking, options.order, watch);
+            let Ok(Outcome::Found(trace)) = report.outcome else {
+                return found;
+            };
+            let last = trace.states.last().map(|(words, _)| words.clone());
+            let mut words = last.unwrap_or_default();
+            let Ok(Some(constraints)) = taking.constraints(&mut symbolic, &mut words) else {
+                return found;
+            };
+            let shown = Shown {
+                value: value.into(),
+                is_greatest,
+                is_reached,
+            };
+            let shows = Shows::Takes(question.predicate, measure, shown, &constraints);
+            let mut witnesses = Witnesses::new(&mut symbolic, options);
+            witnesses.add(trace, None, shows);
+            let which = if is_greatest { "greatest" } else { "least" };
+            found.extend(witnesses.found.into_iter().map(|witness| Witness {
+                title: Some(format!("{which} {text}")),
+                ..witness
+            }));
+        }
+    }
+    found
 }
 
 /// What the numbers alone do not say: that no state counts, or that a value is not reached.
@@ -380,22 +507,22 @@ fn reachable(
     watch: &mut LimitWatch,
 ) -> Answer {
     let mut symbolic = symbolic(network, executor, &[goal], &[], Abstraction::LowerUpper);
-    let mut goal = goal;
-    let report = reach::search(&mut symbolic, &mut goal, options.order, watch);
-    let mut evidence = Evidence::default();
+    let mut look = goal;
+    let report = reach::search(&mut symbolic, &mut look, options.order, watch);
+    let mut witnesses = Witnesses::new(&mut symbolic, options);
     let verdict = match report.outcome {
         Ok(Outcome::Found(trace)) => {
-            evidence.trace = Some(trace);
-            found(symbolic.is_approximate())
+            witnesses.add(trace, None, Shows::Reaches(goal));
+            found(witnesses.symbolic.is_approximate())
         }
         Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
         Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, trace)) => {
-            evidence.trace = Some(trace);
+            witnesses.add(trace, None, Shows::Possible);
             Verdict::Error(failure)
         }
     };
-    new_answer(verdict, evidence, report.counters)
+    new_answer(verdict, witnesses.into_evidence(), report.counters)
 }
 
 fn game(

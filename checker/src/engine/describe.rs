@@ -5,11 +5,14 @@
 use std::fmt::Write as _;
 
 use super::LoadedModel;
+use super::evidence::{Missing, Proof, Witness};
 use crate::ir::{EdgeLabels, Network, RunTimeErrorKind, Shape};
 use crate::network::stepper::{select_count, select_values};
 use crate::network::{Failure, Part};
 use crate::search::liveness::Ending;
 use crate::search::reach::Trace;
+use crate::verify::replay::{Defect, End, Run};
+use crate::verify::{self, State};
 use crate::zones::{Bound, Zone};
 
 /// Calls `visit` with the name and the value of every scalar part of every variable.
@@ -210,6 +213,139 @@ pub fn ending_text(ending: Ending) -> String {
         }
         Ending::Waits => "\nTime passes for ever in the last state.\n".to_owned(),
         Ending::Stuck => "\nNothing is possible any more in the last state.\n".to_owned(),
+    }
+}
+
+/// A number of ticks as an exact fraction of the unit of time.
+pub fn fraction(ticks: i64, ticks_per_unit: i64) -> String {
+    let (mut divisor, mut rest) = (ticks_per_unit, ticks.rem_euclid(ticks_per_unit));
+    while rest != 0 {
+        (divisor, rest) = (rest, divisor % rest);
+    }
+    match ticks_per_unit / divisor {
+        1 => (ticks / divisor).to_string(),
+        denominator => format!("{}/{denominator}", ticks / divisor),
+    }
+}
+
+/// A run with exact times as text: each state in one line, what happens after how long below it.
+pub fn run_text(network: &Network, run: &Run, states: &[State]) -> String {
+    let unit = run.ticks_per_unit;
+    let mut text = "\nRun:\n".to_owned();
+    let entered = &states[..states.len().min(run.steps.len() + 1)];
+    for (index, state) in entered.iter().enumerate() {
+        let _ = writeln!(text, "{index}: {}", state_line(network, state, unit));
+        if let Some(step) = run.steps.get(index) {
+            if step.wait != 0 {
+                let _ = writeln!(text, "  wait {}", fraction(step.wait, unit));
+            }
+            for part in &step.parts {
+                let _ = writeln!(text, "  {}", part_text(network, (*part).into()));
+            }
+        }
+    }
+    if let (End::After(wait) | End::Waits(wait) | End::Stuck(wait), Some(end)) =
+        (run.end, states.get(entered.len()))
+    {
+        let end = state_line(network, end, unit);
+        let _ = writeln!(text, "  wait {}\n   {end}", fraction(wait, unit));
+    }
+    text + &match run.end {
+        End::After(_) => String::new(),
+        End::Loop(start) => {
+            format!("  The same as state {start} from here on: the run goes round for ever.\n")
+        }
+        End::Waits(_) => "  Time passes for ever.\n".to_owned(),
+        End::Stuck(_) => "  Nothing is possible any more.\n".to_owned(),
+    }
+}
+
+/// A state with exact clock values in one line.
+pub fn state_line(network: &Network, state: &State, ticks_per_unit: i64) -> String {
+    let mut parts = vec!["(".to_owned()];
+    for (index, process) in network.processes.iter().enumerate() {
+        let location = location_name(network, index, &state.words);
+        parts.push(format!("{}.{location}", process.name));
+    }
+    parts.push(")".to_owned());
+    for_each_value(network, &state.words, |name, value| {
+        parts.push(match value {
+            Value::Integer(value) => format!("{name}={value}"),
+            Value::Double(value) => format!("{name}={value:?}"),
+        });
+    });
+    for (clock, &value) in network.clocks.iter().zip(&state.clocks).skip(1) {
+        parts.push(format!(
+            "{}={}",
+            clock.name,
+            fraction(value, ticks_per_unit)
+        ));
+    }
+    parts.join(" ")
+}
+
+/// A witness as text: the symbolic trace in UPPAAL's form, and the run with exact times.
+pub fn witness_text(network: &Network, witness: &Witness) -> String {
+    let title = witness.title.as_ref();
+    let mut text = title.map_or_else(String::new, |title| format!("{title}:\n"));
+    text += &trace_text(network, &witness.trace);
+    text += &witness.ending.map_or_else(String::new, ending_text);
+    match &witness.run {
+        Some(Proof::Replayed(run, states, _)) => text += &run_text(network, run, states),
+        Some(Proof::Missing(missing)) => {
+            let _ = writeln!(text, "\nNo exact times: {}.", missing_text(*missing));
+        }
+        Some(Proof::Violated(..) | Proof::Impossible) | None => {}
+    }
+    text
+}
+
+/// Why there is no run with exact times.
+pub fn missing_text(missing: Missing) -> String {
+    match missing {
+        Missing::StoppedClock => "a clock stands still on the way".to_owned(),
+        Missing::Approximate => "the zones are too large, the moves may not be possible".to_owned(),
+        Missing::TooHard => "too many ways to choose between".to_owned(),
+        Missing::OpenLoop => "the loop was not found to close exactly".to_owned(),
+        Missing::Failed(_) => "the model fails on the way".to_owned(),
+        Missing::NotCovered(verify::Error::Unsupported(what)) => {
+            format!("the replay does not cover {what}")
+        }
+        Missing::NotCovered(_) => "the replay fails on the way".to_owned(),
+    }
+}
+
+/// What the replay of a run covered, or what is wrong with it.
+pub fn proof_lines(proof: &Proof) -> Vec<String> {
+    let violated = |what: String| vec![format!("trace violated: {what}")];
+    match proof {
+        Proof::Replayed(_, _, coverage) => vec![format!(
+            "trace replayed: {} states, {} moves, {} moments of waits",
+            coverage.states, coverage.moves, coverage.moments
+        )],
+        Proof::Missing(missing) => {
+            vec![format!("trace not replayed: {}", missing_text(*missing))]
+        }
+        Proof::Impossible => violated("its moves have no times".to_owned()),
+        Proof::Violated(_, violation) => {
+            let defect = defect_text(violation.defect);
+            violated(format!("{defect} (state {})", violation.state))
+        }
+    }
+}
+
+fn defect_text(defect: Defect) -> &'static str {
+    match defect {
+        Defect::Malformed => "its end, its waits or its moments are not those of a run",
+        Defect::NoTime => "time cannot pass here so long",
+        Defect::NoMove => "the move is not possible here",
+        Defect::NotReached => "what is to be reached does not hold at the end",
+        Defect::NotOpen => "what is to be answered does not hold at the moment given",
+        Defect::NotKept => "what must stay does not hold here",
+        Defect::NoLoop => "the last state is not like the one that it leads back to",
+        Defect::NotEndless => "time does not pass for ever here, or the run ends",
+        Defect::NotStuck => "something is possible here",
+        Defect::OtherValue => "the value is another one",
     }
 }
 

@@ -14,11 +14,13 @@ use crate::network::Part;
 use crate::search::StateStore;
 use crate::search::extremum::{Extreme, Extremes};
 use crate::search::liveness::Ending;
-use crate::search::reach::Trace;
+use crate::verify::State;
+use crate::verify::replay::{End, Run};
 use crate::zones::Zone;
 
 use super::answer::Values;
 use super::describe::{self, Value};
+use super::evidence::{Proof, Witness};
 
 /// An edge.
 pub fn part(network: &Network, part: Part) -> Json {
@@ -34,6 +36,7 @@ pub fn part(network: &Network, part: Part) -> Json {
         "edge": part.edge,
         "source": process.locations[edge.source.0 as usize].name,
         "target": process.locations[target.0 as usize].name,
+        "branch": part.branch,
         "select": select,
         "guard": edge.labels.guard,
         "sync": edge.labels.sync,
@@ -92,26 +95,85 @@ pub fn values(values: &Values) -> Json {
     }
 }
 
-/// A trace; `ending` says why a run never ends: `loop` is the index of the state that its last state leads back to.
-pub fn trace(network: &Network, trace: &Trace, ending: Option<Ending>) -> Json {
-    let states = trace.states.iter().map(|(words, zone)| {
+/// The witnesses of an answer: one object, or, for values, one with a list of `traces`.
+///
+/// A trace has `format` "ntagen-trace" and `version` 1. `states` are symbolic, `transitions` the edges between them, `ending` says why
+/// the run never ends: `loop` is the index of the state that its last state leads back to. `run` has exact times, in ticks of
+/// which `ticks_per_unit` make a unit of time: its `steps` each wait and take edges, `end` says what comes then, `from` from which
+/// moment on what must stay does, and `states` are those on entry, with the one after the last wait.
+pub fn witnesses(network: &Network, witnesses: &[Witness], query: &str) -> Json {
+    let mut json = json!({ "format": TRACE_FORMAT, "version": 1, "query": query });
+    let traces = witnesses.iter().map(|one| witness(network, one));
+    match (witnesses, &mut json) {
+        ([only], Json::Object(fields)) if only.title.is_none() => {
+            if let Json::Object(more) = witness(network, only) {
+                fields.extend(more);
+            }
+        }
+        _ => json["traces"] = traces.collect(),
+    }
+    json
+}
+
+/// What a file with traces says that it is.
+pub const TRACE_FORMAT: &str = "ntagen-trace";
+
+fn witness(network: &Network, witness: &Witness) -> Json {
+    let states = witness.trace.states.iter().map(|(words, zone)| {
         json!({
             "locations": locations(network, words),
             "variables": variables(network, words),
             "zone": describe::zone_constraints(network, zone),
         })
     });
-    let moves = trace.moves.iter().map(|one| parts(network, one));
-    let mut json =
-        json!({ "states": states.collect::<Vec<_>>(), "transitions": moves.collect::<Vec<_>>() });
-    if let Some(ending) = ending {
+    let moves = witness.trace.moves.iter().map(|one| parts(network, one));
+    let mut json = json!({});
+    if let Some(title) = &witness.title {
+        json["title"] = json!(title);
+    }
+    json["states"] = states.collect();
+    json["transitions"] = moves.collect();
+    if let Some(ending) = witness.ending {
         json["ending"] = match ending {
             Ending::Loop(start) => json!({ "kind": "loop", "loop": start }),
             Ending::Waits => json!({ "kind": "waits" }),
             Ending::Stuck => json!({ "kind": "stuck" }),
         };
     }
+    if let Some(Proof::Replayed(exact, states, _)) = &witness.run {
+        json["run"] = run(network, exact, states);
+    }
     json
+}
+
+/// A run with exact times.
+pub fn run(network: &Network, run: &Run, states: &[State]) -> Json {
+    let steps = run.steps.iter().map(|step| {
+        let edges = step.parts.iter().map(|&one| part(network, one.into()));
+        json!({ "wait": step.wait, "edges": edges.collect::<Vec<_>>() })
+    });
+    let end = match run.end {
+        End::After(wait) => json!({ "kind": "after", "wait": wait }),
+        End::Loop(state) => json!({ "kind": "loop", "state": state }),
+        End::Waits(wait) => json!({ "kind": "waits", "wait": wait }),
+        End::Stuck(wait) => json!({ "kind": "stuck", "wait": wait }),
+    };
+    let states = states.iter().map(|state| {
+        let clocks = network.clocks.iter().zip(&state.clocks).skip(1);
+        let clocks = clocks.map(|(clock, value)| (clock.name.clone(), json!(value)));
+        json!({
+            "locations": locations(network, &state.words),
+            "variables": variables(network, &state.words),
+            "clocks": clocks.collect::<Map<_, _>>(),
+        })
+    });
+    json!({
+        "ticks_per_unit": run.ticks_per_unit,
+        "steps": steps.collect::<Vec<_>>(),
+        "end": end,
+        "from": { "state": run.from.state, "wait": run.from.wait },
+        "states": states.collect::<Vec<_>>(),
+    })
 }
 
 /// Plans: of each, the transitions that leave a state without committed locations; all others follow from them.

@@ -5,6 +5,7 @@
 
 pub mod answer;
 pub mod describe;
+pub mod evidence;
 pub mod explain;
 pub mod facts;
 pub mod json;
@@ -85,6 +86,8 @@ pub struct Options {
     pub strategy: bool,
     /// Whether the strategy is to be checked in closed loop.
     pub verify: bool,
+    /// Whether traces are to be timed exactly, and replayed.
+    pub runs: bool,
 }
 
 impl Default for Options {
@@ -97,6 +100,7 @@ impl Default for Options {
             plans: PlansWanted::default(),
             strategy: false,
             verify: false,
+            runs: false,
         }
     }
 }
@@ -280,8 +284,8 @@ impl LoadedModel {
         })
     }
 
-    /// The query, and its warnings as text.
-    fn compile(&mut self, span: Span) -> Result<(crate::ir::Query, Vec<String>), Rejection> {
+    /// Compiles a query, whose code becomes part of the network: the query, and its warnings as text.
+    pub fn compile(&mut self, span: Span) -> Result<(crate::ir::Query, Vec<String>), Rejection> {
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
         if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
             let strategies = &self.strategies;

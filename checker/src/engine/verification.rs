@@ -82,16 +82,29 @@ fn decision(decision: &Decision) -> strategy::Decision {
     let action = decision.action.as_ref();
     strategy::Decision {
         zones: zones(&decision.zones),
-        action: action.map(|parts| parts.iter().map(|&one| part(one)).collect()),
+        action: action.map(|parts| parts.iter().map(|&one| one.into()).collect()),
     }
 }
 
-fn part(part: Part) -> verify::Part {
-    verify::Part {
-        process: part.process,
-        edge: part.edge,
-        branch: part.branch,
-        select: part.select,
+impl From<Part> for verify::Part {
+    fn from(part: Part) -> verify::Part {
+        verify::Part {
+            process: part.process,
+            edge: part.edge,
+            branch: part.branch,
+            select: part.select,
+        }
+    }
+}
+
+impl From<verify::Part> for Part {
+    fn from(part: verify::Part) -> Part {
+        Part {
+            process: part.process,
+            edge: part.edge,
+            branch: part.branch,
+            select: part.select,
+        }
     }
 }
 
@@ -145,7 +158,7 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
     for (index, state) in violation.states.iter().enumerate() {
         lines.push(format!(
             "  {}",
-            state_line(network, state, violation.ticks_per_unit)
+            describe::state_line(network, state, violation.ticks_per_unit)
         ));
         match violation.steps.get(index) {
             Some(Step::Time) => lines.push("    time passes".to_owned()),
@@ -161,28 +174,6 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
         }
     }
     lines
-}
-
-fn state_line(network: &Network, state: &verify::State, ticks_per_unit: i64) -> String {
-    let mut parts = Vec::new();
-    for (index, process) in network.processes.iter().enumerate() {
-        let location = describe::location_name(network, index, &state.words);
-        parts.push(format!("{}.{location}", process.name));
-    }
-    describe::for_each_value(network, &state.words, |name, value| {
-        parts.push(match value {
-            describe::Value::Integer(value) => format!("{name}={value}"),
-            describe::Value::Double(value) => format!("{name}={value}"),
-        });
-    });
-    for (clock, value) in network.clocks.iter().zip(&state.clocks).skip(1) {
-        let (units, rest) = (value / ticks_per_unit, value % ticks_per_unit);
-        parts.push(match rest {
-            0 => format!("{}={units}", clock.name),
-            _ => format!("{}={units}+{rest}/{ticks_per_unit}", clock.name),
-        });
-    }
-    parts.join(" ")
 }
 
 fn part_text(network: &Network, part: verify::Part) -> String {

@@ -426,17 +426,7 @@ impl<'p> Liveness<'p> {
                 outside
             }
         };
-        let passage = Passage {
-            barriers: if may_delay {
-                symbolic.barriers(words, whole.bounds())?
-            } else {
-                Federation::empty(dimension)
-            },
-            stopped: symbolic.stopped(words)?,
-            whole,
-            outside,
-            may_delay,
-        };
+        let passage = Passage::new(symbolic, words, whole, outside)?;
         self.is_coarse |= passage.is_coarse();
         let mut inside = passage.reached(entry);
         inside.reduce();
@@ -472,6 +462,24 @@ impl<'p> Liveness<'p> {
     }
 }
 
+/// The valuations of a state inside the predicate from which time can pass without limit, and those from which no wait leads to a
+/// move or out of the predicate. `whole` is what the invariants allow.
+pub(super) fn endings(
+    symbolic: &mut Symbolic<'_>,
+    keep: &Predicate,
+    words: &mut [i32],
+    whole: Zone,
+) -> Result<(Federation, Federation), Failure> {
+    let dimension = whole.dimension();
+    let extent = symbolic.extent(keep, words, whole.bounds())?;
+    let inside = extent.to_federation(whole.bounds(), dimension);
+    let mut outside = Federation::of_zone(dimension, whole.bounds());
+    outside.subtract(&inside);
+    let passage = Passage::new(symbolic, words, whole, outside)?;
+    let stuck = passage.stuck(symbolic, words, &inside)?;
+    Ok((passage.waiting(&inside), stuck))
+}
+
 fn push_state(trace: &mut Trace, words: &[i32], zones: &[Zone]) {
     if let Some(zone) = zones.last() {
         trace.states.push((words.to_vec(), zone.clone()));
@@ -491,6 +499,26 @@ struct Passage {
 }
 
 impl Passage {
+    fn new(
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        whole: Zone,
+        outside: Federation,
+    ) -> Result<Passage, Failure> {
+        let may_delay = symbolic.may_delay(words)?;
+        Ok(Passage {
+            barriers: if may_delay {
+                symbolic.barriers(words, whole.bounds())?
+            } else {
+                Federation::empty(whole.dimension())
+            },
+            stopped: symbolic.stopped(words)?,
+            whole,
+            outside,
+            may_delay,
+        })
+    }
+
     /// What delay inside the predicate reaches.
     fn reached(&self, entry: &Zone) -> Federation {
         let dimension = self.whole.dimension();

@@ -6,7 +6,9 @@ pub mod leads_to;
 pub mod limits;
 pub mod liveness;
 pub mod reach;
+pub mod schedule;
 pub mod store;
+pub mod taking;
 pub mod zone_table;
 
 pub use limits::{Counters, StopReason, Watch};

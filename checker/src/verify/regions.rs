@@ -17,7 +17,7 @@
 //! Source: R. Alur, D. Dill, "A theory of timed automata", TCS 126, 1994, section 4; P. Bouyer, C. Dufourd, E. Fleury, A. Petit,
 //! "Updatable timed automata", TCS 321, 2004 (differences and copies).
 
-use crate::ir::{AssignedValue, ClockAtom, Edge, Network, Update};
+use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Update};
 
 use super::concrete::{Error, State};
 
@@ -68,6 +68,15 @@ impl Regions {
             ticks_per_unit: Regions::ticks_per_unit(network),
             bounding,
         })
+    }
+
+    /// The same regions for another number of ticks in a unit, which must be more than twice the number of clocks.
+    #[must_use]
+    pub fn with_ticks_per_unit(self, ticks_per_unit: i64) -> Regions {
+        Regions {
+            ticks_per_unit,
+            ..self
+        }
     }
 
     /// What keeps the set finite.
@@ -150,15 +159,19 @@ fn shorten_gaps(clocks: &mut [i64], longest: i64, unit: i64) {
     }
 }
 
-/// The greatest constant, in absolute value, that guards and invariants compare clocks with.
-fn constants(network: &Network) -> i64 {
+/// The clock comparisons of guards and invariants.
+pub(super) fn atoms(network: &Network) -> impl Iterator<Item = &ClockAtom> {
     let processes = network.processes.iter();
-    let atoms = processes.flat_map(|process| {
+    processes.flat_map(|process| {
         let guards = process.edges.iter().map(|edge| &edge.guard);
         let invariants = process.locations.iter().map(|location| &location.invariant);
         guards.chain(invariants).flat_map(|guard| &guard.atoms)
-    });
-    atoms.map(greatest_constant).max().unwrap_or(0)
+    })
+}
+
+/// The greatest constant, in absolute value, that guards and invariants compare clocks with.
+fn constants(network: &Network) -> i64 {
+    atoms(network).map(greatest_constant).max().unwrap_or(0)
 }
 
 /// The greatest constant of a comparison, in absolute value.
@@ -166,14 +179,19 @@ pub fn greatest_constant(atom: &ClockAtom) -> i64 {
     i64::from(atom.low).abs().max(i64::from(atom.high).abs())
 }
 
+/// The assignments to clocks of all updates.
+pub(super) fn assignments(network: &Network) -> impl Iterator<Item = &ClockAssignment> {
+    let edges = network.processes.iter().flat_map(|process| &process.edges);
+    let hooks = network.before_update.iter().chain(&network.after_update);
+    let updates = edges.flat_map(updates_of).chain(hooks);
+    updates.flat_map(|update| &update.assignments)
+}
+
 /// The greatest value that a clock is set to, at the start included, and whether some copy adds or takes away something.
 fn assigned(network: &Network) -> (i64, bool, bool) {
-    let edges = network.processes.iter().flat_map(|process| &process.edges);
-    let updates = edges.flat_map(updates_of);
-    let hooks = network.before_update.iter().chain(&network.after_update);
     let initial = network.initial_clocks.iter().max();
     let mut result = (initial.map_or(0, |&value| i64::from(value)), false, false);
-    for assignment in updates.chain(hooks).flat_map(|update| &update.assignments) {
+    for assignment in assignments(network) {
         match assignment.value {
             AssignedValue::Integer(_, high) => result.0 = result.0.max(i64::from(high)),
             AssignedValue::Clock(_, low, high) => {

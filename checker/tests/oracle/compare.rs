@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::io::Write as _;
 
 use checker::engine::Verdict;
+use checker::engine::evidence::Proof;
 use checker::engine::verification;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Rejection};
 use checker::search::limits::StopReason;
@@ -98,6 +99,7 @@ pub(crate) fn options() -> Options {
             states: Some(MOST_STATES),
             ..Limits::default()
         },
+        runs: true,
         ..Options::default()
     }
 }
@@ -168,6 +170,18 @@ pub(crate) fn check(
         Err(Error::RunTime(_)) => matches!(answer.verdict, Verdict::Error(_)),
         Err(Error::Unsupported(what)) => panic!("{what} is not generated"),
     };
+    for witness in &answer.evidence.witnesses {
+        match &witness.run {
+            Some(Proof::Replayed(..)) | None => {}
+            run => {
+                let text = describe();
+                return Err(TestCaseError::fail(format!(
+                    "{text}\n{:?}\n{run:#?}",
+                    witness.ending
+                )));
+            }
+        }
+    }
     if is_right {
         return Ok(());
     }

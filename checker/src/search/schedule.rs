@@ -1,0 +1,592 @@
+//! When the moves of a symbolic run can happen: exact times for a given sequence of moves.
+//!
+//! Along a known sequence of moves a clock's value is the time since the move that set it last, plus what it was set to. So
+//! guards, invariants and predicates become bounds on differences of the times of events (moves, and moments that are looked at),
+//! and the earliest times that satisfy them are longest paths. Two things have alternatives: where something must not
+//! hold at a moment (a receiver that abstains, a move of higher priority), one of its comparisons must fail; and where a wait
+//! must not pass through a zone, it must end before the zone begins, start after it has ended, or run beside it. They are tried one
+//! after the other, and only where the earliest times violate them.
+//!
+//! A strict bound is a weak one with an infinitesimal distance: times are pairs of an integer and a count of infinitesimals. In the
+//! end the infinitesimal becomes `1 / (n + 1)`, where n is the greatest count: a bound that is not met exactly then has at
+//! least one whole unit of room, which n of them do not fill.
+//!
+//! Invariant: times are the least that satisfy all bounds so far, or the bounds contradict each other.
+//!
+//! Source: R. Dechter, I. Meiri, J. Pearl, "Temporal constraint networks", Artificial Intelligence 49, 1991 (times as shortest
+//! paths, alternatives by backtracking); A. Armando, C. Castellini, E. Giunchiglia, "SAT-based procedures for temporal reasoning",
+//! ECP 1999 (alternatives only where they are violated).
+//!
+//! Cost: a bound that moves n times costs up to n times the bounds among them; alternatives are exponential in the worst case,
+//! and given up after [`MOST_ATTEMPTS`].
+
+use std::collections::VecDeque;
+
+use crate::ir::Predicate;
+use crate::network::{Failure, Moves, Part, Symbolic};
+use crate::zones::clocks::Assignment;
+use crate::zones::dbm::Constraint;
+use crate::zones::{Bound, Federation, Zone, minimal};
+
+use super::liveness;
+
+/// Alternatives that are tried before a schedule is given up.
+const MOST_ATTEMPTS: usize = 100_000;
+
+/// What is asked of the end of a run.
+#[derive(Clone, Debug)]
+pub enum Finish<'t> {
+    /// Nothing: it ends on entry of its last state.
+    Entry,
+    /// The predicate holds, and these constraints on the clocks.
+    Holds(&'t Predicate, Vec<Constraint>),
+    /// Time can pass for ever within what must stay.
+    Waits,
+    /// Nothing is possible any more, within what must stay.
+    Stuck,
+}
+
+/// Something that must stay.
+#[derive(Clone, Copy, Debug)]
+pub struct Stays<'t> {
+    /// From some moment in the state with this index at which this holds; or from the beginning.
+    pub from: Option<(usize, &'t Predicate)>,
+    /// What must stay.
+    pub keep: &'t Predicate,
+}
+
+/// A run that is wanted.
+#[derive(Clone, Debug)]
+pub struct Wanted<'t> {
+    /// Its moves.
+    pub moves: &'t [Vec<Part>],
+    /// What must stay, and from when on.
+    pub stays: Option<Stays<'t>>,
+    /// How it ends.
+    pub finish: Finish<'t>,
+}
+
+/// Exact times of a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Schedule {
+    /// How many ticks make one unit of time.
+    pub ticks_per_unit: i64,
+    /// When each move happens.
+    pub moves: Vec<i64>,
+    /// From when on something stays; 0 if nothing has to.
+    pub from: i64,
+    /// When the end is looked at.
+    pub end: i64,
+}
+
+/// Why there are no times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unscheduled {
+    /// A clock stands still while time passes.
+    StoppedClock,
+    /// The moves are not possible in this order.
+    Impossible,
+    /// Too many alternatives.
+    TooHard,
+    /// The model failed.
+    Failed(Failure),
+}
+
+impl From<Failure> for Unscheduled {
+    fn from(failure: Failure) -> Unscheduled {
+        Unscheduled::Failed(failure)
+    }
+}
+
+/// The earliest times of a run.
+pub fn schedule(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<Schedule, Unscheduled> {
+    let mut plan = Plan::new(symbolic)?;
+    plan.write(wanted)?;
+    plan.solve()
+}
+
+/// Least times and bounds: an integer and a count of infinitesimals.
+type Time = (i64, i64);
+
+/// `times[later] >= times[earlier] + apart`
+#[derive(Clone, Copy, Debug)]
+struct Distance {
+    earlier: usize,
+    later: usize,
+    apart: Time,
+}
+
+/// Ways to satisfy something: all distances of one of them must hold.
+type Alternatives = Vec<Vec<Distance>>;
+
+/// The run that is being written down.
+struct Plan<'s, 'a> {
+    symbolic: &'s mut Symbolic<'a>,
+    words: Vec<i32>,
+    /// By clock: the event that set it last, and to what; nothing for the reference clock.
+    set: Vec<(usize, i64)>,
+    /// The event at which the state at hand was entered or last looked at.
+    now: usize,
+    /// What must stay in the state at hand.
+    keep: Option<Predicate>,
+    times: Times,
+    alternatives: Vec<Alternatives>,
+    /// The events of the moves, of the look, and of the end.
+    moves: Vec<usize>,
+    look: usize,
+    end: usize,
+}
+
+impl<'s, 'a> Plan<'s, 'a> {
+    fn new(symbolic: &'s mut Symbolic<'a>) -> Result<Plan<'s, 'a>, Unscheduled> {
+        let (words, _, invariant) = symbolic.start()?;
+        let network = symbolic.stepper.network();
+        let initial = network.initial_clocks.iter();
+        let mut set: Vec<(usize, i64)> = initial.map(|&value| (0, i64::from(value))).collect();
+        set.resize(symbolic.dimension(), (0, 0));
+        let mut plan = Plan {
+            symbolic,
+            words,
+            set,
+            now: 0,
+            keep: None,
+            times: Times::new(),
+            alternatives: Vec::new(),
+            moves: Vec::new(),
+            look: 0,
+            end: 0,
+        };
+        plan.require_all(0, &invariant)?;
+        Ok(plan)
+    }
+
+    fn write(&mut self, wanted: &Wanted<'_>) -> Result<(), Unscheduled> {
+        if let Some(Stays { from: None, keep }) = wanted.stays {
+            self.stay_from(0, keep)?;
+        }
+        for state in 0..=wanted.moves.len() {
+            if let Some(Stays {
+                from: Some((first, open)),
+                keep,
+            }) = wanted.stays
+                && first == state
+            {
+                let look = self.wait()?;
+                let part = self.extent(open)?;
+                self.require_part(look, &part)?;
+                self.stay_from(look, keep)?;
+            }
+            if let Some(parts) = wanted.moves.get(state) {
+                let event = self.wait()?;
+                self.moves.push(event);
+                self.take(event, parts)?;
+            }
+        }
+        self.finish(&wanted.finish)
+    }
+
+    /// From this event in the state at hand on the predicate stays.
+    fn stay_from(&mut self, event: usize, keep: &Predicate) -> Result<(), Unscheduled> {
+        self.look = event;
+        self.keep = Some(keep.clone());
+        self.keep_at(event)
+    }
+
+    fn finish(&mut self, finish: &Finish<'_>) -> Result<(), Unscheduled> {
+        self.end = self.now;
+        let part = match finish {
+            Finish::Entry => {
+                return Ok(());
+            }
+            Finish::Holds(predicate, constraints) => {
+                self.end = self.wait()?;
+                self.require_all(self.end, constraints)?;
+                self.extent(predicate)?
+            }
+            Finish::Waits | Finish::Stuck => {
+                self.end = self.wait()?;
+                let whole = self.whole()?;
+                let keep = self.keep.clone().unwrap_or(Predicate::Constant(true));
+                let (waits, stuck) =
+                    liveness::endings(self.symbolic, &keep, &mut self.words, whole)?;
+                if let Finish::Waits = finish {
+                    waits
+                } else {
+                    stuck
+                }
+            }
+        };
+        self.require_part(self.end, &part)
+    }
+
+    /// All clock values that the invariants of the state at hand allow.
+    fn whole(&mut self) -> Result<Zone, Unscheduled> {
+        let mut whole = Zone::universe(self.symbolic.dimension());
+        let invariant = self.symbolic.invariant(&mut self.words)?;
+        if !invariant.is_some_and(|invariant| whole.constrain_all(&invariant)) {
+            return Err(Unscheduled::Impossible);
+        }
+        Ok(whole)
+    }
+
+    fn extent(&mut self, predicate: &Predicate) -> Result<Federation, Unscheduled> {
+        let whole = self.whole()?;
+        let extent = self
+            .symbolic
+            .extent(predicate, &mut self.words, whole.bounds())?;
+        Ok(extent.to_federation(whole.bounds(), whole.dimension()))
+    }
+
+    /// A new event, reached by waiting in the state at hand.
+    fn wait(&mut self) -> Result<usize, Unscheduled> {
+        let (start, end) = (self.now, self.times.add());
+        self.require(Distance {
+            earlier: start,
+            later: end,
+            apart: (0, 0),
+        })?;
+        self.now = end;
+        if !self.symbolic.may_delay(&mut self.words)? {
+            return self
+                .require(Distance {
+                    earlier: end,
+                    later: start,
+                    apart: (0, 0),
+                })
+                .map(|()| end);
+        }
+        if !self.symbolic.stopped(&self.words)?.is_empty() {
+            return Err(Unscheduled::StoppedClock);
+        }
+        let whole = self.whole()?;
+        let invariant = self.symbolic.invariant(&mut self.words)?;
+        self.require_all(end, &invariant.unwrap_or_default())?;
+        let barriers = self.symbolic.barriers(&mut self.words, whole.bounds())?;
+        for barrier in barriers.zones() {
+            self.avoid((start, end), barrier, true);
+        }
+        let outside = self.outside(&whole)?;
+        for zone in outside.zones() {
+            self.avoid((start, end), zone, false);
+        }
+        Ok(end)
+    }
+
+    /// Where what must stay does not hold.
+    fn outside(&mut self, whole: &Zone) -> Result<Federation, Unscheduled> {
+        let dimension = whole.dimension();
+        let Some(keep) = &self.keep else {
+            return Ok(Federation::empty(dimension));
+        };
+        let negation = Predicate::Not(Box::new(keep.clone()));
+        let extent = self
+            .symbolic
+            .extent(&negation, &mut self.words, whole.bounds())?;
+        Ok(extent.to_federation(whole.bounds(), dimension))
+    }
+
+    /// What must stay holds at an event.
+    fn keep_at(&mut self, event: usize) -> Result<(), Unscheduled> {
+        let Some(keep) = self.keep.clone() else {
+            return Ok(());
+        };
+        let part = self.extent(&keep)?;
+        self.require_part(event, &part)
+    }
+
+    fn take(&mut self, event: usize, parts: &[Part]) -> Result<(), Unscheduled> {
+        let mut moves = Moves::default();
+        self.symbolic.moves(&mut self.words, &mut moves)?;
+        let one = moves.iter().find(|one| one.parts == parts);
+        let one = one.ok_or(Unscheduled::Impossible)?;
+        let mut words = self.words.clone();
+        let effect = self.symbolic.fire(one, &mut words)?;
+        let effect = effect.ok_or(Unscheduled::Impossible)?;
+        self.require_all(event, &effect.guard)?;
+        for conjunction in &effect.excluded {
+            let broken = conjunction.iter().map(|one| one.negated());
+            let broken = broken.filter_map(|one| self.distance(event, one));
+            let broken: Alternatives = broken.map(|one| vec![one]).collect();
+            self.alternatives.push(broken);
+        }
+        self.words = words;
+        for assignment in &effect.assignments {
+            match *assignment {
+                Assignment::Value { clock, value } => self.set[clock] = (event, i64::from(value)),
+                Assignment::Copy {
+                    clock,
+                    source,
+                    increment,
+                } => {
+                    let (since, value) = self.set[source];
+                    self.set[clock] = (since, value + i64::from(increment));
+                    // No clock is negative.
+                    self.require_all(event, &[at_least_zero(clock)])?;
+                }
+                Assignment::Free { .. } => return Err(Unscheduled::Impossible),
+            }
+        }
+        self.require_all(event, &effect.invariant)?;
+        self.keep_at(event)
+    }
+
+    fn require_all(&mut self, event: usize, all: &[Constraint]) -> Result<(), Unscheduled> {
+        for &one in all {
+            if let Some(distance) = self.distance(event, one) {
+                self.require(distance)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn require(&mut self, distance: Distance) -> Result<(), Unscheduled> {
+        if self.times.require(distance) {
+            Ok(())
+        } else {
+            Err(Unscheduled::Impossible)
+        }
+    }
+
+    /// The clock values at an event lie in the federation.
+    fn require_part(&mut self, event: usize, part: &Federation) -> Result<(), Unscheduled> {
+        let alternatives: Alternatives = part
+            .zones()
+            .map(|zone| {
+                let mut distances = Vec::new();
+                minimal::for_each_minimal(zone, part.dimension(), |one| {
+                    distances.extend(self.distance(event, one));
+                });
+                distances
+            })
+            .collect();
+        match alternatives.as_slice() {
+            [] => Err(Unscheduled::Impossible),
+            [only] => only.iter().try_for_each(|&distance| self.require(distance)),
+            _ => {
+                self.alternatives.push(alternatives);
+                Ok(())
+            }
+        }
+    }
+
+    /// The wait between two events does not pass through the zone; with `may_meet` it may end in the zone's first moment.
+    ///
+    /// All bounds of the closed zone count, not only the minimal ones: that a lower bound is met after an upper one has failed shows
+    /// in the bound on their difference that follows from the two.
+    fn avoid(&mut self, (start, end): (usize, usize), zone: &[Bound], may_meet: bool) {
+        let dimension = self.symbolic.dimension();
+        let mut alternatives = Alternatives::new();
+        for (index, &bound) in zone.iter().enumerate() {
+            let (left, right) = (index / dimension, index % dimension);
+            if left == right || bound.is_infinite() {
+                continue;
+            }
+            let is_lower = left == 0;
+            let failing = if is_lower && may_meet {
+                // Ends where the lower bound is met at the latest.
+                Constraint {
+                    left: right,
+                    right: 0,
+                    bound: Bound::weak(-bound.value()).unwrap_or(Bound::INFINITY),
+                }
+            } else {
+                let one = Constraint { left, right, bound };
+                one.negated()
+            };
+            // A lower bound fails up to the end; an upper one from the start on, and one on a difference all the time.
+            let event = if is_lower { end } else { start };
+            alternatives.extend(self.distance(event, failing).map(|one| vec![one]));
+        }
+        if may_meet {
+            // No wait meets nothing new.
+            alternatives.push(vec![Distance {
+                earlier: end,
+                later: start,
+                apart: (0, 0),
+            }]);
+        }
+        self.alternatives.push(alternatives);
+    }
+
+    /// A constraint on the clock values at an event as one on times; `None` for one that says nothing.
+    fn distance(&self, event: usize, one: Constraint) -> Option<Distance> {
+        if one.bound.is_infinite() {
+            return None;
+        }
+        // A clock's value is `times[event] - times[since] + offset`.
+        let (left, right) = (self.set[one.left], self.set[one.right]);
+        let bound = i64::from(one.bound.value());
+        let (later, earlier, bound) = match (one.left, one.right) {
+            (_, 0) => (left.0, event, bound - left.1),
+            (0, _) => (event, right.0, bound + right.1),
+            _ => (left.0, right.0, bound - left.1 + right.1),
+        };
+        Some(Distance {
+            earlier,
+            later,
+            apart: (-bound, i64::from(one.bound.is_strict())),
+        })
+    }
+
+    fn solve(mut self) -> Result<Schedule, Unscheduled> {
+        self.choose()?;
+        let times = &self.times.least;
+        let greatest = times.iter().map(|time| time.1).max().unwrap_or(0);
+        let ticks_per_unit = greatest + 1;
+        let ticks = |event: usize| times[event].0 * ticks_per_unit + times[event].1;
+        Ok(Schedule {
+            ticks_per_unit,
+            moves: self.moves.iter().map(|&event| ticks(event)).collect(),
+            from: ticks(self.look),
+            end: ticks(self.end),
+        })
+    }
+
+    /// Finds times that satisfy one of each alternatives.
+    fn choose(&mut self) -> Result<(), Unscheduled> {
+        // By decision: what is chosen from, which is tried next, and the state before.
+        let mut decisions: Vec<(usize, usize, Mark)> = Vec::new();
+        let mut attempts = 0;
+        while let Some(violated) = self.first_violated() {
+            decisions.push((violated, 0, self.times.mark()));
+            loop {
+                let Some((index, next, mark)) = decisions.last_mut() else {
+                    return Err(Unscheduled::Impossible);
+                };
+                self.times.undo(*mark);
+                let Some(distances) = self.alternatives[*index].get(*next) else {
+                    decisions.pop();
+                    continue;
+                };
+                *next += 1;
+                attempts += 1;
+                if attempts > MOST_ATTEMPTS {
+                    return Err(Unscheduled::TooHard);
+                }
+                if distances.iter().all(|&one| self.times.require(one)) {
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn first_violated(&self) -> Option<usize> {
+        let is_met = |one: &Distance| self.times.is_met(*one);
+        self.alternatives
+            .iter()
+            .position(|ways| !ways.iter().any(|way| way.iter().all(is_met)))
+    }
+}
+
+fn at_least_zero(clock: usize) -> Constraint {
+    Constraint {
+        left: 0,
+        right: clock,
+        bound: Bound::LE_ZERO,
+    }
+}
+
+/// Where to go back to.
+#[derive(Clone, Copy, Debug)]
+struct Mark {
+    distances: usize,
+    changes: usize,
+}
+
+/// Least times under distances, with a way back.
+#[derive(Debug)]
+struct Times {
+    least: Vec<Time>,
+    /// By event: the distances from it to later ones.
+    from: Vec<Vec<(usize, Time)>>,
+    /// The events that distances were added to, in order.
+    added: Vec<usize>,
+    /// The changes of least times, in order: event and old time.
+    changes: Vec<(usize, Time)>,
+    queue: VecDeque<usize>,
+}
+
+impl Times {
+    /// One event, at time 0.
+    fn new() -> Times {
+        let mut times = Times {
+            least: Vec::new(),
+            from: Vec::new(),
+            added: Vec::new(),
+            changes: Vec::new(),
+            queue: VecDeque::new(),
+        };
+        times.add();
+        times
+    }
+
+    /// Adds an event.
+    fn add(&mut self) -> usize {
+        self.least.push((0, 0));
+        self.from.push(Vec::new());
+        self.least.len() - 1
+    }
+
+    fn mark(&self) -> Mark {
+        Mark {
+            distances: self.added.len(),
+            changes: self.changes.len(),
+        }
+    }
+
+    fn undo(&mut self, mark: Mark) {
+        for event in self.added.drain(mark.distances..).rev() {
+            self.from[event].pop();
+        }
+        for (event, time) in self.changes.drain(mark.changes..).rev() {
+            self.least[event] = time;
+        }
+    }
+
+    fn is_met(&self, one: Distance) -> bool {
+        self.least[one.later] >= sum(self.least[one.earlier], one.apart)
+    }
+
+    /// Adds a distance and moves the events after it; returns false if it contradicts the others, and then the times mean nothing.
+    fn require(&mut self, one: Distance) -> bool {
+        if one.earlier == one.later {
+            return one.apart <= (0, 0);
+        }
+        self.from[one.earlier].push((one.later, one.apart));
+        self.added.push(one.earlier);
+        if !self.raise(one.later, sum(self.least[one.earlier], one.apart)) {
+            return true;
+        }
+        self.queue.clear();
+        self.queue.push_back(one.later);
+        while let Some(event) = self.queue.pop_front() {
+            // The start never moves; and what moves because of the event that the new distance begins at moves for ever.
+            if event == 0 || event == one.earlier {
+                return false;
+            }
+            for index in 0..self.from[event].len() {
+                let (later, distance) = self.from[event][index];
+                if self.raise(later, sum(self.least[event], distance)) {
+                    self.queue.push_back(later);
+                }
+            }
+        }
+        true
+    }
+
+    /// Moves an event to a time if it is earlier; returns whether it was.
+    fn raise(&mut self, event: usize, time: Time) -> bool {
+        let old = self.least[event];
+        if old >= time {
+            return false;
+        }
+        self.changes.push((event, old));
+        self.least[event] = time;
+        true
+    }
+}
+
+fn sum(one: Time, other: Time) -> Time {
+    (one.0 + other.0, one.1 + other.1)
+}

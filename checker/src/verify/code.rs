@@ -1,0 +1,330 @@
+//! The code of a model on words: conditions, updates and the composition of edges into moves, from the definitions.
+//!
+//! What code says about clocks is handed on as constraints and assignments, which [`super::concrete`] evaluates.
+//!
+//! The definitions (the documentation's pages on semantics, edges and locations):
+//! * one of the participants of a move leaves a committed location if some process is in one;
+//! * a binary synchronisation takes two processes, sender and receiver; a broadcast takes the sender and, of every other process
+//!   with an enabled receiving edge, exactly one such edge;
+//! * updates run sender first, then receivers in the order of the processes.
+//!
+//! Cost: written to be read; every call allocates.
+
+use std::cell::RefCell;
+
+use crate::exec::{
+    Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError,
+};
+use crate::ir::{ClockId, Edge, FixedConstraint, FunctionId, Guard, Network, Update, Urgency};
+
+use super::concrete::{Error, Part};
+
+/// Runs the code of a network on the interpreter.
+pub(super) struct Code<'a> {
+    network: &'a Network,
+    interpreter: Interpreter,
+    /// What the running call emits; kept to save allocations.
+    emitted: RefCell<(Vec<EmittedConstraint>, Vec<EmittedAssignment>)>,
+}
+
+/// An edge whose guard holds as far as words decide.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub(super) part: Part,
+    /// The channel, and whether the edge sends.
+    pub(super) sync: Option<(u32, bool)>,
+}
+
+/// A combination of edges that are taken together.
+#[derive(Clone, Debug)]
+pub(super) struct Combination {
+    /// The participants, the sender (or the only process) first.
+    pub(super) parts: Vec<Part>,
+    /// The channel.
+    pub(super) channel: Option<u32>,
+}
+
+impl<'a> Code<'a> {
+    pub(super) fn new(network: &'a Network) -> Code<'a> {
+        Code {
+            network,
+            interpreter: Interpreter::new(&network.functions, &network.constants),
+            emitted: RefCell::default(),
+        }
+    }
+
+    pub(super) fn network(&self) -> &'a Network {
+        self.network
+    }
+
+    /// The edge of a part.
+    pub(super) fn edge(&self, part: Part) -> &'a Edge {
+        &self.network.processes[part.process as usize].edges[part.edge as usize]
+    }
+
+    /// Whether time may pass in the location of a process.
+    pub(super) fn urgency(&self, process: usize, words: &[i32]) -> Urgency {
+        self.network.processes[process].locations[words[process] as usize].urgency
+    }
+
+    /// What the invariant of one process asks of the clocks; `None` if the words break it.
+    pub(super) fn invariant(
+        &self,
+        process: usize,
+        words: &[i32],
+    ) -> Result<Option<Vec<FixedConstraint>>, Error> {
+        let location = words[process] as usize;
+        let invariant = &self.network.processes[process].locations[location].invariant;
+        self.condition(invariant, &[], words)
+    }
+
+    /// What a guard asks of the clocks; `None` if the words break it.
+    fn condition(
+        &self,
+        guard: &Guard,
+        values: &[i32],
+        words: &[i32],
+    ) -> Result<Option<Vec<FixedConstraint>>, Error> {
+        let mut constraints = guard.fixed.clone();
+        if let Some(function) = guard.function {
+            if self.call(function, values, &mut words.to_vec())? == 0 {
+                return Ok(None);
+            }
+            let emitted = &self.emitted.borrow().0;
+            constraints.extend(emitted.iter().map(|one| FixedConstraint {
+                left: one.left,
+                right: one.right,
+                bound: one.bound,
+                strict: one.strict,
+            }));
+        }
+        Ok(Some(constraints))
+    }
+
+    /// The edges of a process whose guards hold as far as words decide, and whose clock constraints are accepted.
+    pub(super) fn candidates(
+        &self,
+        process: usize,
+        words: &[i32],
+        accepts: &dyn Fn(&[FixedConstraint]) -> bool,
+    ) -> Result<Vec<Candidate>, Error> {
+        let mut found = Vec::new();
+        let definition = &self.network.processes[process];
+        for &edge in &definition.locations[words[process] as usize].edges {
+            let definition = &definition.edges[edge.0 as usize];
+            for (select, values) in select_combinations(definition).iter().enumerate() {
+                let Some(guard) = self.condition(&definition.guard, values, words)? else {
+                    continue;
+                };
+                if !accepts(&guard) {
+                    continue;
+                }
+                let sync = match definition.sync {
+                    None => None,
+                    Some(sync) => {
+                        let offset = match sync.index {
+                            Some(index) => self.call(index, values, &mut words.to_vec())?,
+                            None => 0,
+                        };
+                        Some((sync.channel.0 + offset as u32, sync.send))
+                    }
+                };
+                let part = Part {
+                    process: process as u32,
+                    edge: edge.0,
+                    branch: 0,
+                    select: select as u32,
+                };
+                found.push(Candidate { part, sync });
+            }
+        }
+        Ok(found)
+    }
+
+    /// All combinations of candidates, given by process, that make a move.
+    pub(super) fn combinations(
+        &self,
+        candidates: &[Vec<Candidate>],
+        words: &[i32],
+    ) -> Vec<Combination> {
+        let mut found = Vec::new();
+        for (process, edges) in candidates.iter().enumerate() {
+            for one in edges {
+                match one.sync {
+                    None => self.push(&[one], &mut found),
+                    Some((channel, true)) => {
+                        self.synchronise(process, one, channel, candidates, &mut found);
+                    }
+                    Some((_, false)) => {}
+                }
+            }
+        }
+        let is_committed = |process: usize| self.urgency(process, words) == Urgency::Committed;
+        if (0..candidates.len()).any(is_committed) {
+            found.retain(|one| {
+                let mut parts = one.parts.iter();
+                parts.any(|part| is_committed(part.process as usize))
+            });
+        }
+        found
+    }
+
+    fn synchronise(
+        &self,
+        sender: usize,
+        send: &Candidate,
+        channel: u32,
+        candidates: &[Vec<Candidate>],
+        found: &mut Vec<Combination>,
+    ) {
+        let receiving = |process: usize| -> Vec<&Candidate> {
+            let edges = candidates[process].iter();
+            edges
+                .filter(|one| one.sync == Some((channel, false)))
+                .collect()
+        };
+        let others = (0..candidates.len()).filter(|&process| process != sender);
+        if !self.network.channels[channel as usize].broadcast {
+            for receive in others.flat_map(receiving) {
+                self.push(&[send, receive], found);
+            }
+            return;
+        }
+        let mut open = vec![vec![send]];
+        for choices in others.map(receiving).filter(|choices| !choices.is_empty()) {
+            open = open
+                .iter()
+                .flat_map(|taken| {
+                    choices.iter().map(|choice| {
+                        let mut taken = taken.clone();
+                        taken.push(*choice);
+                        taken
+                    })
+                })
+                .collect();
+        }
+        for taken in open {
+            self.push(&taken, found);
+        }
+    }
+
+    /// Adds a combination for each choice of branches, the last participant's fastest.
+    fn push(&self, participants: &[&Candidate], found: &mut Vec<Combination>) {
+        let mut choices: Vec<Vec<Part>> = vec![Vec::new()];
+        for one in participants {
+            let branches = 0..self.edge(one.part).branches.len() as u32;
+            choices = choices
+                .iter()
+                .flat_map(|parts| {
+                    branches.clone().map(|branch| {
+                        let mut parts = parts.clone();
+                        parts.push(Part { branch, ..one.part });
+                        parts
+                    })
+                })
+                .collect();
+        }
+        found.extend(choices.into_iter().map(|parts| Combination {
+            parts,
+            channel: participants[0].sync.map(|(channel, _)| channel),
+        }));
+    }
+
+    /// Takes a move on words; what it assigns to clocks, in order.
+    pub(super) fn take(
+        &self,
+        parts: &[Part],
+        words: &mut [i32],
+    ) -> Result<Vec<EmittedAssignment>, Error> {
+        let mut assignments = Vec::new();
+        if let Some(update) = &self.network.before_update {
+            self.update(update, &[], words, &mut assignments)?;
+        }
+        for &part in parts {
+            let edge = self.edge(part);
+            let values = &select_combinations(edge)[part.select as usize];
+            self.update(&edge.update, values, words, &mut assignments)?;
+            let branch = &edge.branches[part.branch as usize];
+            self.update(&branch.update, values, words, &mut assignments)?;
+        }
+        for &part in parts {
+            let target = self.edge(part).branches[part.branch as usize].target;
+            words[part.process as usize] = target.0 as i32;
+        }
+        if let Some(update) = &self.network.after_update {
+            self.update(update, &[], words, &mut assignments)?;
+        }
+        Ok(assignments)
+    }
+
+    fn update(
+        &self,
+        update: &Update,
+        values: &[i32],
+        words: &mut [i32],
+        assignments: &mut Vec<EmittedAssignment>,
+    ) -> Result<(), Error> {
+        if let Some(function) = update.function {
+            self.call(function, values, words)?;
+            assignments.extend_from_slice(&self.emitted.borrow().1);
+        }
+        for &(target, value) in &update.fixed {
+            assignments.push(EmittedAssignment {
+                target,
+                source: ClockId(0),
+                value,
+            });
+        }
+        Ok(())
+    }
+
+    /// The level of a combination: the priority of its channel, then the greatest of its processes.
+    pub(super) fn level(&self, parts: &[Part], channel: Option<u32>) -> (u32, u32) {
+        let network = self.network;
+        let of_channel = match channel {
+            Some(channel) => network.channels[channel as usize].priority,
+            None => network.features.default_priority,
+        };
+        let processes = parts.iter();
+        let processes = processes.map(|part| network.processes[part.process as usize].priority);
+        (of_channel, processes.max().unwrap_or(0))
+    }
+
+    /// The value of a function without parameters.
+    pub(super) fn value(&self, function: FunctionId, words: &[i32]) -> Result<i32, Error> {
+        self.call(function, &[], &mut words.to_vec())
+    }
+
+    /// Runs a function; what it emits is left in the buffers.
+    fn call(&self, function: FunctionId, values: &[i32], words: &mut [i32]) -> Result<i32, Error> {
+        let (constraints, assignments) = &mut *self.emitted.borrow_mut();
+        constraints.clear();
+        assignments.clear();
+        let mut context = Context {
+            state: words,
+            constraints,
+            assignments,
+        };
+        let result: Result<i32, RunTimeError> =
+            self.interpreter.call(function, values, &mut context);
+        Ok(result?)
+    }
+}
+
+/// All combinations of the select values of an edge, the last binding fastest.
+fn select_combinations(edge: &Edge) -> Vec<Vec<i32>> {
+    let mut combinations = vec![Vec::new()];
+    for select in &edge.select {
+        combinations = combinations
+            .iter()
+            .flat_map(|values: &Vec<i32>| {
+                (select.low..=select.high).map(|value| {
+                    let mut values = values.clone();
+                    values.push(value);
+                    values
+                })
+            })
+            .collect();
+    }
+    combinations
+}
