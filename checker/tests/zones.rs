@@ -10,7 +10,7 @@
 use checker::zones::clocks::{self, Assignment};
 use checker::zones::dbm::{self, Constraint};
 use checker::zones::extrapolate::{self, Ceilings};
-use checker::zones::{Bound, ClockSet, Federation, Relation, Zone, minimal, past};
+use checker::zones::{Bound, ClockSet, Federation, Relation, Zone, instants, minimal, past};
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
 
@@ -456,6 +456,24 @@ proptest! {
         check_zone(&past, seed, |point| {
             delays(zone.dimension()).any(|delay| contains(&zone, &delayed(point, delay, &ClockSet::EMPTY)))
         });
+    }
+
+    #[test]
+    fn instants_before_and_after_a_set_see_it_at_any_small_delay(
+        (federation, stopped) in dimensions().prop_flat_map(|dimension| (federations(dimension, 3), clock_sets(dimension))),
+        seed: u64,
+    ) {
+        let before = instants::before(&federation, &stopped);
+        let after = instants::after(&federation, &stopped);
+        // Points lie two steps apart, so a delay of one step is as good as any smaller one.
+        for point in points(federation.dimension(), seed) {
+            let is_in = |delay: i64| {
+                let moved = delayed(&point, delay, &stopped);
+                moved.iter().all(|&value| value >= 0) && federation_contains(&federation, &moved)
+            };
+            assert_eq!(federation_contains(&before, &point), is_in(1));
+            assert_eq!(federation_contains(&after, &point), is_in(-1));
+        }
     }
 
     #[test]

@@ -13,7 +13,8 @@
 //! * [`extrapolate`]: the abstractions that make the zone graph finite;
 //! * [`federation`]: finite unions of zones, with exact subtraction and inclusion;
 //! * [`past`]: the safe timed predecessors of timed games;
-//! * [`future`]: their mirror image, and delays that something stops.
+//! * [`future`]: their mirror image, and delays that something stops;
+//! * [`instants`]: what lies just before and just after a set.
 //!
 //! Sources: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, for the operations on zones;
 //! the others are named where they are used.
@@ -33,6 +34,7 @@ pub mod extrapolate;
 
 pub mod federation;
 pub mod future;
+pub mod instants;
 pub mod past;
 
 pub use bound::Bound;
