@@ -317,8 +317,8 @@ class Model:
             timeout_s: The search stops after this time.
             plans: Which winning sequences to list.
             max_plans: At most this many plans are listed.
-            strategy: Whether a winning strategy is wanted.
-            verify: Whether the strategy is to be checked against every move of the environment.
+            strategy: Whether the strategy of the player who wins is wanted.
+            verify: Whether the strategy is to be checked against every move of the opponent.
             trace: Whether witnesses and counterexamples get exact times, which an independent
                 replay checks. For ``sup``, ``inf`` and ``bounds`` this takes a second search.
             progress: Is called some twenty times a second with the numbers of explored,

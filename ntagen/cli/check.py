@@ -113,12 +113,13 @@ class _Outputs:
     "--strategy",
     metavar="FILE.json",
     type=click.Path(path_type=Path),
-    help="Write the strategy of the (last) satisfied control query.",
+    help="Write the winner's strategy of the (last) control query: the controller's, or how the "
+    "environment prevents it.",
 )
 @click.option(
     "--verify",
     is_flag=True,
-    help="Check strategies against every move of the environment, and replay traces at exact "
+    help="Check strategies against every move of the opponent, and replay traces at exact "
     "times, independently of the solver.",
 )
 @click.option(
@@ -343,7 +344,8 @@ def _write_evidence(
     strategy = answer.strategy_json() if outputs.strategy else None
     if outputs.strategy and strategy is not None:
         write_files({outputs.strategy: strategy + "\n"})
-        notes.append(f"strategy written to {outputs.strategy}")
+        whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
+        notes.append(f"{whose} written to {outputs.strategy}")
     if outputs.plans and answer.plan_count is not None:
         notes += _write_plans(answer, outputs.plans, outputs.ranking, scene)
     return notes

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use crate::exec::Executor;
+use crate::game::Player;
 use crate::game::graph::{Graph, Objective as GameObjective};
 use crate::game::plans::{NoPlans, Plan, Plans};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
@@ -45,7 +46,7 @@ pub enum Verdict {
 pub struct Evidence {
     /// Witnesses, counterexamples, or the way to a failure: one, or one a value.
     pub witnesses: Vec<Witness>,
-    /// A winning strategy, if it was wanted.
+    /// The strategy of the player who wins, if it was wanted.
     pub strategy: Option<Strategy>,
     /// How the check of the strategy ended, if it was wanted.
     pub verification: Option<Verification>,
@@ -122,9 +123,10 @@ pub(super) fn unsupported_game(
         _ if cooperative => Some("E<> control:"),
         _ if time_optimal => Some("control_t*"),
         _ if observations => Some("partial observation"),
-        Objective::Reach(_) | Objective::Until(..) => None,
-        Objective::Safe(_) => Some("control: A[]"),
-        Objective::WeakUntil(..) => Some("control: A[ W ]"),
+        Objective::Reach(_)
+        | Objective::Until(..)
+        | Objective::Safe(_)
+        | Objective::WeakUntil(..) => None,
         Objective::Buchi(..) => Some("control: A[] (p && A<> q)"),
     }
 }
@@ -532,17 +534,19 @@ fn game(
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let (goal, keep) = match objective {
-        Objective::Reach(goal) => (goal, None),
-        Objective::Until(keep, goal) => (goal, Some(keep)),
-        _ => unreachable!("unsupported objectives were refused"),
+    let (goal, keep, seeker) = match objective {
+        Objective::Reach(goal) => (Some(goal), None, Player::Controller),
+        Objective::Until(keep, goal) => (Some(goal), Some(keep), Player::Controller),
+        Objective::Safe(keep) => (None, Some(keep), Player::Environment),
+        Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Player::Environment),
+        Objective::Buchi(..) => unreachable!("unsupported objectives were refused"),
     };
-    let predicates: Vec<&Predicate> = std::iter::once(goal).chain(keep).collect();
+    let predicates: Vec<&Predicate> = goal.into_iter().chain(keep).collect();
     let mut symbolic = game_symbolic(network, executor, &predicates);
     let wanted = GameObjective {
-        goal: Some(goal),
+        goal,
         keep,
-        must_progress: true,
+        must_progress: seeker == Player::Controller,
     };
     let mut graph = match Graph::new(&mut symbolic, wanted) {
         Ok(graph) => graph,
@@ -554,57 +558,71 @@ fn game(
             );
         }
     };
-    let mut solver = Solver::new(&mut graph, options.forced);
-    let extent = if let PlansWanted::All(_) = options.plans {
-        Extent::Everything
-    } else {
-        Extent::Verdict
+    let mut solver = Solver::new(&mut graph, seeker, options.forced);
+    let is_planned = options.plans != PlansWanted::No && seeker == Player::Controller;
+    let extent = match options.plans {
+        PlansWanted::All(_) if is_planned => Extent::Everything,
+        _ => Extent::Verdict,
     };
     let result = solver.solve(extent, watch);
     let counters = solver.counters();
-    match result {
-        Ok(GameAnswer::Winning) => {
-            let mut answer = won(&mut solver, options, counters);
-            if options.verify
-                && let Some(strategy) = &answer.evidence.strategy
-            {
-                let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
-                let decisions = verification::decisions(network, strategy);
-                let verification =
-                    verification::verify(network, objective, &decisions, options.forced, most);
-                answer.evidence.verification = Some(verification);
-            }
-            answer
-        }
-        Ok(GameAnswer::NotWinning) => {
-            let evidence = Evidence {
-                plans: no_plans(options),
-                ..Evidence::default()
-            };
-            new_answer(Verdict::NotSatisfied, evidence, counters)
-        }
+    let winner = match result {
+        Ok(GameAnswer::Won(winner)) => winner,
         Ok(GameAnswer::Stopped(reason)) => {
-            new_answer(Verdict::Unknown(reason), Evidence::default(), counters)
+            return new_answer(Verdict::Unknown(reason), Evidence::default(), counters);
         }
-        Err(failure) => new_answer(Verdict::Error(failure), Evidence::default(), counters),
+        Err(failure) => {
+            return new_answer(Verdict::Error(failure), Evidence::default(), counters);
+        }
+    };
+    // Beside stopped clocks the past of a zone may be too large, so that nobody is known to win.
+    if solver.graph.symbolic.is_approximate() {
+        return new_answer(Verdict::Maybe, Evidence::default(), counters);
     }
-}
-
-fn no_plans(options: &Options) -> Option<Vec<Plan>> {
-    (options.plans != PlansWanted::No).then(Vec::new)
-}
-
-/// The answer for a won game, with the evidence that is wanted.
-fn won(solver: &mut Solver<'_, '_, '_>, options: &Options, counters: Counters) -> Answer {
-    let mut answer = new_answer(Verdict::Satisfied, Evidence::default(), counters);
+    let verdict = match winner {
+        Player::Controller => Verdict::Satisfied,
+        Player::Environment => Verdict::NotSatisfied,
+    };
+    let mut answer = new_answer(verdict, Evidence::default(), counters);
+    if is_planned {
+        add_plans(&mut answer, &mut solver, options);
+    }
     if options.strategy || options.verify {
-        match strategy::extract(solver) {
-            Ok(strategy) => answer.evidence.strategy = Some(strategy),
+        match strategy::extract(&mut solver) {
+            Ok(strategy) => {
+                if options.verify {
+                    let verification = verified(network, objective, &strategy, options);
+                    answer.evidence.verification = Some(verification);
+                }
+                answer.evidence.strategy = Some(strategy);
+            }
             Err(failure) => answer.verdict = Verdict::Error(failure),
         }
     }
+    answer
+}
+
+/// Checks a strategy in closed loop.
+fn verified(
+    network: &Network,
+    objective: &Objective,
+    strategy: &Strategy,
+    options: &Options,
+) -> Verification {
+    let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
+    let decisions = verification::decisions(network, strategy);
+    let played = (&decisions[..], strategy.owner, strategy.selection);
+    verification::verify(network, objective, played, options.forced, most)
+}
+
+/// Adds the plans that are wanted to the answer for a solved game.
+fn add_plans(answer: &mut Answer, solver: &mut Solver<'_, '_, '_>, options: &Options) {
     let most = match options.plans {
-        PlansWanted::No => return answer,
+        PlansWanted::No => return,
+        _ if answer.verdict == Verdict::NotSatisfied => {
+            answer.evidence.plans = Some(Vec::new());
+            return;
+        }
         PlansWanted::First => 1,
         PlansWanted::All(most) => most,
     };
@@ -619,7 +637,6 @@ fn won(solver: &mut Solver<'_, '_, '_>, options: &Options, counters: Counters) -
         }
         Err(failure) => answer.verdict = Verdict::Error(failure),
     }
-    answer
 }
 
 /// At most this many plans, and whether there are more.

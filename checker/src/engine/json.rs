@@ -1,14 +1,17 @@
 //! Answers as JSON: traces, strategies and plans in the words of the model.
 //!
-//! A strategy file has `format` "ntagen-strategy" and `version` 1. Its `states` each have `locations` by process, `variables`
-//! (those that some update writes), and `decisions` in order: the first whose `zones` hold for the clock values applies. A
+//! A strategy file has `format` "ntagen-strategy" and `version` 1. `owner` is "controller" or "environment": who wins, and plays by it.
+//! Its `states` each have `locations` by process, `variables` (those that some update writes), and `decisions` in order. With
+//! `selection` "first" the first decision whose `zones` hold for the clock values applies; with "any" each that does is allowed. A
 //! zone is a list of constraints that all hold; an empty list of constraints always holds. `action` is a list of edges, or null
-//! for waiting. `rank` never grows along a play and is 0 at the goal.
+//! for waiting: letting time pass, and the opponent move. `goal` says that play has ended in the state, won. `rank` never grows along
+//! a play and is 0 at what is sought; it is 0 everywhere in strategies that only avoid something.
 
 use serde_json::{Map, Value as Json, json};
 
+use crate::game::Player;
 use crate::game::plans::Plan;
-use crate::game::strategy::{Decision, Strategy};
+use crate::game::strategy::{Decision, Selection, Strategy};
 use crate::ir::Network;
 use crate::network::Part;
 use crate::search::StateStore;
@@ -217,7 +220,20 @@ pub fn strategy(network: &Network, strategy: &Strategy, query: &str) -> Json {
         })
     });
     let states: Vec<Json> = states.collect();
-    json!({ "format": "ntagen-strategy", "version": 1, "query": query, "states": states })
+    json!({
+        "format": "ntagen-strategy",
+        "version": 1,
+        "query": query,
+        "owner": match strategy.owner {
+            Player::Controller => "controller",
+            Player::Environment => "environment",
+        },
+        "selection": match strategy.selection {
+            Selection::First => "first",
+            Selection::Any => "any",
+        },
+        "states": states,
+    })
 }
 
 fn decision(network: &Network, decision: &Decision) -> Json {

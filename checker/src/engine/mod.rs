@@ -32,7 +32,8 @@ pub use answer::{Answer, Evidence, Verdict};
 pub use limits::Limits;
 pub use verification::Verification;
 
-use crate::game::Forced;
+use crate::game::strategy::Selection;
+use crate::game::{Forced, Player};
 use crate::search::reach::Order;
 
 /// Codes of what the engine refuses to answer although the model is right.
@@ -266,11 +267,12 @@ impl LoadedModel {
         code.executor()
     }
 
-    /// Checks decisions for a control query in closed loop, wherever they come from.
+    /// Checks in closed loop that decisions for a control query win, wherever they come from: those of which player, and
+    /// which of several that apply counts.
     pub fn verify_strategy(
         &mut self,
         text: &QueryText,
-        strategy: &[Decisions],
+        strategy: (&[Decisions], Player, Selection),
         forced: Forced,
         most_regions: u64,
     ) -> Result<Verification, Rejection> {
@@ -376,7 +378,7 @@ impl LoadedModel {
                 query.span,
                 format!("{kind} are not supported"),
             )
-            .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, and control: with A<> or A[ U ]")
+            .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, and control: with A<>, A[], A[ U ] or A[ W ]")
         } else if let Some(construct) = construct {
             Diagnostic::new(
                 codes::UNSUPPORTED_CONSTRUCT,

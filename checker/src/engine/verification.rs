@@ -1,12 +1,12 @@
 //! From a strategy of the solver to the independent check, and from its outcome to words.
 
-use crate::game::Forced;
-use crate::game::strategy::{Decision, Strategy};
+use crate::game::strategy::{Decision, Selection, Strategy};
+use crate::game::{Forced, Player};
 use crate::ir::{Network, Objective, Predicate};
 use crate::network::{Part, predicate};
 use crate::search::StateStore;
 use crate::verify::strategy::{
-    self, Claim, Constraint, Decisions, Defect, Forcing, Step, Violation,
+    self, Aim, Claim, Constraint, Decisions, Defect, Forcing, Owner, Step, Violation,
 };
 use crate::verify::{self, regions};
 use crate::zones::{Bound, Federation, minimal};
@@ -19,21 +19,29 @@ pub const MOST_REGIONS: u64 = 2_000_000;
 /// How the check of a strategy ended; an error says why it could not be done.
 pub type Verification = Result<strategy::Outcome, verify::Error>;
 
-/// Checks a strategy for reachability in closed loop. The network must hold the code of the objective.
+/// Checks that the owner of a strategy wins, in closed loop. The network must hold the code of the objective.
 pub fn verify(
     network: &Network,
     objective: &Objective,
-    strategy: &[Decisions],
+    (strategy, owner, selection): (&[Decisions], Player, Selection),
     forced: Forced,
     most_regions: u64,
 ) -> Verification {
-    let (goal, keep) = match objective {
-        Objective::Reach(goal) => (goal, None),
-        Objective::Until(keep, goal) => (goal, Some(keep)),
-        _ => return Err(verify::Error::Unsupported("objectives without a goal")),
+    let (goal, keep, aim) = match objective {
+        Objective::Reach(goal) => (Some(goal), None, Aim::Reach),
+        Objective::Until(keep, goal) => (Some(goal), Some(keep), Aim::Reach),
+        Objective::Safe(keep) => (None, Some(keep), Aim::Keep),
+        Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Aim::Keep),
+        Objective::Buchi(..) => return Err(verify::Error::Unsupported("Büchi objectives")),
     };
-    let (constant, has_differences) = constants(goal, keep);
+    let (constant, has_differences) = constants(goal.into_iter().chain(keep));
     let claim = Claim {
+        owner: match owner {
+            Player::Controller => Owner::Controller,
+            Player::Environment => Owner::Environment,
+        },
+        is_permissive: selection == Selection::Any,
+        aim,
         goal,
         keep,
         forcing: match forced {
@@ -47,8 +55,7 @@ pub fn verify(
     strategy::verify(network, strategy, &claim, most_regions)
 }
 
-fn constants(goal: &Predicate, keep: Option<&Predicate>) -> (i64, bool) {
-    let predicates = std::iter::once(goal).chain(keep);
+fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> (i64, bool) {
     let atoms: Vec<_> = predicates.flat_map(predicate::atoms).collect();
     let constant = atoms.iter().map(regions::greatest_constant).max();
     let has_differences = atoms
@@ -129,7 +136,7 @@ fn zones(federation: &Federation) -> Vec<Vec<Constraint>> {
 pub fn describe(network: &Network, verification: &Verification) -> Vec<String> {
     match verification {
         Ok(strategy::Outcome::Verified(coverage)) => vec![format!(
-            "strategy verified: {} regions, {} moves of the controller, {} of the environment, {} ends in the goal",
+            "strategy verified: {} regions, {} moves of its own, {} of the opponent, {} ends that are won",
             coverage.regions, coverage.own_moves, coverage.opponent_moves, coverage.goals
         )],
         Ok(strategy::Outcome::TooLarge(coverage)) => vec![format!(
@@ -151,8 +158,9 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
         Defect::NoDecision => "it has no decision here",
         Defect::ImpossibleAction => "its action is not possible here",
         Defect::Broken => "what must be kept does not hold here",
-        Defect::Stuck => "it waits where time cannot pass and nobody must move",
-        Defect::Endless => "the run goes on for ever without the goal",
+        Defect::GoalReached => "the goal of the controller holds here",
+        Defect::Stuck => "it waits where time cannot pass and it may not",
+        Defect::Endless => "the run goes on for ever without what the strategy is for",
     };
     let mut lines = vec![format!("strategy violated: {defect}")];
     for (index, state) in violation.states.iter().enumerate() {

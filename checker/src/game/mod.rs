@@ -3,11 +3,38 @@
 //! The controller owns a move if all participating edges are controllable; all other moves are the environment's. The
 //! environment is faster: where both can move at the same instant, it may.
 
+mod evasion;
 pub mod graph;
 pub mod plans;
 pub mod programs;
 pub mod reach;
+mod stops;
 pub mod strategy;
+
+/// Who plays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Player {
+    /// The one for whom a control query asks.
+    Controller,
+    /// Its opponent.
+    Environment,
+}
+
+impl Player {
+    /// The other one.
+    #[must_use]
+    pub fn opponent(self) -> Player {
+        match self {
+            Player::Controller => Player::Environment,
+            Player::Environment => Player::Controller,
+        }
+    }
+
+    /// Whether the player owns a move that is, or is not, controllable.
+    pub fn owns(self, controllable: bool) -> bool {
+        controllable == (self == Player::Controller)
+    }
+}
 
 /// What happens at a point where time cannot pass and the environment has a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -1,7 +1,10 @@
-//! Reachability games: can the controller force the goal, keeping what must be kept until then?
+//! Attractor games: can one player, the *seeker*, force play into a set, whatever the other one, the *evader*, does?
 //!
-//! The algorithm is on the fly and goes forward and backward in turns. Forward, nodes are expanded; backward, the winning
-//! valuations of a node are computed anew when those of a successor have grown:
+//! For reachability the controller seeks the goal. For safety the environment seeks a valuation in which what must be kept is
+//! broken; the controller wins where it does not get there. In both, play ends in the goal, if there is one.
+//!
+//! The algorithm is on the fly and goes forward and backward in turns. Forward, nodes are expanded; backward, the valuations of a
+//! node from which the seeker wins are computed anew when those of a successor have grown. For the controller as the seeker:
 //!
 //! ```text
 //! good   = goal ∪ ⋃ Pre_c(win)                     what the controller can reach by a move
@@ -10,9 +13,19 @@
 //! win    = Pred_t(good ∪ forced, bad)              wait into good without meeting bad
 //! ```
 //!
-//! A move of the environment into a node that is not explored counts as lost, so every intermediate result is sound, and the
-//! search ends as soon as the initial valuation is winning. Each gain is recorded with a stamp: a strategy that moves from
-//! valuations of one stamp into those of smaller ones makes progress.
+//! For the environment, which is faster, and whose opponent must move where time stops and only the controller can:
+//!
+//! ```text
+//! now    = broken ∪ ⋃ Pre_u(win), less goal        what the environment has at once, whatever the controller does
+//! escape = ⋃ Pre_c(not win), less now              where the controller gets away
+//! held   = stop ∩ ⋃ enabled_c, less ⋃ enabled_u and escape
+//! win    = Pred_t(now ∪ held, escape ∪ goal)
+//! ```
+//!
+//! A move of the evader into a node that is not explored counts as an escape, so every intermediate result is sound, and the
+//! search ends as soon as the initial valuation is won. Each gain is recorded with a stamp: a strategy that moves from
+//! valuations of one stamp into those of smaller ones makes progress. Where the seeker wins nowhere any more, the evader has only
+//! to stay outside of what is won.
 //!
 //! Forward, the solver dives: it follows the first moves of newly made nodes as far as they go, then takes up the oldest node that
 //! waits and dives from there. Ways with few departures from the first moves so come first (W. D. Harvey, M. L. Ginsberg, "Limited
@@ -30,13 +43,13 @@ use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::{ClockSet, Federation, past};
 
-use super::Forced;
 use super::graph::{Edge, Graph, NONE, Standing};
+use super::{Forced, Player};
 
 /// Expanded nodes between two looks at the limits.
 const LOOK_EVERY: u64 = 64;
 
-/// The winning valuations of a node.
+/// The valuations of a node from which the seeker wins.
 #[derive(Clone, Debug)]
 pub enum Win {
     /// None, as far as known.
@@ -68,10 +81,8 @@ pub enum Extent {
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// The controller wins from the initial valuation.
-    Winning,
-    /// It does not.
-    NotWinning,
+    /// This player wins from the initial valuation.
+    Won(Player),
     /// A limit came first.
     Stopped(StopReason),
 }
@@ -80,11 +91,13 @@ pub enum Answer {
 pub struct Solver<'g, 's, 'a> {
     /// The graph.
     pub graph: &'g mut Graph<'s, 'a>,
-    /// By node: the winning valuations.
+    /// Who seeks.
+    pub seeker: Player,
+    /// By node: the valuations from which the seeker wins.
     pub win: Vec<Win>,
-    /// By node: the gains, by ascending stamp. Goals have stamp 0.
+    /// By node: the gains, by ascending stamp. What is sought has stamp 0.
     pub gains: Vec<Vec<Gain>>,
-    forced: Forced,
+    pub(super) forced: Forced,
     stamp: u32,
     /// Nodes to be expanded, the oldest first.
     waiting: VecDeque<u32>,
@@ -97,9 +110,10 @@ pub struct Solver<'g, 's, 'a> {
 
 impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// A solver that has looked at the initial node only.
-    pub fn new(graph: &'g mut Graph<'s, 'a>, forced: Forced) -> Solver<'g, 's, 'a> {
+    pub fn new(graph: &'g mut Graph<'s, 'a>, seeker: Player, forced: Forced) -> Solver<'g, 's, 'a> {
         let mut solver = Solver {
             graph,
+            seeker,
             win: Vec::new(),
             gains: Vec::new(),
             forced,
@@ -133,8 +147,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 self.is_updated[node as usize] = false;
                 self.update(node)?;
             }
-            if extent == Extent::Verdict && self.is_winning()? {
-                return Ok(Answer::Winning);
+            if extent == Extent::Verdict && self.is_won() {
+                break;
             }
             let Some(node) = self.next_waiting() else {
                 break;
@@ -153,11 +167,12 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 }
             }
         }
-        Ok(if self.is_winning()? {
-            Answer::Winning
+        let winner = if self.is_won() {
+            self.seeker
         } else {
-            Answer::NotWinning
-        })
+            self.seeker.opponent()
+        };
+        Ok(Answer::Won(winner))
     }
 
     fn next_waiting(&mut self) -> Option<u32> {
@@ -168,22 +183,16 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    /// Whether the initial valuation is winning.
-    pub fn is_winning(&mut self) -> Result<bool, Failure> {
+    /// Whether the seeker wins from the initial valuation.
+    pub fn is_won(&self) -> bool {
         match &self.win[0] {
-            Win::Nothing => Ok(false),
-            Win::Everything => Ok(true),
+            Win::Nothing => false,
+            Win::Everything => true,
             Win::Part(part) => {
-                let values: Vec<i64> = self
-                    .graph
-                    .symbolic
-                    .stepper
-                    .network()
-                    .initial_clocks
-                    .iter()
-                    .map(|&value| i64::from(value))
-                    .collect();
-                Ok(part.contains(&values, 1))
+                let network = self.graph.symbolic.stepper.network();
+                let values = network.initial_clocks.iter();
+                let values: Vec<i64> = values.map(|&value| i64::from(value)).collect();
+                part.contains(&values, 1)
             }
         }
     }
@@ -219,32 +228,20 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         Ok(())
     }
 
-    /// Gives nodes that were just made their place: goals are won from the start.
+    /// Gives nodes that were just made their place: what is sought is won from the start.
     fn adopt_new_nodes(&mut self) {
         for node in self.win.len()..self.graph.nodes.len() {
-            let (win, gains) = match self.graph.nodes[node].standing {
-                Standing::Goal => (
-                    Win::Everything,
-                    vec![Gain {
-                        stamp: 0,
-                        part: None,
-                    }],
-                ),
-                Standing::Open | Standing::Broken => (Win::Nothing, Vec::new()),
-                Standing::Mixed => match self
-                    .graph
-                    .parts(node as u32)
-                    .map(|parts| parts.goal.clone())
-                {
-                    Some(goal) if !goal.is_empty() => (
-                        Win::Part(goal.clone()),
-                        vec![Gain {
-                            stamp: 0,
-                            part: Some(goal),
-                        }],
-                    ),
-                    _ => (Win::Nothing, Vec::new()),
-                },
+            let win = self.sought(node as u32);
+            let gains = match &win {
+                Win::Nothing => Vec::new(),
+                Win::Everything => vec![Gain {
+                    stamp: 0,
+                    part: None,
+                }],
+                Win::Part(part) => vec![Gain {
+                    stamp: 0,
+                    part: Some(part.clone()),
+                }],
             };
             self.win.push(win);
             self.gains.push(gains);
@@ -254,6 +251,37 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 self.wait_for(0);
             }
         }
+    }
+
+    /// The valuations of a node that the seeker wants to get to.
+    fn sought(&self, node: u32) -> Win {
+        let part = match (self.graph.nodes[node as usize].standing, self.seeker) {
+            (Standing::Goal, Player::Controller) | (Standing::Broken, Player::Environment) => {
+                return Win::Everything;
+            }
+            (Standing::Mixed, Player::Controller) => self.goal(node),
+            (Standing::Mixed, Player::Environment) => self.broken(node),
+            _ => return Win::Nothing,
+        };
+        if part.is_empty() {
+            Win::Nothing
+        } else {
+            Win::Part(part)
+        }
+    }
+
+    /// Where the goal holds in a node that is neither a goal nor broken as a whole.
+    pub(super) fn goal(&self, node: u32) -> Federation {
+        let none = || Federation::empty(self.graph.dimension());
+        let parts = self.graph.parts(node);
+        parts.map_or_else(none, |parts| parts.goal.clone())
+    }
+
+    /// As [`Solver::goal`], where what must be kept does not hold, goals excepted.
+    pub(super) fn broken(&self, node: u32) -> Federation {
+        let none = || Federation::empty(self.graph.dimension());
+        let parts = self.graph.parts(node);
+        parts.map_or_else(none, |parts| parts.broken.clone())
     }
 
     /// Lets a node wait for its expansion unless it is decided.
@@ -325,17 +353,18 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     fn quick(&self, node: u32) -> Option<bool> {
         let mut can_move = false;
         let mut is_spoiled = false;
-        let mut has_opponent = false;
+        let mut has_evader = false;
         for index in self.graph.edges_of(node) {
             let edge = &self.graph.edges[index];
-            match (&self.win[edge.target as usize], edge.controllable) {
+            let is_own = self.seeker.owns(edge.controllable);
+            match (&self.win[edge.target as usize], is_own) {
                 (Win::Part(_), _) => return None,
                 (Win::Everything, true) => can_move |= edge.is_total,
                 (Win::Nothing, true) => {}
                 (Win::Everything, false) if edge.length > 1 && !edge.is_total => return None,
-                (Win::Everything, false) => has_opponent = true,
+                (Win::Everything, false) => has_evader = true,
                 (Win::Nothing, false) => {
-                    has_opponent = true;
+                    has_evader = true;
                     is_spoiled = true;
                 }
             }
@@ -343,59 +372,28 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         if self.graph.nodes[node as usize].standing != Standing::Open {
             return None;
         }
-        if can_move && !is_spoiled {
+        if can_move && (!is_spoiled || self.seeker == Player::Environment) {
             return Some(true);
         }
         let wins_nothing = |index: usize| {
             let edge = &self.graph.edges[index];
             !matches!(self.win[edge.target as usize], Win::Everything)
         };
-        // Without a winning move and without an opponent that could be forced, there is nothing to gain.
-        if self.graph.edges_of(node).all(wins_nothing) && (!has_opponent || is_spoiled) {
+        // Without a winning move and without an evader that could be forced, there is nothing to gain.
+        if self.graph.edges_of(node).all(wins_nothing) && (!has_evader || is_spoiled) {
             return Some(false);
         }
         None
     }
 
-    /// The winning valuations of a node; `None` if they did not grow.
+    /// The won valuations of a node; `None` if they did not grow.
     fn grown(&mut self, node: u32) -> Result<Option<Win>, Failure> {
-        let dimension = self.graph.dimension();
-        let mut good = match &self.win[node as usize] {
-            Win::Part(part) => part.clone(),
-            _ => Federation::empty(dimension),
+        let mut won = match self.seeker {
+            Player::Controller => self.controllers_gain(node)?,
+            Player::Environment => self.environments_gain(node)?,
         };
-        let goal = self
-            .graph
-            .parts(node)
-            .map_or_else(|| Federation::empty(dimension), |parts| parts.goal.clone());
-        let mut bad = self.graph.parts(node).map_or_else(
-            || Federation::empty(dimension),
-            |parts| parts.broken.clone(),
-        );
-        let mut opponent = Federation::empty(dimension);
-        for index in self.graph.edges_of(node) {
-            let edge = self.graph.edges[index];
-            if edge.controllable {
-                good.unite(&self.before(&edge, &self.win[edge.target as usize]));
-            } else {
-                bad.unite(&self.spoiling(&edge));
-                opponent.unite(&self.enabled(&edge));
-            }
-        }
-        bad.subtract(&goal);
-        let forced = self.forced(node, opponent, &bad)?;
-        good.unite(&forced);
-        let delays = self.graph.nodes[node as usize].delays;
-        let stopped = self.stopped(node)?;
-        let mut won = if delays {
-            past::predecessors(&good, &bad, &stopped)
-        } else {
-            good.subtract(&bad);
-            good
-        };
-        won.unite(&goal);
-        won.intersect_zone(self.graph.zone(node));
         let whole = self.graph.zone(node);
+        won.intersect_zone(whole);
         if won.is_empty() {
             return Ok(None);
         }
@@ -410,7 +408,75 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         Ok(is_new.then_some(Win::Part(won)))
     }
 
-    fn stopped(&mut self, node: u32) -> Result<ClockSet, Failure> {
+    /// What the controller wins as the seeker, as far as known.
+    fn controllers_gain(&mut self, node: u32) -> Result<Federation, Failure> {
+        let mut good = self.known(node);
+        let goal = self.goal(node);
+        let mut bad = self.broken(node);
+        for index in self.graph.edges_of(node) {
+            let edge = self.graph.edges[index];
+            if edge.controllable {
+                good.unite(&self.before(&edge, &self.win[edge.target as usize]));
+            } else {
+                bad.unite(&self.spoiling(&edge));
+            }
+        }
+        bad.subtract(&goal);
+        let forced = self.forced_environment(node, &bad)?;
+        good.unite(&forced);
+        let mut won = self.safe_past(node, good, &bad)?;
+        won.unite(&goal);
+        Ok(won)
+    }
+
+    /// What the environment wins as the seeker, as far as known.
+    fn environments_gain(&mut self, node: u32) -> Result<Federation, Failure> {
+        let goal = self.goal(node);
+        let mut now = self.broken(node);
+        let mut escape = Federation::empty(self.graph.dimension());
+        for index in self.graph.edges_of(node) {
+            let edge = self.graph.edges[index];
+            if edge.controllable {
+                escape.unite(&self.spoiling(&edge));
+            } else {
+                now.unite(&self.before(&edge, &self.win[edge.target as usize]));
+            }
+        }
+        now.subtract(&goal);
+        let mut good = self.forced_controller(node)?;
+        good.subtract(&escape);
+        good.unite(&now);
+        good.unite(&self.known(node));
+        escape.subtract(&now);
+        escape.unite(&goal);
+        self.safe_past(node, good, &escape)
+    }
+
+    /// What was won in a node so far, as far as it is a part of it.
+    fn known(&self, node: u32) -> Federation {
+        match &self.win[node as usize] {
+            Win::Part(part) => part.clone(),
+            _ => Federation::empty(self.graph.dimension()),
+        }
+    }
+
+    /// The valuations of a node that get into `good` without meeting `bad`, by waiting if time may pass.
+    pub(super) fn safe_past(
+        &mut self,
+        node: u32,
+        mut good: Federation,
+        bad: &Federation,
+    ) -> Result<Federation, Failure> {
+        if self.graph.nodes[node as usize].delays {
+            let stopped = self.stopped(node)?;
+            return Ok(past::predecessors(&good, bad, &stopped));
+        }
+        good.subtract(bad);
+        Ok(good)
+    }
+
+    /// The clocks that stand still in a node.
+    pub(super) fn stopped(&mut self, node: u32) -> Result<ClockSet, Failure> {
         let mut words = self.graph.symbolic.stepper.network().initial.clone();
         self.graph.load(node, &mut words);
         self.graph.symbolic.stopped(&words)
@@ -433,7 +499,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     }
 
     /// The valuations of an edge's source in which its first move is possible.
-    fn enabled(&self, edge: &Edge) -> Federation {
+    pub(super) fn enabled(&self, edge: &Edge) -> Federation {
         self.graph.programs.enabled(
             edge.program,
             self.graph.zone(edge.source),
@@ -441,9 +507,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         )
     }
 
-    /// The valuations from which a move of the environment is not known to lead into winning ones. In a chain the controller
-    /// may still wait well or get stuck, so there it is what is not led into winning valuations.
-    fn spoiling(&self, edge: &Edge) -> Federation {
+    /// The valuations from which a move of the evader is not known to lead into won ones. In a chain somebody may still wait or
+    /// get stuck, so there it is what is not led into won valuations.
+    pub(super) fn spoiling(&self, edge: &Edge) -> Federation {
         if edge.length == 1 {
             return self.before(edge, &self.lost(edge.target));
         }
@@ -452,8 +518,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         spoiling
     }
 
-    /// The valuations of a node that are not known to be winning.
-    fn lost(&self, node: u32) -> Win {
+    /// The valuations of a node that are not known to be won.
+    pub(super) fn lost(&self, node: u32) -> Win {
         match &self.win[node as usize] {
             Win::Nothing => Win::Everything,
             Win::Everything => Win::Nothing,
@@ -463,85 +529,5 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 Win::Part(rest)
             }
         }
-    }
-
-    /// The valuations in which time stops, the environment has a move, and must take one.
-    fn forced(
-        &mut self,
-        node: u32,
-        opponent: Federation,
-        bad: &Federation,
-    ) -> Result<Federation, Failure> {
-        if opponent.is_empty() {
-            return Ok(opponent);
-        }
-        let mut words = self.graph.symbolic.stepper.network().initial.clone();
-        self.graph.load(node, &mut words);
-        let mut stops = self.stops(node, &mut words)?;
-        let mut all = Federation::empty(self.graph.dimension());
-        for (component, stop) in &mut stops {
-            *stop = stop.intersection(&opponent);
-            stop.subtract(bad);
-            for (mover, edge) in self.controllable_movers(node, &mut words)? {
-                let blocks = match (self.forced, *component) {
-                    (Forced::Neutral, _) => false,
-                    (Forced::Tiga, Some(component)) => mover.contains(&component),
-                    (Forced::Product, _) | (Forced::Tiga, None) => true,
-                };
-                if blocks {
-                    stop.subtract(&self.enabled(&self.graph.edges[edge]));
-                }
-            }
-            all.unite(stop);
-        }
-        Ok(all)
-    }
-
-    /// The valuations in which time cannot pass, with the process that stops it (`None`: an urgent channel).
-    fn stops(
-        &mut self,
-        node: u32,
-        words: &mut [i32],
-    ) -> Result<Vec<(Option<u32>, Federation)>, Failure> {
-        let dimension = self.graph.dimension();
-        let whole = Federation::of_zone(dimension, self.graph.zone(node));
-        let network = self.graph.symbolic.stepper.network();
-        let mut stops = Vec::new();
-        for (index, process) in network.processes.iter().enumerate() {
-            let urgency = process.locations[words[index] as usize].urgency;
-            if urgency != crate::ir::Urgency::Normal {
-                stops.push((Some(index as u32), whole.clone()));
-            }
-        }
-        if stops.is_empty() && !self.graph.nodes[node as usize].delays {
-            stops.push((None, whole));
-        }
-        let stopped = self.graph.symbolic.stopped(words)?;
-        for (process, bound) in self.graph.symbolic.upper_bounds(words)? {
-            let mut faces = Federation::empty(dimension);
-            faces.add_upper_faces(self.graph.zone(node), &[bound], &stopped);
-            stops.push((Some(process), faces));
-        }
-        Ok(stops)
-    }
-
-    /// The controllable edges of a node, each with the processes that take part in its first move.
-    fn controllable_movers(
-        &mut self,
-        node: u32,
-        words: &mut [i32],
-    ) -> Result<Vec<(Vec<u32>, usize)>, Failure> {
-        let mut moves = crate::network::Moves::default();
-        self.graph.symbolic.stepper.moves(words, &mut moves)?;
-        let edges = self
-            .graph
-            .edges_of(node)
-            .filter(|&index| self.graph.edges[index].controllable);
-        Ok(edges
-            .map(|index| {
-                let parts = moves.get(self.graph.edges[index].ordinal as usize).parts;
-                (parts.iter().map(|part| part.process).collect(), index)
-            })
-            .collect())
     }
 }

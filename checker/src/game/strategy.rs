@@ -1,11 +1,18 @@
-//! Strategies: what the controller does, state by state.
+//! Strategies: what a player does, state by state.
 //!
-//! A strategy lists, for each discrete state that play under it can reach, decisions in order: the first decision whose zones
-//! contain the clock values applies. A decision is a move, or to wait. States inside chains of forced moves are listed too,
-//! so that a strategy can be followed, and checked, move by move.
+//! A strategy lists, for each discrete state that play under it can reach, decisions. A decision is a move of its owner, or to
+//! wait: let time pass as long as the zones of the decision go, and leave moving to the opponent. States inside chains of forced
+//! moves are listed too, so that a strategy can be followed, and checked, move by move. Where play has ended there is nothing to
+//! decide.
 //!
-//! For reachability the strategy follows the stamps of the gains: from valuations of stamp k it moves only into valuations of
-//! smaller stamps, or waits for them; so it makes progress and ends in the goal.
+//! There are four kinds, by who wins and how:
+//! * The controller of a reachability game, and the environment of a safety game, follow the stamps of the gains: from valuations
+//!   of stamp k they move only into valuations of smaller stamps, or wait for them; so they make progress and get there.
+//! * The controller of a safety game may do whatever keeps it safe: its strategy allows all such moves and all such waiting. It is
+//!   the most permissive one, with one choice made: where what is safe has no last moment, and a move must be made before, it is
+//!   made in the last stretch of time in which it is possible.
+//! * The environment of a reachability game that it wins moves where that leads to what the controller does not win, and else
+//!   waits: it never gets under pressure there.
 //!
 //! Source: Cassez et al., CONCUR 2005, section 5 (strategies from the order in which winning states were found).
 
@@ -13,6 +20,8 @@ use crate::network::{ClockEffect, Failure, Moves, Part};
 use crate::zones::dbm::Constraint;
 use crate::zones::{ClockSet, Federation};
 
+use super::Player;
+use super::evasion;
 use super::graph::{Edge, Standing};
 use super::reach::{Gain, Solver, Win};
 
@@ -23,7 +32,8 @@ pub struct Decision {
     pub zones: Federation,
     /// The move to take; `None` is to wait.
     pub action: Option<Vec<Part>>,
-    /// The rank of the valuations: moves between nodes lead to smaller ones, and inside chains it never grows. 0 is the goal.
+    /// The rank of the valuations: moves between nodes lead to smaller ones, and inside chains it never grows. 0 is where what was
+    /// sought is reached, and everywhere in a strategy that only has to avoid.
     pub rank: u32,
 }
 
@@ -34,36 +44,69 @@ pub struct StrategyState {
     pub words: Vec<i32>,
     /// The decisions, in order.
     pub decisions: Vec<Decision>,
-    /// Whether the play ends here because the goal holds.
+    /// Whether play has ended here, won, whatever the clocks say.
     pub is_goal: bool,
 }
 
+/// Which of the decisions that apply counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Selection {
+    /// The first.
+    First,
+    /// Any of them: each is allowed.
+    Any,
+}
+
 /// A strategy.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Strategy {
+    /// Who plays by it.
+    pub owner: Player,
+    /// Which of the decisions that apply counts. Decisions of states with the same words are one list, in the order of ranks.
+    pub selection: Selection,
     /// The states, the initial one first.
     pub states: Vec<StrategyState>,
 }
 
-/// Reads the strategy of a solved and winning game.
+/// Reads the strategy of the player who wins a solved game.
 pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
-    let mut strategy = Strategy::default();
+    let (owner, is_seeking) = if solver.is_won() {
+        (solver.seeker, true)
+    } else {
+        (solver.seeker.opponent(), false)
+    };
+    let mut strategy = Strategy {
+        owner,
+        selection: match owner {
+            Player::Controller if !is_seeking => Selection::Any,
+            _ => Selection::First,
+        },
+        states: Vec::new(),
+    };
     let mut seen = vec![false; solver.graph.nodes.len()];
     let mut waiting = vec![0_u32];
     seen[0] = true;
     while let Some(node) = waiting.pop() {
-        let (decisions, taken) = decisions(solver, node)?;
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);
-        let is_goal = solver.graph.nodes[node as usize].standing == Standing::Goal;
+        let (decisions, taken) = if is_seeking {
+            decisions(solver, node)?
+        } else {
+            evasion::decisions(solver, node)?
+        };
+        let standing = solver.graph.nodes[node as usize].standing;
         let source = words.clone();
         strategy.states.push(StrategyState {
             words,
             decisions,
-            is_goal,
+            is_goal: standing == won_standing(owner),
         });
         for edge in taken {
-            inner_states(solver, edge, &source, &mut strategy)?;
+            if is_seeking {
+                inner_states(solver, edge, &source, &mut strategy)?;
+            } else {
+                evasion::inner_states(solver, edge, &source, &mut strategy)?;
+            }
             let target = solver.graph.edges[edge as usize].target;
             if !std::mem::replace(&mut seen[target as usize], true) {
                 waiting.push(target);
@@ -73,6 +116,14 @@ pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
     Ok(strategy)
 }
 
+/// The nodes in which play has ended in favour of a player.
+fn won_standing(owner: Player) -> Standing {
+    match owner {
+        Player::Controller => Standing::Goal,
+        Player::Environment => Standing::Broken,
+    }
+}
+
 /// The decisions in a node, and the edges that play may take from it.
 fn decisions(
     solver: &mut Solver<'_, '_, '_>,
@@ -80,7 +131,7 @@ fn decisions(
 ) -> Result<(Vec<Decision>, Vec<u32>), Failure> {
     let mut decisions = Vec::new();
     let mut taken = Vec::new();
-    if solver.graph.nodes[node as usize].standing == Standing::Goal {
+    if solver.graph.nodes[node as usize].standing == won_standing(solver.seeker) {
         return Ok((decisions, taken));
     }
     let moves = moves_of(solver, node)?;
@@ -89,7 +140,7 @@ fn decisions(
         if gain.stamp > 0 {
             for edge in solver.graph.edges_of(node) {
                 let edge_data = solver.graph.edges[edge];
-                if !edge_data.controllable {
+                if !solver.seeker.owns(edge_data.controllable) {
                     continue;
                 }
                 let earlier = won_before(solver, edge_data.target, gain.stamp);
@@ -118,12 +169,12 @@ fn decisions(
     let opponent = solver
         .graph
         .edges_of(node)
-        .filter(|&edge| !solver.graph.edges[edge].controllable);
+        .filter(|&edge| !solver.seeker.owns(solver.graph.edges[edge].controllable));
     taken.extend(opponent.map(|edge| edge as u32));
     Ok((decisions, taken))
 }
 
-fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Moves, Failure> {
+pub(super) fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Moves, Failure> {
     let mut words = solver.graph.symbolic.stepper.network().initial.clone();
     solver.graph.load(node, &mut words);
     let mut moves = Moves::default();
@@ -135,7 +186,11 @@ fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Moves, Failure
     Ok(moves)
 }
 
-fn whole_or_part(solver: &Solver<'_, '_, '_>, node: u32, part: Option<&Federation>) -> Federation {
+pub(super) fn whole_or_part(
+    solver: &Solver<'_, '_, '_>,
+    node: u32,
+    part: Option<&Federation>,
+) -> Federation {
     match part {
         Some(part) => part.clone(),
         None => Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node)),
@@ -163,15 +218,15 @@ fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
 }
 
 /// A state inside a chain, with its only move.
-struct Inner {
-    words: Vec<i32>,
-    parts: Vec<Part>,
-    controllable: bool,
+pub(super) struct Inner {
+    pub(super) words: Vec<i32>,
+    pub(super) parts: Vec<Part>,
+    pub(super) controllable: bool,
     /// Whether time may pass before the move.
-    delays: bool,
+    pub(super) delays: bool,
     /// The invariant of the state.
-    invariant: Vec<Constraint>,
-    effect: ClockEffect,
+    pub(super) invariant: Vec<Constraint>,
+    pub(super) effect: ClockEffect,
 }
 
 /// Adds the states inside a chain. Each has one move, which is taken where the rest of the chain leads into valuations of
@@ -184,6 +239,7 @@ fn inner_states(
 ) -> Result<(), Failure> {
     let edge = solver.graph.edges[edge as usize];
     let inside = walk(solver, &edge, source)?;
+    let is_own = |inner: &Inner| solver.seeker.owns(inner.controllable);
     let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
     for gain in &solver.gains[edge.target as usize] {
         let mut won = whole_or_part(solver, edge.target, gain.part.as_ref());
@@ -192,7 +248,7 @@ fn inner_states(
             won.constrain_all(&inner.invariant);
             decisions.push(Decision {
                 zones: won.clone(),
-                action: inner.controllable.then(|| inner.parts.clone()),
+                action: is_own(inner).then(|| inner.parts.clone()),
                 rank: gain.stamp,
             });
             if inner.delays {
@@ -218,7 +274,7 @@ fn inner_states(
 }
 
 /// The states inside the chain of an edge, in order.
-fn walk(
+pub(super) fn walk(
     solver: &mut Solver<'_, '_, '_>,
     edge: &Edge,
     source: &[i32],

@@ -1,12 +1,20 @@
-//! Closing the loop: a strategy against every move of the environment.
+//! Closing the loop: a strategy against every move of its opponent.
 //!
 //! The play goes over regions (see [`super::regions`]), whose constants include those of the strategy, so that each region has
-//! one decision. From a region in which the strategy waits, the environment may make any of its moves, or time passes to the
-//! next region; from one in which it acts, the environment may still be first. The strategy is right if
+//! one list of decisions. From a region in which the strategy waits, the opponent may make any of its moves, or time passes to the
+//! next region. Where the controller acts, the environment may still be first; where the environment acts, it is first. A strategy
+//! of the controller is right if
 //! * every region that is met before the goal satisfies what must be kept and has a decision;
 //! * every action is one of the moves of the state, is the controller's, and its target satisfies the invariants;
-//! * where the strategy waits and time cannot pass, the environment has a move and must take it (see [`Forcing`]);
-//! * no play goes on for ever without the goal: the graph up to the goals has no cycle, not even a region without end.
+//! * where it waits and time cannot pass, the environment has a move and must take it (see [`Forcing`]); if it has only to keep
+//!   something, play may also stop there, unless only the controller can move;
+//! * if it has to reach the goal, no play goes on for ever without: the graph up to the goals has no cycle, not even a region
+//!   without end.
+//!
+//! One of the environment is right if no play meets the goal before what must be kept is broken, every decision is there and
+//! possible, and
+//! * against a controller that has to reach the goal, it never waits where it must move;
+//! * against one that has to keep something, every play ends in a region in which that is broken.
 //!
 //! Cost: one look at each region and move of the closed loop; memory for each region.
 
@@ -57,11 +65,35 @@ pub enum Forcing {
     Always,
 }
 
-/// What is claimed.
+/// Who plays by the strategy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Owner {
+    /// The controller.
+    Controller,
+    /// The environment.
+    Environment,
+}
+
+/// What the controller is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aim {
+    /// To reach the goal.
+    Reach,
+    /// To keep what must be kept for ever, or until the goal.
+    Keep,
+}
+
+/// What is claimed: that the owner of the strategy wins, by getting the controller to its aim, or by keeping it from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Claim<'a> {
-    /// What is reached.
-    pub goal: &'a Predicate,
+    /// Who plays by the strategy.
+    pub owner: Owner,
+    /// Whether every decision that applies is allowed; else the first counts.
+    pub is_permissive: bool,
+    /// What the controller is asked for.
+    pub aim: Aim,
+    /// Where play ends, for the controller; `None` without such an end.
+    pub goal: Option<&'a Predicate>,
     /// What holds until then.
     pub keep: Option<&'a Predicate>,
     /// When the environment must move.
@@ -72,16 +104,23 @@ pub struct Claim<'a> {
     pub has_differences: bool,
 }
 
+impl Claim<'_> {
+    /// Whether plays that never end are lost for the owner.
+    fn must_end(&self) -> bool {
+        (self.owner == Owner::Controller) == (self.aim == Aim::Reach)
+    }
+}
+
 /// What was looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Coverage {
     /// Regions of the closed loop, goals included.
     pub regions: u64,
-    /// Moves of the controller that the strategy makes.
+    /// Moves that the strategy makes.
     pub own_moves: u64,
-    /// Moves of the environment that it is met by.
+    /// Moves of the opponent that it is met by.
     pub opponent_moves: u64,
-    /// Regions in which play ends because the goal holds.
+    /// Regions in which play ends, won.
     pub goals: u64,
 }
 
@@ -90,13 +129,15 @@ pub struct Coverage {
 pub enum Defect {
     /// There is no decision.
     NoDecision,
-    /// The move of the decision is not possible, or not the controller's.
+    /// The move of the decision is not possible, or not the owner's.
     ImpossibleAction,
     /// What must be kept does not hold.
     Broken,
-    /// The strategy waits, time cannot pass, and nobody must move.
+    /// The goal holds, against the environment.
+    GoalReached,
+    /// The strategy waits where time cannot pass, although play may stop there, lost, or it must move itself.
     Stuck,
-    /// The play goes on for ever without the goal.
+    /// The play goes on for ever without what the owner wants.
     Endless,
 }
 
@@ -170,7 +211,7 @@ fn identity<'w>(network: &Network, words: &'w [i32]) -> &'w [i32] {
 enum Mark {
     /// On the path at hand.
     Open,
-    /// All plays from it reach the goal.
+    /// All plays from it are right.
     Done,
 }
 
@@ -195,7 +236,7 @@ impl<'a> Play<'a> {
     fn run(&mut self, most_regions: u64) -> Result<Outcome, Error> {
         let mut initial = self.semantics.initial()?;
         self.regions.represent_state(&mut initial);
-        if let Some(defect) = self.enter(initial)? {
+        if let Some(defect) = self.enter(&initial)? {
             return Ok(self.violated(defect));
         }
         while let Some(frame) = self.path.last_mut() {
@@ -207,6 +248,7 @@ impl<'a> Play<'a> {
             frame.taken = Some(step);
             match self.seen.get(&target) {
                 Some(Mark::Done) => continue,
+                Some(Mark::Open) if !self.claim.must_end() => continue,
                 Some(Mark::Open) => {
                     self.push(target, Vec::new());
                     return Ok(self.violated(Defect::Endless));
@@ -216,7 +258,7 @@ impl<'a> Play<'a> {
             if self.coverage.regions >= most_regions {
                 return Ok(Outcome::TooLarge(self.coverage));
             }
-            if let Some(defect) = self.enter(target)? {
+            if let Some(defect) = self.enter(&target)? {
                 return Ok(self.violated(defect));
             }
         }
@@ -248,21 +290,21 @@ impl<'a> Play<'a> {
     }
 
     /// Puts a new region on the path, with its successors in the closed loop; what is wrong with it.
-    fn enter(&mut self, state: State) -> Result<Option<Defect>, Error> {
+    fn enter(&mut self, state: &State) -> Result<Option<Defect>, Error> {
         self.coverage.regions += 1;
         self.seen.insert(state.clone(), Mark::Open);
-        if self.semantics.holds(self.claim.goal, &state)? {
-            self.coverage.goals += 1;
-            self.push(state, Vec::new());
-            return Ok(None);
-        }
         self.push(state.clone(), Vec::new());
-        if let Some(keep) = self.claim.keep
-            && !self.semantics.holds(keep, &state)?
-        {
-            return Ok(Some(Defect::Broken));
+        if let Some(winner) = self.winner(state)? {
+            return Ok(if winner == self.claim.owner {
+                self.coverage.goals += 1;
+                None
+            } else if winner == Owner::Controller {
+                Some(Defect::GoalReached)
+            } else {
+                Some(Defect::Broken)
+            });
         }
-        match self.successors(&state)? {
+        match self.successors(state)? {
             Err(defect) => Ok(Some(defect)),
             Ok(successors) => {
                 let frame = self.path.last_mut().expect("the region was just put there");
@@ -272,48 +314,90 @@ impl<'a> Play<'a> {
         }
     }
 
+    /// Who has won in a state; `None` if play goes on.
+    fn winner(&self, state: &State) -> Result<Option<Owner>, Error> {
+        if let Some(goal) = self.claim.goal
+            && self.semantics.holds(goal, state)?
+        {
+            return Ok(Some(Owner::Controller));
+        }
+        Ok(match self.claim.keep {
+            Some(keep) if !self.semantics.holds(keep, state)? => Some(Owner::Environment),
+            _ => None,
+        })
+    }
+
     /// Where play may go from a region under the strategy.
     fn successors(&mut self, state: &State) -> Result<Result<Vec<(Step, State)>, Defect>, Error> {
-        let Some(decision) = self.decision(state) else {
-            return Ok(Err(Defect::NoDecision));
-        };
         let moves = self.semantics.moves(state)?;
-        let mut targets = Vec::new();
+        let mut possible = Vec::new();
         for one in &moves {
             if let Some(mut target) = self.semantics.take(state, &one.parts)? {
                 self.regions.represent_state(&mut target);
-                targets.push((one, target));
+                possible.push((one, target));
             }
         }
-        let opponent = targets.iter().filter(|(one, _)| !one.controllable);
-        let mut successors: Vec<(Step, State)> = opponent
-            .map(|(one, target)| (Step::Move((*one).clone()), target.clone()))
-            .collect();
-        self.coverage.opponent_moves += successors.len() as u64;
-        if let Some(action) = &decision.action {
-            let mut own = targets.into_iter();
-            let Some((one, target)) = own.find(|(one, _)| one.controllable && one.parts == *action)
-            else {
+        let decisions = self.decisions(state);
+        if decisions.is_empty() {
+            return Ok(Err(Defect::NoDecision));
+        }
+        let is_own = |one: &Move| one.controllable == (self.claim.owner == Owner::Controller);
+        let mut successors: Vec<(Step, State)> = Vec::new();
+        let mut acts_first = false;
+        for action in decisions.iter().filter_map(|one| one.action.as_ref()) {
+            let mut own = possible.iter().filter(|(one, _)| is_own(one));
+            let Some((one, target)) = own.find(|(one, _)| one.parts == *action) else {
                 return Ok(Err(Defect::ImpossibleAction));
             };
             self.coverage.own_moves += 1;
-            successors.push((Step::Move(one.clone()), target));
-            return Ok(Ok(successors));
+            acts_first = self.claim.owner == Owner::Environment;
+            successors.push((Step::Move((*one).clone()), target.clone()));
         }
-        let mut later = state.clone();
-        self.regions.pass(&mut later.clocks);
-        if !self.semantics.is_time_stopped(state, &moves)
-            && self.semantics.invariants_hold(&later)?
-        {
-            successors.push((Step::Time, later));
-        } else if successors.is_empty() || !self.is_forced(state, &later, &moves, &targets)? {
-            return Ok(Err(Defect::Stuck));
+        if !acts_first {
+            let others = possible.iter().filter(|(one, _)| !is_own(one));
+            let others = others.map(|(one, target)| (Step::Move((*one).clone()), target.clone()));
+            let before = successors.len();
+            successors.extend(others);
+            self.coverage.opponent_moves += (successors.len() - before) as u64;
+        }
+        if decisions.iter().any(|one| one.action.is_none()) {
+            let mut later = state.clone();
+            self.regions.pass(&mut later.clocks);
+            if !self.semantics.is_time_stopped(state, &moves)
+                && self.semantics.invariants_hold(&later)?
+            {
+                successors.push((Step::Time, later));
+            } else if !self.may_rest(state, &later, &moves, &possible)? {
+                return Ok(Err(Defect::Stuck));
+            }
         }
         Ok(Ok(successors))
     }
 
-    /// The decision that applies.
-    fn decision(&self, state: &State) -> Option<&'a Decision> {
+    /// Whether the owner may wait in a state in which time cannot pass.
+    fn may_rest(
+        &self,
+        state: &State,
+        later: &State,
+        moves: &[Move],
+        possible: &[(&Move, State)],
+    ) -> Result<bool, Error> {
+        let has_own = possible.iter().any(|(one, _)| one.controllable);
+        let has_other = possible.iter().any(|(one, _)| !one.controllable);
+        let must_controller_move = has_own && !has_other;
+        Ok(match (self.claim.owner, self.claim.aim) {
+            (Owner::Controller, Aim::Keep) => !must_controller_move,
+            (Owner::Environment, Aim::Keep) => must_controller_move,
+            (owner, Aim::Reach) => {
+                let must_environment_move =
+                    has_other && self.is_forced(state, later, moves, possible)?;
+                must_environment_move == (owner == Owner::Controller)
+            }
+        })
+    }
+
+    /// The decisions that apply.
+    fn decisions(&self, state: &State) -> Vec<&'a Decision> {
         let words = identity(self.semantics.network(), &state.words);
         let unit = self.semantics.ticks_per_unit();
         let holds = |one: &Constraint| {
@@ -321,10 +405,18 @@ impl<'a> Play<'a> {
             let bound = i64::from(one.bound) * unit;
             difference < bound || (!one.strict && difference == bound)
         };
-        let decisions: &'a Decisions = self.strategy.get(words)?;
+        let Some(&decisions) = self.strategy.get(words) else {
+            return Vec::new();
+        };
         let applies =
             |decision: &&Decision| decision.zones.iter().any(|zone| zone.iter().all(holds));
-        decisions.decisions.iter().find(applies)
+        let most = if self.claim.is_permissive {
+            usize::MAX
+        } else {
+            1
+        };
+        let all: &'a [Decision] = &decisions.decisions;
+        all.iter().filter(applies).take(most).collect()
     }
 
     /// Whether the environment must move in a state in which time cannot pass.

@@ -29,32 +29,47 @@ fn compare(
         Ok(None) => return Ok(()),
         Err(error) => Err(error),
     };
-    let queries = [
-        format!("control: A<> {}", network.formula(goal)),
-        format!(
-            "control: A[ {} U {} ]",
-            network.formula(keep),
-            network.formula(goal)
-        ),
+    let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
+    let rules = [
+        (Rule::Tiga, Forced::Tiga),
+        (Rule::Product, Forced::Product),
+        (Rule::Neutral, Forced::Neutral),
     ];
-    for (has_keep, query) in [false, true].into_iter().zip(queries) {
-        for (rule, forced) in [
-            (Rule::Tiga, Forced::Tiga),
-            (Rule::Product, Forced::Product),
-            (Rule::Neutral, Forced::Neutral),
-        ] {
+    for (query, has_goal, has_keep, must_reach) in [
+        (format!("control: A<> {goal_text}"), true, false, true),
+        (
+            format!("control: A[ {keep_text} U {goal_text} ]"),
+            true,
+            true,
+            true,
+        ),
+        (format!("control: A[] {keep_text}"), false, true, false),
+        (
+            format!("control: A[ {keep_text} W {goal_text} ]"),
+            true,
+            true,
+            false,
+        ),
+    ] {
+        // The rule matters only where something must be reached.
+        for (rule, forced) in rules.into_iter().take(if must_reach { 3 } else { 1 }) {
             let expected = match &graph {
                 Ok(graph) => {
-                    let goal = labels(network, goal, graph);
+                    let count = graph.nodes.len();
+                    let goal = if has_goal {
+                        labels(network, goal, graph)
+                    } else {
+                        vec![false; count]
+                    };
                     let keep = if has_keep {
                         labels(network, keep, graph)
                     } else {
-                        vec![true; goal.len()]
+                        vec![true; count]
                     };
                     let objective = Objective {
                         goal: &goal,
                         keep: &keep,
-                        must_reach: true,
+                        must_reach,
                     };
                     Ok(winning(graph, &objective, rule)[0])
                 }
@@ -90,11 +105,11 @@ fn labels(network: &Network, formula: &Formula, graph: &Graph) -> Vec<bool> {
 }
 
 #[test]
-fn reachability_games_equal_brute_force() {
+fn games_equal_brute_force() {
     let strategy = (
         generate::network(SHAPE),
         generate::formula(SHAPE),
         generate::formula(SHAPE),
     );
-    compare::run("reachability games", 300, &strategy, compare);
+    compare::run("games", 300, &strategy, compare);
 }

@@ -1,9 +1,12 @@
 //! Strategies that were made wrong on purpose must be caught.
 //!
-//! The game is the running example of the TIGA manual (section 3), for which every decision matters.
+//! The first game is the running example of the TIGA manual (section 3), for which every decision matters.
 
 use checker::engine::{LoadedModel, verification};
+use checker::game::strategy::Selection;
+use checker::game::{Forced, Player};
 use checker::syntax::ast::QueryText;
+use checker::verify::Part;
 use checker::verify::strategy::{Decision, Decisions, Defect, Outcome};
 
 use crate::compare;
@@ -26,26 +29,58 @@ process P() {
 system P;
 ";
 
-fn solved() -> (LoadedModel, QueryText, Vec<Decisions>) {
-    let mut model = compare::load(GAME);
-    let query = model.add_query(QUERY);
+/// The controller has to hurry, and the environment is faster.
+const RACE: &str = "
+process P() {
+  clock x;
+  state L { x <= 3 }, G, Bad;
+  init L;
+  trans L -> G { guard x >= 2; },
+        L -u-> Bad { guard x >= 1; };
+}
+system P;
+";
+
+/// A game, with the strategy of its winner.
+struct Solved {
+    model: LoadedModel,
+    query: QueryText,
+    strategy: Vec<Decisions>,
+    owner: Player,
+    selection: Selection,
+}
+
+fn solved(game: &str, query: &str) -> Solved {
+    let mut model = compare::load(game);
+    let query = model.add_query(query);
     let options = checker::engine::Options {
         strategy: true,
         ..compare::options()
     };
     let answer = model.check(&query, &options).expect("the query is right");
-    let strategy = answer.evidence.strategy.expect("the game is won");
-    let decisions = verification::decisions(model.network(), &strategy);
-    (model, query, decisions)
+    let strategy = answer.evidence.strategy.expect("somebody wins");
+    Solved {
+        strategy: verification::decisions(model.network(), &strategy),
+        owner: strategy.owner,
+        selection: strategy.selection,
+        model,
+        query,
+    }
 }
 
-/// The defect of the strategy after `mutate`, which is given the decisions of a location.
-fn check_defect(location: i32, mutate: impl Fn(&mut Vec<Decision>)) -> Option<Defect> {
-    let (mut model, query, mut strategy) = solved();
-    let state = strategy.iter_mut().find(|state| state.words[0] == location);
+/// The defect of a strategy after `mutate`, which is given the decisions of a location.
+fn defect_of(
+    mut solved: Solved,
+    location: i32,
+    mutate: impl Fn(&mut Vec<Decision>),
+) -> Option<Defect> {
+    let mut states = solved.strategy.iter_mut();
+    let state = states.find(|state| state.words[0] == location);
     mutate(&mut state.expect("play gets there").decisions);
-    let verification = model
-        .verify_strategy(&query, &strategy, checker::game::Forced::Tiga, 10_000)
+    let played = (&solved.strategy[..], solved.owner, solved.selection);
+    let verification = solved
+        .model
+        .verify_strategy(&solved.query, played, Forced::Tiga, 10_000)
         .expect("the query is right");
     match verification.expect("the model can be checked") {
         Outcome::Verified(_) => None,
@@ -55,6 +90,21 @@ fn check_defect(location: i32, mutate: impl Fn(&mut Vec<Decision>)) -> Option<De
         }
         Outcome::TooLarge(_) => panic!("the game is small"),
     }
+}
+
+fn check_defect(location: i32, mutate: impl Fn(&mut Vec<Decision>)) -> Option<Defect> {
+    defect_of(solved(GAME, QUERY), location, mutate)
+}
+
+/// Adds a decision for all valuations before the others.
+fn everywhere(decisions: &mut Vec<Decision>, action: Option<Vec<Part>>) {
+    decisions.insert(
+        0,
+        Decision {
+            zones: vec![Vec::new()],
+            action,
+        },
+    );
 }
 
 fn acts(decisions: &mut [Decision]) -> &mut Decision {
@@ -96,19 +146,89 @@ fn widened_zone_of_an_action_is_caught() {
 
 #[test]
 fn widened_zone_of_waiting_is_caught() {
-    let widen = |decisions: &mut Vec<Decision>| {
-        decisions.insert(
-            0,
-            Decision {
-                zones: vec![Vec::new()],
-                action: None,
-            },
-        );
-    };
+    let widen = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
     assert_eq!(check_defect(1, widen), Some(Defect::Endless));
 }
 
 #[test]
 fn missing_decision_is_caught() {
     assert_eq!(check_defect(1, Vec::clear), Some(Defect::NoDecision));
+}
+
+const SAFE: &str = "control: A[] not P.L4";
+
+#[test]
+fn permissive_strategy_as_it_is_passes() {
+    let solved = solved(GAME, SAFE);
+    assert_eq!(
+        (solved.owner, solved.selection),
+        (Player::Controller, Selection::Any)
+    );
+    assert_eq!(defect_of(solved, 0, |_| {}), None);
+}
+
+#[test]
+fn permissive_strategy_that_waits_too_long_is_caught() {
+    let wait = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
+    assert_eq!(defect_of(solved(GAME, SAFE), 0, wait), Some(Defect::Broken));
+}
+
+#[test]
+fn permissive_strategy_with_a_move_too_many_is_caught() {
+    let widen = |decisions: &mut Vec<Decision>| {
+        let action = acts(decisions).action.clone();
+        everywhere(decisions, action);
+    };
+    assert_eq!(
+        defect_of(solved(GAME, SAFE), 1, widen),
+        Some(Defect::ImpossibleAction)
+    );
+}
+
+/// Both counter-strategies of the race: against reaching, and against keeping.
+fn counter_strategies() -> [Solved; 2] {
+    ["control: A<> P.G", "control: A[] not P.Bad"].map(|query| {
+        let solved = solved(RACE, query);
+        assert_eq!(
+            (solved.owner, solved.selection),
+            (Player::Environment, Selection::First)
+        );
+        solved
+    })
+}
+
+#[test]
+fn counter_strategies_as_they_are_pass() {
+    for solved in counter_strategies() {
+        assert_eq!(defect_of(solved, 0, |_| {}), None);
+    }
+}
+
+#[test]
+fn counter_strategy_that_waits_is_caught() {
+    let defects = counter_strategies()
+        .map(|solved| defect_of(solved, 0, |decisions| everywhere(decisions, None)));
+    assert_eq!(defects, [Some(Defect::GoalReached), Some(Defect::Stuck)]);
+}
+
+#[test]
+fn counter_strategy_that_moves_too_early_is_caught() {
+    for solved in counter_strategies() {
+        let widen = |decisions: &mut Vec<Decision>| {
+            let action = acts(decisions).action.clone();
+            everywhere(decisions, action);
+        };
+        assert_eq!(defect_of(solved, 0, widen), Some(Defect::ImpossibleAction));
+    }
+}
+
+#[test]
+fn counter_strategy_with_a_move_of_the_controller_is_caught() {
+    for solved in counter_strategies() {
+        let steal = |decisions: &mut Vec<Decision>| {
+            let action = acts(decisions).action.as_mut().expect("it acts");
+            action[0].edge = 0;
+        };
+        assert_eq!(defect_of(solved, 0, steal), Some(Defect::ImpossibleAction));
+    }
 }

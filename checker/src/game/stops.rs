@@ -1,0 +1,123 @@
+//! Where time stops, and who must move there.
+
+use crate::network::Failure;
+use crate::zones::Federation;
+
+use super::reach::Solver;
+use super::{Forced, Player};
+
+impl Solver<'_, '_, '_> {
+    /// The valuations in which time stops, the environment has a move, and must take one.
+    pub(super) fn forced_environment(
+        &mut self,
+        node: u32,
+        bad: &Federation,
+    ) -> Result<Federation, Failure> {
+        let opponent = self.enabled_moves(node, Player::Environment);
+        if opponent.is_empty() {
+            return Ok(opponent);
+        }
+        let mut words = self.graph.symbolic.stepper.network().initial.clone();
+        self.graph.load(node, &mut words);
+        let mut stops = self.stops(node, &mut words)?;
+        let mut all = Federation::empty(self.graph.dimension());
+        for (component, stop) in &mut stops {
+            *stop = stop.intersection(&opponent);
+            stop.subtract(bad);
+            for (mover, edge) in self.controllable_movers(node, &mut words)? {
+                let blocks = match (self.forced, *component) {
+                    (Forced::Neutral, _) => false,
+                    (Forced::Tiga, Some(component)) => mover.contains(&component),
+                    (Forced::Product, _) | (Forced::Tiga, None) => true,
+                };
+                if blocks {
+                    stop.subtract(&self.enabled(&self.graph.edges[edge]));
+                }
+            }
+            all.unite(stop);
+        }
+        Ok(all)
+    }
+
+    /// The valuations in which time stops, the controller has a move, and the environment has none: the controller must move.
+    pub(super) fn forced_controller(&mut self, node: u32) -> Result<Federation, Failure> {
+        let mut forced = self.enabled_moves(node, Player::Controller);
+        if forced.is_empty() {
+            return Ok(forced);
+        }
+        forced = forced.intersection(&self.standstill(node)?);
+        forced.subtract(&self.enabled_moves(node, Player::Environment));
+        Ok(forced)
+    }
+
+    /// The valuations of a node in which time cannot pass.
+    pub(super) fn standstill(&mut self, node: u32) -> Result<Federation, Failure> {
+        let mut words = self.graph.symbolic.stepper.network().initial.clone();
+        self.graph.load(node, &mut words);
+        let mut all = Federation::empty(self.graph.dimension());
+        for (_, stop) in self.stops(node, &mut words)? {
+            all.unite(&stop);
+        }
+        Ok(all)
+    }
+
+    /// The valuations of a node in which a player has a move.
+    pub(super) fn enabled_moves(&self, node: u32, player: Player) -> Federation {
+        let mut enabled = Federation::empty(self.graph.dimension());
+        for index in self.graph.edges_of(node) {
+            let edge = &self.graph.edges[index];
+            if player.owns(edge.controllable) {
+                enabled.unite(&self.enabled(edge));
+            }
+        }
+        enabled
+    }
+
+    /// The valuations in which time cannot pass, with the process that stops it (`None`: an urgent channel).
+    fn stops(
+        &mut self,
+        node: u32,
+        words: &mut [i32],
+    ) -> Result<Vec<(Option<u32>, Federation)>, Failure> {
+        let dimension = self.graph.dimension();
+        let whole = Federation::of_zone(dimension, self.graph.zone(node));
+        let network = self.graph.symbolic.stepper.network();
+        let mut stops = Vec::new();
+        for (index, process) in network.processes.iter().enumerate() {
+            let urgency = process.locations[words[index] as usize].urgency;
+            if urgency != crate::ir::Urgency::Normal {
+                stops.push((Some(index as u32), whole.clone()));
+            }
+        }
+        if stops.is_empty() && !self.graph.nodes[node as usize].delays {
+            stops.push((None, whole));
+        }
+        let stopped = self.graph.symbolic.stopped(words)?;
+        for (process, bound) in self.graph.symbolic.upper_bounds(words)? {
+            let mut faces = Federation::empty(dimension);
+            faces.add_upper_faces(self.graph.zone(node), &[bound], &stopped);
+            stops.push((Some(process), faces));
+        }
+        Ok(stops)
+    }
+
+    /// The controllable edges of a node, each with the processes that take part in its first move.
+    fn controllable_movers(
+        &mut self,
+        node: u32,
+        words: &mut [i32],
+    ) -> Result<Vec<(Vec<u32>, usize)>, Failure> {
+        let mut moves = crate::network::Moves::default();
+        self.graph.symbolic.stepper.moves(words, &mut moves)?;
+        let edges = self
+            .graph
+            .edges_of(node)
+            .filter(|&index| self.graph.edges[index].controllable);
+        Ok(edges
+            .map(|index| {
+                let parts = moves.get(self.graph.edges[index].ordinal as usize).parts;
+                (parts.iter().map(|part| part.process).collect(), index)
+            })
+            .collect())
+    }
+}
