@@ -20,7 +20,7 @@ pub use jit::{Jit, JitError};
 pub use optimise::optimise;
 pub use rounds::ROUND_LIMIT;
 
-use crate::ir::{ClockId, FunctionId, RunTimeErrorKind, SiteId};
+use crate::ir::{ClockId, FixedConstraint, FunctionId, RunTimeErrorKind, SiteId};
 
 /// What a call reads and writes beside its arguments.
 #[derive(Debug)]
@@ -42,6 +42,17 @@ pub struct EmittedConstraint {
     pub right: ClockId,
     pub bound: i32,
     pub strict: bool,
+}
+
+impl From<FixedConstraint> for EmittedConstraint {
+    fn from(fixed: FixedConstraint) -> EmittedConstraint {
+        EmittedConstraint {
+            left: fixed.left,
+            right: fixed.right,
+            bound: fixed.bound,
+            strict: fixed.strict,
+        }
+    }
 }
 
 /// `target := value`, or `target := source + value` if the source is not the reference clock.

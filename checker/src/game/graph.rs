@@ -15,13 +15,14 @@ use crate::ir::Predicate;
 use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
 use crate::search::store::{DiscreteId, StateStore};
 use crate::search::zone_table::{ZoneId, ZoneTable};
-use crate::zones::dbm::{self, Constraint};
+use crate::zones::dbm;
 use crate::zones::{Bound, Federation, Zone};
 
 use super::programs::{ProgramId, ProgramStep, Programs};
+use super::trails::{Ending, Root, Trails};
 
 /// Moves in one chain, at most; longer ones are cut by a node, so that loops end.
-const LONGEST_CHAIN: usize = 64;
+pub(super) const LONGEST_CHAIN: usize = 64;
 
 /// No node or edge.
 pub const NONE: u32 = u32::MAX;
@@ -107,7 +108,7 @@ pub struct Graph<'s, 'a> {
     pub symbolic: &'s mut Symbolic<'a>,
     objective: Objective<'s>,
     store: StateStore,
-    zones: ZoneTable,
+    pub(super) zones: ZoneTable,
     /// What edges do to clocks.
     pub programs: Programs,
     /// The nodes; the first is the initial one.
@@ -124,11 +125,21 @@ pub struct Graph<'s, 'a> {
     spare: Vec<i32>,
     moves: Moves,
     chain_moves: Moves,
-    steps: Vec<ProgramStep>,
+    pub(super) steps: Vec<ProgramStep>,
     /// What the move that was just taken does to clocks.
     effect: ClockEffect,
     entries: Vec<Zone>,
-    chains_delays: bool,
+    pub(super) chains_delays: bool,
+    pub(super) trails: Trails,
+}
+
+/// Where an edge starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Origin {
+    pub(super) node: u32,
+    /// The index of the first move.
+    pub(super) ordinal: u32,
+    controllable: bool,
 }
 
 impl<'s, 'a> Graph<'s, 'a> {
@@ -156,6 +167,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             effect: ClockEffect::default(),
             entries: Vec::new(),
             chains_delays: objective.must_progress && !network.features.stopwatches,
+            trails: Trails::new(symbolic.has_fixed_delays(), &objective),
             objective,
             symbolic,
         };
@@ -185,6 +197,8 @@ impl<'s, 'a> Graph<'s, 'a> {
         let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
         (self.store.bytes()
             + self.zones.bytes()
+            + self.trails.bytes()
+            + self.symbolic.stepper.bytes()
             + nodes
             + self.edges.capacity() * size_of::<Edge>()) as u64
     }
@@ -202,11 +216,16 @@ impl<'s, 'a> Graph<'s, 'a> {
 
     /// The node of a state, made if no stored one contains it.
     fn node(&mut self, words: &mut [i32], zone: &Zone) -> Result<u32, Failure> {
+        let id = self.zones.intern(zone.bounds());
+        self.node_of(words, zone, id)
+    }
+
+    /// As [`Graph::node`], with the id of the zone.
+    fn node_of(&mut self, words: &mut [i32], zone: &Zone, id: ZoneId) -> Result<u32, Failure> {
         let (discrete, is_new) = self.store.intern(words);
         if is_new {
             self.heads.push(NONE);
         }
-        let id = self.zones.intern(zone.bounds());
         let mut node = self.heads[discrete.0 as usize];
         while node != NONE {
             let Node {
@@ -253,7 +272,11 @@ impl<'s, 'a> Graph<'s, 'a> {
     }
 
     /// Where the goal holds, and where what must be kept does.
-    fn extents(&mut self, words: &mut [i32], zone: &Zone) -> Result<(Extent, Extent), Failure> {
+    pub(super) fn extents(
+        &mut self,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<(Extent, Extent), Failure> {
         let goal = match self.objective.goal {
             Some(goal) => self.symbolic.extent(goal, words, zone.bounds())?,
             None => Extent::Nowhere,
@@ -283,13 +306,19 @@ impl<'s, 'a> Graph<'s, 'a> {
         moves: &mut Moves,
     ) -> Result<(), Failure> {
         self.explored += 1;
-        self.symbolic.stepper.moves(words, moves)?;
+        let root = self.moves_of(node, words, moves)?;
         let delays = self.symbolic.stepper.may_delay(words, moves);
         let first = self.edges.len() as u32;
-        for ordinal in 0..moves.len() {
+        for ordinal in 0..moves.len() as u32 {
+            let controllable = moves.get(ordinal as usize).controllable;
+            let origin = Origin {
+                node,
+                ordinal,
+                controllable,
+            };
             let mut target = std::mem::take(&mut self.target);
             target.copy_from_slice(words);
-            let result = self.follow(node, moves, ordinal as u32, &mut target);
+            let result = self.follow(origin, root, moves, &mut target);
             self.target = target;
             result?;
         }
@@ -300,17 +329,41 @@ impl<'s, 'a> Graph<'s, 'a> {
         Ok(())
     }
 
+    /// Computes the moves of a node; gives the root of their trails, if they were met before.
+    fn moves_of(
+        &mut self,
+        node: u32,
+        words: &mut [i32],
+        moves: &mut Moves,
+    ) -> Result<Option<Root>, Failure> {
+        let stepper = &mut self.symbolic.stepper;
+        if self.trails.is_useful()
+            && let Some(vector) = stepper.vector(words)
+            && let Some(offer) = stepper.offer(vector, words)?
+        {
+            moves.copy_from(stepper.offered(offer));
+            let zone = self.nodes[node as usize].zone;
+            return Ok(self.trails.root(offer, zone, moves));
+        }
+        stepper.moves(words, moves)?;
+        Ok(None)
+    }
+
     /// Takes a move of a node, and the moves after it as long as there is no choice; adds the edge.
     fn follow(
         &mut self,
-        node: u32,
+        origin: Origin,
+        root: Option<Root>,
         moves: &Moves,
-        ordinal: u32,
         target: &mut Vec<i32>,
     ) -> Result<(), Failure> {
-        let one = moves.get(ordinal as usize);
-        let origin = (ordinal, one.controllable);
-        let zone = self.zones.get(self.nodes[node as usize].zone);
+        if let Some(root) = root
+            && self.follow_trail(root, moves, origin, target)?
+        {
+            return Ok(());
+        }
+        let one = moves.get(origin.ordinal as usize);
+        let zone = self.zones.get(self.nodes[origin.node as usize].zone);
         if !self.symbolic.is_enabled(one, zone)?
             || !self.symbolic.fire_into(one, target, &mut self.effect)?
         {
@@ -319,29 +372,30 @@ impl<'s, 'a> Graph<'s, 'a> {
         self.effect
             .entry_zones(zone, self.symbolic.dimension(), &mut self.entries);
         self.steps.clear();
-        self.push_step(false);
+        push_step(&mut self.steps, false, &self.effect);
         if self.entries.len() != 1 {
-            return self.end_in_pieces(node, target, origin);
+            return self.end_in_pieces(target, origin);
         }
         let mut zone = self.entries.swap_remove(0);
-        let mut length = 1;
-        loop {
-            let may_delay = self.symbolic.may_delay(target)?;
-            let invariant = invariant_of(&self.steps);
-            self.symbolic
-                .delay(target, may_delay, invariant, zone.bounds_mut())?;
-            if length as usize == LONGEST_CHAIN {
-                break;
-            }
-            if !self.only_move(target, &mut zone, may_delay)? {
-                break;
-            }
-            self.push_step(may_delay);
+        let may_delay = delay_after(self.symbolic, target, &self.steps, &mut zone)?;
+        self.go_on(origin, target, zone, (1, may_delay))
+    }
+
+    /// Goes on with a chain of which `length` moves were taken, and adds its edge. The zone contains its future if time may pass.
+    pub(super) fn go_on(
+        &mut self,
+        origin: Origin,
+        target: &mut Vec<i32>,
+        mut zone: Zone,
+        (mut length, mut may_delay): (u32, bool),
+    ) -> Result<(), Failure> {
+        while (length as usize) < LONGEST_CHAIN && self.only_move(target, &mut zone, may_delay)? {
+            push_step(&mut self.steps, may_delay, &self.effect);
             std::mem::swap(target, &mut self.spare);
             length += 1;
+            may_delay = delay_after(self.symbolic, target, &self.steps, &mut zone)?;
         }
-        self.symbolic.extrapolate(target, zone.bounds_mut());
-        self.add_edge(node, target, &zone, origin, length)
+        self.end(target, zone, origin, length)
     }
 
     /// Takes the only move of a state inside a chain: leaves its effect in `effect`, the words after it in `spare`, and the zone on
@@ -355,10 +409,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         if may_delay && !self.chains_delays {
             return Ok(false);
         }
-        if !matches!(
-            self.extents(words, zone)?,
-            (Extent::Nowhere, Extent::Everywhere)
-        ) {
+        if !self.is_open(words, zone)? {
             return Ok(false);
         }
         self.symbolic.stepper.moves(words, &mut self.chain_moves)?;
@@ -385,51 +436,60 @@ impl<'s, 'a> Graph<'s, 'a> {
         Ok(true)
     }
 
-    /// Adds a step to the program at hand. One that changes nothing is left out, unless it is the first or ends an invariant.
-    fn push_step(&mut self, delays: bool) {
-        let is_kept = invariant_is_open(&self.steps);
-        if delays || is_kept || !self.effect.is_trivial() {
-            let effect = self.effect.clone();
-            self.steps.push(ProgramStep { delays, effect });
-        }
-    }
-
     /// Ends an edge whose first move enters in several zones, or none: an edge to each.
-    fn end_in_pieces(
-        &mut self,
-        node: u32,
-        target: &mut [i32],
-        origin: (u32, bool),
-    ) -> Result<(), Failure> {
+    fn end_in_pieces(&mut self, target: &mut [i32], origin: Origin) -> Result<(), Failure> {
         for mut zone in std::mem::take(&mut self.entries) {
-            let may_delay = self.symbolic.may_delay(target)?;
-            let invariant = invariant_of(&self.steps);
-            self.symbolic
-                .delay(target, may_delay, invariant, zone.bounds_mut())?;
-            self.symbolic.extrapolate(target, zone.bounds_mut());
-            self.add_edge(node, target, &zone, origin, 1)?;
+            delay_after(self.symbolic, target, &self.steps, &mut zone)?;
+            self.end(target, zone, origin, 1)?;
         }
         Ok(())
     }
 
-    fn add_edge(
+    /// Adds the edge of the steps at hand, which lead to this zone.
+    fn end(
         &mut self,
-        source: u32,
-        words: &mut [i32],
-        zone: &Zone,
-        (ordinal, controllable): (u32, bool),
+        target: &mut [i32],
+        mut zone: Zone,
+        origin: Origin,
         length: u32,
     ) -> Result<(), Failure> {
-        let target = self.node(words, zone)?;
-        let program = self.programs.intern(&self.steps);
+        self.symbolic.extrapolate(target, zone.bounds_mut());
+        let mut ending = Ending {
+            id: self.zones.intern(zone.bounds()),
+            zone,
+            program: self.programs.intern(&self.steps),
+            totality: None,
+        };
+        self.add_edge(target, &mut ending, origin, length)
+    }
+
+    /// Adds an edge to the state with these words in which a chain ended.
+    pub(super) fn add_edge(
+        &mut self,
+        words: &mut [i32],
+        ending: &mut Ending,
+        Origin {
+            node: source,
+            ordinal,
+            controllable,
+        }: Origin,
+        length: u32,
+    ) -> Result<(), Failure> {
+        let target = self.node_of(words, &ending.zone, ending.id)?;
+        let program = ending.program;
         let (from, to) = (
             self.nodes[source as usize].zone,
             self.nodes[target as usize].zone,
         );
-        let ends = ((from, self.zones.get(from)), (to, self.zones.get(to)));
-        let is_total = self
-            .programs
-            .is_total(program, ends.0, ends.1, self.symbolic.dimension());
+        let is_total = match ending.totality {
+            Some((known, is_total)) if known == to => is_total,
+            _ => {
+                let ends = ((from, self.zones.get(from)), (to, self.zones.get(to)));
+                self.programs
+                    .is_total(program, ends.0, ends.1, self.symbolic.dimension())
+            }
+        };
+        ending.totality = Some((to, is_total));
         let edge = self.edges.len() as u32;
         let next_in = std::mem::replace(&mut self.nodes[target as usize].first_in, edge);
         self.edges.push(Edge {
@@ -446,14 +506,27 @@ impl<'s, 'a> Graph<'s, 'a> {
     }
 }
 
-/// The invariant of the state that the steps lead to: that of the last one, since steps that are left out have none.
-fn invariant_of(steps: &[ProgramStep]) -> &[Constraint] {
-    steps.last().map_or(&[], |last| &last.effect.invariant)
+/// Lets time pass in a state that the steps lead to, within its invariant, if it may; returns whether it may.
+pub(super) fn delay_after(
+    symbolic: &mut Symbolic<'_>,
+    words: &mut [i32],
+    steps: &[ProgramStep],
+    zone: &mut Zone,
+) -> Result<bool, Failure> {
+    let may_delay = symbolic.may_delay(words)?;
+    // The invariant of the state is that of the last step, since steps that are left out have none.
+    let invariant = steps.last().map_or(&[][..], |last| &last.effect.invariant);
+    symbolic.delay(words, may_delay, invariant, zone.bounds_mut())?;
+    Ok(may_delay)
 }
 
-/// Whether the next step must be kept even if it changes nothing: it is the first, or ends the invariant of the last one.
-fn invariant_is_open(steps: &[ProgramStep]) -> bool {
-    steps
+/// Adds a step to a program. One that changes nothing is left out, unless it is the first or ends an invariant.
+pub(super) fn push_step(steps: &mut Vec<ProgramStep>, delays: bool, effect: &ClockEffect) {
+    let is_kept = steps
         .last()
-        .is_none_or(|last| !last.effect.invariant.is_empty())
+        .is_none_or(|last| !last.effect.invariant.is_empty());
+    if delays || is_kept || !effect.is_trivial() {
+        let effect = effect.clone();
+        steps.push(ProgramStep { delays, effect });
+    }
 }

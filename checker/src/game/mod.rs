@@ -10,6 +10,7 @@ pub mod programs;
 pub mod reach;
 mod stops;
 pub mod strategy;
+mod trails;
 
 /// Who plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,7 +11,9 @@
 pub mod bounds;
 pub mod differences;
 pub mod failure;
+mod fixed;
 pub mod moves;
+mod offers;
 mod passage;
 pub mod predicate;
 pub mod stepper;
@@ -19,7 +21,9 @@ pub mod symbolic;
 
 pub use bounds::{Abstraction, ClockBounds};
 pub use failure::Failure;
+pub use fixed::FixedMove;
 pub use moves::{MoveRef, Moves, Part};
+pub use offers::{OfferId, VectorId};
 pub use predicate::Extent;
 pub use stepper::Stepper;
 pub use symbolic::{ClockEffect, Symbolic};

@@ -27,7 +27,7 @@ struct Header {
 }
 
 /// The moves of a state.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Moves {
     headers: Vec<Header>,
     parts: Vec<Part>,
@@ -73,6 +73,22 @@ impl Moves {
         self.parts.clear();
         self.constraints.clear();
         self.excluded.clear();
+    }
+
+    /// The bytes that the moves take.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.headers)
+            + size_of_val(&*self.parts)
+            + size_of_val(&*self.constraints)
+            + size_of_val(&*self.excluded)
+    }
+
+    /// Replaces the moves by others and keeps the memory.
+    pub fn copy_from(&mut self, other: &Moves) {
+        self.headers.clone_from(&other.headers);
+        self.parts.clone_from(&other.parts);
+        self.constraints.clone_from(&other.constraints);
+        self.excluded.clone_from(&other.excluded);
     }
 
     /// How many moves there are.

@@ -13,6 +13,7 @@ use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTi
 use crate::ir::{ChannelId, Edge, FunctionId, Guard, Location, Network, Process, Update, Urgency};
 
 use super::moves::{MoveRef, Moves, Part};
+use super::offers::{Next, OfferId, Offers, Record, VectorId};
 
 /// An edge with what is asked of it most.
 #[derive(Clone, Copy, Debug)]
@@ -92,6 +93,10 @@ pub struct Stepper<'a> {
     /// By receiving process of a broadcast: the range of its candidates.
     groups: Vec<(usize, usize)>,
     parts: Vec<Part>,
+    /// Moves that were put together before.
+    offers: Offers,
+    /// What is evaluated while moves are put together to be remembered.
+    record: Option<Record>,
 }
 
 /// What a process does in a broadcast that is being put together.
@@ -126,6 +131,8 @@ impl<'a> Stepper<'a> {
             chosen: Vec::new(),
             groups: Vec::new(),
             parts: Vec::new(),
+            offers: Offers::new(network.processes.len()),
+            record: None,
         }
     }
 
@@ -186,6 +193,64 @@ impl<'a> Stepper<'a> {
 
     /// All moves of the state, as far as the words decide, into `out`.
     pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), RunTimeError> {
+        if let Some(vector) = self.offers.vector(words)
+            && let Some(offer) = self.offer(vector, words)?
+        {
+            out.copy_from(self.offers.moves(offer));
+            return Ok(());
+        }
+        self.put_together(words, out)
+    }
+
+    /// The location vector of the state, if it is known; it is after the first time that it was asked for.
+    pub fn vector(&mut self, words: &[i32]) -> Option<VectorId> {
+        self.offers.vector(words)
+    }
+
+    /// The moves of a state with this location vector, if they depend on locations and answers of guards alone and there is place
+    /// to remember them.
+    pub fn offer(
+        &mut self,
+        vector: VectorId,
+        words: &mut [i32],
+    ) -> Result<Option<OfferId>, RunTimeError> {
+        let Some(mut way) = self.offers.start(vector) else {
+            return Ok(None);
+        };
+        loop {
+            match self.offers.next(way) {
+                Next::Offer(offer) => return Ok(Some(offer)),
+                Next::Ask(function, arguments) => {
+                    let mut context = Context {
+                        state: words,
+                        constraints: &mut self.constraints,
+                        assignments: &mut self.assignments,
+                    };
+                    let answer = self.executor.call(function, arguments, &mut context)?;
+                    self.offers.answer(&mut way, answer);
+                }
+                Next::Unknown => break,
+            }
+        }
+        let mut moves = Moves::default();
+        self.record = Some(Record::default());
+        let result = self.put_together(words, &mut moves);
+        let record = self.record.take().unwrap_or_default();
+        result?;
+        Ok(self.offers.remember(vector, record, &moves))
+    }
+
+    /// The moves of an offer.
+    pub fn offered(&self, offer: OfferId) -> &Moves {
+        self.offers.moves(offer)
+    }
+
+    /// The bytes that remembered moves take, about.
+    pub fn bytes(&self) -> usize {
+        self.offers.bytes()
+    }
+
+    fn put_together(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), RunTimeError> {
         out.clear();
         let committed = self.is_committed(words);
         for process in 0..self.tables.len() {
@@ -437,19 +502,23 @@ impl<'a> Stepper<'a> {
     /// Evaluates a guard with the arguments in the buffer; its clock constraints are appended to the buffer.
     fn guard(&mut self, guard: &Guard, words: &mut [i32]) -> Result<bool, RunTimeError> {
         let first = self.constraints.len();
+        if guard.emits
+            && let Some(record) = &mut self.record
+        {
+            record.spoil();
+        }
         if let Some(function) = guard.function
             && self.call(self.executor, function, words)? == 0
         {
             self.constraints.truncate(first);
             return Ok(false);
         }
-        self.constraints
-            .extend(guard.fixed.iter().map(|fixed| EmittedConstraint {
-                left: fixed.left,
-                right: fixed.right,
-                bound: fixed.bound,
-                strict: fixed.strict,
-            }));
+        self.constraints.extend(
+            guard
+                .fixed
+                .iter()
+                .map(|&fixed| EmittedConstraint::from(fixed)),
+        );
         Ok(true)
     }
 
@@ -459,12 +528,21 @@ impl<'a> Stepper<'a> {
         function: FunctionId,
         words: &mut [i32],
     ) -> Result<i32, RunTimeError> {
+        if let Some(record) = &self.record
+            && let Some(answer) = record.answer(function, &self.arguments)
+        {
+            return Ok(answer);
+        }
         let mut context = Context {
             state: words,
             constraints: &mut self.constraints,
             assignments: &mut self.assignments,
         };
-        executor.call(function, &self.arguments, &mut context)
+        let answer = executor.call(function, &self.arguments, &mut context)?;
+        if let Some(record) = &mut self.record {
+            record.note(function, &self.arguments, answer);
+        }
+        Ok(answer)
     }
 
     /// Emits the chosen combination, once for each combination of branches.
@@ -561,6 +639,21 @@ impl<'a> Stepper<'a> {
                 value,
             }));
         Ok(())
+    }
+
+    /// Runs a function on the state.
+    pub(super) fn run(
+        &mut self,
+        function: FunctionId,
+        arguments: &[i32],
+        words: &mut [i32],
+    ) -> Result<i32, RunTimeError> {
+        let mut context = Context {
+            state: words,
+            constraints: &mut self.constraints,
+            assignments: &mut self.assignments,
+        };
+        self.executor.call(function, arguments, &mut context)
     }
 
     /// Evaluates all invariants: `None` if the words break one, else the clock constraints that must hold.
