@@ -66,9 +66,9 @@ picture: $(INSTALLED) ## Draw examples/scene.png, the picture of the README
 	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10
 
 .PHONY: bench
-bench: $(INSTALLED) ## Measure the engine: all plans of the paper's instance, then zones and code
+bench: $(INSTALLED) ## Measure the engine: all plans of the paper's instance, then code, loading and zones
 	$(BIN)/python tests/benchmarks/needle.py
-	source $(RUST) && cd checker && cargo bench --locked
+	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
 .PHONY: clean
 clean: ## Remove all that was built, also .venv

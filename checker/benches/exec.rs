@@ -1,26 +1,40 @@
-//! How fast is compiled code? A step and a roll of the needle, against the same arithmetic written by hand in C
-//! (`exec.c`, compiled with `cc -O2`), and how long compiling takes.
+//! How fast is compiled code? A step and a roll of the needle, from the text of the generated model through the front end, against
+//! the same arithmetic written by hand in C (`exec.c`, compiled with `cc -O2`).
 //!
 //! Prints nanoseconds a call and the ratio to C; fails if the two reach different states.
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints")]
 
-#[path = "../tests/exec/needle.rs"]
-mod needle;
+mod support;
 
 use std::error::Error;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use checker::exec::{Context, Executor, Interpreter, Jit};
-use checker::ir::FunctionId;
+use checker::ir::{FunctionId, Network};
+
+use support::{Scratch, load};
 
 const ROUNDS: u32 = 2_000;
 /// The fastest of so many repetitions counts; C and compiled code take turns, so that both see the same load.
 const REPETITIONS: u32 = 40;
+/// What the C program calls `dt`, `velocity` and `radius`; constants in the model, and so no part of its state.
+const CONSTANTS: [i32; 3] = [2, 1_000, 30_000];
+/// The variables of the model that the C program knows, in its order.
+const VARIABLES: [&str; 8] = [
+    "needle_progress",
+    "tip_roll",
+    "motion_circle_yaw",
+    "ROT_counter",
+    "tip_pos",
+    "motion_circle_center",
+    "vectors",
+    "matrices",
+];
 
 /// A run of the rounds.
 struct Run {
@@ -36,29 +50,38 @@ impl Run {
     }
 }
 
+/// The functions of the model that are called.
+struct Functions {
+    step: FunctionId,
+    roll: FunctionId,
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
-    let functions = needle::functions();
-    let begin = Instant::now();
-    let jit = Jit::new(&functions, &[])?;
-    for function in [needle::STEP, needle::ROTATE] {
-        jit.compile_function(function)?;
-    }
-    println!("compiling step and roll: {:.2?}", begin.elapsed());
-    let program = CProgram::compile()?;
-    let (mut c, mut compiled) = (program.run()?, run(&jit)?);
+    let scratch = Scratch::new()?;
+    let model = load(&scratch.needle_model()?)?;
+    let network = model.network();
+    let functions = Functions {
+        step: function(network, "step")?,
+        roll: function(network, "rotate_deg")?,
+    };
+    let jit = Jit::new(&network.functions, &network.constants)?;
+    jit.compile_function(functions.step)?;
+    jit.compile_function(functions.roll)?;
+    let program = scratch.compile("benches/exec.c")?;
+    let mut c = run_c(&program, network)?;
+    let mut compiled = run(&jit, network, &functions)?;
     for _ in 1..REPETITIONS {
-        c.take_faster(&program.run()?);
-        compiled.take_faster(&run(&jit)?);
+        c.take_faster(&run_c(&program, network)?);
+        compiled.take_faster(&run(&jit, network, &functions)?);
     }
-    let interpreted = run(&Interpreter::new(&functions, &[]))?;
-    assert_eq!(
-        compiled.state, c.state,
-        "compiled code and C reach the same state"
-    );
-    assert_eq!(
-        interpreted.state, c.state,
-        "the interpreter and C reach the same state"
-    );
+    let interpreter = Interpreter::new(&network.functions, &network.constants);
+    let interpreted = run(&interpreter, network, &functions)?;
+    for (name, run) in [
+        ("compiled code", &compiled),
+        ("the interpreter", &interpreted),
+    ] {
+        assert_eq!(run.state, c.state, "{name} and C reach the same state");
+    }
     for (name, times) in [
         ("C", &c),
         ("compiled", &compiled),
@@ -75,16 +98,41 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn run(engine: &dyn Executor) -> Result<Run, Box<dyn Error>> {
-    let mut state = needle::initial_state();
-    call(engine, needle::ROTATE, &[90], 1, &mut state)?;
-    let step = call(engine, needle::STEP, &[], ROUNDS, &mut state)?;
-    let roll = call(engine, needle::ROTATE, &[90], ROUNDS, &mut state)?;
+fn function(network: &Network, name: &str) -> Result<FunctionId, Box<dyn Error>> {
+    let found = network.functions.iter().position(|f| f.name == name);
+    let index = found.ok_or_else(|| format!("the model has no function {name}"))?;
+    Ok(FunctionId(u32::try_from(index)?))
+}
+
+/// The words that the C program knows, out of those of a state.
+fn known_words(network: &Network, state: &[i32]) -> Result<Vec<i32>, Box<dyn Error>> {
+    let mut known = CONSTANTS.to_vec();
+    for name in VARIABLES {
+        let variables = &network.layout.variables;
+        let variable = variables
+            .iter()
+            .find(|variable| variable.name == name)
+            .ok_or_else(|| format!("the model has no variable {name}"))?;
+        let words = variable.shape.words() as usize;
+        known.extend(&state[variable.offset as usize..][..words]);
+    }
+    Ok(known)
+}
+
+fn run(
+    engine: &dyn Executor,
+    network: &Network,
+    functions: &Functions,
+) -> Result<Run, Box<dyn Error>> {
+    let mut state = network.initial.clone();
+    call(engine, functions.roll, &[90], 1, &mut state)?;
+    let step = call(engine, functions.step, &[], ROUNDS, &mut state)?;
+    let roll = call(engine, functions.roll, &[90], ROUNDS, &mut state)?;
     let nanoseconds = |time: Duration| time.as_secs_f64() * 1e9 / f64::from(ROUNDS);
     Ok(Run {
         step: nanoseconds(step),
         roll: nanoseconds(roll),
-        state,
+        state: known_words(network, &state)?,
     })
 }
 
@@ -109,51 +157,25 @@ fn call(
     Ok(begin.elapsed())
 }
 
-/// The compiled C program; its file is removed in the end.
-struct CProgram(PathBuf);
-
-impl CProgram {
-    fn compile() -> Result<CProgram, Box<dyn Error>> {
-        let program = std::env::temp_dir().join(format!("exec-bench-{}", std::process::id()));
-        let source = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/exec.c");
-        let compiled = Command::new("cc")
-            .args(["-O2", "-o"])
-            .arg(&program)
-            .args([source, "-lm"])
-            .status()?;
-        if !compiled.success() {
-            return Err("cc failed".into());
-        }
-        Ok(CProgram(program))
+fn run_c(program: &Path, network: &Network) -> Result<Run, Box<dyn Error>> {
+    let mut child = Command::new(program)
+        .arg(ROUNDS.to_string())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let mut input = String::new();
+    for word in known_words(network, &network.initial)? {
+        write!(input, "{word} ")?;
     }
-
-    fn run(&self) -> Result<Run, Box<dyn Error>> {
-        let mut child = Command::new(&self.0)
-            .arg(ROUNDS.to_string())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
-        let mut input = String::new();
-        for word in needle::initial_state() {
-            write!(input, "{word} ")?;
-        }
-        let mut stdin = child.stdin.take().ok_or("the program has an input")?;
-        stdin.write_all(input.as_bytes())?;
-        drop(stdin);
-        let output = String::from_utf8(child.wait_with_output()?.stdout)?;
-        let mut fields = output.split_whitespace();
-        let mut time = || -> Result<f64, Box<dyn Error>> {
-            Ok(fields.next().ok_or("the program prints times")?.parse()?)
-        };
-        let (step, roll) = (time()?, time()?);
-        let state = fields.map(str::parse).collect::<Result<_, _>>()?;
-        Ok(Run { step, roll, state })
-    }
-}
-
-impl Drop for CProgram {
-    fn drop(&mut self) {
-        // A file that is left over in the temporary folder does no harm.
-        let _ = std::fs::remove_file(&self.0);
-    }
+    let mut stdin = child.stdin.take().ok_or("the program has an input")?;
+    stdin.write_all(input.as_bytes())?;
+    drop(stdin);
+    let output = String::from_utf8(child.wait_with_output()?.stdout)?;
+    let mut fields = output.split_whitespace();
+    let mut time = || -> Result<f64, Box<dyn Error>> {
+        Ok(fields.next().ok_or("the program prints times")?.parse()?)
+    };
+    let (step, roll) = (time()?, time()?);
+    let state = fields.map(str::parse).collect::<Result<_, _>>()?;
+    Ok(Run { step, roll, state })
 }
