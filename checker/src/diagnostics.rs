@@ -8,6 +8,8 @@
 //! * Diagnostics are values. They are collected, sorted by position and reported together; nothing here prints.
 
 use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// Index of a [`Source`] in a [`SourceMap`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -43,18 +45,20 @@ impl Span {
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     /// The file as the user named it; empty for text given directly (a query on the command line).
-    pub path: String,
+    pub path: Arc<str>,
     /// The place in words, for example `template Gate, edge Free → Occ, guard`; empty for a whole file.
     pub place: String,
     /// The decoded text that spans count in.
     pub text: String,
-    /// Pairs (byte of `text`, byte of the file), ascending; between two entries both advance together.
+    /// The byte of the file that the text begins at.
+    pub file_start: u32,
+    /// Pairs (byte of `text`, byte of the file), ascending, where the two do not advance together; between two entries,
+    /// and before the first, they do.
     pub offsets: Vec<(u32, u32)>,
-    /// The file's byte offsets at which lines start, from the line that the text begins in to the one that it ends
-    /// in. Empty: the text is the file.
-    pub line_starts: Vec<u32>,
-    /// How many lines of the file come before the first one of `line_starts`.
-    pub first_line: u32,
+    /// The file's byte offsets at which lines start. Empty: the text is the file.
+    pub line_starts: Arc<[u32]>,
+    /// Which of the `line_starts` belong to the lines from that which the text begins in to the one that it ends in.
+    pub lines: Range<u32>,
 }
 
 /// Line and column of a place in a file, both counted from 1; columns count characters.
@@ -74,7 +78,7 @@ impl Source {
             .partition_point(|&(text, _)| text <= text_offset);
         match index.checked_sub(1).map(|i| self.offsets[i]) {
             Some((text, file)) => file + (text_offset - text),
-            None => text_offset,
+            None => self.file_start + text_offset,
         }
     }
 }
@@ -107,11 +111,9 @@ impl SourceMap {
             return position_in_text(&source.text, span.start);
         }
         let offset = source.file_offset(span.start);
-        let line = source
-            .line_starts
-            .partition_point(|&start| start <= offset)
-            .max(1);
-        let line_start = source.line_starts[line - 1];
+        let lines = &source.line_starts[source.lines.start as usize..source.lines.end as usize];
+        let line = lines.partition_point(|&start| start <= offset).max(1);
+        let line_start = lines[line - 1];
         // Only bytes of the file that belong to the text can be told to be the rest of a character.
         let first = source.text.floor_char_boundary(span.start as usize);
         let rest_bytes = source.text[..first]
@@ -128,7 +130,7 @@ impl SourceMap {
         Position {
             line: u32::try_from(line)
                 .unwrap_or(u32::MAX)
-                .saturating_add(source.first_line),
+                .saturating_add(source.lines.start),
             column,
         }
     }

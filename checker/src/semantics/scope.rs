@@ -4,8 +4,9 @@
 //! the prelude, the global declarations and its own; the declarations of the system section are seen by the system line and
 //! by queries only. The prelude is a scope of its own, so a model may declare its names again.
 
-use std::collections::HashMap;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use super::typed::{Expr, Place, Signature};
 use super::types::Type;
@@ -38,7 +39,7 @@ pub(super) enum Entity {
 /// The names of one scope.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scope {
-    names: HashMap<String, (Entity, Span)>,
+    names: FxHashMap<String, (Entity, Span)>,
 }
 
 impl Scope {

@@ -120,7 +120,7 @@ fn limit(diagnostics: &mut Vec<Diagnostic>) {
 fn add_file(path: &str, text: String, sources: &mut SourceMap) -> Span {
     let end = lexer::to_u32(text.len());
     let source = sources.add(Source {
-        path: path.to_owned(),
+        path: path.into(),
         text,
         ..Source::default()
     });

@@ -4,22 +4,24 @@
 use super::lexer::to_u32;
 use crate::diagnostics::{Source, SourceId, SourceMap, Span};
 use roxmltree::Node;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// The file that elements are read from.
 pub(super) struct XmlFile<'a> {
-    pub(super) path: &'a str,
+    pub(super) path: Arc<str>,
     pub(super) text: &'a str,
-    line_starts: Vec<u32>,
+    line_starts: Arc<[u32]>,
 }
 
 impl<'a> XmlFile<'a> {
-    pub(super) fn new(path: &'a str, text: &'a str) -> XmlFile<'a> {
+    pub(super) fn new(path: &str, text: &'a str) -> XmlFile<'a> {
         let ends = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
         let line_starts = std::iter::once(0)
             .chain(ends.map(|(index, _)| to_u32(index + 1)))
             .collect();
         XmlFile {
-            path,
+            path: path.into(),
             text,
             line_starts,
         }
@@ -31,7 +33,7 @@ impl<'a> XmlFile<'a> {
         let raw = self.text.get(start..end).unwrap_or("");
         let (text, offsets) = match decode(raw, start) {
             Some(decoded) => decoded,
-            None => (all_text(node), vec![(0, to_u32(start))]),
+            None => (all_text(node), Vec::new()),
         };
         self.add(text, offsets, start..end, place, sources)
     }
@@ -39,20 +41,19 @@ impl<'a> XmlFile<'a> {
     /// Adds bytes of the file as they are.
     pub(super) fn add_raw(
         &self,
-        range: std::ops::Range<usize>,
+        range: Range<usize>,
         place: String,
         sources: &mut SourceMap,
     ) -> Span {
         let text = self.text.get(range.clone()).unwrap_or("").to_owned();
-        let offsets = vec![(0, to_u32(range.start))];
-        self.add(text, offsets, range, place, sources)
+        self.add(text, Vec::new(), range, place, sources)
     }
 
     fn add(
         &self,
         text: String,
         offsets: Vec<(u32, u32)>,
-        range: std::ops::Range<usize>,
+        range: Range<usize>,
         place: String,
         sources: &mut SourceMap,
     ) -> Span {
@@ -61,12 +62,13 @@ impl<'a> XmlFile<'a> {
         let last = lines.partition_point(|&line| line as usize <= range.end);
         let end = to_u32(text.len());
         let source: SourceId = sources.add(Source {
-            path: self.path.to_owned(),
+            path: Arc::clone(&self.path),
             place,
             text,
+            file_start: to_u32(range.start),
             offsets,
-            line_starts: lines[first..last].to_vec(),
-            first_line: to_u32(first),
+            line_starts: Arc::clone(lines),
+            lines: to_u32(first)..to_u32(last),
         });
         Span {
             source,
@@ -107,10 +109,10 @@ fn all_text(node: Node) -> String {
     texts.filter_map(|child| child.text()).collect()
 }
 
-/// The decoded text and its offsets; `None` if it uses an entity that is not predefined.
+/// The decoded text and its further offsets; `None` if it uses an entity that is not predefined.
 fn decode(raw: &str, file_start: usize) -> Option<(String, Vec<(u32, u32)>)> {
     let mut text = String::with_capacity(raw.len());
-    let mut offsets = vec![(0, to_u32(file_start))];
+    let mut offsets = Vec::new();
     let mut position = 0;
     while position < raw.len() {
         let rest = &raw[position..];
