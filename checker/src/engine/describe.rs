@@ -364,6 +364,11 @@ pub fn failure_text(model: &LoadedModel, failure: Failure) -> String {
             let process = &network.processes[process as usize].name;
             format!("{process} gives a clock the rate {rate}; only 0 and 1 have a meaning here")
         }
+        Failure::Moves(most) => {
+            format!(
+                "a state has more than {most} moves: too many receivers of a broadcast have a choice"
+            )
+        }
         Failure::InitialInvariant => "the initial state breaks an invariant".to_owned(),
     }
 }

@@ -42,24 +42,37 @@ impl Interpreter {
         self.constants.extend_from_slice(constants);
     }
 
-    /// Calls a function and counts the executed instructions.
-    pub(super) fn measure(
+    /// Calls a function that may take this number of rounds instead of [`ROUND_LIMIT`]; returns also how many it took.
+    pub fn call_within(
         &self,
+        round_limit: u64,
         function: FunctionId,
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> (Result<i32, RunTimeError>, u64) {
+        let (result, effort) = self.measure(round_limit, function, arguments, context);
+        (result, effort.rounds)
+    }
+
+    /// Calls a function and measures its effort.
+    pub(super) fn measure(
+        &self,
+        round_limit: u64,
+        function: FunctionId,
+        arguments: &[i32],
+        context: &mut Context<'_>,
+    ) -> (Result<i32, RunTimeError>, Effort) {
         MACHINE.with_borrow_mut(|machine| {
             machine.reset();
             let mut run = Run {
                 program: self,
                 machine,
                 context,
-                rounds: 0,
-                instructions: 0,
+                round_limit,
+                effort: Effort::default(),
             };
             let result = run.call(function, arguments);
-            (result, run.instructions)
+            (result, run.effort)
         })
     }
 }
@@ -71,8 +84,16 @@ impl Executor for Interpreter {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
-        self.measure(function, arguments, context).0
+        self.measure(ROUND_LIMIT, function, arguments, context).0
     }
+}
+
+/// What a call took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Effort {
+    /// Rounds of loops, and calls of functions that call others.
+    pub(super) rounds: u64,
+    pub(super) instructions: u64,
 }
 
 thread_local! {
@@ -167,10 +188,9 @@ struct Run<'run, 'context> {
     program: &'run Interpreter,
     machine: &'run mut Machine,
     context: &'run mut Context<'context>,
-    /// The rounds of loops so far.
-    rounds: u64,
-    /// The instructions so far.
-    instructions: u64,
+    /// How many rounds it may take.
+    round_limit: u64,
+    effort: Effort,
 }
 
 impl<'run> Run<'run, '_> {
@@ -187,7 +207,7 @@ impl<'run> Run<'run, '_> {
             let block = self.block(active);
             if let Some(instruction) = block.instructions.get(active.next) {
                 active.next += 1;
-                self.instructions += 1;
+                self.effort.instructions += 1;
                 if let Instruction::Call {
                     function,
                     arguments,
@@ -423,8 +443,8 @@ impl<'run> Run<'run, '_> {
                 self.set_integer(active, target, value);
             }
             Instruction::CountRound { .. } => {
-                self.rounds += 1;
-                if self.rounds > ROUND_LIMIT {
+                self.effort.rounds += 1;
+                if self.effort.rounds > self.round_limit {
                     return Err(RunTimeErrorKind::StepLimit);
                 }
             }

@@ -16,6 +16,8 @@ pub enum Failure {
         /// The rate.
         rate: i32,
     },
+    /// A state has more than this number of moves.
+    Moves(usize),
     /// The initial state breaks an invariant.
     InitialInvariant,
 }

@@ -12,6 +12,7 @@ use std::ops::Range;
 use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
 use crate::ir::{ChannelId, Edge, FunctionId, Guard, Location, Network, Process, Update, Urgency};
 
+use super::failure::Failure;
 use super::moves::{MoveRef, Moves, Part};
 use super::offers::{Next, OfferId, Offers, Record, VectorId};
 
@@ -90,13 +91,24 @@ pub struct Stepper<'a> {
     /// The channel of the moves that are being put together.
     channel: Option<ChannelId>,
     chosen: Vec<Choice>,
-    /// By receiving process of a broadcast: the range of its candidates.
-    groups: Vec<(usize, usize)>,
+    /// The receiving processes of the broadcast that is being put together.
+    groups: Vec<Group>,
     parts: Vec<Part>,
     /// Moves that were put together before.
     offers: Offers,
     /// What is evaluated while moves are put together to be remembered.
     record: Option<Record>,
+}
+
+/// A receiving process of a broadcast: its candidates, and what it does in the combination at hand.
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    first: usize,
+    last: usize,
+    /// One past the last pick.
+    end: usize,
+    /// A candidate, or `last` for abstaining.
+    pick: usize,
 }
 
 /// What a process does in a broadcast that is being put together.
@@ -192,7 +204,7 @@ impl<'a> Stepper<'a> {
     }
 
     /// All moves of the state, as far as the words decide, into `out`.
-    pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), RunTimeError> {
+    pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         if let Some(vector) = self.offers.vector(words)
             && let Some(offer) = self.offer(vector, words)?
         {
@@ -213,7 +225,7 @@ impl<'a> Stepper<'a> {
         &mut self,
         vector: VectorId,
         words: &mut [i32],
-    ) -> Result<Option<OfferId>, RunTimeError> {
+    ) -> Result<Option<OfferId>, Failure> {
         let Some(mut way) = self.offers.start(vector) else {
             return Ok(None);
         };
@@ -250,7 +262,7 @@ impl<'a> Stepper<'a> {
         self.offers.bytes()
     }
 
-    fn put_together(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), RunTimeError> {
+    fn put_together(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         out.clear();
         let committed = self.is_committed(words);
         for process in 0..self.tables.len() {
@@ -268,6 +280,7 @@ impl<'a> Stepper<'a> {
                 let entry = self.tables[process][location].sends[index];
                 self.synchronisations(process as u32, entry, committed && !own, words, out)?;
             }
+            check_count(out)?;
         }
         Ok(())
     }
@@ -278,7 +291,7 @@ impl<'a> Stepper<'a> {
         entry: EdgeEntry<'a>,
         words: &mut [i32],
         out: &mut Moves,
-    ) -> Result<(), RunTimeError> {
+    ) -> Result<(), Failure> {
         self.candidates.clear();
         self.constraints.clear();
         self.channel = None;
@@ -299,7 +312,7 @@ impl<'a> Stepper<'a> {
         needs_committed: bool,
         words: &mut [i32],
         out: &mut Moves,
-    ) -> Result<(), RunTimeError> {
+    ) -> Result<(), Failure> {
         let (network, executor, definition) = (self.network, self.executor, entry.edge);
         let Some(sync) = definition.sync else {
             return Ok(());
@@ -364,7 +377,7 @@ impl<'a> Stepper<'a> {
         needs_committed: bool,
         words: &mut [i32],
         out: &mut Moves,
-    ) -> Result<(), RunTimeError> {
+    ) -> Result<(), Failure> {
         let mut groups = std::mem::take(&mut self.groups);
         groups.clear();
         let mut has_committed = !needs_committed;
@@ -377,43 +390,62 @@ impl<'a> Stepper<'a> {
             self.enabled_receives(receiver, channel, words)?;
             if self.candidates.len() > first {
                 has_committed |= self.is_process_committed(receiver, words);
-                groups.push((first, self.candidates.len()));
+                groups.push(self.group(first));
             }
         }
         if has_committed {
             self.chosen.clear();
             self.chosen.push(Choice::Takes(0));
-            self.combine(&groups, needs_committed, words, out);
+            self.combine(&mut groups, needs_committed, words, out)?;
         }
         self.groups = groups;
         Ok(())
     }
 
-    /// Emits every combination of the receivers' alternatives.
+    /// Emits every combination of the receivers' alternatives with the sender, which was chosen; the last receiver's change
+    /// fastest.
     fn combine(
         &mut self,
-        groups: &[(usize, usize)],
+        groups: &mut [Group],
         needs_committed: bool,
         words: &[i32],
         out: &mut Moves,
-    ) {
-        let Some((&(first, last), rest)) = groups.split_first() else {
+    ) -> Result<(), Failure> {
+        loop {
+            self.chosen.truncate(1);
+            self.chosen.extend(groups.iter().map(|group| {
+                if group.pick < group.last {
+                    Choice::Takes(group.pick as u32)
+                } else {
+                    Choice::Abstains(group.first as u32, group.last as u32)
+                }
+            }));
             if !needs_committed || self.has_committed_choice(words) {
                 self.emit(out);
+                check_count(out)?;
             }
-            return;
-        };
-        for candidate in first..last {
-            self.chosen.push(Choice::Takes(candidate as u32));
-            self.combine(rest, needs_committed, words, out);
-            self.chosen.pop();
+            let next = groups.iter().rposition(|group| group.pick + 1 < group.end);
+            let Some(next) = next else {
+                return Ok(());
+            };
+            groups[next].pick += 1;
+            for group in &mut groups[next + 1..] {
+                group.pick = group.first;
+            }
         }
+    }
+
+    /// The candidates from `first` on, all of one receiving process.
+    fn group(&self, first: usize) -> Group {
+        let last = self.candidates.len();
+        // A receiver whose edges all have clock guards may have none that is open: abstaining comes after its candidates.
         let guarded = |candidate: &Candidate| candidate.constraints.0 < candidate.constraints.1;
-        if self.candidates[first..last].iter().all(guarded) {
-            self.chosen
-                .push(Choice::Abstains(first as u32, last as u32));
-            self.combine(rest, needs_committed, words, out);
-            self.chosen.pop();
+        let may_abstain = self.candidates[first..last].iter().all(guarded);
+        Group {
+            first,
+            last,
+            end: last + usize::from(may_abstain),
+            pick: first,
         }
     }
 
@@ -729,6 +761,16 @@ pub fn select_count(edge: &Edge) -> u32 {
         .iter()
         .map(|select| (select.high - select.low + 1) as u32)
         .product()
+}
+
+/// The most moves of a state: receivers of a broadcast that have a choice each multiply.
+const MOST_MOVES: usize = 1 << 20;
+
+fn check_count(moves: &Moves) -> Result<(), Failure> {
+    if moves.len() > MOST_MOVES {
+        return Err(Failure::Moves(MOST_MOVES));
+    }
+    Ok(())
 }
 
 /// The select values of a combination.

@@ -30,6 +30,8 @@ const MOST_UNSTORED: u64 = 256;
 
 /// States between two looks at the limits.
 const LOOK_EVERY: u64 = 256;
+/// Moves between two looks at the limits below one stored state.
+const LOOK_EVERY_MOVES: u64 = 1 << 12;
 
 /// No node.
 const NONE: u32 = u32::MAX;
@@ -299,8 +301,16 @@ impl<'s, 'a> Search<'s, 'a> {
 
     fn visit_frames(&mut self, frames: &mut Vec<Frame>) -> Result<Visit, Failure> {
         let mut depth = 0;
+        let mut taken: u64 = 0;
         self.open(&mut frames[0])?;
         loop {
+            taken += 1;
+            if taken.is_multiple_of(LOOK_EVERY_MOVES) {
+                let counters = self.counters();
+                if let Some(reason) = self.watch.look(&counters) {
+                    return Ok(Visit::Stopped(reason));
+                }
+            }
             if frames[depth].next == frames[depth].moves.len() {
                 if depth == 0 {
                     return Ok(Visit::Done);

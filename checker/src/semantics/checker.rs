@@ -2,17 +2,25 @@
 
 use std::collections::HashSet;
 
+use rustc_hash::FxHashMap;
+
 use super::codes;
 use super::lower::{Builder, Images};
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Local, LocalId, Place, Root};
 use super::types::{Size, Type};
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
-use crate::exec::{Context, Executor, Interpreter};
-use crate::ir::{Channel, Clock, FunctionId, Network, ProcessId, RunTimeErrorKind, Variable};
+use crate::exec::{Context, Interpreter};
+use crate::ir::{
+    Channel, Clock, Function, FunctionId, Instruction, Network, ProcessId, RunTimeErrorKind,
+    Variable,
+};
 
 /// The place of the system section's scope: behind the prelude's and the global one.
 const SYSTEM_SCOPE: usize = 2;
+
+/// How many rounds of loops all constants of a model may take together: about a second.
+const CONSTANT_ROUND_LIMIT: u64 = 10_000_000;
 
 #[expect(
     clippy::struct_excessive_bools,
@@ -63,6 +71,8 @@ pub(super) struct World {
     pub(super) initial: Vec<i32>,
     /// The initial words of the `meta` variables.
     pub(super) initial_meta: Vec<i32>,
+    /// How many rounds of loops the constants have taken so far.
+    pub(super) constant_rounds: u64,
     /// How many scalar sets there are.
     pub(super) scalar_sets: u32,
     /// The scopes that queries see: prelude, globals, system.
@@ -291,19 +301,44 @@ impl<'a> Checker<'a> {
 
     /// Runs a function that writes `words` words to the start of an otherwise empty state.
     pub(super) fn run(
-        &self,
+        &mut self,
         function: FunctionId,
         words: u32,
     ) -> Result<Vec<i32>, RunTimeErrorKind> {
         let network = &self.world.network;
-        let interpreter = Interpreter::new(&network.functions, &network.constants);
+        let functions = excerpt(&network.functions, function);
+        let interpreter = Interpreter::new(&functions, &network.constants);
         let mut state = vec![0; words as usize];
         let mut context = Context {
             state: &mut state,
             constraints: &mut Vec::new(),
             assignments: &mut Vec::new(),
         };
-        let result = interpreter.call(function, &[], &mut context);
+        let left = CONSTANT_ROUND_LIMIT.saturating_sub(self.world.constant_rounds);
+        let (result, rounds) = interpreter.call_within(left, FunctionId(0), &[], &mut context);
+        self.world.constant_rounds += rounds;
         result.map(|_| state).map_err(|error| error.kind)
     }
+}
+
+/// A function and all that it calls, as a program of its own that begins with it.
+fn excerpt(functions: &[Function], root: FunctionId) -> Vec<Function> {
+    let mut numbers = FxHashMap::from_iter([(root, FunctionId(0))]);
+    let mut wanted = vec![root];
+    let mut program = Vec::new();
+    while let Some(&next) = wanted.get(program.len()) {
+        let mut function = functions[next.0 as usize].clone();
+        let blocks = function.blocks.iter_mut();
+        for instruction in blocks.flat_map(|block| &mut block.instructions) {
+            if let Instruction::Call { function, .. } = instruction {
+                let called = *function;
+                *function = *numbers.entry(called).or_insert_with(|| {
+                    wanted.push(called);
+                    FunctionId(wanted.len() as u32 - 1)
+                });
+            }
+        }
+        program.push(function);
+    }
+    program
 }

@@ -111,7 +111,9 @@ impl Checker<'_> {
             RunTimeErrorKind::NotAnInteger => "a double that fits into no integer",
             RunTimeErrorKind::ClockValue => "a clock value beyond the limits",
             RunTimeErrorKind::AssertionFailed => "an assertion that does not hold",
-            RunTimeErrorKind::StepLimit => "a loop without end",
+            RunTimeErrorKind::StepLimit => {
+                "its loops, with those of all constants before it, take more than ten million rounds"
+            }
         };
         self.error(
             codes::CONSTANT_WITHOUT_VALUE,

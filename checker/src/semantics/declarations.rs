@@ -7,7 +7,7 @@ use super::clock_expressions::integral_double;
 use super::codes;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Place, Root};
-use super::types::{DEFAULT_INT, Index, Size, StructType, Type};
+use super::types::{self, DEFAULT_INT, Index, SIZE_LIMIT, Size, StructType, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::ir::CLOCK_LIMIT;
@@ -81,7 +81,7 @@ impl Checker<'_> {
                     codes::ARRAY_TOO_LARGE,
                     dimension_span(dimension),
                     "this array has too many parts",
-                    "the limit is 67108864 words, clocks or channels",
+                    "the limit is 16777216 words",
                 );
                 return Type::Error;
             }
@@ -410,6 +410,16 @@ impl Checker<'_> {
         free: bool,
         span: Span,
     ) -> Entity {
+        if !ty.is_register()
+            && !self.has_room(
+                self.world.network.constants.len() + words.len(),
+                "constants",
+                SIZE_LIMIT,
+                span,
+            )
+        {
+            return Entity::Broken;
+        }
         if ty.is_register() {
             let value = match ty {
                 Type::Double => {
@@ -442,6 +452,9 @@ impl Checker<'_> {
         ty: &Type,
         parts: Option<Vec<InitialPart>>,
     ) -> Entity {
+        if !self.has_room_for(ty, variable.name.span) {
+            return Entity::Broken;
+        }
         let parts = parts.unwrap_or_default();
         let words = self.initial_words(&parts, ty);
         let meta = variable.ty.prefixes.meta;
@@ -463,6 +476,40 @@ impl Checker<'_> {
             place,
             ty: ty.clone(),
         }
+    }
+
+    /// Whether the state has room for one more variable; reports if it has not.
+    fn has_room_for(&mut self, ty: &Type, span: Span) -> bool {
+        let size = ty.size();
+        let words = self.world.initial.len() + self.world.initial_meta.len();
+        let clocks = self.world.network.clocks.len();
+        let channels = self.world.network.channels.len();
+        self.has_room(words + size.words as usize, "variables", SIZE_LIMIT, span)
+            && self.has_room(
+                clocks + size.clocks as usize - 1,
+                "clocks",
+                types::CLOCK_LIMIT,
+                span,
+            )
+            && self.has_room(
+                channels + size.channels as usize,
+                "channels",
+                types::CHANNEL_LIMIT,
+                span,
+            )
+    }
+
+    fn has_room(&mut self, count: usize, what: &str, limit: u64, span: Span) -> bool {
+        let fits = count as u64 <= limit;
+        if !fits {
+            self.error(
+                codes::ARRAY_TOO_LARGE,
+                span,
+                format!("the model has more {what} than the engine takes"),
+                &format!("the limit is {limit} of them, parts of arrays and structs included"),
+            );
+        }
+        fits
     }
 
     fn warn_of_doubles(&mut self, variable: &ast::Variable, ty: &Type, meta: bool) {

@@ -192,8 +192,8 @@ impl Checker<'_> {
         let count: u64 = types
             .iter()
             .map(|ty| u64::from(parameter_count(ty)))
-            .product();
-        if count + self.world.network.processes.len() as u64 > PROCESS_LIMIT {
+            .fold(1, u64::saturating_mul);
+        if count.saturating_add(self.world.network.processes.len() as u64) > PROCESS_LIMIT {
             self.error(
                 codes::RANGE_TOO_LARGE,
                 name.span,

@@ -1,6 +1,6 @@
 //! Templates: locations and edges of one process.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use super::checker::Checker;
 use super::codes;
@@ -14,6 +14,9 @@ use crate::syntax::ast;
 
 /// The most branches that the select bindings of one leg may stand for.
 const BRANCH_LIMIT: u64 = 1 << 16;
+
+/// The most edges that the select bindings of one may stand for.
+const SELECT_LIMIT: u64 = 1 << 20;
 
 /// What an edge can lead to.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +81,7 @@ impl Checker<'_> {
         }
     }
 
-    fn node(&mut self, nodes: &HashMap<&str, Node>, name: &ast::Name) -> Option<Node> {
+    fn node(&mut self, nodes: &FxHashMap<&str, Node>, name: &ast::Name) -> Option<Node> {
         let node = nodes.get(name.text.as_str()).copied();
         if node.is_none() {
             self.error(
@@ -193,15 +196,15 @@ impl Checker<'_> {
         &mut self,
         template: &ast::Template,
         edge: &ast::Edge,
-        nodes: &HashMap<&str, Node>,
+        nodes: &FxHashMap<&str, Node>,
         source: LocationId,
     ) -> ir::Edge {
         self.locals.clear();
         let place = format!(
             "template {}, edge {} → {}",
             template.name.text,
-            node_name(template, &edge.source.text),
-            node_name(template, &edge.target.text)
+            node_name(template, nodes, &edge.source.text),
+            node_name(template, nodes, &edge.target.text)
         );
         self.scopes.push(Scope::default());
         let selects = self.selects(&edge.select);
@@ -262,6 +265,17 @@ impl Checker<'_> {
             };
             selects.push(Select { local, range });
         }
+        let counts = selects
+            .iter()
+            .map(|select| u64::from(select.range.high.abs_diff(select.range.low)) + 1);
+        if counts.fold(1, u64::saturating_mul) > SELECT_LIMIT {
+            self.error(
+                codes::RANGE_TOO_LARGE,
+                bindings[0].1.span,
+                format!("this select stands for more than {SELECT_LIMIT} edges"),
+                "use smaller ranges",
+            );
+        }
         selects
     }
 
@@ -269,7 +283,7 @@ impl Checker<'_> {
         &mut self,
         template: &ast::Template,
         edge: &ast::Edge,
-        nodes: &HashMap<&str, Node>,
+        nodes: &FxHashMap<&str, Node>,
         parameters: usize,
         place: &str,
     ) -> Vec<ir::Branch> {
@@ -337,7 +351,7 @@ impl Checker<'_> {
             let (low, high) = ty.bounds();
             u64::from(high.abs_diff(low)) + 1
         });
-        if counts.product::<u64>() > BRANCH_LIMIT {
+        if counts.fold(1, u64::saturating_mul) > BRANCH_LIMIT {
             self.error(
                 codes::RANGE_TOO_LARGE,
                 leg.span,
@@ -379,8 +393,8 @@ impl Checker<'_> {
     }
 }
 
-fn nodes(template: &ast::Template) -> HashMap<&str, Node> {
-    let mut nodes = HashMap::new();
+fn nodes(template: &ast::Template) -> FxHashMap<&str, Node> {
+    let mut nodes = FxHashMap::default();
     for (i, location) in template.locations.iter().enumerate() {
         nodes
             .entry(location.id.as_str())
@@ -394,9 +408,15 @@ fn nodes(template: &ast::Template) -> HashMap<&str, Node> {
     nodes
 }
 
-fn node_name<'t>(template: &'t ast::Template, id: &'t str) -> &'t str {
-    let location = template.locations.iter().find(|location| location.id == id);
-    let name = location.and_then(|location| location.name.as_ref());
+fn node_name<'t>(
+    template: &'t ast::Template,
+    nodes: &FxHashMap<&str, Node>,
+    id: &'t str,
+) -> &'t str {
+    let name = match nodes.get(id) {
+        Some(&Node::Location(i)) => template.locations[i as usize].name.as_ref(),
+        _ => None,
+    };
     name.map_or(id, |name| name.text.as_str())
 }
 

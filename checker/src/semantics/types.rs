@@ -15,8 +15,14 @@ use std::sync::Arc;
 /// The bounds of `int` without a range.
 pub(super) const DEFAULT_INT: (i32, i32) = (-32768, 32767);
 
-/// The most words, clocks or channels that a declaration may take.
-pub(super) const SIZE_LIMIT: u64 = 1 << 26;
+/// The most words, clocks or channels that a declaration may take, and the most words of all declarations together.
+pub(super) const SIZE_LIMIT: u64 = 1 << 24;
+
+/// The most channels of a model: each has a name of its own.
+pub(super) const CHANNEL_LIMIT: u64 = 1 << 20;
+
+/// The most clocks of a model: a zone takes four bytes for each pair of them.
+pub(super) const CLOCK_LIMIT: u64 = 1 << 12;
 
 /// A type.
 #[derive(Clone, Debug, PartialEq)]

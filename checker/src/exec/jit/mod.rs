@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
 use crate::ir::{Function, FunctionId};
 
-use super::{Context, Executor, Interpreter, RunTimeError};
+use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError};
 
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};
@@ -134,12 +134,14 @@ impl Jit {
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
         let entry = &self.entries[function.0 as usize];
-        let (result, instructions) = self.interpreter.measure(function, arguments, context);
+        let (result, effort) = self
+            .interpreter
+            .measure(ROUND_LIMIT, function, arguments, context);
         let heat = entry.heat.load(Ordering::Relaxed);
         if heat == NEVER {
             return result;
         }
-        let heat = heat + instructions;
+        let heat = heat + effort.instructions;
         entry.heat.store(heat, Ordering::Relaxed);
         if heat > HOT_INSTRUCTIONS {
             // A function that cannot be compiled goes on being interpreted, which gives the same results.
