@@ -3,6 +3,8 @@
 //! A state is symbolic: its zone holds all clock values that the moves so far allow. A move is listed if it is possible at some
 //! of them. Nothing is extrapolated.
 
+use crate::exec::Executor;
+use crate::ir::Network;
 use crate::network::{Abstraction, ClockBounds, Failure, Moves, Part, Stepper, Symbolic};
 use crate::zones::Zone;
 
@@ -34,29 +36,7 @@ impl LoadedModel {
 
     /// The moves of a state, and where each leads. More than one entry for a move if a receiver abstains.
     pub fn successors(&self, point: &Point) -> Result<Vec<(Vec<Part>, Point)>, Failure> {
-        let mut symbolic = self.symbolic();
-        let mut words = point.words.clone();
-        let mut moves = Moves::default();
-        symbolic.stepper.moves(&mut words, &mut moves)?;
-        let mut successors = Vec::new();
-        let mut entries = Vec::new();
-        for one in moves.iter() {
-            if !symbolic.is_enabled(one, point.zone.bounds())? {
-                continue;
-            }
-            let mut target = words.clone();
-            let Some(effect) = symbolic.fire(one, &mut target)? else {
-                continue;
-            };
-            effect.entry_zones(point.zone.bounds(), symbolic.dimension(), &mut entries);
-            for mut zone in entries.drain(..) {
-                let may_delay = symbolic.may_delay(&mut target)?;
-                symbolic.delay(&target, may_delay, &effect.invariant, zone.bounds_mut())?;
-                let words = target.clone();
-                successors.push((one.parts.to_vec(), Point { words, zone }));
-            }
-        }
-        Ok(successors)
+        successors(&mut self.symbolic(), point)
     }
 
     /// Follows moves as long as time cannot pass and there is exactly one; the state where time can pass, or there is a choice,
@@ -76,8 +56,41 @@ impl LoadedModel {
     }
 
     fn symbolic(&self) -> Symbolic<'_> {
-        let network = self.network();
-        let bounds = ClockBounds::new(network, &[], Abstraction::Exact);
-        Symbolic::new(Stepper::new(network, self.executor()), bounds)
+        symbolic(self.network(), self.executor())
     }
+}
+
+/// The semantics of a network as simulations take it: nothing is extrapolated.
+pub fn symbolic<'a>(network: &'a Network, executor: &'a dyn Executor) -> Symbolic<'a> {
+    let bounds = ClockBounds::new(network, &[], Abstraction::Exact);
+    Symbolic::new(Stepper::new(network, executor), bounds)
+}
+
+/// The moves of a state, and where each leads. More than one entry for a move if a receiver abstains.
+pub fn successors(
+    symbolic: &mut Symbolic<'_>,
+    point: &Point,
+) -> Result<Vec<(Vec<Part>, Point)>, Failure> {
+    let mut words = point.words.clone();
+    let mut moves = Moves::default();
+    symbolic.stepper.moves(&mut words, &mut moves)?;
+    let mut successors = Vec::new();
+    let mut entries = Vec::new();
+    for one in moves.iter() {
+        if !symbolic.is_enabled(one, point.zone.bounds())? {
+            continue;
+        }
+        let mut target = words.clone();
+        let Some(effect) = symbolic.fire(one, &mut target)? else {
+            continue;
+        };
+        effect.entry_zones(point.zone.bounds(), symbolic.dimension(), &mut entries);
+        for mut zone in entries.drain(..) {
+            let may_delay = symbolic.may_delay(&mut target)?;
+            symbolic.delay(&target, may_delay, &effect.invariant, zone.bounds_mut())?;
+            let words = target.clone();
+            successors.push((one.parts.to_vec(), Point { words, zone }));
+        }
+    }
+    Ok(successors)
 }
