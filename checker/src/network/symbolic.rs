@@ -180,7 +180,7 @@ impl<'a> Symbolic<'a> {
             .moves(words, &mut moves)
             .map(|()| self.stepper.may_delay(words, &moves));
         self.inner_moves = moves;
-        Ok(result?)
+        result
     }
 
     /// Lets time pass within the invariant if it may.
