@@ -7,6 +7,7 @@ use crate::game::Player;
 use crate::game::graph::{Graph, Objective as GameObjective};
 use crate::game::plans::{NoPlans, Plan, Plans};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
+use crate::game::recurrence;
 use crate::game::strategy::{self, Strategy};
 use crate::ir::{ClockAtom, Measure, Network, Objective, Predicate, Query, QueryKind};
 use crate::network::bounds::is_difference;
@@ -113,21 +114,11 @@ pub struct Answer {
 }
 
 /// Names the part of a game query that there is no algorithm for.
-pub(super) fn unsupported_game(
-    objective: &Objective,
-    cooperative: bool,
-    time_optimal: bool,
-    observations: bool,
-) -> Option<&'static str> {
-    match objective {
-        _ if cooperative => Some("E<> control:"),
-        _ if time_optimal => Some("control_t*"),
-        _ if observations => Some("partial observation"),
-        Objective::Reach(_)
-        | Objective::Until(..)
-        | Objective::Safe(_)
-        | Objective::WeakUntil(..) => None,
-        Objective::Buchi(..) => Some("control: A[] (p && A<> q)"),
+pub(super) fn unsupported_game(time_optimal: bool, observations: bool) -> Option<&'static str> {
+    match () {
+        () if time_optimal => Some("control_t*"),
+        () if observations => Some("partial observation"),
+        () => None,
     }
 }
 
@@ -170,8 +161,13 @@ pub(super) fn answer(
             };
             extremum(network, executor, question, options, &mut watch)
         }
-        QueryKind::Control { objective, .. } => {
-            game(network, executor, objective, options, &mut watch)
+        QueryKind::Control {
+            objective,
+            cooperative,
+            ..
+        } => {
+            let asked = (objective, *cooperative);
+            game(network, executor, asked, options, &mut watch)
         }
         QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
             unreachable!("unsupported queries were refused")
@@ -530,17 +526,22 @@ fn reachable(
 fn game(
     network: &Network,
     executor: &dyn Executor,
-    objective: &Objective,
+    (objective, is_cooperative): (&Objective, bool),
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
+    let recurring;
     let (goal, keep, seeker) = match objective {
         Objective::Reach(goal) => (Some(goal), None, Player::Controller),
         Objective::Until(keep, goal) => (Some(goal), Some(keep), Player::Controller),
         Objective::Safe(keep) => (None, Some(keep), Player::Environment),
         Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Player::Environment),
-        Objective::Buchi(..) => unreachable!("unsupported objectives were refused"),
+        Objective::Buchi(keep, goal) => {
+            recurring = Predicate::And(vec![keep.clone(), goal.clone()]);
+            (Some(&recurring), Some(keep), Player::Controller)
+        }
     };
+    let is_recurring = matches!(objective, Objective::Buchi(..));
     let predicates: Vec<&Predicate> = goal.into_iter().chain(keep).collect();
     let mut symbolic = game_symbolic(network, executor, &predicates);
     let wanted = GameObjective {
@@ -559,12 +560,20 @@ fn game(
         }
     };
     let mut solver = Solver::new(&mut graph, seeker, options.forced);
-    let is_planned = options.plans != PlansWanted::No && seeker == Player::Controller;
+    let is_planned = options.plans != PlansWanted::No
+        && matches!(objective, Objective::Reach(_) | Objective::Until(..))
+        && !is_cooperative;
     let extent = match options.plans {
         PlansWanted::All(_) if is_planned => Extent::Everything,
         _ => Extent::Verdict,
     };
-    let result = solver.solve(extent, watch);
+    let result = if is_recurring {
+        recurrence::solve(&mut solver, is_cooperative, watch)
+    } else if is_cooperative {
+        solver.solve_cooperative(watch)
+    } else {
+        solver.solve(extent, watch)
+    };
     let counters = solver.counters();
     let winner = match result {
         Ok(GameAnswer::Won(winner)) => winner,
@@ -587,7 +596,11 @@ fn game(
     if is_planned {
         add_plans(&mut answer, &mut solver, options);
     }
-    if options.strategy || options.verify {
+    let has_strategy = match winner {
+        Player::Controller => !is_cooperative,
+        Player::Environment => !is_cooperative && !is_recurring,
+    };
+    if has_strategy && (options.strategy || options.verify) {
         match strategy::extract(&mut solver) {
             Ok(strategy) => {
                 if options.verify {

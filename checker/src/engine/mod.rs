@@ -345,16 +345,10 @@ impl LoadedModel {
             | QueryKind::LeadsTo(..)
             | QueryKind::Extremum { .. } => None,
             QueryKind::Control {
-                objective,
-                cooperative,
                 time_optimal,
                 observations,
-            } => answer::unsupported_game(
-                objective,
-                *cooperative,
-                time_optimal.is_some(),
-                observations.is_some(),
-            ),
+                ..
+            } => answer::unsupported_game(time_optimal.is_some(), observations.is_some()),
             QueryKind::SaveStrategy { .. } => Some("saveStrategy"),
             QueryKind::LoadStrategy { .. } => Some("loadStrategy"),
         };
@@ -378,7 +372,7 @@ impl LoadedModel {
                 query.span,
                 format!("{kind} are not supported"),
             )
-            .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, and control: with A<>, A[], A[ U ] or A[ W ]")
+            .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control: and E<> control:")
         } else if let Some(construct) = construct {
             Diagnostic::new(
                 codes::UNSUPPORTED_CONSTRUCT,

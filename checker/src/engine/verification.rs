@@ -32,7 +32,7 @@ pub fn verify(
         Objective::Until(keep, goal) => (Some(goal), Some(keep), Aim::Reach),
         Objective::Safe(keep) => (None, Some(keep), Aim::Keep),
         Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Aim::Keep),
-        Objective::Buchi(..) => return Err(verify::Error::Unsupported("Büchi objectives")),
+        Objective::Buchi(keep, goal) => (Some(goal), Some(keep), Aim::Recur),
     };
     let (constant, has_differences) = constants(goal.into_iter().chain(keep));
     let claim = Claim {

@@ -8,6 +8,7 @@ pub mod graph;
 pub mod plans;
 pub mod programs;
 pub mod reach;
+pub mod recurrence;
 mod stops;
 pub mod strategy;
 mod trails;

@@ -49,6 +49,9 @@ use super::{Forced, Player};
 /// Expanded nodes between two looks at the limits.
 const LOOK_EVERY: u64 = 64;
 
+/// Updates between two looks at the limits, where no node is expanded.
+const UPDATES_BETWEEN_LOOKS: u32 = 1024;
+
 /// The valuations of a node from which the seeker wins.
 #[derive(Clone, Debug)]
 pub enum Win {
@@ -93,6 +96,12 @@ pub struct Solver<'g, 's, 'a> {
     pub graph: &'g mut Graph<'s, 'a>,
     /// Who seeks.
     pub seeker: Player,
+    /// What is sought, by node, if it is not where the goal holds. Play does not end there, and all nodes are expanded.
+    pub(super) targets: Option<Vec<Win>>,
+    /// Whether play goes on from the goal.
+    pub(super) goes_on: bool,
+    /// Whether it matters what can be reached at all, through whatever has been won or lost.
+    pub(super) is_cooperative: bool,
     /// By node: the valuations from which the seeker wins.
     pub win: Vec<Win>,
     /// By node: the gains, by ascending stamp. What is sought has stamp 0.
@@ -114,6 +123,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let mut solver = Solver {
             graph,
             seeker,
+            targets: None,
+            goes_on: false,
+            is_cooperative: false,
             win: Vec::new(),
             gains: Vec::new(),
             forced,
@@ -143,9 +155,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     pub fn solve(&mut self, extent: Extent, watch: &mut dyn Watch) -> Result<Answer, Failure> {
         let mut next_look = LOOK_EVERY;
         loop {
-            while let Some(node) = self.updates.pop() {
-                self.is_updated[node as usize] = false;
-                self.update(node)?;
+            if let Some(reason) = self.propagate(watch)? {
+                return Ok(Answer::Stopped(reason));
             }
             if extent == Extent::Verdict && self.is_won() {
                 break;
@@ -173,6 +184,72 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             self.seeker.opponent()
         };
         Ok(Answer::Won(winner))
+    }
+
+    /// Updates nodes until nothing grows.
+    pub(super) fn propagate(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<Option<StopReason>, Failure> {
+        let mut until_look = UPDATES_BETWEEN_LOOKS;
+        while let Some(node) = self.updates.pop() {
+            self.is_updated[node as usize] = false;
+            self.update(node)?;
+            until_look -= 1;
+            if until_look == 0 {
+                until_look = UPDATES_BETWEEN_LOOKS;
+                let reason = watch.look(&self.counters());
+                if reason.is_some() {
+                    return Ok(reason);
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Forgets what was won, and seeks these parts of the nodes, in all of which play goes on.
+    pub(super) fn restart(&mut self, targets: Vec<Win>) {
+        self.targets = Some(targets);
+        self.stamp = 0;
+        self.win.clear();
+        self.gains.clear();
+        self.is_waiting.clear();
+        self.is_updated.clear();
+        self.updates.clear();
+        self.adopt_new_nodes();
+        for node in 0..self.graph.nodes.len() as u32 {
+            self.mark(node);
+        }
+    }
+
+    /// Lets nodes be expanded in which the goal holds; in a cooperative game also those that are broken.
+    pub(super) fn go_on(&mut self, is_cooperative: bool) {
+        self.goes_on = true;
+        self.is_cooperative = is_cooperative;
+        self.wait_for(0);
+    }
+
+    /// Whether both players together can get to where the controller wins; explores everything.
+    pub fn solve_cooperative(&mut self, watch: &mut dyn Watch) -> Result<Answer, Failure> {
+        self.go_on(true);
+        if let Answer::Stopped(reason) = self.solve(Extent::Everything, watch)? {
+            return Ok(Answer::Stopped(reason));
+        }
+        Ok(Answer::Won(if self.has_won_somewhere() {
+            Player::Controller
+        } else {
+            Player::Environment
+        }))
+    }
+
+    /// Whether the controller wins somewhere, inside chains included.
+    pub(super) fn has_won_somewhere(&self) -> bool {
+        if self.seeker == Player::Controller {
+            return self.win.iter().any(|win| !matches!(win, Win::Nothing));
+        }
+        let mut edges = self.graph.edges.iter();
+        self.win.iter().any(|win| !matches!(win, Win::Everything))
+            || edges.any(|edge| edge.length > 1 && !self.spoiling(edge).is_empty())
     }
 
     fn next_waiting(&mut self) -> Option<u32> {
@@ -255,6 +332,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
 
     /// The valuations of a node that the seeker wants to get to.
     fn sought(&self, node: u32) -> Win {
+        if let Some(targets) = &self.targets {
+            return targets[node as usize].clone();
+        }
         let part = match (self.graph.nodes[node as usize].standing, self.seeker) {
             (Standing::Goal, Player::Controller) | (Standing::Broken, Player::Environment) => {
                 return Win::Everything;
@@ -270,9 +350,26 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    /// Where the goal holds in a node that is neither a goal nor broken as a whole.
+    /// Whether the words decide who has won in a node.
+    fn is_decided(&self, node: u32) -> bool {
+        match self.graph.nodes[node as usize].standing {
+            Standing::Broken => true,
+            Standing::Goal => self.targets.is_none(),
+            Standing::Open | Standing::Mixed => false,
+        }
+    }
+
+    /// Where the goal holds, or what is sought lies, in a node that is neither a goal nor broken as a whole.
     pub(super) fn goal(&self, node: u32) -> Federation {
-        let none = || Federation::empty(self.graph.dimension());
+        let dimension = self.graph.dimension();
+        if let Some(targets) = &self.targets {
+            return match &targets[node as usize] {
+                Win::Nothing => Federation::empty(dimension),
+                Win::Everything => Federation::of_zone(dimension, self.graph.zone(node)),
+                Win::Part(part) => part.clone(),
+            };
+        }
+        let none = || Federation::empty(dimension);
         let parts = self.graph.parts(node);
         parts.map_or_else(none, |parts| parts.goal.clone())
     }
@@ -289,8 +386,12 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let Some(known) = self.graph.nodes.get(node as usize) else {
             return;
         };
-        let is_decided = matches!(known.standing, Standing::Goal | Standing::Broken);
-        if !known.is_expanded && !is_decided && !self.is_waiting[node as usize] {
+        let is_left = match known.standing {
+            Standing::Goal => !self.goes_on,
+            Standing::Broken => !self.is_cooperative,
+            Standing::Open | Standing::Mixed => false,
+        };
+        if !known.is_expanded && !is_left && !self.is_waiting[node as usize] {
             self.is_waiting[node as usize] = true;
             self.waiting.push_back(node);
         }
@@ -305,7 +406,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// Computes the winning valuations of a node anew; if they grew, its predecessors are to be updated.
     fn update(&mut self, node: u32) -> Result<(), Failure> {
         let state = self.graph.nodes[node as usize];
-        if !state.is_expanded || matches!(self.win[node as usize], Win::Everything) {
+        let is_settled =
+            self.is_decided(node) || matches!(self.win[node as usize], Win::Everything);
+        if !state.is_expanded || is_settled {
             return Ok(());
         }
         let grown = match self.quick(node) {
@@ -369,7 +472,14 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 }
             }
         }
-        if self.graph.nodes[node as usize].standing != Standing::Open {
+        let is_open = match &self.targets {
+            None => self.graph.nodes[node as usize].standing == Standing::Open,
+            Some(targets) => {
+                matches!(targets[node as usize], Win::Nothing)
+                    && self.graph.nodes[node as usize].standing != Standing::Mixed
+            }
+        };
+        if !is_open {
             return None;
         }
         if can_move && (!is_spoiled || self.seeker == Player::Environment) {

@@ -5,9 +5,11 @@
 //! moves are listed too, so that a strategy can be followed, and checked, move by move. Where play has ended there is nothing to
 //! decide.
 //!
-//! There are four kinds, by who wins and how:
+//! There are five kinds, by who wins and how:
 //! * The controller of a reachability game, and the environment of a safety game, follow the stamps of the gains: from valuations
 //!   of stamp k they move only into valuations of smaller stamps, or wait for them; so they make progress and get there.
+//! * The controller of a game with a goal that is to come again and again does the same, and from the goal goes on into anything
+//!   from which it wins; the ranks count anew from there.
 //! * The controller of a safety game may do whatever keeps it safe: its strategy allows all such moves and all such waiting. It is
 //!   the most permissive one, with one choice made: where what is safe has no last moment, and a move must be made before, it is
 //!   made in the last stretch of time in which it is possible.
@@ -99,7 +101,7 @@ pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
         strategy.states.push(StrategyState {
             words,
             decisions,
-            is_goal: standing == won_standing(owner),
+            is_goal: standing == won_standing(owner) && solver.targets.is_none(),
         });
         for edge in taken {
             if is_seeking {
@@ -131,19 +133,26 @@ fn decisions(
 ) -> Result<(Vec<Decision>, Vec<u32>), Failure> {
     let mut decisions = Vec::new();
     let mut taken = Vec::new();
-    if solver.graph.nodes[node as usize].standing == won_standing(solver.seeker) {
+    let is_over = solver.graph.nodes[node as usize].standing == won_standing(solver.seeker);
+    if is_over && solver.targets.is_none() {
         return Ok((decisions, taken));
     }
     let moves = moves_of(solver, node)?;
     for gain in solver.gains[node as usize].clone() {
         let mut rest = whole_or_part(solver, node, gain.part.as_ref());
-        if gain.stamp > 0 {
+        // Where what is sought is to come again and again, play goes on from there into anything that is won.
+        let goes_on = solver.targets.is_some();
+        if gain.stamp > 0 || goes_on {
             for edge in solver.graph.edges_of(node) {
                 let edge_data = solver.graph.edges[edge];
                 if !solver.seeker.owns(edge_data.controllable) {
                     continue;
                 }
-                let earlier = won_before(solver, edge_data.target, gain.stamp);
+                let earlier = if gain.stamp > 0 {
+                    won_before(solver, edge_data.target, gain.stamp)
+                } else {
+                    solver.win[edge_data.target as usize].clone()
+                };
                 let mut zones = solver.before(&edge_data, &earlier);
                 zones = zones.intersection(&rest);
                 if !zones.is_empty() {

@@ -9,7 +9,7 @@
 //! * where it waits and time cannot pass, the environment has a move and must take it (see [`Forcing`]); if it has only to keep
 //!   something, play may also stop there, unless only the controller can move;
 //! * if it has to reach the goal, no play goes on for ever without: the graph up to the goals has no cycle, not even a region
-//!   without end.
+//!   without end; if the goal is to recur, the same from each goal on.
 //!
 //! One of the environment is right if no play meets the goal before what must be kept is broken, every decision is there and
 //! possible, and
@@ -81,6 +81,8 @@ pub enum Aim {
     Reach,
     /// To keep what must be kept for ever, or until the goal.
     Keep,
+    /// To keep it for ever, and have the goal again and again.
+    Recur,
 }
 
 /// What is claimed: that the owner of the strategy wins, by getting the controller to its aim, or by keeping it from it.
@@ -92,7 +94,7 @@ pub struct Claim<'a> {
     pub is_permissive: bool,
     /// What the controller is asked for.
     pub aim: Aim,
-    /// Where play ends, for the controller; `None` without such an end.
+    /// Where play ends, for the controller, unless the goal is to recur; `None` without such an end.
     pub goal: Option<&'a Predicate>,
     /// What holds until then.
     pub keep: Option<&'a Predicate>,
@@ -105,9 +107,9 @@ pub struct Claim<'a> {
 }
 
 impl Claim<'_> {
-    /// Whether plays that never end are lost for the owner.
+    /// Whether plays that go on for ever, without the goal if that is to recur, are lost for the owner.
     fn must_end(&self) -> bool {
-        (self.owner == Owner::Controller) == (self.aim == Aim::Reach)
+        (self.owner == Owner::Controller) == (self.aim != Aim::Keep)
     }
 }
 
@@ -197,6 +199,8 @@ pub fn verify(
         claim,
         seen: HashMap::new(),
         path: Vec::new(),
+        goals: Vec::new(),
+        is_from_goal: false,
         coverage: Coverage::default(),
     };
     play.run(most_regions)
@@ -229,6 +233,10 @@ struct Play<'a> {
     claim: &'a Claim<'a>,
     seen: HashMap<State, Mark>,
     path: Vec<Frame>,
+    /// Goals that are to recur and were met, with their successors.
+    goals: Vec<(State, Vec<(Step, State)>)>,
+    /// Whether the path begins in a goal and not in the initial state.
+    is_from_goal: bool,
     coverage: Coverage,
 }
 
@@ -237,9 +245,18 @@ impl<'a> Play<'a> {
         let mut initial = self.semantics.initial()?;
         self.regions.represent_state(&mut initial);
         if let Some(defect) = self.enter(&initial)? {
-            return Ok(self.violated(defect));
+            return self.violated(defect);
         }
-        while let Some(frame) = self.path.last_mut() {
+        loop {
+            let Some(frame) = self.path.last_mut() else {
+                // From each goal that is to recur, play is followed anew.
+                let Some((goal, successors)) = self.goals.pop() else {
+                    return Ok(Outcome::Verified(self.coverage));
+                };
+                self.push(goal, successors);
+                self.is_from_goal = true;
+                continue;
+            };
             let Some((step, target)) = frame.successors.pop() else {
                 let frame = self.path.pop().expect("the path has an end");
                 self.seen.insert(frame.state, Mark::Done);
@@ -251,7 +268,7 @@ impl<'a> Play<'a> {
                 Some(Mark::Open) if !self.claim.must_end() => continue,
                 Some(Mark::Open) => {
                     self.push(target, Vec::new());
-                    return Ok(self.violated(Defect::Endless));
+                    return self.violated(Defect::Endless);
                 }
                 None => {}
             }
@@ -259,10 +276,9 @@ impl<'a> Play<'a> {
                 return Ok(Outcome::TooLarge(self.coverage));
             }
             if let Some(defect) = self.enter(&target)? {
-                return Ok(self.violated(defect));
+                return self.violated(defect);
             }
         }
-        Ok(Outcome::Verified(self.coverage))
     }
 
     fn push(&mut self, state: State, successors: Vec<(Step, State)>) {
@@ -273,9 +289,13 @@ impl<'a> Play<'a> {
         });
     }
 
-    fn violated(&mut self, defect: Defect) -> Outcome {
+    fn violated(&mut self, defect: Defect) -> Result<Outcome, Error> {
         let mut states = Vec::new();
         let mut steps = Vec::new();
+        if self.is_from_goal {
+            let start = self.path[0].state.clone();
+            (states, steps) = self.way_to(&start)?;
+        }
         for frame in self.path.drain(..) {
             states.push(frame.state);
             steps.extend(frame.taken);
@@ -286,7 +306,35 @@ impl<'a> Play<'a> {
             steps,
             ticks_per_unit: self.semantics.ticks_per_unit(),
         };
-        Outcome::Violated(Box::new(violation), self.coverage)
+        Ok(Outcome::Violated(Box::new(violation), self.coverage))
+    }
+
+    /// A run of the closed loop from the initial state to a region that it reaches; the last state is left out.
+    fn way_to(&mut self, end: &State) -> Result<(Vec<State>, Vec<Step>), Error> {
+        let mut initial = self.semantics.initial()?;
+        self.regions.represent_state(&mut initial);
+        let mut origins: HashMap<State, Option<(State, Step)>> = HashMap::new();
+        let mut waiting = std::collections::VecDeque::from([initial.clone()]);
+        origins.insert(initial, None);
+        while let Some(state) = waiting.pop_front().filter(|state| state != end) {
+            let Ok(successors) = self.successors(&state)? else {
+                continue;
+            };
+            for (step, target) in successors {
+                if !origins.contains_key(&target) {
+                    origins.insert(target.clone(), Some((state.clone(), step)));
+                    waiting.push_back(target);
+                }
+            }
+        }
+        let (mut states, mut steps) = (Vec::new(), Vec::new());
+        let mut last = end.clone();
+        while let Some(Some((state, step))) = origins.remove(&last) {
+            states.insert(0, state.clone());
+            steps.insert(0, step);
+            last = state;
+        }
+        Ok((states, steps))
     }
 
     /// Puts a new region on the path, with its successors in the closed loop; what is wrong with it.
@@ -306,6 +354,11 @@ impl<'a> Play<'a> {
         }
         match self.successors(state)? {
             Err(defect) => Ok(Some(defect)),
+            Ok(successors) if self.claim.aim == Aim::Recur && self.is_goal(state)? => {
+                self.coverage.goals += 1;
+                self.goals.push((state.clone(), successors));
+                Ok(None)
+            }
             Ok(successors) => {
                 let frame = self.path.last_mut().expect("the region was just put there");
                 frame.successors = successors;
@@ -316,15 +369,20 @@ impl<'a> Play<'a> {
 
     /// Who has won in a state; `None` if play goes on.
     fn winner(&self, state: &State) -> Result<Option<Owner>, Error> {
-        if let Some(goal) = self.claim.goal
-            && self.semantics.holds(goal, state)?
-        {
+        if self.claim.aim != Aim::Recur && self.is_goal(state)? {
             return Ok(Some(Owner::Controller));
         }
         Ok(match self.claim.keep {
             Some(keep) if !self.semantics.holds(keep, state)? => Some(Owner::Environment),
             _ => None,
         })
+    }
+
+    fn is_goal(&self, state: &State) -> Result<bool, Error> {
+        match self.claim.goal {
+            Some(goal) => self.semantics.holds(goal, state),
+            None => Ok(false),
+        }
     }
 
     /// Where play may go from a region under the strategy.
@@ -385,10 +443,15 @@ impl<'a> Play<'a> {
         let has_own = possible.iter().any(|(one, _)| one.controllable);
         let has_other = possible.iter().any(|(one, _)| !one.controllable);
         let must_controller_move = has_own && !has_other;
-        Ok(match (self.claim.owner, self.claim.aim) {
+        // Where play stops at a goal that is to recur, nothing is owed.
+        let aim = match self.claim.aim {
+            Aim::Recur if self.is_goal(state)? => Aim::Keep,
+            other => other,
+        };
+        Ok(match (self.claim.owner, aim) {
             (Owner::Controller, Aim::Keep) => !must_controller_move,
             (Owner::Environment, Aim::Keep) => must_controller_move,
-            (owner, Aim::Reach) => {
+            (owner, Aim::Reach | Aim::Recur) => {
                 let must_environment_move =
                     has_other && self.is_forced(state, later, moves, possible)?;
                 must_environment_move == (owner == Owner::Controller)

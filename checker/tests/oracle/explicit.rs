@@ -180,6 +180,35 @@ pub(crate) fn winning(graph: &Graph, objective: &Objective<'_>, rule: Rule) -> V
     }
 }
 
+/// The nodes from which the controller can keep for ever, and have the goal again and again: a greatest fixpoint around a least
+/// one. Where play ends, the goal must hold.
+pub(crate) fn recurring(graph: &Graph, goal: &[bool], keep: &[bool], rule: Rule) -> Vec<bool> {
+    let mut kept = vec![true; graph.nodes.len()];
+    loop {
+        let mut win = vec![false; graph.nodes.len()];
+        loop {
+            let mut changed = false;
+            for node in (0..graph.nodes.len()).rev() {
+                let wins = keep[node]
+                    && if goal[node] {
+                        is_won(graph, node, &kept, false, rule)
+                    } else {
+                        is_won(graph, node, &win, true, rule)
+                    };
+                changed |= wins != win[node];
+                win[node] = wins;
+            }
+            if !changed {
+                break;
+            }
+        }
+        if win == kept {
+            return win;
+        }
+        kept = win;
+    }
+}
+
 fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule) -> bool {
     let node = &graph.nodes[node];
     let (own, others): (Vec<&Step>, Vec<&Step>) =

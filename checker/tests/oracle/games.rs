@@ -5,7 +5,7 @@ use checker::game::Forced;
 use proptest::test_runner::TestCaseError;
 
 use crate::compare::{self, Tally};
-use crate::explicit::{Graph, Objective, Rule, winning};
+use crate::explicit::{Graph, Objective, Rule, recurring, winning};
 use crate::generate::{self, Formula, Network, Shape};
 
 const SHAPE: Shape = Shape {
@@ -35,62 +35,93 @@ fn compare(
         (Rule::Product, Forced::Product),
         (Rule::Neutral, Forced::Neutral),
     ];
-    for (query, has_goal, has_keep, must_reach) in [
-        (format!("control: A<> {goal_text}"), true, false, true),
+    for (query, kind) in [
+        (format!("control: A<> {goal_text}"), Kind::Reach),
         (
             format!("control: A[ {keep_text} U {goal_text} ]"),
-            true,
-            true,
-            true,
+            Kind::Until,
         ),
-        (format!("control: A[] {keep_text}"), false, true, false),
+        (format!("control: A[] {keep_text}"), Kind::Safe),
         (
             format!("control: A[ {keep_text} W {goal_text} ]"),
-            true,
-            true,
-            false,
+            Kind::WeakUntil,
+        ),
+        (
+            format!("control: A[] ({keep_text} && A<> {goal_text})"),
+            Kind::Recur,
         ),
     ] {
-        // The rule matters only where something must be reached.
-        for (rule, forced) in rules.into_iter().take(if must_reach { 3 } else { 1 }) {
-            let expected = match &graph {
-                Ok(graph) => {
-                    let count = graph.nodes.len();
-                    let goal = if has_goal {
-                        labels(network, goal, graph)
-                    } else {
-                        vec![false; count]
-                    };
-                    let keep = if has_keep {
-                        labels(network, keep, graph)
-                    } else {
-                        vec![true; count]
-                    };
-                    let objective = Objective {
-                        goal: &goal,
-                        keep: &keep,
-                        must_reach,
-                    };
-                    Ok(winning(graph, &objective, rule)[0])
-                }
+        let has_rule = matches!(kind, Kind::Reach | Kind::Until | Kind::Recur);
+        for (rule, forced) in rules.into_iter().take(if has_rule { 3 } else { 1 }) {
+            let wins = match &graph {
+                Ok(graph) => Ok(wins(network, (goal, keep), graph, kind, rule)),
                 Err(error) => Err(*error),
             };
-            let options = Options {
-                forced,
-                verify: true,
-                ..compare::options()
-            };
-            let query_text = model.add_query(&query);
-            let answer = model.check(&query_text, &options);
-            compare::check(&answer, expected, tally, || {
-                format!("{text}{query}\n{forced:?}")
-            })?;
-            compare::check_strategy(&model, &answer, tally, || {
-                format!("{text}{query}\n{forced:?}")
-            })?;
+            for is_cooperative in [false, true] {
+                let query = if is_cooperative {
+                    format!("E<> {query}")
+                } else {
+                    query.clone()
+                };
+                let expected = match &wins {
+                    Ok(wins) if is_cooperative => Ok(wins.contains(&true)),
+                    Ok(wins) => Ok(wins[0]),
+                    Err(error) => Err(*error),
+                };
+                let options = Options {
+                    forced,
+                    verify: true,
+                    ..compare::options()
+                };
+                let query_text = model.add_query(&query);
+                let answer = model.check(&query_text, &options);
+                compare::check(&answer, expected, tally, || {
+                    format!("{text}{query}\n{forced:?}")
+                })?;
+                compare::check_strategy(&model, &answer, tally, || {
+                    format!("{text}{query}\n{forced:?}")
+                })?;
+            }
         }
     }
     Ok(())
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Reach,
+    Until,
+    Safe,
+    WeakUntil,
+    Recur,
+}
+
+/// By region: whether the controller wins.
+fn wins(
+    network: &Network,
+    (goal, keep): (&Formula, &Formula),
+    graph: &Graph,
+    kind: Kind,
+    rule: Rule,
+) -> Vec<bool> {
+    let count = graph.nodes.len();
+    let goal = match kind {
+        Kind::Safe => vec![false; count],
+        _ => labels(network, goal, graph),
+    };
+    let keep = match kind {
+        Kind::Reach => vec![true; count],
+        _ => labels(network, keep, graph),
+    };
+    if kind == Kind::Recur {
+        return recurring(graph, &goal, &keep, rule);
+    }
+    let objective = Objective {
+        goal: &goal,
+        keep: &keep,
+        must_reach: matches!(kind, Kind::Reach | Kind::Until),
+    };
+    winning(graph, &objective, rule)
 }
 
 /// By region: whether the formula holds.
@@ -111,5 +142,5 @@ fn games_equal_brute_force() {
         generate::formula(SHAPE),
         generate::formula(SHAPE),
     );
-    compare::run("games", 300, &strategy, compare);
+    compare::run("games", 150, &strategy, compare);
 }

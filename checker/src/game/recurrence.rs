@@ -1,0 +1,149 @@
+//! Games with a goal that is to come again and again: `A[] (p && A<> q)`.
+//!
+//! The controller wins a play if p always holds and q holds at some instant from every one on. A play that ends wins if q holds
+//! at its end. What it wins is the greatest X such that from every valuation in X it can get, within p, into q, and go on from there
+//! without leaving X:
+//!
+//! ```text
+//! leave  = what the controller cannot keep from leaving X: Pred_t(not X ∪ Pre_u(not X) ∪ held, ⋃ Pre_c(X), less Pre_u(not X))
+//! target = p ∩ q, less leave
+//! X      = from where the controller can force play into the target, within p ([`super::reach`])
+//! ```
+//!
+//! X begins with everything and shrinks until it stays; the graph is explored before. With the goals that are met at the start of
+//! each round, the strategy of the last one is a strategy for the whole: see [`super::strategy`].
+//!
+//! Source: L. de Alfaro, M. Faella, T. Henzinger, R. Majumdar, M. Stoelinga, "The Element of Surprise in Timed Games", CONCUR 2003
+//! (nested fixpoints over timed predecessors).
+
+use crate::network::Failure;
+use crate::search::limits::Watch;
+use crate::zones::Federation;
+
+use super::Player;
+use super::graph::Standing;
+use super::reach::{Answer, Extent, Solver, Win};
+
+/// Solves the game of a new solver with the controller as its seeker. The goal of its graph must be p ∩ q, and p what is kept.
+/// On a win, the strategy can be read from it. If the players work together, it is enough that it can be won from somewhere.
+pub fn solve(
+    solver: &mut Solver<'_, '_, '_>,
+    is_cooperative: bool,
+    watch: &mut dyn Watch,
+) -> Result<Answer, Failure> {
+    solver.go_on(is_cooperative);
+    if let Answer::Stopped(reason) = solver.solve(Extent::Everything, watch)? {
+        return Ok(Answer::Stopped(reason));
+    }
+    let mut kept: Vec<Win> = (0..solver.graph.nodes.len() as u32)
+        .map(|node| unbroken(solver, node))
+        .collect();
+    loop {
+        let mut targets = Vec::with_capacity(kept.len());
+        for node in 0..kept.len() as u32 {
+            targets.push(target(solver, node, &kept)?);
+        }
+        solver.restart(targets);
+        if let Some(reason) = solver.propagate(watch)? {
+            return Ok(Answer::Stopped(reason));
+        }
+        if !is_cooperative && !solver.is_won() {
+            return Ok(Answer::Won(Player::Environment));
+        }
+        let mut has_shrunk = false;
+        for (node, old) in kept.iter_mut().enumerate() {
+            has_shrunk |= !is_within(solver, node as u32, old, &solver.win[node]);
+            old.clone_from(&solver.win[node]);
+        }
+        if !has_shrunk {
+            let is_won = if is_cooperative {
+                solver.has_won_somewhere()
+            } else {
+                solver.is_won()
+            };
+            return Ok(Answer::Won(if is_won {
+                Player::Controller
+            } else {
+                Player::Environment
+            }));
+        }
+        if let Some(reason) = watch.look(&solver.counters()) {
+            return Ok(Answer::Stopped(reason));
+        }
+    }
+}
+
+/// The part of a node in which what must be kept holds.
+fn unbroken(solver: &Solver<'_, '_, '_>, node: u32) -> Win {
+    match solver.graph.nodes[node as usize].standing {
+        Standing::Broken => Win::Nothing,
+        Standing::Open | Standing::Goal => Win::Everything,
+        Standing::Mixed => {
+            let mut rest = Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node));
+            rest.subtract(&solver.broken(node));
+            as_win(rest)
+        }
+    }
+}
+
+fn as_win(part: Federation) -> Win {
+    if part.is_empty() {
+        Win::Nothing
+    } else {
+        Win::Part(part)
+    }
+}
+
+fn to_federation(solver: &Solver<'_, '_, '_>, node: u32, win: &Win) -> Federation {
+    match win {
+        Win::Nothing => Federation::empty(solver.graph.dimension()),
+        Win::Everything => Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node)),
+        Win::Part(part) => part.clone(),
+    }
+}
+
+fn is_within(solver: &Solver<'_, '_, '_>, node: u32, one: &Win, other: &Win) -> bool {
+    match (one, other) {
+        (Win::Nothing, _) | (_, Win::Everything) => true,
+        (_, Win::Nothing) => false,
+        _ => to_federation(solver, node, one).is_subset(&to_federation(solver, node, other)),
+    }
+}
+
+/// The part of a node in which the goal holds, and from which the controller can go on without leaving what is kept.
+fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Win, Failure> {
+    let mut goal = match solver.graph.nodes[node as usize].standing {
+        Standing::Open | Standing::Broken => return Ok(Win::Nothing),
+        Standing::Goal => Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node)),
+        Standing::Mixed => {
+            let parts = solver.graph.parts(node);
+            parts.map_or_else(
+                || Federation::empty(solver.graph.dimension()),
+                |parts| parts.goal.clone(),
+            )
+        }
+    };
+    let mut out = Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node));
+    out.subtract(&to_federation(solver, node, &kept[node as usize]));
+    let mut back = Federation::empty(solver.graph.dimension());
+    for index in solver.graph.edges_of(node) {
+        let edge = solver.graph.edges[index];
+        let into = solver.before(&edge, &kept[edge.target as usize]);
+        if edge.controllable {
+            back.unite(&into);
+        } else {
+            let mut spoiling = solver.enabled(&edge);
+            spoiling.subtract(&into);
+            out.unite(&spoiling);
+        }
+    }
+    back.subtract(&out);
+    let mut held = solver.forced_controller(node)?;
+    held.subtract(&back);
+    out.unite(&held);
+    goal.subtract(&solver.safe_past(node, out, &back)?);
+    if goal.includes_zone(solver.graph.zone(node)) {
+        return Ok(Win::Everything);
+    }
+    Ok(as_win(goal))
+}
