@@ -3,13 +3,9 @@
 use std::time::Instant;
 
 use crate::exec::Executor;
-use crate::game::Player;
-use crate::game::graph::{Graph, Objective as GameObjective};
-use crate::game::plans::{NoPlans, Plan, Plans};
-use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
-use crate::game::recurrence;
-use crate::game::strategy::{self, Strategy};
-use crate::ir::{ClockAtom, Measure, Network, Objective, Predicate, Query, QueryKind};
+use crate::game::plans::Plan;
+use crate::game::strategy::Strategy;
+use crate::ir::{ClockAtom, Measure, Network, Predicate, Query, QueryKind};
 use crate::network::bounds::is_difference;
 use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic, predicate};
 use crate::search::extremum::{self, Extreme, Extremes, Question};
@@ -24,8 +20,8 @@ use crate::verify::strategy::Outcome as StrategyCheck;
 
 use super::evidence::{self, Proof, Shows, Witness};
 use super::limits::LimitWatch;
-use super::verification::{self, Verification};
-use super::{Options, PlansWanted};
+use super::verification::Verification;
+use super::{Options, games};
 
 /// What a query came out as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,15 +109,6 @@ pub struct Answer {
     pub load_seconds: f64,
 }
 
-/// Names the part of a game query that there is no algorithm for.
-pub(super) fn unsupported_game(time_optimal: bool, observations: bool) -> Option<&'static str> {
-    match () {
-        () if time_optimal => Some("control_t*"),
-        () if observations => Some("partial observation"),
-        () => None,
-    }
-}
-
 /// Answers a query that [`super::LoadedModel`] has accepted.
 pub(super) fn answer(
     network: &Network,
@@ -167,7 +154,7 @@ pub(super) fn answer(
             ..
         } => {
             let asked = (objective, *cooperative);
-            game(network, executor, asked, options, &mut watch)
+            games::game(network, executor, asked, options, &mut watch)
         }
         QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
             unreachable!("unsupported queries were refused")
@@ -178,7 +165,7 @@ pub(super) fn answer(
     answer
 }
 
-fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counters) -> Answer {
+pub(super) fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counters) -> Answer {
     Answer {
         verdict,
         value: None,
@@ -207,7 +194,7 @@ fn negated(answer: Answer) -> Answer {
 }
 
 /// Whether the network or a query compares two clocks.
-fn has_differences(network: &Network, atoms: &[ClockAtom]) -> bool {
+pub(super) fn has_differences(network: &Network, atoms: &[ClockAtom]) -> bool {
     network.features.diagonals || atoms.iter().any(is_difference)
 }
 
@@ -240,23 +227,6 @@ fn symbolic<'a>(
         Abstraction::Maximum
     } else {
         wanted
-    };
-    let bounds = ClockBounds::new(network, &atoms, abstraction);
-    Symbolic::new(Stepper::new(network, executor), bounds)
-}
-
-/// Zones for games. Their graph does not cut zones, so with comparisons of two clocks there is no abstraction.
-fn game_symbolic<'a>(
-    network: &'a Network,
-    executor: &'a dyn Executor,
-    predicates: &[&Predicate],
-) -> Symbolic<'a> {
-    let atoms = predicates.iter().flat_map(|one| predicate::atoms(one));
-    let atoms: Vec<ClockAtom> = atoms.collect();
-    let abstraction = if has_differences(network, &atoms) {
-        Abstraction::Exact
-    } else {
-        Abstraction::Maximum
     };
     let bounds = ClockBounds::new(network, &atoms, abstraction);
     Symbolic::new(Stepper::new(network, executor), bounds)
@@ -521,153 +491,4 @@ fn reachable(
         }
     };
     new_answer(verdict, witnesses.into_evidence(), report.counters)
-}
-
-fn game(
-    network: &Network,
-    executor: &dyn Executor,
-    (objective, is_cooperative): (&Objective, bool),
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Answer {
-    let recurring;
-    let (goal, keep, seeker) = match objective {
-        Objective::Reach(goal) => (Some(goal), None, Player::Controller),
-        Objective::Until(keep, goal) => (Some(goal), Some(keep), Player::Controller),
-        Objective::Safe(keep) => (None, Some(keep), Player::Environment),
-        Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Player::Environment),
-        Objective::Buchi(keep, goal) => {
-            recurring = Predicate::And(vec![keep.clone(), goal.clone()]);
-            (Some(&recurring), Some(keep), Player::Controller)
-        }
-    };
-    let is_recurring = matches!(objective, Objective::Buchi(..));
-    let predicates: Vec<&Predicate> = goal.into_iter().chain(keep).collect();
-    let mut symbolic = game_symbolic(network, executor, &predicates);
-    let wanted = GameObjective {
-        goal,
-        keep,
-        must_progress: seeker == Player::Controller,
-    };
-    let mut graph = match Graph::new(&mut symbolic, wanted) {
-        Ok(graph) => graph,
-        Err(failure) => {
-            return new_answer(
-                Verdict::Error(failure),
-                Evidence::default(),
-                Counters::default(),
-            );
-        }
-    };
-    let mut solver = Solver::new(&mut graph, seeker, options.forced);
-    let is_planned = options.plans != PlansWanted::No
-        && matches!(objective, Objective::Reach(_) | Objective::Until(..))
-        && !is_cooperative;
-    let extent = match options.plans {
-        PlansWanted::All(_) if is_planned => Extent::Everything,
-        _ => Extent::Verdict,
-    };
-    let result = if is_recurring {
-        recurrence::solve(&mut solver, is_cooperative, watch)
-    } else if is_cooperative {
-        solver.solve_cooperative(watch)
-    } else {
-        solver.solve(extent, watch)
-    };
-    let counters = solver.counters();
-    let winner = match result {
-        Ok(GameAnswer::Won(winner)) => winner,
-        Ok(GameAnswer::Stopped(reason)) => {
-            return new_answer(Verdict::Unknown(reason), Evidence::default(), counters);
-        }
-        Err(failure) => {
-            return new_answer(Verdict::Error(failure), Evidence::default(), counters);
-        }
-    };
-    // Beside stopped clocks the past of a zone may be too large, so that nobody is known to win.
-    if solver.graph.symbolic.is_approximate() {
-        return new_answer(Verdict::Maybe, Evidence::default(), counters);
-    }
-    let verdict = match winner {
-        Player::Controller => Verdict::Satisfied,
-        Player::Environment => Verdict::NotSatisfied,
-    };
-    let mut answer = new_answer(verdict, Evidence::default(), counters);
-    if is_planned {
-        add_plans(&mut answer, &mut solver, options);
-    }
-    let has_strategy = match winner {
-        Player::Controller => !is_cooperative,
-        Player::Environment => !is_cooperative && !is_recurring,
-    };
-    if has_strategy && (options.strategy || options.verify) {
-        match strategy::extract(&mut solver) {
-            Ok(strategy) => {
-                if options.verify {
-                    let verification = verified(network, objective, &strategy, options);
-                    answer.evidence.verification = Some(verification);
-                }
-                answer.evidence.strategy = Some(strategy);
-            }
-            Err(failure) => answer.verdict = Verdict::Error(failure),
-        }
-    }
-    answer
-}
-
-/// Checks a strategy in closed loop.
-fn verified(
-    network: &Network,
-    objective: &Objective,
-    strategy: &Strategy,
-    options: &Options,
-) -> Verification {
-    let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
-    let decisions = verification::decisions(network, strategy);
-    let played = (&decisions[..], strategy.owner, strategy.selection);
-    verification::verify(network, objective, played, options.forced, most)
-}
-
-/// Adds the plans that are wanted to the answer for a solved game.
-fn add_plans(answer: &mut Answer, solver: &mut Solver<'_, '_, '_>, options: &Options) {
-    let most = match options.plans {
-        PlansWanted::No => return,
-        _ if answer.verdict == Verdict::NotSatisfied => {
-            answer.evidence.plans = Some(Vec::new());
-            return;
-        }
-        PlansWanted::First => 1,
-        PlansWanted::All(most) => most,
-    };
-    match plans(solver, most) {
-        Ok(Ok((plans, has_more))) => {
-            answer.evidence.plans = Some(plans);
-            answer.evidence.has_more_plans = has_more && most > 1;
-        }
-        Ok(Err(NoPlans::EnvironmentChooses)) => {
-            let message = "the environment has choices, so the strategy is no list of plans";
-            answer.message = Some(message.to_owned());
-        }
-        Err(failure) => answer.verdict = Verdict::Error(failure),
-    }
-}
-
-/// At most this many plans, and whether there are more.
-fn plans(
-    solver: &mut Solver<'_, '_, '_>,
-    most: usize,
-) -> Result<Result<(Vec<Plan>, bool), NoPlans>, Failure> {
-    let mut paths = match Plans::new(solver) {
-        Ok(paths) => paths,
-        Err(reason) => return Ok(Err(reason)),
-    };
-    let mut plans = Vec::new();
-    while let Some(path) = paths.next_path() {
-        if plans.len() == most {
-            return Ok(Ok((plans, true)));
-        }
-        let path = path.to_vec();
-        plans.push(paths.spell(&path)?);
-    }
-    Ok(Ok((plans, false)))
 }

@@ -8,6 +8,7 @@ pub mod describe;
 pub mod evidence;
 pub mod explain;
 pub mod facts;
+mod games;
 pub mod json;
 pub mod limits;
 pub mod simulation;
@@ -348,7 +349,7 @@ impl LoadedModel {
                 time_optimal,
                 observations,
                 ..
-            } => answer::unsupported_game(time_optimal.is_some(), observations.is_some()),
+            } => games::unsupported_game(time_optimal.is_some(), observations.is_some()),
             QueryKind::SaveStrategy { .. } => Some("saveStrategy"),
             QueryKind::LoadStrategy { .. } => Some("loadStrategy"),
         };

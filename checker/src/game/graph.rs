@@ -9,7 +9,8 @@
 //!   since nobody has a choice.
 //! * An edge leads to a node whose zone contains the zone that the moves reach.
 //!
-//! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly.
+//! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly. Where two clocks are compared,
+//! zones are cut along the comparisons, and a move has an edge for each piece; there are no chains then.
 
 use crate::ir::Predicate;
 use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
@@ -357,7 +358,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         moves: &Moves,
         target: &mut Vec<i32>,
     ) -> Result<(), Failure> {
-        if let Some(root) = root
+        if let Some(root) = root.filter(|_| !self.symbolic.splits())
             && self.follow_trail(root, moves, origin, target)?
         {
             return Ok(());
@@ -373,7 +374,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             .entry_zones(zone, self.symbolic.dimension(), &mut self.entries);
         self.steps.clear();
         push_step(&mut self.steps, false, &self.effect);
-        if self.entries.len() != 1 {
+        if self.entries.len() != 1 || self.symbolic.splits() {
             return self.end_in_pieces(target, origin);
         }
         let mut zone = self.entries.swap_remove(0);
@@ -438,8 +439,14 @@ impl<'s, 'a> Graph<'s, 'a> {
 
     /// Ends an edge whose first move enters in several zones, or none: an edge to each.
     fn end_in_pieces(&mut self, target: &mut [i32], origin: Origin) -> Result<(), Failure> {
-        for mut zone in std::mem::take(&mut self.entries) {
-            delay_after(self.symbolic, target, &self.steps, &mut zone)?;
+        let mut zones = std::mem::take(&mut self.entries);
+        for zone in &mut zones {
+            delay_after(self.symbolic, target, &self.steps, zone)?;
+        }
+        if self.symbolic.splits() {
+            self.symbolic.extrapolate_all(target, &mut zones);
+        }
+        for zone in zones {
             self.end(target, zone, origin, 1)?;
         }
         Ok(())

@@ -238,6 +238,11 @@ impl<'a> Symbolic<'a> {
         }
     }
 
+    /// Whether extrapolation cuts zones, so that one may become several: see [`Symbolic::extrapolate_all`].
+    pub fn splits(&self) -> bool {
+        self.bounds.splits()
+    }
+
     /// Extrapolates each of the zones of a state; where guards compare clocks, one may become several.
     pub fn extrapolate_all(&mut self, words: &[i32], zones: &mut Vec<Zone>) {
         if self.bounds.splits() {

@@ -1,0 +1,241 @@
+//! Game queries: who wins, how, and by which plans.
+
+use crate::exec::Executor;
+use crate::game::Player;
+use crate::game::graph::{Graph, Objective as GameObjective};
+use crate::game::plans::{NoPlans, Plan, Plans};
+use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
+use crate::game::recurrence;
+use crate::game::strategy::{self, Strategy};
+use crate::ir::{ClockAtom, Network, Objective, Predicate};
+use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic, predicate};
+use crate::search::limits::{Counters, StopReason, Watch};
+
+use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
+use super::limits::LimitWatch;
+use super::verification::{self, Verification};
+use super::{Options, PlansWanted};
+/// Names the part of a game query that there is no algorithm for.
+pub(super) fn unsupported_game(time_optimal: bool, observations: bool) -> Option<&'static str> {
+    match () {
+        () if time_optimal => Some("control_t*"),
+        () if observations => Some("partial observation"),
+        () => None,
+    }
+}
+
+/// States that a game is explored for without abstraction where two clocks are compared. Many such games are finite so, and then far
+/// smaller than with zones that are cut along the comparisons.
+const MOST_EXACT_STATES: u64 = 4096;
+
+/// Stops a search after a number of states, if nothing else does before.
+struct Attempt<'w> {
+    watch: &'w mut dyn Watch,
+    most: u64,
+    is_given_up: bool,
+}
+
+impl Watch for Attempt<'_> {
+    fn look(&mut self, counters: &Counters) -> Option<StopReason> {
+        let reason = self.watch.look(counters);
+        if reason.is_none() && counters.explored > self.most {
+            self.is_given_up = true;
+            return Some(StopReason::States);
+        }
+        reason
+    }
+}
+
+/// Answers a game query: with Extra-M+, or, where two clocks are compared, without abstraction first.
+pub(super) fn game(
+    network: &Network,
+    executor: &dyn Executor,
+    asked: (&Objective, bool),
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let atoms = objective_atoms(asked.0);
+    let zones = |abstraction| {
+        let bounds = ClockBounds::new(network, &atoms, abstraction);
+        Symbolic::new(Stepper::new(network, executor), bounds)
+    };
+    if !has_differences(network, &atoms) {
+        return played(zones(Abstraction::Maximum), asked, options, watch);
+    }
+    let mut attempt = Attempt {
+        watch,
+        most: MOST_EXACT_STATES,
+        is_given_up: false,
+    };
+    let first = played(zones(Abstraction::Exact), asked, options, &mut attempt);
+    if !attempt.is_given_up {
+        return first;
+    }
+    let mut second = played(zones(Abstraction::Differences), asked, options, watch);
+    second.counters.explored += first.counters.explored;
+    second
+}
+
+/// The clock comparisons of an objective.
+fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
+    let (one, other) = match objective {
+        Objective::Reach(goal) => (goal, None),
+        Objective::Safe(keep) => (keep, None),
+        Objective::Until(keep, goal)
+        | Objective::WeakUntil(keep, goal)
+        | Objective::Buchi(keep, goal) => (keep, Some(goal)),
+    };
+    let both = std::iter::once(one).chain(other);
+    both.flat_map(predicate::atoms).collect()
+}
+
+/// Plays the game of a query in these zones.
+fn played(
+    mut symbolic: Symbolic<'_>,
+    (objective, is_cooperative): (&Objective, bool),
+    options: &Options,
+    watch: &mut dyn Watch,
+) -> Answer {
+    let network = symbolic.stepper.network();
+    let recurring;
+    let (goal, keep, seeker) = match objective {
+        Objective::Reach(goal) => (Some(goal), None, Player::Controller),
+        Objective::Until(keep, goal) => (Some(goal), Some(keep), Player::Controller),
+        Objective::Safe(keep) => (None, Some(keep), Player::Environment),
+        Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Player::Environment),
+        Objective::Buchi(keep, goal) => {
+            recurring = Predicate::And(vec![keep.clone(), goal.clone()]);
+            (Some(&recurring), Some(keep), Player::Controller)
+        }
+    };
+    let is_recurring = matches!(objective, Objective::Buchi(..));
+    let wanted = GameObjective {
+        goal,
+        keep,
+        must_progress: seeker == Player::Controller,
+    };
+    let mut graph = match Graph::new(&mut symbolic, wanted) {
+        Ok(graph) => graph,
+        Err(failure) => {
+            return new_answer(
+                Verdict::Error(failure),
+                Evidence::default(),
+                Counters::default(),
+            );
+        }
+    };
+    let mut solver = Solver::new(&mut graph, seeker, options.forced);
+    let is_planned = options.plans != PlansWanted::No
+        && matches!(objective, Objective::Reach(_) | Objective::Until(..))
+        && !is_cooperative;
+    let extent = match options.plans {
+        PlansWanted::All(_) if is_planned => Extent::Everything,
+        _ => Extent::Verdict,
+    };
+    let result = if is_recurring {
+        recurrence::solve(&mut solver, is_cooperative, watch)
+    } else if is_cooperative {
+        solver.solve_cooperative(watch)
+    } else {
+        solver.solve(extent, watch)
+    };
+    let counters = solver.counters();
+    let winner = match result {
+        Ok(GameAnswer::Won(winner)) => winner,
+        Ok(GameAnswer::Stopped(reason)) => {
+            return new_answer(Verdict::Unknown(reason), Evidence::default(), counters);
+        }
+        Err(failure) => {
+            return new_answer(Verdict::Error(failure), Evidence::default(), counters);
+        }
+    };
+    // Beside stopped clocks the past of a zone may be too large, so that nobody is known to win.
+    if solver.graph.symbolic.is_approximate() {
+        return new_answer(Verdict::Maybe, Evidence::default(), counters);
+    }
+    let verdict = match winner {
+        Player::Controller => Verdict::Satisfied,
+        Player::Environment => Verdict::NotSatisfied,
+    };
+    let mut answer = new_answer(verdict, Evidence::default(), counters);
+    if network.features.priorities {
+        answer.message = Some("games ignore the priorities of the model".to_owned());
+    }
+    if is_planned {
+        add_plans(&mut answer, &mut solver, options);
+    }
+    let has_strategy = match winner {
+        Player::Controller => !is_cooperative,
+        Player::Environment => !is_cooperative && !is_recurring,
+    };
+    if has_strategy && (options.strategy || options.verify) {
+        match strategy::extract(&mut solver) {
+            Ok(strategy) => {
+                if options.verify {
+                    let verification = verified(network, objective, &strategy, options);
+                    answer.evidence.verification = Some(verification);
+                }
+                answer.evidence.strategy = Some(strategy);
+            }
+            Err(failure) => answer.verdict = Verdict::Error(failure),
+        }
+    }
+    answer
+}
+
+/// Checks a strategy in closed loop.
+fn verified(
+    network: &Network,
+    objective: &Objective,
+    strategy: &Strategy,
+    options: &Options,
+) -> Verification {
+    let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
+    let decisions = verification::decisions(network, strategy);
+    let played = (&decisions[..], strategy.owner, strategy.selection);
+    verification::verify(network, objective, played, options.forced, most)
+}
+
+/// Adds the plans that are wanted to the answer for a solved game.
+fn add_plans(answer: &mut Answer, solver: &mut Solver<'_, '_, '_>, options: &Options) {
+    let most = match options.plans {
+        PlansWanted::No => return,
+        _ if answer.verdict == Verdict::NotSatisfied => {
+            answer.evidence.plans = Some(Vec::new());
+            return;
+        }
+        PlansWanted::First => 1,
+        PlansWanted::All(most) => most,
+    };
+    match plans(solver, most) {
+        Ok(Ok((plans, has_more))) => {
+            answer.evidence.plans = Some(plans);
+            answer.evidence.has_more_plans = has_more && most > 1;
+        }
+        Ok(Err(NoPlans::EnvironmentChooses)) => {
+            let message = "the environment has choices, so the strategy is no list of plans";
+            answer.message = Some(message.to_owned());
+        }
+        Err(failure) => answer.verdict = Verdict::Error(failure),
+    }
+}
+
+/// At most this many plans, and whether there are more.
+fn plans(
+    solver: &mut Solver<'_, '_, '_>,
+    most: usize,
+) -> Result<Result<(Vec<Plan>, bool), NoPlans>, Failure> {
+    let mut paths = match Plans::new(solver) {
+        Ok(paths) => paths,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let mut plans = Vec::new();
+    while let Some(path) = paths.next_path() {
+        if plans.len() == most {
+            return Ok(Ok((plans, true)));
+        }
+        let path = path.to_vec();
+        plans.push(paths.spell(&path)?);
+    }
+    Ok(Ok((plans, false)))
+}
