@@ -313,10 +313,9 @@ impl LoadedModel {
                 Ok(())
             }
             #[cfg(feature = "jit")]
-            (Some((CodeEngine::Jit, PreparedCode::Jit(jit))), CodeEngine::Jit) => {
-                jit.extend(&network.functions, &network.constants);
-                Ok(())
-            }
+            (Some((CodeEngine::Jit, PreparedCode::Jit(jit))), CodeEngine::Jit) => jit
+                .extend(&network.functions, &network.constants)
+                .map_err(|error| error.to_string()),
             (code, CodeEngine::Interpreter) => {
                 let interpreter = Interpreter::new(&network.functions, &network.constants);
                 *code = Some((wanted, PreparedCode::Interpreter(interpreter)));

@@ -11,6 +11,8 @@ mod rounds;
 mod interpreter;
 mod optimise;
 
+mod validate;
+
 #[cfg(feature = "jit")]
 mod jit;
 
@@ -19,6 +21,7 @@ pub use interpreter::Interpreter;
 pub use jit::{Jit, JitError};
 pub use optimise::optimise;
 pub use rounds::ROUND_LIMIT;
+pub use validate::{Flaw, validate};
 
 use crate::ir::{ClockId, FixedConstraint, FunctionId, RunTimeErrorKind, SiteId};
 

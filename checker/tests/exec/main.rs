@@ -4,3 +4,4 @@ mod models;
 mod operators;
 mod random;
 mod support;
+mod validation;

@@ -7,8 +7,9 @@
 //! Invariants
 //! * Compiled code is never moved or freed before the engine is dropped; queries that come later only add to it.
 //! * `unsafe` is confined to this module: calling compiled code, what compiled code calls back, and freeing it.
-//! * The code that is compiled is trusted as the interpreter trusts it not: registers have the types that instructions
-//!   say, indices were checked ([`crate::ir::Instruction::ScaleIndex`]), and functions do not call themselves.
+//! * The code that is compiled is trusted as the interpreter trusts it not, and so it is validated before: registers have the
+//!   types that instructions say, indices were checked ([`crate::ir::Instruction::ScaleIndex`]), accesses stay inside their
+//!   memory, and functions do not call themselves.
 
 mod compiler;
 mod needs;
@@ -23,7 +24,7 @@ use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
 use crate::ir::{Function, FunctionId};
 
-use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError};
+use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, validate};
 
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};
@@ -56,6 +57,8 @@ pub struct Jit {
     interpreter: Interpreter,
     entries: Vec<Entry>,
     constants: Vec<i32>,
+    /// How many words of state the code reaches.
+    state_words: usize,
     compiler: Mutex<Compiler>,
 }
 
@@ -77,9 +80,10 @@ impl Jit {
             interpreter: Interpreter::default(),
             entries: Vec::new(),
             constants: Vec::new(),
+            state_words: 0,
             compiler: Mutex::new(Compiler::new()?),
         };
-        jit.extend(functions, constants);
+        jit.extend(functions, constants)?;
         Ok(jit)
     }
 
@@ -93,8 +97,11 @@ impl Jit {
     }
 
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
-    /// What is compiled stays so.
-    pub fn extend(&mut self, functions: &[Function], constants: &[i32]) {
+    /// What is compiled stays so. An error for code that is no valid program ([`validate`]), and then nothing is taken over.
+    pub fn extend(&mut self, functions: &[Function], constants: &[i32]) -> Result<(), JitError> {
+        let words =
+            validate(functions, self.entries.len(), constants.len()).map_err(JitError::new)?;
+        self.state_words = self.state_words.max(words);
         self.entries.resize_with(functions.len(), Entry::default);
         self.compiler
             .get_mut()
@@ -102,6 +109,7 @@ impl Jit {
             .extend(functions, constants);
         self.interpreter.extend(functions, constants);
         self.constants = constants.to_vec();
+        Ok(())
     }
 
     /// Compiles a function now, whether it is worth it or not.
@@ -171,6 +179,10 @@ impl Executor for Jit {
         if code.is_null() {
             return self.call_cold(function, arguments, context);
         }
+        assert!(
+            context.state.len() >= self.state_words,
+            "the state has the words of the layout"
+        );
         let frame_words = entry.frame_words.load(Ordering::Relaxed);
         if frame_words == 0 {
             let frame = ptr::dangling_mut();

@@ -16,6 +16,8 @@ mod numbering;
 mod operands;
 mod unroll;
 
+pub(super) use operands::target;
+
 use std::collections::BTreeMap;
 
 use crate::ir::{Block, Function, FunctionId, Instruction, Register};
