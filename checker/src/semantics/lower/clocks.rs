@@ -138,14 +138,14 @@ impl Builder<'_> {
         }
     }
 
-    /// Emits an assignment to a clock.
+    /// Emits an assignment to a clock; returns the clock, for an assignment may stand where a clock does.
     pub(super) fn assign_clock(
         &mut self,
         expr: &Expr,
         target: &Expr,
         source: Option<&Expr>,
         value: Option<&Expr>,
-    ) {
+    ) -> (ClockOperand, ClockSet) {
         self.emits = true;
         let (clock, target_set) = self.clock(target);
         let Some(source) = source else {
@@ -162,7 +162,7 @@ impl Builder<'_> {
                 value: register,
                 site,
             });
-            return;
+            return (clock, target_set);
         };
         let (source, source_set) = self.clock(source);
         let increment: Option<Register> = value.map(|value| self.value(value));
@@ -178,5 +178,6 @@ impl Builder<'_> {
             increment,
             site,
         });
+        (clock, target_set)
     }
 }

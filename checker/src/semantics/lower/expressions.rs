@@ -380,7 +380,9 @@ impl Builder<'_> {
                 target,
                 source,
                 value,
-            } => self.assign_clock(expr, target, source.as_deref(), value.as_deref()),
+            } => {
+                self.assign_clock(expr, target, source.as_deref(), value.as_deref());
+            }
             Kind::Call { .. } if !expr.ty.is_register() => {
                 let words = expr.ty.size().words;
                 let result = (words > 0).then(|| self.frame(words));

@@ -292,6 +292,14 @@ impl Builder<'_> {
         if let Kind::Ternary(condition, then, otherwise) = &expr.kind {
             return self.choose_clock(condition, then, otherwise);
         }
+        if let Kind::AssignClock {
+            target,
+            source,
+            value,
+        } = &expr.kind
+        {
+            return self.assign_clock(expr, target, source.as_deref(), value.as_deref());
+        }
         let path = self.path(expr, Memory::Clocks);
         let first = ClockId(path.offset);
         let Start::Register(register, parameter) = path.start else {
