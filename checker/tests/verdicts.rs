@@ -1,7 +1,8 @@
 //! Models with the verdicts of their queries: `tests/corpus/verdicts` and `tests/corpus/games`.
 //!
 //! A file begins with lines `// query: …`, each followed by `// verdict: …` (`// verdict neutral: …` and `// verdict product: …`
-//! where the rule for forced moves matters) and `// origin: …`, which says how the verdict is known. Other comment lines are
+//! where the rule for forced moves matters) and `// origin: …`, which says how the verdict is known. A line `// given: …` is a query that
+//! is answered before those below it, for the strategy that it defines. Other comment lines are
 //! prose. The verdict of a query for values is the values. Every trace must pass its replay. Every query is answered with every search order and with the interpreter and compiled code, and must come out
 //! the same.
 
@@ -15,6 +16,8 @@ use checker::search::extremum::Extreme;
 use checker::search::reach::Order;
 
 struct Case {
+    /// The queries that come before it.
+    given: Vec<String>,
     query: String,
     verdicts: Vec<(Option<Forced>, String)>,
     origin: String,
@@ -22,6 +25,7 @@ struct Case {
 
 fn cases(path: &Path, text: &str) -> Vec<Case> {
     let mut cases: Vec<Case> = Vec::new();
+    let mut given: Vec<String> = Vec::new();
     for line in text
         .lines()
         .map_while(|line| line.strip_prefix("//"))
@@ -34,10 +38,15 @@ fn cases(path: &Path, text: &str) -> Vec<Case> {
         let forced = match key {
             "query" => {
                 cases.push(Case {
+                    given: given.clone(),
                     query: value,
                     verdicts: Vec::new(),
                     origin: String::new(),
                 });
+                continue;
+            }
+            "given" => {
+                given.push(value);
                 continue;
             }
             "origin" => {
@@ -71,10 +80,15 @@ fn engines() -> Vec<CodeEngine> {
     }
 }
 
-fn verdict_of(path: &Path, bytes: &[u8], query: &str, options: &Options) -> String {
+fn verdict_of(path: &Path, bytes: &[u8], case: &Case, options: &Options) -> String {
     let mut model = LoadedModel::load(&path.display().to_string(), bytes)
         .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-    let text = model.add_query(query);
+    for given in &case.given {
+        let text = model.add_query(given);
+        let answer = model.check(&text, options);
+        answer.unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    }
+    let text = model.add_query(&case.query);
     match model.check(&text, options) {
         Err(_) => "rejected".to_owned(),
         Ok(answer) if answer.evidence.is_verified() == Some(false) => {
@@ -131,7 +145,7 @@ fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>
                     runs: true,
                     ..Options::default()
                 };
-                let found = verdict_of(path, bytes, &case.query, &options);
+                let found = verdict_of(path, bytes, case, &options);
                 if &found != expected {
                     failures.push(format!(
                         "{}: {}\n  expected {expected} ({}), found {found} with {order:?}, {code:?}, {forced:?}",

@@ -1,13 +1,17 @@
 //! From a compiled query to its answer.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::exec::Executor;
+use crate::game::closed_loop::ClosedLoop;
 use crate::game::plans::Plan;
 use crate::game::strategy::Strategy;
 use crate::ir::{ClockAtom, Measure, Network, Predicate, Query, QueryKind};
 use crate::network::bounds::is_difference;
-use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic, predicate};
+use crate::network::{
+    Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, predicate,
+};
 use crate::search::extremum::{self, Extreme, Extremes, Question};
 use crate::search::leads_to::{self, Unanswered};
 use crate::search::limits::{Counters, StopReason};
@@ -44,7 +48,7 @@ pub struct Evidence {
     /// Witnesses, counterexamples, or the way to a failure: one, or one a value.
     pub witnesses: Vec<Witness>,
     /// The strategy of the player who wins, if it was wanted.
-    pub strategy: Option<Strategy>,
+    pub strategy: Option<Arc<Strategy>>,
     /// How the check of the strategy ended, if it was wanted.
     pub verification: Option<Verification>,
     /// Plans, if they were wanted.
@@ -109,30 +113,44 @@ pub struct Answer {
     pub load_seconds: f64,
 }
 
+/// What a query is about.
+#[derive(Clone, Copy)]
+pub(super) struct Subject<'a> {
+    pub(super) network: &'a Network,
+    pub(super) executor: &'a dyn Executor,
+    /// The strategy that the controller follows.
+    pub(super) under: Option<&'a ClosedLoop>,
+}
+
+impl<'a> Subject<'a> {
+    /// The comparisons of the strategy.
+    fn atoms(&self) -> &'a [ClockAtom] {
+        self.under.map_or(&[], Restriction::atoms)
+    }
+}
+
 /// Answers a query that [`super::LoadedModel`] has accepted.
-pub(super) fn answer(
-    network: &Network,
-    executor: &dyn Executor,
-    query: &Query,
-    options: &Options,
-) -> Answer {
+pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> Answer {
+    let Subject {
+        network, executor, ..
+    } = subject;
     let start = Instant::now();
     let mut watch = LimitWatch::new(options.limits.clone());
     let mut answer = match &query.kind {
-        QueryKind::Reachable(goal) => reachable(network, executor, goal, options, &mut watch),
+        QueryKind::Reachable(goal) => reachable(subject, goal, options, &mut watch),
         QueryKind::Invariantly(invariant) => {
             let broken = negation(invariant);
-            negated(reachable(network, executor, &broken, options, &mut watch))
+            negated(reachable(subject, &broken, options, &mut watch))
         }
-        QueryKind::PotentiallyAlways(keep) => always(network, executor, keep, options, &mut watch),
+        QueryKind::PotentiallyAlways(keep) => always(subject, keep, options, &mut watch),
         QueryKind::Eventually(goal) => {
             let keep = negation(goal);
-            negated(always(network, executor, &keep, options, &mut watch))
+            negated(always(subject, &keep, options, &mut watch))
         }
         QueryKind::LeadsTo(cause, effect) => {
             let open = Predicate::And(vec![cause.clone(), negation(effect)]);
             let keep = negation(effect);
-            leads_to(network, executor, (&open, &keep), options, &mut watch)
+            leads_to(subject, (&open, &keep), options, &mut watch)
         }
         QueryKind::Extremum {
             least,
@@ -145,8 +163,9 @@ pub(super) fn answer(
                 items,
                 least: *least,
                 greatest: *greatest,
+                further: subject.atoms(),
             };
-            extremum(network, executor, question, options, &mut watch)
+            extremum(subject, question, options, &mut watch)
         }
         QueryKind::Control {
             objective,
@@ -157,7 +176,7 @@ pub(super) fn answer(
             games::game(network, executor, asked, options, &mut watch)
         }
         QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
-            unreachable!("unsupported queries were refused")
+            unreachable!("strategies are saved and loaded elsewhere")
         }
     };
     answer.seconds = start.elapsed().as_secs_f64();
@@ -201,16 +220,21 @@ pub(super) fn has_differences(network: &Network, atoms: &[ClockAtom]) -> bool {
 /// Zones for searches, with an abstraction that is sound for the network and these predicates, and keeps what further
 /// comparisons tell.
 fn symbolic<'a>(
-    network: &'a Network,
-    executor: &'a dyn Executor,
+    subject: Subject<'a>,
     predicates: &[&Predicate],
     further: &[ClockAtom],
     wanted: Abstraction,
 ) -> Symbolic<'a> {
+    let Subject {
+        network,
+        executor,
+        under,
+    } = subject;
     let mut atoms: Vec<ClockAtom> = predicates
         .iter()
         .flat_map(|one| predicate::atoms(one))
         .chain(further.iter().cloned())
+        .chain(subject.atoms().iter().cloned())
         .collect();
     let mut needs_maximum = predicates.iter().any(|one| predicate::has_deadlock(one));
     if predicate::depends_on_negations(network) {
@@ -230,6 +254,7 @@ fn symbolic<'a>(
     };
     let bounds = ClockBounds::new(network, &atoms, abstraction);
     Symbolic::new(Stepper::new(network, executor), bounds)
+        .restricted(under.map(|one| one as &dyn Restriction))
 }
 
 /// The verdict on something that was found, in zones that may be too large.
@@ -243,13 +268,12 @@ fn found(is_approximate: bool) -> Verdict {
 
 /// Is there a run inside the predicate that never leaves it?
 fn always(
-    network: &Network,
-    executor: &dyn Executor,
+    subject: Subject<'_>,
     keep: &Predicate,
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let mut symbolic = symbolic(network, executor, &[keep], &[], Abstraction::Maximum);
+    let mut symbolic = symbolic(subject, &[keep], &[], Abstraction::Maximum);
     let mut search = Liveness::new(&symbolic, keep);
     let outcome = search.from_start(&mut symbolic, watch);
     let mut witnesses = Witnesses::new(&mut symbolic, options);
@@ -273,14 +297,17 @@ fn always(
 struct Witnesses<'w, 'a> {
     symbolic: &'w mut Symbolic<'a>,
     has_runs: bool,
+    /// Whether the runs follow a strategy.
+    is_restricted: bool,
     found: Vec<Witness>,
 }
 
 impl<'w, 'a> Witnesses<'w, 'a> {
     fn new(symbolic: &'w mut Symbolic<'a>, options: &Options) -> Witnesses<'w, 'a> {
         Witnesses {
-            symbolic,
             has_runs: options.runs,
+            is_restricted: symbolic.is_restricted(),
+            symbolic,
             found: Vec::new(),
         }
     }
@@ -289,7 +316,16 @@ impl<'w, 'a> Witnesses<'w, 'a> {
     fn add(&mut self, trace: Trace, ending: Option<Ending>, shows: Shows<'_>) {
         let mut witness = Witness::new(trace, ending);
         // An initial state that cannot be entered is no run.
-        if self.has_runs && !witness.trace.states.is_empty() {
+        // What is stuck under a strategy may go on in the model, which is what the replay knows.
+        let is_dead = match shows {
+            Shows::Reaches(predicate) | Shows::Takes(predicate, ..) => {
+                predicate::has_deadlock(predicate)
+            }
+            Shows::Stays(_) => ending == Some(Ending::Stuck),
+            Shows::Possible => false,
+        };
+        let is_comparable = !(self.is_restricted && is_dead);
+        if self.has_runs && is_comparable && !witness.trace.states.is_empty() {
             let network = self.symbolic.stepper.network();
             let proof = evidence::prove(self.symbolic, network, &witness.trace, ending, shows);
             witness.run = Some(proof);
@@ -307,13 +343,12 @@ impl<'w, 'a> Witnesses<'w, 'a> {
 
 /// Does every state of `open` lead out of `keep`?
 fn leads_to(
-    network: &Network,
-    executor: &dyn Executor,
+    subject: Subject<'_>,
     (open, keep): (&Predicate, &Predicate),
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let mut symbolic = symbolic(network, executor, &[open, keep], &[], Abstraction::Maximum);
+    let mut symbolic = symbolic(subject, &[open, keep], &[], Abstraction::Maximum);
     let mut goal = Unanswered::new(&symbolic, open, keep);
     let report = reach::search(&mut symbolic, &mut goal, options.order, watch);
     let mut witnesses = Witnesses::new(&mut symbolic, options);
@@ -348,23 +383,16 @@ fn leads_to(
 
 /// The least and greatest values.
 fn extremum(
-    network: &Network,
-    executor: &dyn Executor,
+    subject: Subject<'_>,
     question: Question<'_>,
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
     let mut zones = |further: &[ClockAtom]| {
         let predicates = [question.predicate];
-        symbolic(
-            network,
-            executor,
-            &predicates,
-            further,
-            Abstraction::LowerUpper,
-        )
+        symbolic(subject, &predicates, further, Abstraction::LowerUpper)
     };
-    let report = extremum::search(question, network, &mut zones, options.order, watch);
+    let report = extremum::search(question, subject.network, &mut zones, options.order, watch);
     let mut evidence = Evidence::default();
     let mut values = None;
     let verdict = match report.outcome {
@@ -468,13 +496,12 @@ fn remark(values: &Values, items: &[(Measure, String)]) -> Option<String> {
 }
 
 fn reachable(
-    network: &Network,
-    executor: &dyn Executor,
+    subject: Subject<'_>,
     goal: &Predicate,
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let mut symbolic = symbolic(network, executor, &[goal], &[], Abstraction::LowerUpper);
+    let mut symbolic = symbolic(subject, &[goal], &[], Abstraction::LowerUpper);
     let mut look = goal;
     let report = reach::search(&mut symbolic, &mut look, options.order, watch);
     let mut witnesses = Witnesses::new(&mut symbolic, options);

@@ -1,5 +1,7 @@
 //! Game queries: who wins, how, and by which plans.
 
+use std::sync::Arc;
+
 use crate::exec::Executor;
 use crate::game::Player;
 use crate::game::graph::{Graph, Objective as GameObjective};
@@ -175,7 +177,7 @@ fn played(
                     let verification = verified(network, objective, &strategy, options);
                     answer.evidence.verification = Some(verification);
                 }
-                answer.evidence.strategy = Some(strategy);
+                answer.evidence.strategy = Some(Arc::new(strategy));
             }
             Err(failure) => answer.verdict = Verdict::Error(failure),
         }

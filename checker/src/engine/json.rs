@@ -10,11 +10,11 @@
 use serde_json::{Map, Value as Json, json};
 
 use crate::game::Player;
+use crate::game::closed_loop;
 use crate::game::plans::Plan;
 use crate::game::strategy::{Decision, Selection, Strategy};
 use crate::ir::Network;
 use crate::network::Part;
-use crate::search::StateStore;
 use crate::search::extremum::{Extreme, Extremes};
 use crate::search::liveness::Ending;
 use crate::verify::State;
@@ -198,19 +198,8 @@ pub fn plans(network: &Network, plans: &[Plan], query: &str, has_more: bool) -> 
 
 /// A strategy. Decisions of states with the same words are joined and come in the order of their ranks.
 pub fn strategy(network: &Network, strategy: &Strategy, query: &str) -> Json {
-    let mut store = StateStore::new(network);
-    let mut joined: Vec<(&[i32], bool, Vec<&Decision>)> = Vec::new();
-    for state in &strategy.states {
-        let (id, is_new) = store.intern(&state.words);
-        if is_new {
-            joined.push((&state.words, state.is_goal, Vec::new()));
-        }
-        let entry = &mut joined[id.0 as usize];
-        entry.1 |= state.is_goal;
-        entry.2.extend(&state.decisions);
-    }
-    let states = joined.iter_mut().map(|(words, is_goal, decisions)| {
-        decisions.sort_by_key(|decision| decision.rank);
+    let joined = closed_loop::joined(network, strategy);
+    let states = joined.iter().map(|(words, is_goal, decisions)| {
         let decisions: Vec<Json> = decisions.iter().map(|one| decision(network, one)).collect();
         json!({
             "locations": locations(network, words),

@@ -12,6 +12,7 @@ mod games;
 pub mod json;
 pub mod limits;
 pub mod simulation;
+pub mod strategies;
 pub mod verification;
 
 use std::time::Instant;
@@ -31,6 +32,7 @@ use crate::verify::{self, strategy::Decisions};
 
 pub use answer::{Answer, Evidence, Verdict};
 pub use limits::Limits;
+pub use strategies::NamedStrategy;
 pub use verification::Verification;
 
 use crate::game::strategy::Selection;
@@ -46,6 +48,8 @@ pub mod codes {
         UNSUPPORTED_CONSTRUCT = "E0802" "unsupported-construct";
         /// Compiled code was asked for, and this build or machine has none.
         NO_COMPILED_CODE = "E0803" "no-compiled-code";
+        /// A strategy is asked for whose query was not satisfied.
+        NO_STRATEGY = "E0804" "no-strategy";
     }
 }
 
@@ -134,6 +138,8 @@ pub struct LoadedModel {
     model: Model,
     sources: SourceMap,
     templates: Vec<Template>,
+    /// The strategies that queries defined, in the order of their definition.
+    strategies: Vec<NamedStrategy>,
     /// The queries of the file.
     pub queries: Vec<QueryText>,
     /// Warnings of loading the model and files of queries, rendered.
@@ -141,8 +147,6 @@ pub struct LoadedModel {
     /// Seconds that loading took, compilation of code included once a query was checked.
     pub load_seconds: f64,
     code: Option<(CodeEngine, PreparedCode)>,
-    /// The names of the strategies that queries so far have defined.
-    strategies: Vec<String>,
 }
 
 /// The code of the model, ready to run.
@@ -185,11 +189,11 @@ impl LoadedModel {
             model,
             sources,
             templates: parsed.document.templates,
+            strategies: Vec::new(),
             queries,
             warnings,
             load_seconds,
             code: None,
-            strategies: Vec::new(),
         })
     }
 
@@ -240,17 +244,44 @@ impl LoadedModel {
         self.refuse_unsupported(&query)?;
         self.prepare_code(options.code, query.span)?;
         self.load_seconds += start.elapsed().as_secs_f64();
-        let Some((_, code)) = &self.code else {
-            unreachable!("code was just prepared")
-        };
-        let mut answer = answer::answer(&self.model.network, code.executor(), &query, options);
-        answer.load_seconds = self.load_seconds;
+        let mut answer = self.answer(&query, options)?;
         answer.warnings = warnings;
-        if let Some(name) = query
-            .strategy
-            .filter(|_| answer.verdict == Verdict::Satisfied)
-        {
-            self.strategies.push(name);
+        answer.load_seconds = self.load_seconds;
+        Ok(answer)
+    }
+
+    /// Answers a compiled query; keeps the strategy that it defines.
+    fn answer(&mut self, query: &crate::ir::Query, options: &Options) -> Result<Answer, Rejection> {
+        let under = query.under.as_ref();
+        let under = under.map(|name| self.closed_loop(name, query.span));
+        let under = under.transpose()?;
+        let subject = answer::Subject {
+            network: &self.model.network,
+            executor: self.executor(),
+            under: under.as_ref(),
+        };
+        let Some(name) = &query.strategy else {
+            return Ok(answer::answer(subject, query, options));
+        };
+        let with_strategy = Options {
+            strategy: true,
+            ..options.clone()
+        };
+        let mut answer = answer::answer(subject, query, &with_strategy);
+        let text = self.sources.text(query.span);
+        // Where the query is not satisfied, the strategy is the environment's.
+        let is_won = answer.verdict == Verdict::Satisfied;
+        self.keep_strategy(NamedStrategy {
+            name: name.clone(),
+            query: text
+                .split_once('=')
+                .map_or(text, |parts| parts.1)
+                .trim()
+                .to_owned(),
+            strategy: is_won.then(|| answer.evidence.strategy.clone()).flatten(),
+        });
+        if !options.strategy {
+            answer.evidence.strategy = None;
         }
         Ok(answer)
     }
@@ -291,8 +322,8 @@ impl LoadedModel {
     pub fn compile(&mut self, span: Span) -> Result<(crate::ir::Query, Vec<String>), Rejection> {
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
         if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
-            let strategies = &self.strategies;
-            let (query, more) = self.model.compile_query(&parsed, &self.sources, strategies);
+            let names = self.strategy_names();
+            let (query, more) = self.model.compile_query(&parsed, &self.sources, &names);
             diagnostics.extend(more);
             if let Some(query) = query {
                 return Ok((query, Rejection::new(diagnostics, &self.sources).rendered));
@@ -337,6 +368,8 @@ impl LoadedModel {
 
     /// Refuses, by name, what there is no algorithm for.
     fn refuse_unsupported(&self, query: &crate::ir::Query) -> Result<(), Rejection> {
+        let is_game = matches!(query.kind, QueryKind::Control { .. });
+        let is_under = query.under.is_some();
         let kind = match &query.kind {
             QueryKind::Reachable(_)
             | QueryKind::Invariantly(_)
@@ -344,20 +377,20 @@ impl LoadedModel {
             | QueryKind::Eventually(_)
             | QueryKind::LeadsTo(..)
             | QueryKind::Extremum { .. } => None,
+            QueryKind::SaveStrategy { .. } => Some("saveStrategy"),
+            QueryKind::LoadStrategy { .. } => Some("loadStrategy"),
             QueryKind::Control {
                 time_optimal,
                 observations,
                 ..
             } => games::unsupported_game(time_optimal.is_some(), observations.is_some()),
-            QueryKind::SaveStrategy { .. } => Some("saveStrategy"),
-            QueryKind::LoadStrategy { .. } => Some("loadStrategy"),
         };
-        let kind = kind.map(|kind| format!("queries with {kind}"));
-        let under = query.under.as_ref();
-        let under = under.map(|_| "queries under a strategy".to_owned());
         let features = &self.model.network.features;
-        let is_game = matches!(query.kind, QueryKind::Control { .. });
-        let construct = if !features.clock_guarded_urgent {
+        let kind = kind.map(|kind| format!("queries with {kind}"));
+        let under = (is_under && is_game).then(|| "games under a strategy".to_owned());
+        let construct = if is_under && features.stopwatches {
+            Some("stopwatches in a query under a strategy")
+        } else if !features.clock_guarded_urgent {
             None
         } else if is_game {
             Some("clock guards on edges of urgent channels in a game")

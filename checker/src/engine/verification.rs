@@ -1,10 +1,10 @@
 //! From a strategy of the solver to the independent check, and from its outcome to words.
 
+use crate::game::closed_loop;
 use crate::game::strategy::{Decision, Selection, Strategy};
 use crate::game::{Forced, Player};
 use crate::ir::{Network, Objective, Predicate};
 use crate::network::{Part, predicate};
-use crate::search::StateStore;
 use crate::verify::strategy::{
     self, Aim, Claim, Constraint, Decisions, Defect, Forcing, Owner, Step, Violation,
 };
@@ -66,21 +66,10 @@ fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> (i64, bool)
 
 /// The decisions of a strategy by words, in the order of their ranks.
 pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
-    let mut store = StateStore::new(network);
-    let mut joined: Vec<(&[i32], Vec<&Decision>)> = Vec::new();
-    for state in &strategy.states {
-        let (id, is_new) = store.intern(&state.words);
-        if is_new {
-            joined.push((&state.words, Vec::new()));
-        }
-        joined[id.0 as usize].1.extend(&state.decisions);
-    }
-    let states = joined.into_iter().map(|(words, mut decisions)| {
-        decisions.sort_by_key(|decision| decision.rank);
-        Decisions {
-            words: words.to_vec(),
-            decisions: decisions.into_iter().map(decision).collect(),
-        }
+    let states = closed_loop::joined(network, strategy).into_iter();
+    let states = states.map(|(words, _, decisions)| Decisions {
+        words: words.to_vec(),
+        decisions: decisions.into_iter().map(decision).collect(),
     });
     states.collect()
 }

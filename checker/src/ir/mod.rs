@@ -246,7 +246,7 @@ pub struct FixedConstraint {
 }
 
 /// A comparison `left - right ≺ bound` as static analysis sees it: which clocks it may concern, and how large the bound may be.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClockAtom {
     /// The clocks that may stand at the left (one, or all of an array indexed at run time), the reference clock included.
     pub left: ClockRange,

@@ -16,6 +16,7 @@ pub mod moves;
 mod offers;
 mod passage;
 pub mod predicate;
+pub mod restriction;
 pub mod stepper;
 pub mod symbolic;
 
@@ -25,5 +26,6 @@ pub use fixed::FixedMove;
 pub use moves::{MoveRef, Moves, Part};
 pub use offers::{OfferId, VectorId};
 pub use predicate::Extent;
+pub use restriction::{Allowed, Restriction};
 pub use stepper::Stepper;
 pub use symbolic::{ClockEffect, Symbolic};

@@ -3,33 +3,61 @@
 //! A *barrier* is where a synchronisation on an urgent channel is enabled and its guards have clocks: time runs up to it and
 //! not on. If it lies everywhere or nowhere, whatever the clocks say, [`Symbolic::may_delay`] knows it; else the future of a
 //! zone within its barriers is a federation ([`crate::zones::future`]). A guard with a strict lower bound has no first moment:
-//! time stops before it, and the synchronisation never happens, as the definition of urgency has it.
+//! time stops before it, and the synchronisation never happens, as the definition of urgency has it. A restriction
+//! ([`super::restriction`]) has its barriers too: where it does not allow waiting.
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ClockId;
 use crate::zones::dbm::{self, Constraint};
-use crate::zones::{Bound, Federation, Zone, future, minimal};
+use crate::zones::future::{self, Barriers};
+use crate::zones::{Bound, Federation, Zone, minimal};
 
 use super::symbolic::to_constraints;
-use super::{Failure, MoveRef, Moves, Symbolic};
+use super::{Failure, MoveRef, Moves, Symbolic, restriction};
 
 impl Symbolic<'_> {
-    /// The part of the zone in which time cannot pass because of a clock-guarded urgent synchronisation.
-    pub fn barriers(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Federation, Failure> {
-        let mut barriers = Federation::empty(self.dimension());
-        if !self.has_guarded_urgency {
-            return Ok(barriers);
+    /// The part of the zone in which time cannot pass because of a clock-guarded urgent synchronisation or a restriction.
+    pub fn barriers(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Barriers, Failure> {
+        let mut urgent = Federation::empty(self.dimension());
+        if self.has_guarded_urgency {
+            urgent = self.urgent_part(words, zone)?;
         }
+        let allowed = self.restriction.and_then(|one| one.allowed(words));
+        let mut barriers = allowed.map_or_else(
+            || Barriers::none(self.dimension()),
+            |allowed| allowed.barriers.clone(),
+        );
+        for part in std::iter::once(&mut barriers.stops).chain(&mut barriers.open) {
+            part.intersect_zone(zone);
+        }
+        if !urgent.is_empty() {
+            for part in &mut barriers.open {
+                part.subtract(&urgent);
+            }
+            barriers.stops.unite(&urgent);
+        }
+        barriers.open.retain(|part| !part.is_empty());
+        Ok(barriers)
+    }
+
+    /// Whether there may be barriers.
+    pub(super) fn has_barriers(&self) -> bool {
+        self.has_guarded_urgency || self.restriction.is_some()
+    }
+
+    /// The part of the zone in which a clock-guarded urgent synchronisation is enabled.
+    fn urgent_part(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Federation, Failure> {
+        let mut urgent = Federation::empty(self.dimension());
         let mut moves = std::mem::take(&mut self.inner_moves);
         let result = self.stepper.moves(words, &mut moves);
         if result.is_ok() {
             for one in moves.iter().filter(|one| self.stepper.is_urgent_move(*one)) {
-                barriers.unite(&guarded_part(one, zone, self.dimension())?);
+                urgent.unite(&guarded_part(one, zone, self.dimension())?);
             }
         }
         self.inner_moves = moves;
         result?;
-        Ok(barriers)
+        Ok(urgent)
     }
 
     /// Lets time pass in each of the zones on entry of a state; a zone with barriers in its future may become several.
@@ -44,7 +72,7 @@ impl Symbolic<'_> {
             return Ok(());
         }
         let mut entries = Vec::new();
-        if self.has_guarded_urgency {
+        if self.has_barriers() {
             entries.clone_from(zones);
         }
         for zone in zones.iter_mut() {
@@ -69,7 +97,7 @@ impl Symbolic<'_> {
     }
 
     /// What `entry` reaches in `whole`, its future within the invariant, without passing a barrier.
-    fn within(&self, entry: &Zone, whole: &Zone, barriers: &Federation) -> Federation {
+    fn within(&self, entry: &Zone, whole: &Zone, barriers: &Barriers) -> Federation {
         let from = Federation::of_zone(self.dimension(), entry.bounds());
         let nothing = Federation::empty(self.dimension());
         let mut reached = future::successors(&from, &nothing, barriers);
@@ -77,7 +105,8 @@ impl Symbolic<'_> {
         reached
     }
 
-    /// All moves of a state, as far as the words decide, with those that priorities forbid cut down to what is left of them.
+    /// All moves of a state, as far as the words decide, with those that priorities or a restriction forbid cut down to what is
+    /// left of them.
     ///
     /// A move is forbidden where one of a higher level is possible, its target's invariants included. Levels are those of
     /// channels first, then the greatest of the participating processes.
@@ -85,6 +114,9 @@ impl Symbolic<'_> {
         self.stepper.moves(words, out)?;
         if self.has_priorities && out.len() > 1 {
             self.apply_priorities(words, out)?;
+        }
+        if let Some(restriction) = self.restriction {
+            restriction::apply(restriction, words, out);
         }
         Ok(())
     }
@@ -164,7 +196,7 @@ fn guarded_part(one: MoveRef<'_>, zone: &[Bound], dimension: usize) -> Result<Fe
 }
 
 /// The zones of a federation as conjunctions of constraints.
-fn conjunctions(federation: &Federation) -> Vec<Vec<EmittedConstraint>> {
+pub(super) fn conjunctions(federation: &Federation) -> Vec<Vec<EmittedConstraint>> {
     let conjunction = |zone: &[Bound]| {
         let mut constraints = Vec::new();
         minimal::for_each_minimal(zone, federation.dimension(), |one| {

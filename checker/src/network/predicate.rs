@@ -4,7 +4,8 @@
 //! or in none, and cost no zone operation.
 
 use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, Network, Predicate};
-use crate::zones::{Bound, Federation, Zone, future};
+use crate::zones::future::{self, Barriers};
+use crate::zones::{Bound, Federation, Zone};
 
 use super::{Failure, Moves, Symbolic};
 
@@ -180,15 +181,18 @@ impl Symbolic<'_> {
     }
 
     /// The valuations from which no move is possible, now or after any delay.
-    fn deadlock_extent(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Extent, Failure> {
+    fn deadlock_extent(&mut self, words: &mut [i32], own: &[Bound]) -> Result<Extent, Failure> {
         let mut moves = Moves::default();
         self.moves(words, &mut moves)?;
-        let may_delay = self.stepper.may_delay(words, &moves);
+        let may_delay = self.may_delay(words)?;
         let stopped = self.stopped(words)?;
+        // Beside barriers the zone may be one of several pieces of what time reaches.
+        let future = self.future_beside_barriers(may_delay, words, own)?;
+        let zone = future.as_ref().map_or(own, Zone::bounds);
         let barriers = if may_delay {
             self.barriers(words, zone)?
         } else {
-            Federation::empty(self.dimension())
+            Barriers::none(self.dimension())
         };
         let mut alive = Federation::empty(self.dimension());
         let mut target = words.to_vec();
@@ -207,8 +211,26 @@ impl Symbolic<'_> {
                 alive.unite(&before);
             }
         }
-        let whole = self.whole(zone);
+        let whole = self.whole(own);
         Ok(Extent::of(difference(&whole, &alive), &whole))
+    }
+
+    /// All that time reaches from the zone within the invariants if barriers may have cut it; `None` if the zone is that.
+    fn future_beside_barriers(
+        &mut self,
+        may_delay: bool,
+        words: &mut [i32],
+        zone: &[Bound],
+    ) -> Result<Option<Zone>, Failure> {
+        if !may_delay || !self.has_barriers() {
+            return Ok(None);
+        }
+        let Some(invariant) = self.invariant(words)? else {
+            return Ok(None);
+        };
+        let mut future = Zone::from_bounds(self.dimension(), zone);
+        self.delay(words, may_delay, &invariant, future.bounds_mut())?;
+        Ok(Some(future))
     }
 }
 

@@ -16,7 +16,7 @@ use crate::zones::extrapolate::Ceilings;
 use crate::zones::{Bound, ClockSet, Federation, Zone};
 
 use super::bounds::ClockBounds;
-use super::{Failure, MoveRef, Moves, Part, Stepper};
+use super::{Failure, MoveRef, Moves, Part, Restriction, Stepper};
 
 /// Zones on top of the moves of a network. One per thread.
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
@@ -29,6 +29,7 @@ pub struct Symbolic<'a> {
     has_urgent_channels: bool,
     pub(super) has_guarded_urgency: bool,
     pub(super) has_priorities: bool,
+    pub(super) restriction: Option<&'a dyn Restriction>,
     is_approximate: bool,
     ceilings: Ceilings,
     pub(super) inner_moves: Moves,
@@ -62,12 +63,26 @@ impl<'a> Symbolic<'a> {
             has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
             has_guarded_urgency: network.features.clock_guarded_urgent,
             has_priorities: network.features.priorities,
+            restriction: None,
             is_approximate: false,
             ceilings: bounds.everywhere().clone(),
             bounds,
             inner_moves: Moves::default(),
             stepper,
         }
+    }
+
+    /// The same under a restriction, whose atoms `bounds` must have been made with.
+    #[must_use]
+    pub fn restricted(mut self, restriction: Option<&'a dyn Restriction>) -> Symbolic<'a> {
+        self.has_priorities &= restriction.is_none();
+        self.restriction = restriction;
+        self
+    }
+
+    /// Whether it is under a restriction.
+    pub fn is_restricted(&self) -> bool {
+        self.restriction.is_some()
     }
 
     /// The number of clocks, the reference clock included.

@@ -48,6 +48,8 @@ pub struct Question<'q> {
     pub least: bool,
     /// Whether the greatest value is wanted.
     pub greatest: bool,
+    /// Comparisons that decide what happens, beside those of the network.
+    pub further: &'q [ClockAtom],
 }
 
 /// The values of one item; `None` where they were not asked for, or no state counts.
@@ -87,7 +89,7 @@ pub fn search<'a>(
     order: Order,
     watch: &mut dyn Watch,
 ) -> Report {
-    let greatest_constant = greatest_constant(network, question.predicate);
+    let greatest_constant = greatest_constant(network, &question);
     let mut measuring = Measuring::new(question, greatest_constant);
     let mut explored = 0;
     loop {
@@ -125,13 +127,15 @@ pub fn search<'a>(
 }
 
 /// A value that no comparison of the model or the query exceeds.
-fn greatest_constant(network: &Network, predicate: &Predicate) -> i32 {
+fn greatest_constant(network: &Network, question: &Question<'_>) -> i32 {
     let guards = network.processes.iter().flat_map(|process| {
         let edges = process.edges.iter().map(|edge| &edge.guard);
         edges.chain(process.locations.iter().map(|location| &location.invariant))
     });
     let atoms = guards.flat_map(|guard| guard.atoms.iter().cloned());
-    let all = atoms.chain(predicate::atoms(predicate));
+    let all = atoms
+        .chain(predicate::atoms(question.predicate))
+        .chain(question.further.iter().cloned());
     let greatest = all.map(|atom| atom.low.saturating_abs().max(atom.high.saturating_abs()));
     let greatest = greatest.max().unwrap_or(0);
     let reset = differences::greatest_reset(network);

@@ -18,6 +18,7 @@ pub struct Unanswered<'p> {
     /// p and not q.
     open: &'p Predicate,
     liveness: Liveness<'p>,
+    is_doubtful: bool,
     /// The run that never meets q, from the state that was found.
     pub run: Option<Run>,
     /// The way from the state at hand to a failure below it.
@@ -34,14 +35,16 @@ impl<'p> Unanswered<'p> {
         Unanswered {
             open,
             liveness: Liveness::new(symbolic, keep),
+            is_doubtful: false,
             run: None,
             failed: None,
         }
     }
 
-    /// Whether a doubt was counted as a run; see [`Liveness::is_coarse`].
+    /// Whether a doubt was counted as a run; see [`Liveness::is_coarse`], and whether the run is one only if time runs in an open part of
+    /// a barrier where it begins.
     pub fn is_coarse(&self) -> bool {
-        self.liveness.is_coarse()
+        self.is_doubtful || self.liveness.is_coarse()
     }
 }
 
@@ -58,19 +61,25 @@ impl Goal for Unanswered<'_> {
         let extent = symbolic.extent(self.open, words, zone.bounds())?;
         for part in extent.to_federation(zone.bounds(), dimension).zones() {
             let entry = Zone::from_bounds(dimension, part);
-            let outcome = self
-                .liveness
-                .from_entry(symbolic, words, &entry, counters, watch);
-            match outcome {
-                Ok(Outcome::Exhausted) => {}
-                Ok(Outcome::Found(run)) => {
-                    self.run = Some(run);
-                    return Ok(Look::Found);
-                }
-                Ok(Outcome::Stopped(reason)) => return Ok(Look::Stopped(reason)),
-                Err((failure, trace)) => {
-                    self.failed = Some(trace);
-                    return Err(failure);
+            // Of a valuation in an open part the zone does not say whether time runs in it.
+            let is_open = !symbolic.barriers(words, part)?.open.is_empty();
+            for is_running in [false, true].into_iter().take(1 + usize::from(is_open)) {
+                let start = (&*words, &entry);
+                let outcome = self
+                    .liveness
+                    .from_entry(symbolic, start, is_running, counters, watch);
+                match outcome {
+                    Ok(Outcome::Exhausted) => {}
+                    Ok(Outcome::Found(run)) => {
+                        self.run = Some(run);
+                        self.is_doubtful = is_running;
+                        return Ok(Look::Found);
+                    }
+                    Ok(Outcome::Stopped(reason)) => return Ok(Look::Stopped(reason)),
+                    Err((failure, trace)) => {
+                        self.failed = Some(trace);
+                        return Err(failure);
+                    }
                 }
             }
         }

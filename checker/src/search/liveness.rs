@@ -21,7 +21,8 @@
 use crate::ir::Predicate;
 use crate::network::{Extent, Failure, Moves, Part, Symbolic};
 use crate::zones::dbm::{self, Constraint};
-use crate::zones::{ClockSet, Federation, Zone, future};
+use crate::zones::future::{self, Barriers};
+use crate::zones::{ClockSet, Federation, Zone};
 
 use super::limits::{Counters, StopReason, Watch};
 use super::reach::Trace;
@@ -167,20 +168,22 @@ impl<'p> Liveness<'p> {
     ) -> Result<Outcome, (Failure, Trace)> {
         let start = symbolic.start();
         let (words, zone, _) = start.map_err(|failure| (failure, Trace::default()))?;
-        self.from_entry(symbolic, &words, &zone, Counters::default(), watch)
+        self.from_entry(symbolic, (&words, &zone), false, Counters::default(), watch)
     }
 
-    /// Searches for a run that begins with some valuation of a zone. `before` is what was done outside this search, for the limits.
+    /// Searches for a run that begins with some valuation of a zone. Where that lies in an open part of a barrier, `is_running` says
+    /// whether time runs in it. `before` is what was done outside this search, for the limits.
     pub fn from_entry(
         &mut self,
         symbolic: &mut Symbolic<'_>,
-        words: &[i32],
-        zone: &Zone,
+        (words, zone): (&[i32], &Zone),
+        is_running: bool,
         before: Counters,
         watch: &mut dyn Watch,
     ) -> Result<Outcome, (Failure, Trace)> {
         let mut words = words.to_vec();
-        let outcome = self.run(symbolic, &mut words, zone, before, watch);
+        let entry = (zone, is_running);
+        let outcome = self.run(symbolic, &mut words, entry, before, watch);
         let outcome = outcome.map_err(|failure| (failure, self.stack_trace()));
         self.frames.clear();
         outcome
@@ -190,14 +193,14 @@ impl<'p> Liveness<'p> {
         &mut self,
         symbolic: &mut Symbolic<'_>,
         words: &mut [i32],
-        zone: &Zone,
+        (zone, is_running): (&Zone, bool),
         before: Counters,
         watch: &mut dyn Watch,
     ) -> Result<Outcome, Failure> {
         let Some(invariant) = symbolic.invariant(words)? else {
             return Ok(Outcome::Exhausted);
         };
-        let mut inside = self.inside(symbolic, words, zone, &invariant)?;
+        let mut inside = self.inside(symbolic, words, (zone, is_running), &invariant)?;
         if let Some(ending) = inside.ending {
             let mut trace = Trace::default();
             push_state(&mut trace, words, &inside.zones);
@@ -269,6 +272,7 @@ impl<'p> Liveness<'p> {
         let mut entries = Vec::new();
         effect.entry_zones(frame.zone.bounds(), symbolic.dimension(), &mut entries);
         for entry in &entries {
+            let entry = (entry, false);
             let inside = self.inside(symbolic, &mut frame.target, entry, &effect.invariant)?;
             frame.pending.extend(inside.zones);
             if inside.ending.is_some() {
@@ -405,7 +409,7 @@ impl<'p> Liveness<'p> {
         &mut self,
         symbolic: &mut Symbolic<'_>,
         words: &mut [i32],
-        entry: &Zone,
+        (entry, is_running): (&Zone, bool),
         invariant: &[Constraint],
     ) -> Result<Inside, Failure> {
         let dimension = symbolic.dimension();
@@ -428,7 +432,7 @@ impl<'p> Liveness<'p> {
         };
         let passage = Passage::new(symbolic, words, whole, outside)?;
         self.is_coarse |= passage.is_coarse();
-        let mut inside = passage.reached(entry);
+        let mut inside = passage.reached(entry, is_running);
         inside.reduce();
         let end = passage.end(symbolic, words, &inside)?;
         let (ending, part) = match end {
@@ -492,8 +496,8 @@ struct Passage {
     whole: Zone,
     /// The part of it in which the predicate does not hold.
     outside: Federation,
-    /// The part of it in which an urgent synchronisation stops time.
-    barriers: Federation,
+    /// The part of it in which an urgent synchronisation or a restriction stops time.
+    barriers: Barriers,
     may_delay: bool,
     stopped: ClockSet,
 }
@@ -510,7 +514,7 @@ impl Passage {
             barriers: if may_delay {
                 symbolic.barriers(words, whole.bounds())?
             } else {
-                Federation::empty(whole.dimension())
+                Barriers::none(whole.dimension())
             },
             stopped: symbolic.stopped(words)?,
             whole,
@@ -520,7 +524,7 @@ impl Passage {
     }
 
     /// What delay inside the predicate reaches.
-    fn reached(&self, entry: &Zone) -> Federation {
+    fn reached(&self, entry: &Zone, is_running: bool) -> Federation {
         let dimension = self.whole.dimension();
         let mut reached = Federation::of_zone(dimension, self.whole.bounds());
         if !self.may_delay || !self.stopped.is_empty() {
@@ -528,6 +532,10 @@ impl Passage {
         } else if !self.outside.is_empty() || !self.barriers.is_empty() {
             let from = Federation::of_zone(dimension, entry.bounds());
             reached = future::successors(&from, &self.outside, &self.barriers);
+            if is_running {
+                let on = future::successors_inside(&from, &self.outside, &self.barriers);
+                reached.unite(&on);
+            }
             reached.intersect_zone(self.whole.bounds());
         }
         reached
@@ -566,7 +574,7 @@ impl Passage {
         let mut waiting = inside.clone();
         if self.stopped.is_empty() {
             let mut leaving = self.outside.clone();
-            leaving.unite(&self.barriers);
+            leaving.unite(&self.barriers.stops);
             leaving.down(&ClockSet::EMPTY);
             waiting.subtract(&leaving);
         }

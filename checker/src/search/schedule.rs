@@ -262,7 +262,10 @@ impl<'s, 'a> Plan<'s, 'a> {
         let invariant = self.symbolic.invariant(&mut self.words)?;
         self.require_all(end, &invariant.unwrap_or_default())?;
         let barriers = self.symbolic.barriers(&mut self.words, whole.bounds())?;
-        for barrier in barriers.zones() {
+        let mut stops = barriers.stops;
+        // Inside an open part time may run; that it does not run out of it, the times need not show.
+        barriers.open.iter().for_each(|part| stops.subtract(part));
+        for barrier in stops.zones() {
             self.avoid((start, end), barrier, true);
         }
         let outside = self.outside(&whole)?;

@@ -115,6 +115,21 @@ impl StateStore {
         (DiscreteId(id), true)
     }
 
+    /// The id of a stored state.
+    pub fn find(&self, words: &[i32]) -> Option<DiscreteId> {
+        let ranges = self.ranges.iter();
+        let stored = ranges.flat_map(|&(first, count)| &words[first..first + count]);
+        let key: Vec<i32> = stored.take(self.identity).copied().collect();
+        let hash = hash_words(&key);
+        let is_same = |entry: &Entry| {
+            entry.hash == hash
+                && record(&self.blocks, self.stride, self.block_bits, entry.id)[..self.identity]
+                    == key
+        };
+        let entry = self.table.find(spread(hash), is_same);
+        entry.map(|entry| DiscreteId(entry.id))
+    }
+
     /// Writes the stored words of a state over those of another state of the same network.
     pub fn load(&self, id: DiscreteId, words: &mut [i32]) {
         let record = record(&self.blocks, self.stride, self.block_bits, id.0);

@@ -11,15 +11,59 @@
 //! initial parts the shortest is contained in all. So for unions the result is the union over the zones of G of the
 //! intersection over all B and U, as for the safe predecessors in [`super::past`], whose mirror image this is.
 //!
+//! A part of a barrier may be *open*: where it has no first moment (`x > 1` after `x <= 1`), there is no valuation at which time
+//! could stop at the latest, so time that comes from outside the barrier runs on inside the part. Where the part has a first
+//! moment, and from valuations in it that time did not lead to, none passes. For a zone P of the part and its lower edge P'
+//! (the valuations from which every short enough delay leads into P), time runs from `F ∩ P'` to the valuations of P strictly
+//! after it, and on as long as it stays in the part.
+//!
 //! Invariant: no clock is stopped. Cost: as [`super::past`].
 
 use super::federation::Federation;
-use super::{Bound, ClockSet, clocks, dbm};
+use super::{Bound, ClockSet, Zone, clocks, dbm, instants, past};
+
+/// Where time does not pass.
+#[derive(Clone, Debug)]
+pub struct Barriers {
+    /// All valuations at which time cannot pass.
+    pub stops: Federation,
+    /// Parts of `stops` that are open.
+    pub open: Vec<Federation>,
+}
+
+impl Barriers {
+    /// No barrier.
+    pub fn none(dimension: usize) -> Barriers {
+        Barriers {
+            stops: Federation::empty(dimension),
+            open: Vec::new(),
+        }
+    }
+
+    /// Whether there is no barrier.
+    pub fn is_empty(&self) -> bool {
+        self.stops.is_empty()
+    }
+}
 
 /// The valuations that `from` reaches by some delay, where no valuation on the way, both ends included, is in `bad`, and none
-/// but the last is in a barrier.
+/// but the last is in a barrier, or all that are form an open part without a first moment.
 #[must_use]
-pub fn successors(from: &Federation, bad: &Federation, barriers: &Federation) -> Federation {
+pub fn successors(from: &Federation, bad: &Federation, barriers: &Barriers) -> Federation {
+    let mut reached = up_to(from, bad, &barriers.stops);
+    if barriers.open.is_empty() {
+        return reached;
+    }
+    let mut waiting = reached.clone();
+    waiting.subtract(&barriers.stops);
+    for part in &barriers.open {
+        reached.unite(&running_on(&waiting, bad, part));
+    }
+    reached
+}
+
+/// As [`successors`], with barriers that have no open part.
+fn up_to(from: &Federation, bad: &Federation, stops: &Federation) -> Federation {
     let dimension = from.dimension();
     let mut result = Federation::empty(dimension);
     for zone in from.zones() {
@@ -28,7 +72,7 @@ pub fn successors(from: &Federation, bad: &Federation, barriers: &Federation) ->
         for bad in bad.zones() {
             lost.unite(&lost_to_bad(zone, &future, bad, dimension));
         }
-        for barrier in barriers.zones() {
+        for barrier in stops.zones() {
             lost.unite(&lost_to_barrier(zone, &future, barrier, dimension));
         }
         let mut reached = Federation::of_zone(dimension, &future);
@@ -38,16 +82,89 @@ pub fn successors(from: &Federation, bad: &Federation, barriers: &Federation) ->
     result
 }
 
-/// The valuations that reach `to` by some delay, where none on the way but the last is in a barrier.
+/// The valuations that time reaches in the open parts of a barrier from `from`, if it is running there already.
 #[must_use]
-pub fn predecessors_within(to: &Federation, barriers: &Federation) -> Federation {
+pub fn successors_inside(from: &Federation, bad: &Federation, barriers: &Barriers) -> Federation {
+    let mut reached = Federation::empty(from.dimension());
+    for part in &barriers.open {
+        reached.unite(&staying_in(&from.intersection(part), bad, part));
+    }
+    reached
+}
+
+/// The valuations in an open part of a barrier that time reaches from `waiting`, which lies outside the barrier.
+fn running_on(waiting: &Federation, bad: &Federation, part: &Federation) -> Federation {
+    let dimension = part.dimension();
+    let mut reached = Federation::empty(dimension);
+    for piece in part.zones() {
+        let starts = waiting.intersection(&lower_edge(piece, dimension));
+        for start in starts.zones() {
+            let mut first = up_to(
+                &Federation::of_zone(dimension, start),
+                bad,
+                &Federation::empty(dimension),
+            );
+            first.intersect_zone(&strictly_after(start, dimension));
+            first.intersect_zone(piece);
+            reached.unite(&first);
+        }
+    }
+    staying_in(&reached, bad, part)
+}
+
+/// What time reaches from a subset of a part without leaving the part.
+fn staying_in(from: &Federation, bad: &Federation, part: &Federation) -> Federation {
+    if from.is_empty() {
+        return from.clone();
+    }
+    let mut left = outside(part);
+    left.unite(bad);
+    up_to(from, &left, &Federation::empty(part.dimension()))
+}
+
+/// The valuations that reach `to` by some delay, where none on the way but the last is in a barrier, or all that are form an
+/// open part without a first moment.
+#[must_use]
+pub fn predecessors_within(to: &Federation, barriers: &Barriers) -> Federation {
+    let mut to = to.clone();
+    for part in &barriers.open {
+        to.unite(&running_into(&to, part, &barriers.stops));
+    }
+    back_to(&to, &barriers.stops)
+}
+
+/// The valuations outside the barrier from which time runs into its open part at once, and in it to a valuation of `to`.
+fn running_into(to: &Federation, part: &Federation, stops: &Federation) -> Federation {
+    let dimension = part.dimension();
+    let mut entries = Federation::empty(dimension);
+    let ends = to.intersection(part);
+    if ends.is_empty() {
+        return entries;
+    }
+    let inside = past::predecessors(&ends, &outside(part), &ClockSet::EMPTY);
+    for piece in part.zones() {
+        let edge = lower_edge(piece, dimension);
+        let mut within = inside.clone();
+        within.intersect_zone(piece);
+        for zone in within.zones() {
+            let mut entry = edge.clone();
+            entry.intersect_zone(strictly_before(zone, dimension).bounds());
+            entries.unite(&entry);
+        }
+    }
+    entries.subtract(stops);
+    entries
+}
+
+/// As [`predecessors_within`], with barriers that have no open part.
+fn back_to(to: &Federation, stops: &Federation) -> Federation {
     let dimension = to.dimension();
     let mut result = Federation::empty(dimension);
     for zone in to.zones() {
         let mut past: Box<[Bound]> = zone.into();
         clocks::down(&mut past, dimension);
         let mut lost = Federation::empty(dimension);
-        for barrier in barriers.zones() {
+        for barrier in stops.zones() {
             lost.unite(&stopped_before(zone, &past, barrier, dimension));
         }
         let mut reaching = Federation::of_zone(dimension, &past);
@@ -121,4 +238,40 @@ fn strictly_after(zone: &[Bound], dimension: usize) -> Box<[Bound]> {
     }
     debug_assert!(!dbm::is_empty(&after));
     after
+}
+
+/// All valuations that are not in the federation.
+fn outside(federation: &Federation) -> Federation {
+    let dimension = federation.dimension();
+    let mut rest = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
+    rest.subtract(federation);
+    rest
+}
+
+/// The valuations from which every short enough delay leads into the zone.
+fn lower_edge(zone: &[Bound], dimension: usize) -> Federation {
+    instants::before(&Federation::of_zone(dimension, zone), &ClockSet::EMPTY)
+}
+
+/// The valuations that lie a positive delay before one of the zone.
+fn strictly_before(zone: &[Bound], dimension: usize) -> Zone {
+    let mut before = Zone::from_bounds(dimension, zone);
+    before.down(&ClockSet::EMPTY);
+    let uppers = (1..dimension).map(|left| (left, strict(zone[left * dimension])));
+    let uppers: Vec<(usize, Bound)> = uppers.filter(|one| one.1.is_finite()).collect();
+    for (left, bound) in uppers {
+        if !before.constrain(left, 0, bound) {
+            break;
+        }
+    }
+    before
+}
+
+/// The bound without its constant; infinity stays.
+fn strict(bound: Bound) -> Bound {
+    if bound.is_infinite() {
+        bound
+    } else {
+        Bound(bound.0 & !1)
+    }
 }

@@ -1,7 +1,10 @@
 //! Games with every rule for forced moves.
 
-use checker::engine::Options;
-use checker::game::Forced;
+use std::sync::Arc;
+
+use checker::engine::{LoadedModel, NamedStrategy, Options};
+use checker::game::strategy::Strategy;
+use checker::game::{Forced, Player};
 use proptest::test_runner::TestCaseError;
 
 use crate::compare::{self, Tally};
@@ -81,6 +84,16 @@ fn compare(
                 compare::check_strategy(&model, &answer, tally, || {
                     format!("{text}{query}\n{forced:?}")
                 })?;
+                let strategy = answer.ok().and_then(|answer| answer.evidence.strategy);
+                if let Some(strategy) = strategy {
+                    for enforced in enforced(kind, strategy.owner, (&goal_text, &keep_text)) {
+                        let strategy = Arc::clone(&strategy);
+                        let result = check_under(&mut model, strategy, &enforced, tally);
+                        result.map_err(|error| {
+                            TestCaseError::fail(format!("{text}{query} {forced:?}: {error}"))
+                        })?;
+                    }
+                }
             }
         }
     }
@@ -122,6 +135,38 @@ fn wins(
         must_reach: matches!(kind, Kind::Reach | Kind::Until),
     };
     winning(graph, &objective, rule)
+}
+
+/// What holds in every run under a strategy of the winner, as far as it can be said without play ending on the way.
+fn enforced(kind: Kind, owner: Player, (goal, keep): (&str, &str)) -> Vec<String> {
+    match (kind, owner) {
+        (Kind::Reach | Kind::Until, Player::Controller) => vec![format!("A<> {goal}")],
+        (Kind::Reach, Player::Environment) => vec![format!("A[] not ({goal})")],
+        (Kind::Safe, Player::Controller) => vec![format!("A[] {keep}")],
+        (Kind::Safe, Player::Environment) => vec![format!("A<> not ({keep})")],
+        (Kind::Recur, Player::Controller) => {
+            vec![format!("A[] {keep}"), format!("not ({goal}) --> {goal}")]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Under a strategy, what it was made for must hold.
+fn check_under(
+    model: &mut LoadedModel,
+    strategy: Arc<Strategy>,
+    query: &str,
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    model.keep_strategy(NamedStrategy {
+        name: "S".to_owned(),
+        query: String::new(),
+        strategy: Some(strategy),
+    });
+    let query = format!("{query} under S");
+    let text = model.add_query(&query);
+    let answer = model.check(&text, &compare::options());
+    compare::check(&answer, Ok(true), tally, || query.clone())
 }
 
 /// By region: whether the formula holds.

@@ -689,3 +689,13 @@ pub(crate) fn has_differences(formula: &Formula) -> bool {
         _ => false,
     }
 }
+
+/// Whether the formula mentions `deadlock`.
+pub(crate) fn has_deadlock(formula: &Formula) -> bool {
+    match formula {
+        Formula::Deadlock => true,
+        Formula::Not(inner) => has_deadlock(inner),
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(has_deadlock),
+        Formula::Location { .. } | Formula::Atom(_) => false,
+    }
+}

@@ -5,6 +5,7 @@
 //!
 //! `NTAGEN_CASES` says how many networks each test tries, `NTAGEN_SEED` from which seed.
 
+mod closed_loops;
 mod compare;
 mod explicit;
 mod games;
