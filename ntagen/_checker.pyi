@@ -34,6 +34,7 @@ class Model:
         strategy: bool,
         verify: bool,
         trace: bool,
+        folder: str | None,
         progress: Callable[[int, int, int, int], object] | None,
     ) -> Answer: ...
 

@@ -302,9 +302,13 @@ class Model:
         strategy: bool = False,
         verify: bool = False,
         trace: bool = True,
+        folder: Path | None = None,
         progress: Progress | None = None,
     ) -> Answer:
         """Answers a query.
+
+        The strategy of ``strategy S = control: …`` is kept under its name: later queries of the
+        same model may be asked ``under S``.
 
         Args:
             query: The query in UPPAAL's language.
@@ -321,6 +325,8 @@ class Model:
             verify: Whether the strategy is to be checked against every move of the opponent.
             trace: Whether witnesses and counterexamples get exact times, which an independent
                 replay checks. For ``sup``, ``inf`` and ``bounds`` this takes a second search.
+            folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
+                folder of the model.
             progress: Is called some twenty times a second with the numbers of explored,
                 stored and waiting states and of bytes.
 
@@ -346,6 +352,7 @@ class Model:
                 strategy=strategy,
                 verify=verify,
                 trace=trace,
+                folder=None if folder is None else str(folder),
                 progress=progress,
             )
         except _checker.RejectedError as error:

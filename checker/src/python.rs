@@ -3,6 +3,7 @@
 //! A model is behind a lock, so that Python threads may share it; the interpreter is released while the engine works, and
 //! signals (Ctrl-C) are looked for now and then.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -17,7 +18,7 @@ use crate::engine::simulation::Point;
 use crate::engine::verification;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, Verdict, describe,
-    explain, facts, json,
+    explain, facts, json, strategy_file,
 };
 use crate::game::Forced;
 use crate::network::Failure;
@@ -183,7 +184,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, progress))]
+    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, folder, progress))]
     #[expect(
         clippy::too_many_arguments,
         reason = "one for each option of the command line"
@@ -202,6 +203,7 @@ impl Model {
         strategy: bool,
         verify: bool,
         trace: bool,
+        folder: Option<PathBuf>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
         let unknown =
@@ -239,6 +241,7 @@ impl Model {
             strategy,
             verify,
             runs: trace,
+            folder,
         };
         let model = slf.get();
         let answer = slf.py().detach(|| {
@@ -538,9 +541,9 @@ impl Answer {
     fn strategy_json(&self) -> Option<String> {
         let strategy = self.inner.evidence.strategy.as_ref()?;
         Some(
-            self.model
-                .get()
-                .with(|model| json::strategy(model.network(), strategy, &self.query).to_string()),
+            self.model.get().with(|model| {
+                strategy_file::write(model.network(), strategy, &self.query).to_string()
+            }),
         )
     }
 }

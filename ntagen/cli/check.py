@@ -74,6 +74,8 @@ class _Asked:
 
     name: str | None
     text: str
+    folder: Path | None = None
+    """Where files that the query names lie; ``None`` is beside the model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,6 +220,7 @@ def command(
                     strategy=strategy is not None,
                     verify=verify,
                     trace=verify or trace is not None,
+                    folder=query.folder,
                     progress=shown,
                 )
             if answer.verified is False:
@@ -246,7 +249,7 @@ def _severity(answer: Answer) -> int:
 def _queries(model: Model, asked: Sequence[str], file: Path | None) -> list[_Asked]:
     """The queries to answer: those asked for, else those of the file, else those of the model."""
     known = [_asked(query) for query in model.queries]
-    from_file = [_asked(query) for query in model.read_queries(file)] if file else []
+    from_file = [_asked(one, file.parent) for one in model.read_queries(file)] if file else []
     if file and not from_file:
         raise InputError(f"{file} holds no query")
     if asked:
@@ -257,13 +260,13 @@ def _queries(model: Model, asked: Sequence[str], file: Path | None) -> list[_Ask
     return from_file or known
 
 
-def _asked(query: Query) -> _Asked:
+def _asked(query: Query, folder: Path | None = None) -> _Asked:
     """A query of a file, named by the first line of its comment or by its strategy."""
     first_line = query.comment.strip().splitlines()[0].strip() if query.comment.strip() else ""
     strategy = re.match(r"strategy\s+(\w+)\s*=", query.text)
     if re.fullmatch(r"[A-Za-z_]\w*", first_line):
-        return _Asked(first_line, query.text)
-    return _Asked(strategy[1] if strategy else None, query.text)
+        return _Asked(first_line, query.text, folder)
+    return _Asked(strategy[1] if strategy else None, query.text, folder)
 
 
 def _find(text: str, named: dict[str, _Asked]) -> _Asked:

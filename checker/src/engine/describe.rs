@@ -17,10 +17,34 @@ use crate::zones::{Bound, Zone};
 
 /// Calls `visit` with the name and the value of every scalar part of every variable.
 pub fn for_each_value(network: &Network, words: &[i32], mut visit: impl FnMut(&str, Value)) {
+    for_each_place(network, |name, Place { shape, offset }| {
+        visit(
+            name,
+            match shape {
+                Shape::Double => {
+                    let (low, high) = (words[offset] as u32, words[offset + 1] as u32);
+                    Value::Double(f64::from_bits(u64::from(low) | u64::from(high) << 32))
+                }
+                _ => Value::Integer(words[offset]),
+            },
+        );
+    });
+}
+
+/// Where a scalar part of a variable lies among the words.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'n> {
+    /// Its shape: neither an array nor a struct.
+    pub shape: &'n Shape,
+    /// Its first word.
+    pub offset: usize,
+}
+
+/// Calls `visit` with the name and the place of every scalar part of every variable.
+pub fn for_each_place<'n>(network: &'n Network, mut visit: impl FnMut(&str, Place<'n>)) {
     for variable in &network.layout.variables {
         let offset = variable.offset as usize;
-        let words = &words[offset..offset + variable.shape.words() as usize];
-        visit_shape(&variable.shape, &variable.name, words, &mut visit);
+        visit_shape(&variable.shape, &variable.name, offset, &mut visit);
     }
 }
 
@@ -33,14 +57,15 @@ pub enum Value {
     Double(f64),
 }
 
-fn visit_shape(shape: &Shape, name: &str, words: &[i32], visit: &mut impl FnMut(&str, Value)) {
+fn visit_shape<'n>(
+    shape: &'n Shape,
+    name: &str,
+    offset: usize,
+    visit: &mut impl FnMut(&str, Place<'n>),
+) {
     match shape {
-        Shape::Integer { .. } | Shape::Bool | Shape::Scalar { .. } => {
-            visit(name, Value::Integer(words[0]));
-        }
-        Shape::Double => {
-            let bits = u64::from(words[0] as u32) | u64::from(words[1] as u32) << 32;
-            visit(name, Value::Double(f64::from_bits(bits)));
+        Shape::Integer { .. } | Shape::Bool | Shape::Scalar { .. } | Shape::Double => {
+            visit(name, Place { shape, offset });
         }
         Shape::Array {
             part,
@@ -49,26 +74,15 @@ fn visit_shape(shape: &Shape, name: &str, words: &[i32], visit: &mut impl FnMut(
         } => {
             let size = part.words() as usize;
             for index in 0..*length {
-                let words = &words[index as usize * size..][..size];
-                visit_shape(
-                    part,
-                    &format!("{name}[{}]", first + index as i32),
-                    words,
-                    visit,
-                );
+                let name = format!("{name}[{}]", first + index as i32);
+                visit_shape(part, &name, offset + index as usize * size, visit);
             }
         }
         Shape::Struct(fields) => {
-            let mut offset = 0;
+            let mut offset = offset;
             for (field, shape) in fields {
-                let size = shape.words() as usize;
-                visit_shape(
-                    shape,
-                    &format!("{name}.{field}"),
-                    &words[offset..offset + size],
-                    visit,
-                );
-                offset += size;
+                visit_shape(shape, &format!("{name}.{field}"), offset, visit);
+                offset += shape.words() as usize;
             }
         }
     }
@@ -79,7 +93,8 @@ pub fn location_name<'n>(network: &'n Network, process: usize, words: &[i32]) ->
     &network.processes[process].locations[words[process] as usize].name
 }
 
-/// The constraints of a zone that say something, as `x - y <= 3` and its kin.
+/// The constraints of a zone that say something, as `x-y <= 3` and its kin; differences that follow from bounds of the clocks alone
+/// are left out.
 pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
     let name = |clock: usize| network.clocks[clock].name.as_str();
     let mut constraints = Vec::new();
@@ -89,7 +104,9 @@ pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
             let bound = zone.bound(left, right);
             let is_trivial =
                 left == right || bound.is_infinite() || (left == 0 && bound >= Bound::LE_ZERO);
-            if is_trivial {
+            let is_difference = left != 0 && right != 0;
+            if is_trivial || (is_difference && zone.bound(left, 0) + zone.bound(0, right) <= bound)
+            {
                 continue;
             }
             let strict = bound.is_strict();

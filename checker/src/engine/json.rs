@@ -1,25 +1,14 @@
-//! Answers as JSON: traces, strategies and plans in the words of the model.
-//!
-//! A strategy file has `format` "ntagen-strategy" and `version` 1. `owner` is "controller" or "environment": who wins, and plays by it.
-//! Its `states` each have `locations` by process, `variables` (those that some update writes), and `decisions` in order. With
-//! `selection` "first" the first decision whose `zones` hold for the clock values applies; with "any" each that does is allowed. A
-//! zone is a list of constraints that all hold; an empty list of constraints always holds. `action` is a list of edges, or null
-//! for waiting: letting time pass, and the opponent move. `goal` says that play has ended in the state, won. `rank` never grows along
-//! a play and is 0 at what is sought; it is 0 everywhere in strategies that only avoid something.
+//! Answers as JSON: traces, values and plans in the words of the model. Strategies are in [`super::strategy_file`].
 
 use serde_json::{Map, Value as Json, json};
 
-use crate::game::Player;
-use crate::game::closed_loop;
 use crate::game::plans::Plan;
-use crate::game::strategy::{Decision, Selection, Strategy};
 use crate::ir::Network;
 use crate::network::Part;
 use crate::search::extremum::{Extreme, Extremes};
 use crate::search::liveness::Ending;
 use crate::verify::State;
 use crate::verify::replay::{End, Run};
-use crate::zones::Zone;
 
 use super::answer::Values;
 use super::describe::{self, Value};
@@ -48,11 +37,13 @@ pub fn part(network: &Network, part: Part) -> Json {
     })
 }
 
-fn parts(network: &Network, list: &[Part]) -> Json {
+/// The edges of a move.
+pub fn parts(network: &Network, list: &[Part]) -> Json {
     Json::Array(list.iter().map(|&one| part(network, one)).collect())
 }
 
-fn locations(network: &Network, words: &[i32]) -> Json {
+/// The location of each process.
+pub fn locations(network: &Network, words: &[i32]) -> Json {
     let entries = network.processes.iter().enumerate();
     Json::Object(
         entries
@@ -66,7 +57,8 @@ fn locations(network: &Network, words: &[i32]) -> Json {
     )
 }
 
-fn variables(network: &Network, words: &[i32]) -> Json {
+/// The value of each scalar part of each variable.
+pub fn variables(network: &Network, words: &[i32]) -> Json {
     let mut values = Map::new();
     describe::for_each_value(network, words, |name, value| {
         let value = match value {
@@ -193,47 +185,5 @@ pub fn plans(network: &Network, plans: &[Plan], query: &str, has_more: bool) -> 
         "count": plans.len(),
         "complete": !has_more,
         "plans": list.collect::<Vec<_>>(),
-    })
-}
-
-/// A strategy. Decisions of states with the same words are joined and come in the order of their ranks.
-pub fn strategy(network: &Network, strategy: &Strategy, query: &str) -> Json {
-    let joined = closed_loop::joined(network, strategy);
-    let states = joined.iter().map(|(words, is_goal, decisions)| {
-        let decisions: Vec<Json> = decisions.iter().map(|one| decision(network, one)).collect();
-        json!({
-            "locations": locations(network, words),
-            "variables": variables(network, words),
-            "goal": is_goal,
-            "decisions": decisions,
-        })
-    });
-    let states: Vec<Json> = states.collect();
-    json!({
-        "format": "ntagen-strategy",
-        "version": 1,
-        "query": query,
-        "owner": match strategy.owner {
-            Player::Controller => "controller",
-            Player::Environment => "environment",
-        },
-        "selection": match strategy.selection {
-            Selection::First => "first",
-            Selection::Any => "any",
-        },
-        "states": states,
-    })
-}
-
-fn decision(network: &Network, decision: &Decision) -> Json {
-    let dimension = decision.zones.dimension();
-    let zones = decision.zones.zones().map(|bounds| {
-        let zone = Zone::from_bounds(dimension, bounds);
-        json!(describe::zone_constraints(network, &zone))
-    });
-    json!({
-        "zones": zones.collect::<Vec<_>>(),
-        "action": decision.action.as_ref().map(|action| parts(network, action)),
-        "rank": decision.rank,
     })
 }

@@ -13,8 +13,10 @@ pub mod json;
 pub mod limits;
 pub mod simulation;
 pub mod strategies;
+pub mod strategy_file;
 pub mod verification;
 
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
@@ -50,6 +52,8 @@ pub mod codes {
         NO_COMPILED_CODE = "E0803" "no-compiled-code";
         /// A strategy is asked for whose query was not satisfied.
         NO_STRATEGY = "E0804" "no-strategy";
+        /// A file of a strategy that cannot be read or written, or does not fit the model.
+        STRATEGY_FILE = "E0805" "strategy-file";
     }
 }
 
@@ -94,6 +98,8 @@ pub struct Options {
     pub verify: bool,
     /// Whether traces are to be timed exactly, and replayed.
     pub runs: bool,
+    /// Where the files of `saveStrategy` and `loadStrategy` lie; `None` is the folder of the model.
+    pub folder: Option<PathBuf>,
 }
 
 impl Default for Options {
@@ -107,6 +113,7 @@ impl Default for Options {
             strategy: false,
             verify: false,
             runs: false,
+            folder: None,
         }
     }
 }
@@ -138,6 +145,8 @@ pub struct LoadedModel {
     model: Model,
     sources: SourceMap,
     templates: Vec<Template>,
+    /// The folder of the file.
+    folder: PathBuf,
     /// The strategies that queries defined, in the order of their definition.
     strategies: Vec<NamedStrategy>,
     /// The queries of the file.
@@ -189,6 +198,10 @@ impl LoadedModel {
             model,
             sources,
             templates: parsed.document.templates,
+            folder: Path::new(path)
+                .parent()
+                .map(Path::to_owned)
+                .unwrap_or_default(),
             strategies: Vec::new(),
             queries,
             warnings,
@@ -244,13 +257,22 @@ impl LoadedModel {
         self.refuse_unsupported(&query)?;
         self.prepare_code(options.code, query.span)?;
         self.load_seconds += start.elapsed().as_secs_f64();
-        let mut answer = self.answer(&query, options)?;
+        let mut answer = match &query.kind {
+            QueryKind::SaveStrategy { file, strategy } => {
+                self.save_strategy((file, strategy), query.span, options)?
+            }
+            QueryKind::LoadStrategy { file } => {
+                let name = query.strategy.as_deref().unwrap_or_default();
+                self.load_strategy((file, name), query.span, options)?
+            }
+            _ => self.answer(&query, options)?,
+        };
         answer.warnings = warnings;
         answer.load_seconds = self.load_seconds;
         Ok(answer)
     }
 
-    /// Answers a compiled query; keeps the strategy that it defines.
+    /// Answers a query that is no file operation; keeps the strategy that it defines.
     fn answer(&mut self, query: &crate::ir::Query, options: &Options) -> Result<Answer, Rejection> {
         let under = query.under.as_ref();
         let under = under.map(|name| self.closed_loop(name, query.span));
@@ -376,9 +398,9 @@ impl LoadedModel {
             | QueryKind::PotentiallyAlways(_)
             | QueryKind::Eventually(_)
             | QueryKind::LeadsTo(..)
-            | QueryKind::Extremum { .. } => None,
-            QueryKind::SaveStrategy { .. } => Some("saveStrategy"),
-            QueryKind::LoadStrategy { .. } => Some("loadStrategy"),
+            | QueryKind::Extremum { .. }
+            | QueryKind::SaveStrategy { .. }
+            | QueryKind::LoadStrategy { .. } => None,
             QueryKind::Control {
                 time_optimal,
                 observations,

@@ -1,15 +1,18 @@
-//! Strategies that have a name: what queries define, and are asked under.
+//! Strategies that have a name: what queries define, save, load, and are asked under.
 //!
 //! A name stays for all later queries of the same loaded model. Its strategy is missing if the query that defines it did not come
-//! out satisfied; to be asked under such a name is an error.
+//! out satisfied; to be asked under such a name is an error. Files lie relative to the folder that [`super::Options`] names, else
+//! to the folder of the model.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::diagnostics::{Diagnostic, Span};
 use crate::game::closed_loop::ClosedLoop;
 use crate::game::strategy::Strategy;
 
-use super::{LoadedModel, Rejection, codes};
+use super::answer::{Answer, Evidence, Verdict, new_answer};
+use super::{LoadedModel, Options, Rejection, codes, strategy_file};
 
 /// A strategy with the query that it answers.
 #[derive(Clone, Debug)]
@@ -40,7 +43,7 @@ impl LoadedModel {
         self.strategies.push(named);
     }
 
-    /// The closed loop of a strategy that a query is asked under.
+    /// The closed loop of a strategy that a query is asked under, or that is to be saved.
     pub(super) fn existing_strategy(
         &self,
         name: &str,
@@ -61,5 +64,103 @@ impl LoadedModel {
     pub(super) fn closed_loop(&self, name: &str, span: Span) -> Result<ClosedLoop, Rejection> {
         let strategy = self.existing_strategy(name, span)?;
         Ok(ClosedLoop::new(self.network(), &strategy))
+    }
+
+    /// Answers `saveStrategy`.
+    pub(super) fn save_strategy(
+        &self,
+        (file, name): (&str, &str),
+        span: Span,
+        options: &Options,
+    ) -> Result<Answer, Rejection> {
+        let strategy = self.existing_strategy(name, span)?;
+        let query = self.strategy(name).map_or("", |one| one.query.as_str());
+        let text = strategy_file::write(self.network(), &strategy, query).to_string();
+        let path = self.strategy_path(file, options);
+        std::fs::write(&path, text + "\n").map_err(|error| {
+            let message = format!("{} cannot be written: {error}", path.display());
+            self.refused(codes::STRATEGY_FILE, span, message, None)
+        })?;
+        let mut answer = new_answer(
+            Verdict::Satisfied,
+            Evidence::default(),
+            crate::search::Counters::default(),
+        );
+        answer.message = Some(format!("strategy {name} written to {}", path.display()));
+        Ok(answer)
+    }
+
+    /// Answers `strategy S = loadStrategy("file")`.
+    pub(super) fn load_strategy(
+        &mut self,
+        (file, name): (&str, &str),
+        span: Span,
+        options: &Options,
+    ) -> Result<Answer, Rejection> {
+        let path = self.strategy_path(file, options);
+        let bytes = std::fs::read(&path).map_err(|error| {
+            let message = format!("{} cannot be read: {error}", path.display());
+            let help = "relative paths start at the folder of the file that the query is in";
+            self.refused(codes::STRATEGY_FILE, span, message, Some(help))
+        })?;
+        let (query, strategy) = self.read_strategy(&path.display().to_string(), &bytes, span)?;
+        let strategy = Arc::new(strategy);
+        let states = strategy.states.len();
+        self.keep_strategy(NamedStrategy {
+            name: name.to_owned(),
+            query,
+            strategy: Some(Arc::clone(&strategy)),
+        });
+        let evidence = Evidence {
+            strategy: Some(strategy),
+            ..Evidence::default()
+        };
+        let mut answer = new_answer(
+            Verdict::Satisfied,
+            evidence,
+            crate::search::Counters::default(),
+        );
+        answer.message = Some(format!(
+            "strategy {name} with {states} states read from {}",
+            path.display()
+        ));
+        Ok(answer)
+    }
+
+    /// Reads a strategy from the bytes of a file; gives the query that it answers, and the strategy. `path` names the file.
+    pub fn read_strategy(
+        &self,
+        path: &str,
+        bytes: &[u8],
+        span: Span,
+    ) -> Result<(String, Strategy), Rejection> {
+        strategy_file::read(self.network(), bytes).map_err(|mismatch| {
+            let message = if mismatch.place.is_empty() {
+                format!("{path}: {}", mismatch.message)
+            } else {
+                format!("{path}, at {}: {}", mismatch.place, mismatch.message)
+            };
+            self.refused(codes::STRATEGY_FILE, span, message, mismatch.help)
+        })
+    }
+
+    fn refused(
+        &self,
+        code: crate::diagnostics::Code,
+        span: Span,
+        message: String,
+        help: Option<&str>,
+    ) -> Rejection {
+        let diagnostic = Diagnostic::new(code, span, message);
+        let diagnostic = match help {
+            Some(help) => diagnostic.help(help),
+            None => diagnostic,
+        };
+        Rejection::new(vec![diagnostic], &self.sources)
+    }
+
+    fn strategy_path(&self, file: &str, options: &Options) -> PathBuf {
+        let folder = options.folder.as_deref().unwrap_or(&self.folder);
+        folder.join(Path::new(file))
     }
 }

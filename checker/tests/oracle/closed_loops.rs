@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use checker::engine::{NamedStrategy, Verdict};
+use checker::engine::{NamedStrategy, Verdict, strategy_file};
 use checker::game::Player;
 use checker::game::strategy::{Decision, Selection, Strategy, StrategyState};
 use checker::network::Part;
@@ -14,6 +14,7 @@ use checker::verify::regions::Bounding;
 use checker::verify::{Regions, Semantics, State};
 use checker::zones::dbm::Constraint;
 use checker::zones::{Bound, Federation, Zone};
+use proptest::prop_assert_eq;
 use proptest::test_runner::TestCaseError;
 
 use crate::compare::{self, Tally};
@@ -374,7 +375,11 @@ fn compare(
     let Some(closed) = close(&semantics, &regions, &strategy) else {
         return Ok(());
     };
-    let description = format!("{text}\n{strategy:#?}");
+    let states = strategy_file::write(&ir, &strategy, "");
+    let read = strategy_file::read(&ir, states.to_string().as_bytes());
+    let read = read.map(|(query, strategy)| strategy_file::write(&ir, &strategy, &query));
+    prop_assert_eq!(read.as_ref(), Ok(&states), "{}", text);
+    let description = format!("{text}\n{states:#}");
     model.keep_strategy(NamedStrategy {
         name: "S".to_owned(),
         query: String::new(),

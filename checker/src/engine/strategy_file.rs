@@ -1,0 +1,453 @@
+//! Strategies as files: written as JSON, and read again for a model.
+//!
+//! The format is described in `docs/strategy.md`. In short: an object with `format` "ntagen-strategy", `version` 1, the `query`,
+//! the `owner`, the `selection`, and `states`, each with `locations` by process, `variables` by name, `goal`, and `decisions` with the
+//! `zones` where they apply. Reading looks names up in the model and refuses what is not in it, so a file fits
+//! every model with the same processes, locations, variables, clocks and edges.
+
+use serde_json::{Map, Value as Json, json};
+
+use crate::game::strategy::{Decision, Selection, Strategy, StrategyState};
+use crate::game::{Player, closed_loop};
+use crate::ir::{EdgeId, Network, Shape};
+use crate::network::Part;
+use crate::network::stepper::{select_count, select_values};
+use crate::zones::dbm::Constraint;
+use crate::zones::{Bound, Federation, Zone};
+
+use super::describe::{self, Place};
+use super::json;
+
+/// The name of the format.
+pub const FORMAT: &str = "ntagen-strategy";
+
+/// The version of the format that is written, and the only one that is read.
+pub const VERSION: u64 = 1;
+
+/// Why a file is no strategy for the model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mismatch {
+    /// Where in the JSON, such as `states[3].decisions[0].zones[1]`; empty for the whole.
+    pub place: String,
+    /// What is wrong.
+    pub message: String,
+    /// What to do about it.
+    pub help: Option<&'static str>,
+}
+
+const OTHER_MODEL: &str =
+    "the strategy was made for another model, or the model has changed: synthesise it again";
+const SEE_FORMAT: &str = "docs/strategy.md describes the format";
+
+/// A strategy as JSON. Decisions of states with the same words are joined and come in the order of their ranks.
+pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
+    let joined = closed_loop::joined(network, strategy);
+    let states = joined.iter().map(|(words, is_goal, decisions)| {
+        let decisions: Vec<Json> = decisions.iter().map(|one| decision(network, one)).collect();
+        json!({
+            "locations": json::locations(network, words),
+            "variables": json::variables(network, words),
+            "goal": is_goal,
+            "decisions": decisions,
+        })
+    });
+    let states: Vec<Json> = states.collect();
+    json!({
+        "format": FORMAT,
+        "version": VERSION,
+        "query": query,
+        "owner": match strategy.owner {
+            Player::Controller => "controller",
+            Player::Environment => "environment",
+        },
+        "selection": match strategy.selection {
+            Selection::First => "first",
+            Selection::Any => "any",
+        },
+        "states": states,
+    })
+}
+
+fn decision(network: &Network, decision: &Decision) -> Json {
+    let action = decision.action.as_ref();
+    json!({
+        "zones": zones(network, &decision.zones),
+        "action": action.map(|parts| json::parts(network, parts)),
+        "rank": decision.rank,
+    })
+}
+
+/// The zones of a federation, each as a list of constraints that all hold.
+pub fn zones(network: &Network, federation: &Federation) -> Vec<Json> {
+    let dimension = federation.dimension();
+    let zones = federation.zones().map(|bounds| {
+        let zone = Zone::from_bounds(dimension, bounds);
+        json!(describe::zone_constraints(network, &zone))
+    });
+    zones.collect()
+}
+
+/// Reads a strategy; gives the query that it answers, and the strategy.
+///
+/// # Errors
+/// The bytes are no JSON of the format, or name what the network does not have.
+pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Mismatch> {
+    let file: Json = serde_json::from_slice(bytes).map_err(|error| Mismatch {
+        place: String::new(),
+        message: format!("this is no JSON: {error}"),
+        help: Some(SEE_FORMAT),
+    })?;
+    let whole = At(&file, String::new());
+    let format = whole.text("format").unwrap_or_default();
+    if format != FORMAT {
+        let message = format!("this is no strategy of ntagen: its \"format\" is not \"{FORMAT}\"");
+        return Err(whole.wrong(message, SEE_FORMAT));
+    }
+    let version = whole.field("version")?;
+    if version.0.as_u64() != Some(VERSION) {
+        let message = format!("version {} of the format is not known", version.0);
+        return Err(version.wrong(message, "this ntagen reads version 1"));
+    }
+    let query = whole.text("query")?;
+    let owner = match whole.text("owner")?.as_str() {
+        "controller" => Player::Controller,
+        "environment" => Player::Environment,
+        other => {
+            let message = format!("nobody is the {other}");
+            let help = "write \"controller\" or \"environment\"";
+            return Err(whole.field("owner")?.wrong(message, help));
+        }
+    };
+    let selection = match whole.text("selection")?.as_str() {
+        "first" => Selection::First,
+        "any" => Selection::Any,
+        other => {
+            let message = format!("there is no selection {other}");
+            let help = "write \"first\" or \"any\"";
+            return Err(whole.field("selection")?.wrong(message, help));
+        }
+    };
+    let reader = Reader { network, owner };
+    let mut strategy = Strategy {
+        owner,
+        selection,
+        states: Vec::new(),
+    };
+    for state in whole.list("states")? {
+        strategy.states.push(reader.state(&state)?);
+    }
+    Ok((query, strategy))
+}
+
+/// A part of the file with its place.
+struct At<'j>(&'j Json, String);
+
+impl<'j> At<'j> {
+    fn wrong(&self, message: impl Into<String>, help: &'static str) -> Mismatch {
+        Mismatch {
+            place: self.1.clone(),
+            message: message.into(),
+            help: Some(help),
+        }
+    }
+
+    fn field(&self, name: &str) -> Result<At<'j>, Mismatch> {
+        let place = if self.1.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{}.{name}", self.1)
+        };
+        match self.0.get(name) {
+            Some(value) => Ok(At(value, place)),
+            None => Err(self.wrong(format!("\"{name}\" is missing"), SEE_FORMAT)),
+        }
+    }
+
+    fn typed<T>(
+        &self,
+        name: &str,
+        what: &str,
+        read: impl Fn(&'j Json) -> Option<T>,
+    ) -> Result<T, Mismatch> {
+        let field = self.field(name)?;
+        read(field.0).ok_or_else(|| field.wrong(format!("this is no {what}"), SEE_FORMAT))
+    }
+
+    fn text(&self, name: &str) -> Result<String, Mismatch> {
+        self.typed(name, "text", |value| value.as_str().map(str::to_owned))
+    }
+
+    fn map(&self, name: &str) -> Result<&'j Map<String, Json>, Mismatch> {
+        self.typed(name, "object", Json::as_object)
+    }
+
+    fn index(&self, name: &str) -> Result<u32, Mismatch> {
+        self.typed(name, "index", |value| {
+            value.as_u64().and_then(|index| u32::try_from(index).ok())
+        })
+    }
+
+    fn list(&self, name: &str) -> Result<Vec<At<'j>>, Mismatch> {
+        self.field(name)?.entries()
+    }
+
+    fn entries(&self) -> Result<Vec<At<'j>>, Mismatch> {
+        let Some(entries) = self.0.as_array() else {
+            return Err(self.wrong("this is no list", SEE_FORMAT));
+        };
+        let entries = entries.iter().enumerate();
+        Ok(entries
+            .map(|(index, one)| At(one, format!("{}[{index}]", self.1)))
+            .collect())
+    }
+}
+
+struct Reader<'n> {
+    network: &'n Network,
+    owner: Player,
+}
+
+impl Reader<'_> {
+    fn state(&self, state: &At<'_>) -> Result<StrategyState, Mismatch> {
+        let mut words = self.network.initial.clone();
+        self.locations(state, &mut words)?;
+        self.variables(state, &mut words)?;
+        let mut decisions = Vec::new();
+        for decision in state.list("decisions")? {
+            decisions.push(self.decision(&decision, &words)?);
+        }
+        Ok(StrategyState {
+            words,
+            decisions,
+            is_goal: state.typed("goal", "truth value", Json::as_bool)?,
+        })
+    }
+
+    fn locations(&self, state: &At<'_>, words: &mut [i32]) -> Result<(), Mismatch> {
+        let given = state.map("locations")?;
+        let place = state.field("locations")?;
+        for (index, process) in self.network.processes.iter().enumerate() {
+            let Some(name) = given.get(&process.name) else {
+                let message = format!("the model's process {} is missing", process.name);
+                return Err(place.wrong(message, OTHER_MODEL));
+            };
+            let found = process
+                .locations
+                .iter()
+                .position(|one| Some(one.name.as_str()) == name.as_str());
+            let Some(location) = found else {
+                let message = format!("process {} has no location {name}", process.name);
+                return Err(place.wrong(message, OTHER_MODEL));
+            };
+            words[index] = location as i32;
+        }
+        let processes = &self.network.processes;
+        match given
+            .keys()
+            .find(|name| !processes.iter().any(|one| &&one.name == name))
+        {
+            Some(name) => Err(place.wrong(format!("the model has no process {name}"), OTHER_MODEL)),
+            None => Ok(()),
+        }
+    }
+
+    fn variables(&self, state: &At<'_>, words: &mut [i32]) -> Result<(), Mismatch> {
+        let given = state.map("variables")?;
+        let at = state.field("variables")?;
+        let mut known = 0;
+        let mut wrong = None;
+        describe::for_each_place(self.network, |name, place| {
+            let Some(value) = given.get(name) else {
+                wrong.get_or_insert(format!("the model's variable {name} is missing"));
+                return;
+            };
+            known += 1;
+            if !set_value(place, value, words) {
+                wrong.get_or_insert(format!("variable {name} cannot be {value}"));
+            }
+        });
+        if wrong.is_none() && known < given.len() {
+            let mut unknown: Vec<&str> = given.keys().map(String::as_str).collect();
+            describe::for_each_place(self.network, |name, _| unknown.retain(|one| *one != name));
+            wrong = unknown
+                .first()
+                .map(|name| format!("the model has no variable {name}"));
+        }
+        match wrong {
+            Some(message) => Err(at.wrong(message, OTHER_MODEL)),
+            None => Ok(()),
+        }
+    }
+
+    fn decision(&self, decision: &At<'_>, words: &[i32]) -> Result<Decision, Mismatch> {
+        let dimension = self.network.clocks.len().max(1);
+        let mut zones = Federation::empty(dimension);
+        for zone in decision.list("zones")? {
+            let mut constraints = Vec::new();
+            for one in zone.entries()? {
+                self.constraint(&one, &mut constraints)?;
+            }
+            zones.push(Zone::of_constraints(dimension, &constraints).bounds());
+        }
+        let action = decision.field("action")?;
+        let action = if action.0.is_null() {
+            None
+        } else {
+            let edges = action.entries()?;
+            let parts: Result<Vec<Part>, Mismatch> =
+                edges.iter().map(|edge| self.part(edge, words)).collect();
+            let parts = parts?;
+            if parts.is_empty() {
+                let help = "write null for waiting";
+                return Err(action.wrong("the action has no edge", help));
+            }
+            let is_controllable = |part: &Part| {
+                let process = &self.network.processes[part.process as usize];
+                process.edges[part.edge as usize].controllable
+            };
+            if !self.owner.owns(parts.iter().all(is_controllable)) {
+                let message = "the move is not one of the player who owns the strategy";
+                return Err(action.wrong(message, OTHER_MODEL));
+            }
+            Some(parts)
+        };
+        Ok(Decision {
+            zones,
+            action,
+            rank: decision.index("rank")?,
+        })
+    }
+
+    /// Adds the constraints that a text such as `x-y <= 3` stands for.
+    fn constraint(&self, at: &At<'_>, into: &mut Vec<Constraint>) -> Result<(), Mismatch> {
+        let text = at.0.as_str().unwrap_or_default();
+        let relations = ["<=", ">=", "==", "<", ">"];
+        let parts = relations.iter().find_map(|relation| {
+            let (terms, value) = text.split_once(relation)?;
+            let value: i32 = value.trim().parse().ok()?;
+            Some((terms.trim(), *relation, value))
+        });
+        let Some((terms, relation, value)) = parts else {
+            let message = format!("{} is no comparison of clocks with a number", at.0);
+            return Err(at.wrong(message, SEE_FORMAT));
+        };
+        let Some((left, right)) = self.clocks(terms) else {
+            let message = format!("the model has no clocks {terms}");
+            return Err(at.wrong(message, OTHER_MODEL));
+        };
+        let is_strict = !relation.ends_with('=');
+        let bound = |value: i32| {
+            let bound = if is_strict {
+                Bound::strict(value)
+            } else {
+                Bound::weak(value)
+            };
+            bound.ok_or_else(|| at.wrong(format!("{value} is too large for a zone"), SEE_FORMAT))
+        };
+        if !relation.starts_with('>') {
+            let bound = bound(value)?;
+            into.push(Constraint { left, right, bound });
+        }
+        if !relation.starts_with('<') {
+            let bound = bound(value.saturating_neg())?;
+            into.push(Constraint {
+                left: right,
+                right: left,
+                bound,
+            });
+        }
+        Ok(())
+    }
+
+    /// The clocks of `x` (then the right one is the reference clock) or `x-y`.
+    fn clocks(&self, terms: &str) -> Option<(usize, usize)> {
+        let clock = |name: &str| {
+            let mut clocks = self.network.clocks.iter().enumerate().skip(1);
+            clocks
+                .find(|(_, clock)| clock.name == name)
+                .map(|(index, _)| index)
+        };
+        if let Some(clock) = clock(terms) {
+            return Some((clock, 0));
+        }
+        let (left, right) = terms.split_once('-')?;
+        Some((clock(left.trim())?, clock(right.trim())?))
+    }
+
+    fn part(&self, at: &At<'_>, words: &[i32]) -> Result<Part, Mismatch> {
+        let name = at.text("process")?;
+        let mut processes = self.network.processes.iter().enumerate();
+        let Some((index, process)) = processes.find(|(_, one)| one.name == name) else {
+            return Err(at.wrong(format!("the model has no process {name}"), OTHER_MODEL));
+        };
+        let edge_index = at.index("edge")?;
+        let (source, target) = (at.text("source")?, at.text("target")?);
+        let location = |id: u32| process.locations[id as usize].name.as_str();
+        let edge = process
+            .edges
+            .get(EdgeId(edge_index).0 as usize)
+            .filter(|edge| location(edge.source.0) == source);
+        let Some(edge) = edge else {
+            let message = format!("edge {edge_index} of process {name} does not leave {source}");
+            return Err(at.wrong(message, OTHER_MODEL));
+        };
+        if words[index] != edge.source.0 as i32 {
+            let message = format!("process {name} is not in {source} in this state");
+            return Err(at.wrong(message, SEE_FORMAT));
+        }
+        let branch = at.index("branch")?;
+        let target_of = edge.branches.get(branch as usize);
+        if target_of.is_none_or(|branch| location(branch.target.0) != target) {
+            let message = format!(
+                "edge {edge_index} of process {name} does not lead to {target} by branch {branch}"
+            );
+            return Err(at.wrong(message, OTHER_MODEL));
+        }
+        let given = at.map("select")?;
+        let mut values = Vec::new();
+        let select = (0..select_count(edge)).find(|&select| {
+            select_values(edge, select, &mut values);
+            let mut bindings = edge.select.iter().zip(&values);
+            bindings.all(|(binding, value)| given.get(&binding.name) == Some(&json!(value)))
+        });
+        let Some(select) = select.filter(|_| given.len() == edge.select.len()) else {
+            let message = format!(
+                "edge {edge_index} of process {name} has no select values {}",
+                json!(given)
+            );
+            return Err(at.wrong(message, OTHER_MODEL));
+        };
+        Ok(Part {
+            process: index as u32,
+            edge: edge_index,
+            branch,
+            select,
+        })
+    }
+}
+
+/// Sets the words of a scalar part of a variable; returns false if it cannot have the value.
+fn set_value(place: Place<'_>, value: &Json, words: &mut [i32]) -> bool {
+    let offset = place.offset;
+    if let Shape::Double = place.shape {
+        let Some(value) = value.as_f64() else {
+            return false;
+        };
+        let bits = value.to_bits();
+        words[offset] = bits as u32 as i32;
+        words[offset + 1] = (bits >> 32) as u32 as i32;
+        return true;
+    }
+    let (low, high) = match *place.shape {
+        Shape::Integer { low, high } => (i64::from(low), i64::from(high)),
+        Shape::Scalar { size, .. } => (0, i64::from(size) - 1),
+        _ => (0, 1),
+    };
+    match value.as_i64().filter(|value| (low..=high).contains(value)) {
+        Some(value) => {
+            words[offset] = value as i32;
+            true
+        }
+        None => false,
+    }
+}
