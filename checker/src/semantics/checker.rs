@@ -42,6 +42,8 @@ pub(super) struct Checker<'a> {
     pub(super) locals: Vec<Local>,
     /// Where values of clocks are used as numbers, as long as it is open whether anything depends on them.
     pub(super) clock_values: Vec<Span>,
+    /// The hybrid clocks that were declared; a warning about each if the model is accepted.
+    pub(super) hybrid_clocks: Vec<(String, Span)>,
     /// Set when a free parameter is looked up.
     pub(super) free_parameter_seen: bool,
     /// Whether a template is checked without an instance: values of parameters are unknown.
@@ -92,6 +94,7 @@ impl<'a> Checker<'a> {
             has_errors: false,
             locals: Vec::new(),
             clock_values: Vec::new(),
+            hybrid_clocks: Vec::new(),
             free_parameter_seen: false,
             is_generic: false,
             system_is_open: false,

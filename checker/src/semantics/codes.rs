@@ -157,4 +157,6 @@ codes! {
     DOUBLE_IN_STATE = "W0203" "double-in-state";
     /// A strategy that takes the place of an earlier one.
     STRATEGY_TWICE = "W0204" "strategy-twice";
+    /// A hybrid clock, which symbolic and game queries do not see.
+    HYBRID_CLOCK_IGNORED = "W0206" "hybrid-clock-ignored";
 }

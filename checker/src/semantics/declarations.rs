@@ -459,6 +459,10 @@ impl Checker<'_> {
         let words = self.initial_words(&parts, ty);
         let meta = variable.ty.prefixes.meta;
         self.warn_of_doubles(variable, ty, meta);
+        if ty.any(&|part| *part == Type::Clock { hybrid: true }) {
+            let name = variable.name.text.clone();
+            self.hybrid_clocks.push((name, variable.name.span));
+        }
         let words = words.unwrap_or_else(|| vec![0; ty.size().words as usize]);
         let place = self.allocate(&variable.name.text, ty, meta, &words);
         let clock_start = Type::Int {

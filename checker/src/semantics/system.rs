@@ -7,7 +7,7 @@ use super::layout::Relocation;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Root};
 use super::types::Memory;
-use crate::diagnostics::Span;
+use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{AssignedValue, Clock, ClockAtom, Features, Location, Network};
 use crate::syntax::ast::{Declaration, Document, SystemItem};
 
@@ -160,6 +160,17 @@ impl Checker<'_> {
         };
         if !self.can_lower() {
             return relocation;
+        }
+        for (name, span) in std::mem::take(&mut self.hybrid_clocks) {
+            self.report(
+                Diagnostic::new(
+                    codes::HYBRID_CLOCK_IGNORED,
+                    span,
+                    format!("the hybrid clock '{name}' is abstracted away in symbolic and game queries"),
+                )
+                .note("its rates and assignments have no effect there; nothing that a query sees depends on it")
+                .help("use an ordinary clock if it matters"),
+            );
         }
         let network = &mut self.world.network;
         network.initial = network
