@@ -232,7 +232,7 @@ def command(
             if as_json:
                 click.echo(json.dumps(_record(answer, query)))
             else:
-                _row(answer, query, notes)
+                _row(answer, query, notes, trace_is_written=trace is not None)
             worst = max(worst, _severity(answer), key=_SEVERITIES.index)
     return worst
 
@@ -304,7 +304,7 @@ def _header(path: Path, model: Model) -> None:
     click.echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
 
 
-def _row(answer: Answer, query: _Asked, notes: Sequence[str]) -> None:
+def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_written: bool) -> None:
     mark, colour = _MARK[answer.verdict]
     label = f"{query.name}: {query.text}" if query.name else query.text
     click.echo(f"  {click.style(f'{mark:<8}', fg=colour, bold=True)}{label}")
@@ -313,9 +313,56 @@ def _row(answer: Answer, query: _Asked, notes: Sequence[str]) -> None:
     facts.append(f"{answer.peak_bytes / 2**20:.1f} MiB")
     if answer.stop:
         facts.insert(0, f"stopped by the limit of {answer.stop}")
+    way = [] if trace_is_written else _way_to_failure(answer)
     shown = [f"value: {json.dumps(answer.value)}"] if answer.value is not None else []
-    for line in [*shown, ", ".join(facts), *([answer.message] if answer.message else []), *notes]:
+    for line in [
+        *shown,
+        ", ".join(facts),
+        *([answer.message] if answer.message else []),
+        *way,
+        *notes,
+    ]:
         click.echo(f"          {line}")
+
+
+MOVES_SHOWN: Final = 12
+"""Transitions of the way to a failure that are shown; all of them with ``--trace``."""
+
+
+def _way_to_failure(answer: Answer) -> list[str]:
+    """The trace to a run-time error in short: transitions, and the state in which it happens."""
+    text = answer.trace_json() if answer.verdict == "error" else None
+    if text is None:
+        return []
+    trace = json.loads(text)
+    moves, last = trace["transitions"], trace["states"][-1]
+    steps = "step" if len(moves) == 1 else "steps"
+    lines = [f"the way there, {len(moves)} {steps} (--trace - shows all states):"]
+    if len(moves) > MOVES_SHOWN:
+        lines.append(f"  … {len(moves) - MOVES_SHOWN} before")
+    first = max(0, len(moves) - MOVES_SHOWN)
+    lines += [f"  {first + 1 + i:>3}. {_move(move)}" for i, move in enumerate(moves[first:])]
+    places = [f"{process}.{location}" for process, location in last["locations"].items()]
+    values = [f"{name}={value}" for name, value in last["variables"].items()]
+    lines.append("in the state")
+    lines.append("  " + " ".join([*places, *values, *last["zone"]]))
+    if "failing" in trace:
+        lines += ["in the step", f"  {_move(trace['failing'])}"]
+    return lines
+
+
+def _move(edges: Sequence[dict[str, Any]]) -> str:
+    """A transition on one line: the edges that are taken together."""
+    return "  |  ".join(_edge(edge) for edge in edges)
+
+
+def _edge(edge: dict[str, Any]) -> str:
+    select = [f"{name}={value}" for name, value in edge["select"].items()]
+    labels = "; ".join(
+        label for label in (", ".join(select), edge["guard"], edge["sync"], edge["update"]) if label
+    )
+    arrow = f"{edge['process']}.{edge['source']} -> {edge['target']}"
+    return f"{arrow}  {{ {labels} }}" if labels else arrow
 
 
 @contextlib.contextmanager

@@ -219,7 +219,7 @@ pub(super) fn has_differences(network: &Network, atoms: &[ClockAtom]) -> bool {
 
 /// Zones for searches, with an abstraction that is sound for the network and these predicates, and keeps what further
 /// comparisons tell.
-fn symbolic<'a>(
+pub(super) fn symbolic<'a>(
     subject: Subject<'a>,
     predicates: &[&Predicate],
     further: &[ClockAtom],

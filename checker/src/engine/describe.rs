@@ -222,6 +222,14 @@ pub fn trace_text(network: &Network, trace: &Trace) -> String {
     text
 }
 
+/// The move that fails in the last state of a trace, below that trace.
+pub fn failing_text(network: &Network, parts: &[Part]) -> String {
+    let lines = parts
+        .iter()
+        .map(|part| format!("  {}\n", part_text(network, *part)));
+    format!("\nFails in the transitions:\n{}", lines.collect::<String>())
+}
+
 /// Why a run never ends, as a line below its trace.
 pub fn ending_text(ending: Ending) -> String {
     match ending {
@@ -306,6 +314,9 @@ pub fn witness_text(network: &Network, witness: &Witness) -> String {
     let title = witness.title.as_ref();
     let mut text = title.map_or_else(String::new, |title| format!("{title}:\n"));
     text += &trace_text(network, &witness.trace);
+    if let Some(failing) = &witness.failing {
+        text += &failing_text(network, failing);
+    }
     text += &witness.ending.map_or_else(String::new, ending_text);
     match &witness.run {
         Some(Proof::Replayed(run, states, _)) => text += &run_text(network, run, states),

@@ -30,6 +30,8 @@ pub struct Witness {
     pub trace: Trace,
     /// Why it never ends, if it does not.
     pub ending: Option<Ending>,
+    /// The move that fails in the last state, if it leads to a failure that is in one.
+    pub failing: Option<Vec<Part>>,
     /// The run with exact times, if it was wanted.
     pub run: Option<Proof>,
 }
@@ -41,6 +43,7 @@ impl Witness {
             title: None,
             trace,
             ending,
+            failing: None,
             run: None,
         }
     }

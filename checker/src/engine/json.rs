@@ -95,7 +95,8 @@ pub fn values(values: &Values) -> Json {
 /// A trace has `format` "ntagen-trace" and `version` 1. `states` are symbolic, `transitions` the edges between them, `ending` says why
 /// the run never ends: `loop` is the index of the state that its last state leads back to. `run` has exact times, in ticks of
 /// which `ticks_per_unit` make a unit of time: its `steps` each wait and take edges, `end` says what comes then, `from` from which
-/// moment on what must stay does, and `states` are those on entry, with the one after the last wait.
+/// moment on what must stay does, and `states` are those on entry, with the one after the last wait. On the way to an error, `failing` has
+/// the edges of the transition that fails in the last state; it is not there if looking at guards, invariants or the query fails.
 pub fn witnesses(network: &Network, witnesses: &[Witness], query: &str) -> Json {
     let mut json = json!({ "format": TRACE_FORMAT, "version": 1, "query": query });
     let traces = witnesses.iter().map(|one| witness(network, one));
@@ -128,6 +129,9 @@ fn witness(network: &Network, witness: &Witness) -> Json {
     }
     json["states"] = states.collect();
     json["transitions"] = moves.collect();
+    if let Some(failing) = &witness.failing {
+        json["failing"] = parts(network, failing);
+    }
     if let Some(ending) = witness.ending {
         json["ending"] = match ending {
             Ending::Loop(start) => json!({ "kind": "loop", "loop": start }),

@@ -8,6 +8,7 @@ pub mod describe;
 pub mod evidence;
 pub mod explain;
 pub mod facts;
+mod failure;
 mod games;
 pub mod json;
 pub mod limits;
@@ -219,11 +220,11 @@ impl LoadedModel {
     pub fn place(&self, span: Span) -> (String, String) {
         let source = self.sources.get(span.source);
         let position = self.sources.position(span);
-        let place = format!("{}:{}:{}", source.path, position.line, position.column);
-        let place = if source.place.is_empty() {
-            place
-        } else {
-            format!("{place} ({})", source.place)
+        let (line, column) = (position.line, position.column);
+        let place = match (&*source.path, source.place.as_str()) {
+            (path, "") => format!("{path}:{line}:{column}"),
+            ("", words) => format!("{words}:{line}:{column}"),
+            (path, words) => format!("{path}:{line}:{column} ({words})"),
         };
         (place, self.sources.text(span).to_owned())
     }
@@ -267,6 +268,7 @@ impl LoadedModel {
             }
             _ => self.answer(&query, options)?,
         };
+        self.complete_failure(&query, options, &mut answer);
         answer.warnings = warnings;
         answer.load_seconds = self.load_seconds;
         Ok(answer)

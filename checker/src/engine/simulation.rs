@@ -5,7 +5,7 @@
 
 use crate::exec::Executor;
 use crate::ir::Network;
-use crate::network::{Abstraction, ClockBounds, Failure, Moves, Part, Stepper, Symbolic};
+use crate::network::{Abstraction, ClockBounds, Failure, MoveRef, Moves, Part, Stepper, Symbolic};
 use crate::zones::Zone;
 
 use super::{CodeEngine, LoadedModel, Rejection};
@@ -22,6 +22,9 @@ pub struct Point {
     pub zone: Zone,
 }
 
+/// Moves, and where each leads.
+pub type Successors = Vec<(Vec<Part>, Point)>;
+
 impl LoadedModel {
     /// Makes the code ready to run; needed once before the other functions here.
     pub fn prepare_simulation(&mut self, code: CodeEngine) -> Result<(), Rejection> {
@@ -35,7 +38,7 @@ impl LoadedModel {
     }
 
     /// The moves of a state, and where each leads. More than one entry for a move if a receiver abstains.
-    pub fn successors(&self, point: &Point) -> Result<Vec<(Vec<Part>, Point)>, Failure> {
+    pub fn successors(&self, point: &Point) -> Result<Successors, Failure> {
         successors(&mut self.symbolic(), point)
     }
 
@@ -55,7 +58,8 @@ impl LoadedModel {
         Ok(point)
     }
 
-    fn symbolic(&self) -> Symbolic<'_> {
+    /// Zones as they are, without abstraction.
+    pub(super) fn symbolic(&self) -> Symbolic<'_> {
         symbolic(self.network(), self.executor())
     }
 }
@@ -67,30 +71,49 @@ pub fn symbolic<'a>(network: &'a Network, executor: &'a dyn Executor) -> Symboli
 }
 
 /// The moves of a state, and where each leads. More than one entry for a move if a receiver abstains.
-pub fn successors(
+pub fn successors(symbolic: &mut Symbolic<'_>, point: &Point) -> Result<Successors, Failure> {
+    successors_or_failure(symbolic, point).map_err(|(failure, _)| failure)
+}
+
+/// The same; a failure comes with the move that fails, unless it is the search for moves itself.
+pub(super) fn successors_or_failure(
     symbolic: &mut Symbolic<'_>,
     point: &Point,
-) -> Result<Vec<(Vec<Part>, Point)>, Failure> {
+) -> Result<Successors, (Failure, Option<Vec<Part>>)> {
     let mut words = point.words.clone();
     let mut moves = Moves::default();
-    symbolic.stepper.moves(&mut words, &mut moves)?;
+    let found = symbolic.stepper.moves(&mut words, &mut moves);
+    found.map_err(|error| (error, None))?;
     let mut successors = Vec::new();
-    let mut entries = Vec::new();
     for one in moves.iter() {
-        if !symbolic.is_enabled(one, point.zone.bounds())? {
-            continue;
-        }
-        let mut target = words.clone();
-        let Some(effect) = symbolic.fire(one, &mut target)? else {
-            continue;
-        };
-        effect.entry_zones(point.zone.bounds(), symbolic.dimension(), &mut entries);
-        for mut zone in entries.drain(..) {
-            let may_delay = symbolic.may_delay(&mut target)?;
-            symbolic.delay(&target, may_delay, &effect.invariant, zone.bounds_mut())?;
-            let words = target.clone();
-            successors.push((one.parts.to_vec(), Point { words, zone }));
-        }
+        taken(symbolic, one, &words, &point.zone, &mut successors)
+            .map_err(|failure| (failure, Some(one.parts.to_vec())))?;
     }
     Ok(successors)
+}
+
+/// Adds where a move leads from a state.
+fn taken(
+    symbolic: &mut Symbolic<'_>,
+    one: MoveRef<'_>,
+    words: &[i32],
+    zone: &Zone,
+    successors: &mut Successors,
+) -> Result<(), Failure> {
+    if !symbolic.is_enabled(one, zone.bounds())? {
+        return Ok(());
+    }
+    let mut target = words.to_vec();
+    let Some(effect) = symbolic.fire(one, &mut target)? else {
+        return Ok(());
+    };
+    let mut entries = Vec::new();
+    effect.entry_zones(zone.bounds(), symbolic.dimension(), &mut entries);
+    for mut zone in entries {
+        let may_delay = symbolic.may_delay(&mut target)?;
+        symbolic.delay(&target, may_delay, &effect.invariant, zone.bounds_mut())?;
+        let words = target.clone();
+        successors.push((one.parts.to_vec(), Point { words, zone }));
+    }
+    Ok(())
 }

@@ -206,3 +206,78 @@ def test_answers_do_not_depend_on_engine_and_order(
     options = ("--engine", engine, "--search", search, "--json")
     out, _ = check_run(capsys, 1, gate, "--query", "A[] Gate.x < 7", *options)
     assert json.loads(out)["verdict"] == "not satisfied"
+
+
+FAILING = """
+int[0,3] n; int a[3];
+process P() {
+  clock x;
+  state A { x <= 2 }, B, C;
+  init A;
+  trans A -> A { guard x >= 2; assign x = 0, n = n + 1; },
+        A -u-> B { guard n == 2; assign a[n] = 1 / (n - 2); },
+        B -> C { };
+}
+system P;
+"""
+
+SYMBOLIC = ["E<> P.C", "A[] not P.C", "E[] n < 3", "A<> P.C", "P.A --> P.C", "sup: n"]
+GAMES = ["control: A<> P.C", "control: A[ n < 3 U P.C ]", "control: A[] n < 3"]
+
+
+@pytest.fixture
+def failing(tmp_path: Path) -> Path:
+    path = tmp_path / "failing.xta"
+    path.write_text(FAILING)
+    return path
+
+
+@pytest.mark.parametrize("query", [*SYMBOLIC, *GAMES])
+@pytest.mark.parametrize("engine", ["jit", "interpreter"])
+def test_a_run_time_error_is_shown_with_the_way_to_it(
+    capsys: pytest.CaptureFixture[str], failing: Path, query: str, engine: str
+) -> None:
+    out, _ = check_run(capsys, 4, failing, "--query", query, "--engine", engine)
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    column = FAILING.splitlines()[7].index("1 / (") + 1
+    assert f"division by zero, at {failing}:8:{column}: 1 / (n - 2)" in lines
+    assert "the way there, 2 steps (--trace - shows all states):" in lines
+    assert lines.count("1. P.A -> A { x >= 2; x = 0, n = n + 1 }") == 1
+    assert lines[lines.index("in the state") + 1].startswith("P.A n=2 a[0]=0 a[1]=0 a[2]=0")
+    assert lines[lines.index("in the step") + 1] == "P.A -> B { n == 2; a[n] = 1 / (n - 2) }"
+
+
+@pytest.mark.parametrize("query", ["E<> a[n] == 7", "control: A<> a[n] == 7", "A<> a[n] == 7"])
+def test_an_error_in_the_query_is_shown_with_the_way_to_it(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, query: str
+) -> None:
+    path = tmp_path / "failing.xta"
+    path.write_text(FAILING.replace("1 / (n - 2)", "1"))
+    out, _ = check_run(capsys, 4, path, "--query", query)
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    column = query.index("n]") + 1
+    assert f"array index out of bounds, at query:1:{column}: n" in lines
+    assert lines[lines.index("in the state") + 1].startswith("P.A n=3 ")
+    assert "in the step" not in lines
+
+
+def test_the_trace_to_an_error_is_written(
+    capsys: pytest.CaptureFixture[str], failing: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "trace.json"
+    query = "control: A<> P.C"
+    out, _ = check_run(capsys, 4, failing, "--query", query, "--json", "--trace", target)
+    assert set(json.loads(out)) == RECORD
+    trace = json.loads(target.read_text())
+    assert [state["variables"]["n"] for state in trace["states"]] == [0, 1, 2]
+    assert len(trace["transitions"]) == 2
+    assert [edge["update"] for edge in trace["failing"]] == ["a[n] = 1 / (n - 2)"]
+    out, _ = check_run(capsys, 4, failing, "--query", query, "--trace", "-")
+    assert "Fails in the transitions:\n  P.A->P.B { n == 2, tau, a[n] = 1 / (n - 2) }" in out
+    assert "the way there" not in out
+
+
+def test_an_error_beyond_the_end_of_play_is_none(
+    capsys: pytest.CaptureFixture[str], failing: Path
+) -> None:
+    check_run(capsys, 0, failing, "--query", "control: A<> n == 1")
