@@ -378,7 +378,10 @@ impl LoadedModel {
             }
             #[cfg(feature = "jit")]
             (code, CodeEngine::Jit) => Jit::new(&network.functions, &network.constants)
-                .map(|jit| *code = Some((wanted, PreparedCode::Jit(Box::new(jit)))))
+                .map(|jit| {
+                    jit.prepare(network.functions_of_edges());
+                    *code = Some((wanted, PreparedCode::Jit(Box::new(jit))));
+                })
                 .map_err(|error| error.to_string()),
             #[cfg(not(feature = "jit"))]
             (_, CodeEngine::Jit) => Err("this build of the engine has no compiler".to_owned()),

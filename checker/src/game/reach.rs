@@ -27,17 +27,16 @@
 //! valuations of one stamp into those of smaller ones makes progress. Where the seeker wins nowhere any more, the evader has only
 //! to stay outside of what is won.
 //!
-//! Forward, the solver dives: it follows the first moves of newly made nodes as far as they go, then takes up the oldest node that
-//! waits and dives from there. Ways with few departures from the first moves so come first (W. D. Harvey, M. L. Ginsberg, "Limited
-//! Discrepancy Search", IJCAI 1995), which finds a first win early where wins are spread.
+//! Forward, the solver dives: it follows a random move of each newly made node as far as this goes, then takes up one of
+//! the nodes that wait, at random, and dives from there. Dives from everywhere meet wins that lie close together sooner than dives
+//! in the order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial Search Through Randomization",
+//! AAAI 1998). The random numbers are the same in every run.
 //!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are.
 //!
 //! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis of Timed
 //! Games", CONCUR 2005; the forced moves are those of G. Behrmann et al., "UPPAAL-TIGA: Time for Playing Games!", CAV 2007,
 //! and the tool's manual, section 3.1.
-
-use std::collections::VecDeque;
 
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
@@ -108,13 +107,28 @@ pub struct Solver<'g, 's, 'a> {
     pub gains: Vec<Vec<Gain>>,
     pub(super) forced: Forced,
     stamp: u32,
-    /// Nodes to be expanded, the oldest first.
-    waiting: VecDeque<u32>,
+    /// Nodes to be expanded; those to dive into stand last.
+    waiting: Vec<u32>,
     is_waiting: Vec<bool>,
+    random: Random,
     /// Whether the last expansion made no node to go on with.
     is_dive_over: bool,
     updates: Vec<u32>,
     is_updated: Vec<bool>,
+}
+
+/// Random numbers: G. L. Steele, D. Lea, C. H. Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014.
+#[derive(Clone, Copy, Debug)]
+struct Random(u64);
+
+impl Random {
+    /// A number below `limit`, which is not 0.
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ (mixed >> 31)) % limit as u64) as usize
+    }
 }
 
 impl<'g, 's, 'a> Solver<'g, 's, 'a> {
@@ -130,7 +144,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             gains: Vec::new(),
             forced,
             stamp: 0,
-            waiting: VecDeque::new(),
+            waiting: Vec::new(),
+            random: Random(0),
             is_dive_over: false,
             is_waiting: Vec::new(),
             updates: Vec::new(),
@@ -253,10 +268,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     }
 
     fn next_waiting(&mut self) -> Option<u32> {
-        if self.is_dive_over {
-            self.waiting.pop_front()
+        if self.is_dive_over && !self.waiting.is_empty() {
+            let index = self.random.below(self.waiting.len());
+            Some(self.waiting.swap_remove(index))
         } else {
-            self.waiting.pop_back()
+            self.waiting.pop()
         }
     }
 
@@ -296,7 +312,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         self.graph.expand(node)?;
         self.adopt_new_nodes();
         let waiting = self.waiting.len();
-        for edge in self.graph.edges_of(node).rev() {
+        let edges = self.graph.edges_of(node);
+        let first = edges.start + self.random.below(edges.len().max(1));
+        for edge in (first..edges.end).chain(edges.start..first) {
             let target = self.graph.edges[edge].target;
             self.wait_for(target);
         }
@@ -393,7 +411,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         };
         if !known.is_expanded && !is_left && !self.is_waiting[node as usize] {
             self.is_waiting[node as usize] = true;
-            self.waiting.push_back(node);
+            self.waiting.push(node);
         }
     }
 

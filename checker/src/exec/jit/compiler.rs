@@ -44,6 +44,8 @@ pub(super) struct Compiler {
     optimised_needs: AllNeeds,
     /// The declarations of the optimised functions; whatever is declared is compiled.
     declared: Vec<Option<FuncId>>,
+    /// How many instructions were compiled so far.
+    compiled: usize,
 }
 
 impl Compiler {
@@ -59,7 +61,8 @@ impl Compiler {
             "false"
         };
         for (name, value) in [
-            ("opt_level", "speed"),
+            // Code comes optimised; to do it again takes as long as all the rest and gains nothing.
+            ("opt_level", "none"),
             ("enable_verifier", verify),
             ("is_pic", "false"),
             ("use_colocated_libcalls", "false"),
@@ -81,12 +84,24 @@ impl Compiler {
             needs: AllNeeds::default(),
             optimised_needs: AllNeeds::default(),
             declared: Vec::new(),
+            compiled: 0,
         })
     }
 
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
     pub(super) fn extend(&mut self, functions: &[Function], constants: &[i32]) {
         self.optimiser.extend(functions, constants);
+    }
+
+    /// How many instructions were compiled so far, counted after optimisation.
+    pub(super) fn compiled(&self) -> usize {
+        self.compiled
+    }
+
+    /// Whether a call of the function is likely to run so much that it should be compiled before the first one.
+    pub(super) fn is_heavy(&mut self, function: FunctionId) -> bool {
+        let given = self.optimiser.given();
+        self.needs.of(given, function.0 as usize).are_heavy()
     }
 
     /// Compiles a function that can be called from outside and all that it calls; `None` if it is none or too large.
@@ -149,6 +164,10 @@ impl Compiler {
     fn define(&mut self, index: usize) -> Result<(), JitError> {
         let id = self.declare(index)?;
         let function = &self.optimiser.made()[index];
+        let blocks = function.blocks.iter();
+        self.compiled += blocks
+            .map(|block| block.instructions.len() + 1)
+            .sum::<usize>();
         self.context.func.signature = native_signature(function, self.convention);
         self.context.func.name = ir::UserFuncName::user(0, id.as_u32());
         let builder = FunctionBuilder::new(&mut self.context.func, &mut self.builder_context);

@@ -1,6 +1,6 @@
 //! Native code by Cranelift: the fast engine.
 //!
-//! A function is interpreted until it has run for a while, and then optimised and compiled with all that it calls. A model with thousands
+//! Functions that loop much are compiled beforehand ([`Jit::prepare`]). Any other function is interpreted until it has run for a while, and then optimised and compiled with all that it calls. A model with thousands
 //! of small guards pays for the few that matter, and a model that is solved at once for none. As interpreted and compiled
 //! code agree in everything, it makes no difference to results when this happens.
 //!
@@ -31,6 +31,8 @@ use runtime::{NativeContext, result_of_status};
 
 /// After so many interpreted instructions a function is compiled. They take about as long as compiling a small one.
 const HOT_INSTRUCTIONS: u64 = 20_000;
+/// Preparing stops after so many instructions, which take some milliseconds to compile.
+const MOST_PREPARED: usize = 6_000;
 /// The heat of a function that is not to be compiled.
 const NEVER: u64 = u64::MAX;
 
@@ -132,6 +134,26 @@ impl Jit {
             entry.heat.store(NEVER, Ordering::Relaxed);
         }
         compiled.map(|_| ())
+    }
+
+    /// Compiles those of the functions of which a single call runs so much that interpreting it would cost more, as long as this takes
+    /// no more than some milliseconds in all.
+    pub fn prepare(&self, functions: impl IntoIterator<Item = FunctionId>) {
+        for function in functions {
+            let mut compiler = self
+                .compiler
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            if compiler.compiled() > MOST_PREPARED {
+                return;
+            }
+            let is_heavy = compiler.is_heavy(function);
+            drop(compiler);
+            if is_heavy {
+                // A function that cannot be compiled is interpreted.
+                let _ = self.compile_function(function);
+            }
+        }
     }
 
     /// Interprets a call, and compiles the function if it has become hot.

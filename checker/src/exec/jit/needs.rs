@@ -1,6 +1,6 @@
 //! What functions need while they run natively, so that what needs too much is interpreted instead.
 
-use crate::ir::{Function, Instruction};
+use crate::ir::{Function, Instruction, Terminator};
 
 /// Compiling larger functions would take longer than most runs.
 const MAX_INSTRUCTIONS: usize = 20_000;
@@ -8,6 +8,10 @@ const MAX_INSTRUCTIONS: usize = 20_000;
 const MAX_STACK_BYTES: usize = 1 << 20;
 /// Functions that call each other deeper are interpreted, which needs no native stack.
 const MAX_DEPTH: usize = 100;
+/// A loop is taken to have so many rounds.
+const ROUNDS: u64 = 4;
+/// A call that runs more instructions than this is worth compiling before the first one.
+const HEAVY_WORK: u64 = 1000;
 /// A quarter of a gigabyte.
 const MAX_FRAME_WORDS: usize = 1 << 26;
 
@@ -19,6 +23,8 @@ pub(super) struct Needs {
     depth: usize,
     /// The largest number of instructions of one function.
     instructions: usize,
+    /// A guess at how many instructions a call runs.
+    work: u64,
 }
 
 impl Needs {
@@ -30,17 +36,23 @@ impl Needs {
             && self.frame_words <= MAX_FRAME_WORDS
     }
 
-    /// The greater needs of two functions of which one runs at a time.
-    fn or(self, other: Needs) -> Needs {
+    /// Whether compiling the function beforehand is likely to pay.
+    pub(super) fn are_heavy(self) -> bool {
+        self.work > HEAVY_WORK
+    }
+
+    /// The needs of two functions of which one runs after the other.
+    fn then(self, other: Needs) -> Needs {
         Needs {
             frame_words: self.frame_words.max(other.frame_words),
             stack_bytes: self.stack_bytes.max(other.stack_bytes),
             depth: self.depth.max(other.depth),
             instructions: self.instructions.max(other.instructions),
+            work: self.work.saturating_add(other.work),
         }
     }
 
-    /// The needs of a function, given the greatest of what it calls.
+    /// The needs of a function, given those of all its calls together.
     fn below(self, function: &Function) -> Needs {
         let instructions = function
             .blocks
@@ -56,6 +68,8 @@ impl Needs {
             stack_bytes: self.stack_bytes.saturating_add(stack_bytes),
             depth: self.depth + 1,
             instructions: self.instructions.max(instructions),
+            work: (self.work.saturating_add(instructions as u64))
+                .saturating_mul(if has_loop(function) { ROUNDS } else { 1 }),
         }
     }
 }
@@ -77,20 +91,30 @@ impl AllNeeds {
                 continue;
             }
             let before = pending.len();
-            let mut most = Needs::default();
+            let mut calls = Needs::default();
             for callee in callees(&functions[index]) {
                 match self.known[callee] {
                     None => pending.push(callee),
-                    Some(needs) => most = most.or(needs),
+                    Some(needs) => calls = calls.then(needs),
                 }
             }
             if pending.len() == before {
-                self.known[index] = Some(most.below(&functions[index]));
+                self.known[index] = Some(calls.below(&functions[index]));
                 pending.pop();
             }
         }
         self.known[root].expect("the root was among the pending")
     }
+}
+
+/// Whether some block goes on to one that stands before it: the front end writes no such jump but for loops.
+fn has_loop(function: &Function) -> bool {
+    let mut blocks = function.blocks.iter().enumerate();
+    blocks.any(|(index, block)| match block.terminator {
+        Terminator::Jump(target) => target.0 as usize <= index,
+        Terminator::Branch(_, one, other) => one.0.min(other.0) as usize <= index,
+        Terminator::Return(_) | Terminator::Fail(..) => false,
+    })
 }
 
 /// The functions that a function calls, once for every call.
