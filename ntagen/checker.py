@@ -31,6 +31,7 @@ SearchOrder = Literal["bfs", "dfs", "random"]
 ForcedRule = Literal["tiga", "product", "neutral"]
 CodeEngine = Literal["jit", "interpreter"]
 PlansWanted = Literal["none", "first", "all"]
+TraceWanted = Literal["any", "shortest", "fastest"]
 
 Extreme = int | Literal["inf"] | None
 """A least or greatest value: ``"inf"`` if there is no greatest, ``None`` if no state counts."""
@@ -103,6 +104,20 @@ class _EdgeEntry:
         return EngineEdge(self.process, self.source, self.targets[branch], self.sync, select)
 
 
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What an independent check came to.
+
+    Attributes:
+        holds: Whether the evidence shows what it is said to; ``None`` if the check does not cover
+            the model or the query.
+        lines: What was looked at, or what is wrong.
+    """
+
+    holds: bool | None
+    lines: tuple[str, ...]
+
+
 class Answer:
     """The answer to a query.
 
@@ -172,6 +187,10 @@ class Answer:
     def trace_json(self) -> str | None:
         """The same as JSON text."""
         return self._raw.trace_json()
+
+    def certificate_text(self) -> str | None:
+        """The certificate as text of its file; ``None`` if none was asked for or there is none."""
+        return self._raw.certificate_text()
 
     def strategy_json(self) -> str | None:
         """The strategy as JSON text; ``None`` if none was asked for or found."""
@@ -302,6 +321,8 @@ class Model:
         strategy: bool = False,
         verify: bool = False,
         trace: bool = True,
+        wanted_trace: TraceWanted = "any",
+        certificate: bool = False,
         folder: Path | None = None,
         progress: Progress | None = None,
     ) -> Answer:
@@ -325,6 +346,11 @@ class Model:
             verify: Whether the strategy is to be checked against every move of the opponent.
             trace: Whether witnesses and counterexamples get exact times, which an independent
                 replay checks. For ``sup``, ``inf`` and ``bounds`` this takes a second search.
+            wanted_trace: For ``E<>`` and ``A[]``: whether the trace is to have the fewest
+                transitions (``shortest``) or to take the least time (``fastest``); either takes
+                a second search.
+            certificate: Whether the reached set is wanted if ``E<>`` is not satisfied or ``A[]``
+                is; it takes a second search.
             folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
                 folder of the model.
             progress: Is called some twenty times a second with the numbers of explored,
@@ -352,12 +378,30 @@ class Model:
                 strategy=strategy,
                 verify=verify,
                 trace=trace,
+                wanted_trace=wanted_trace,
+                certificate=certificate,
                 folder=None if folder is None else str(folder),
                 progress=progress,
             )
         except _checker.RejectedError as error:
             raise RejectedError(error.args[0]) from None
         return Answer(raw, query, self._edge_table())
+
+    def verify(self, text: str, path: str = "") -> Verification:
+        """Checks a trace or a certificate, independently of the search that found it.
+
+        Args:
+            text: The file, as `Answer.trace_json` and `Answer.certificate_text` give it.
+            path: What to call it in messages.
+
+        Raises:
+            RejectedError: It is neither, or does not belong to this model.
+        """
+        try:
+            holds, lines = self._raw.verify(path or "evidence", text)
+        except _checker.RejectedError as error:
+            raise RejectedError(error.args[0]) from None
+        return Verification(holds, tuple(lines))
 
     def simulate(self, engine: CodeEngine = "jit") -> Simulation:
         """Starts a walk through the model from its initial state.

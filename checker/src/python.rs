@@ -17,8 +17,8 @@ use crate::engine::limits::Observer;
 use crate::engine::simulation::Point;
 use crate::engine::verification;
 use crate::engine::{
-    self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, Verdict, describe,
-    explain, facts, json, strategy_file,
+    self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, TraceWanted, Verdict,
+    describe, explain, facts, json, strategy_file,
 };
 use crate::game::Forced;
 use crate::network::Failure;
@@ -183,10 +183,25 @@ impl Model {
         Ok(json_list(facts::queries(&queries)))
     }
 
+    /// Checks a file with a certificate or a trace: whether it holds (`None` if the check does not cover it), and what was looked at.
+    fn verify(
+        slf: &Bound<'_, Self>,
+        path: &str,
+        text: &str,
+    ) -> PyResult<(Option<bool>, Vec<String>)> {
+        let model = slf.get();
+        let checked = slf
+            .py()
+            .detach(|| model.with(|model| model.verify_evidence(path, text)));
+        let checked = checked.map_err(rejected)?;
+        Ok((checked.holds, checked.lines))
+    }
+
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, folder, progress))]
+    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, folder, progress))]
     #[expect(
         clippy::too_many_arguments,
+        clippy::fn_params_excessive_bools,
         reason = "one for each option of the command line"
     )]
     fn check(
@@ -203,6 +218,8 @@ impl Model {
         strategy: bool,
         verify: bool,
         trace: bool,
+        wanted_trace: &str,
+        certificate: bool,
         folder: Option<PathBuf>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
@@ -241,6 +258,13 @@ impl Model {
             strategy,
             verify,
             runs: trace,
+            trace: match wanted_trace {
+                "any" => TraceWanted::Any,
+                "shortest" => TraceWanted::Shortest,
+                "fastest" => TraceWanted::Fastest,
+                other => return Err(unknown("trace", other)),
+            },
+            certificate,
             folder,
         };
         let model = slf.get();
@@ -513,6 +537,16 @@ impl Answer {
             self.model
                 .get()
                 .with(|model| json::witnesses(model.network(), witnesses, &self.query).to_string()),
+        )
+    }
+
+    /// The certificate as a file; `None` without one.
+    fn certificate_text(&self) -> Option<String> {
+        let certificate = self.inner.evidence.certificate.as_ref()?;
+        Some(
+            self.model
+                .get()
+                .with(|model| certificate.text(model.network(), &self.query)),
         )
     }
 

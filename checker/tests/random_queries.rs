@@ -11,8 +11,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use checker::engine::evidence::Proof;
-use checker::engine::{CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::engine::{CodeEngine, Limits, LoadedModel, Options, TraceWanted, Verdict};
 use checker::search::extremum::Extreme;
+use checker::verify::replay::End;
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 1500;
@@ -334,6 +335,29 @@ impl Network {
         found
     }
 
+    /// The fewest moves on a way to a state that is wanted.
+    fn fewest_moves(&self, is_wanted: &dyn Fn(&State) -> bool) -> Option<usize> {
+        let start = ([0, 0], [(0, 0); 2]);
+        let mut found = BTreeSet::from([start]);
+        let mut layer = vec![start];
+        for moves in 0.. {
+            let mut next = Vec::new();
+            while let Some(state) = layer.pop() {
+                if is_wanted(&state) {
+                    return Some(moves);
+                }
+                next.extend(self.successors(&state));
+                layer.extend(self.later(&state).filter(|later| found.insert(*later)));
+            }
+            next.retain(|state| found.insert(*state));
+            if next.is_empty() {
+                return None;
+            }
+            layer = next;
+        }
+        None
+    }
+
     /// Whether no move is possible now or after any wait.
     fn is_dead(&self, state: &State) -> bool {
         let mut state = *state;
@@ -472,6 +496,10 @@ impl Condition {
 }
 
 fn answer(text: &str, query: &str) -> checker::engine::Answer {
+    answer_with(text, query, TraceWanted::Any)
+}
+
+fn answer_with(text: &str, query: &str, trace: TraceWanted) -> checker::engine::Answer {
     let mut model = LoadedModel::load("random.xta", text.as_bytes())
         .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
     let query_text = model.add_query(query);
@@ -482,6 +510,8 @@ fn answer(text: &str, query: &str) -> checker::engine::Answer {
             ..Limits::default()
         },
         runs: true,
+        certificate: true,
+        trace,
         ..Options::default()
     };
     let answer = model
@@ -493,6 +523,22 @@ fn answer(text: &str, query: &str) -> checker::engine::Answer {
             "{query}: {:#?}\n{:?}\n{text}",
             witness.run,
             witness.ending
+        );
+    }
+    if let Some(certificate) = &answer.evidence.certificate {
+        let certificate = certificate.text(model.network(), query);
+        let checked = model.verify_evidence("certificate", &certificate);
+        let checked = checked.expect("the file is one of this model");
+        let is_covered = !query.contains("deadlock") || !text.contains("urgent ");
+        let expected = if is_covered {
+            Some(true)
+        } else {
+            checked.holds.and(Some(true))
+        };
+        assert_eq!(
+            checked.holds, expected,
+            "{query}: {:?}\n{text}",
+            checked.lines
         );
     }
     answer
@@ -512,6 +558,51 @@ fn check_verdict(text: &str, query: &str, expected: bool) {
 }
 
 /// A greatest value up to [`TOP`] is exact in the region graph, one above is only known to be there.
+/// A shortest trace has as many moves as the way through the region graph with the fewest; a fastest one takes the least time, as a
+/// clock that nothing sets says.
+fn check_best_traces(network: &Network, text: &str, condition: &Condition) {
+    let query = format!("E<> {}", condition.text());
+    let run_of = |trace| {
+        let answer = answer_with(text, &query, trace);
+        let mut witnesses = answer.evidence.witnesses.into_iter();
+        match witnesses.next().and_then(|witness| witness.run) {
+            Some(Proof::Replayed(run, ..)) => Some(run),
+            None => None,
+            other => panic!("{query}: {other:#?}\n{text}"),
+        }
+    };
+    let shortest = run_of(TraceWanted::Shortest).map(|run| run.steps.len());
+    let fewest = network.fewest_moves(&|state| condition.holds(state));
+    assert!(
+        shortest == fewest,
+        "{query}: {shortest:?} moves, expected {fewest:?}\n{text}"
+    );
+    let Some(run) = run_of(TraceWanted::Fastest) else {
+        return;
+    };
+    let last = match run.end {
+        End::After(wait) => wait,
+        other => panic!("{query}: {other:?}\n{text}"),
+    };
+    let ticks = run.steps.iter().map(|step| step.wait).sum::<i64>() + last;
+    let timed = text.replacen("clock x, y;", "clock x, y, total;", 1);
+    let least = answer(&timed, &format!("inf{{{}}}: total", condition.text()));
+    let least = least.value.and_then(|values| values.items[0].least);
+    let Some(Extreme::Value { value, is_reached }) = least else {
+        panic!("{query}: {least:?}\n{text}");
+    };
+    let least = i64::from(value) * run.ticks_per_unit;
+    let is_right = if is_reached {
+        ticks == least
+    } else {
+        least < ticks && ticks < least + run.ticks_per_unit
+    };
+    assert!(
+        is_right,
+        "{query}: {run:?} takes longer than {value}\n{text}"
+    );
+}
+
 fn check_extremes(text: &str, condition: &Condition, states: &BTreeSet<State>) {
     let counting: Vec<&State> = states
         .iter()
@@ -579,6 +670,7 @@ fn check_network(random: &mut Random) {
     let answered = !avoiding.iter().any(|state| p.holds(state));
     check_verdict(&text, &format!("{} --> {}", p.text(), q.text()), answered);
     check_extremes(&text, &p, &states);
+    check_best_traces(&network, &text, &p);
     if network.has_deadlock_queries() {
         let is_dead = states
             .iter()

@@ -4,7 +4,8 @@ A command is ``ntagen/cli/NAME.py`` with a click command called ``command``. Its
 when it is run, not before, so that ``ntagen --help`` does not wait for libraries. What a command
 returns is the exit code (nothing means 0); what it raises is turned into one message here.
 
-Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied, 2 the input or the
+Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied (`verify`: the
+evidence does not hold), 2 the input or the
 command line is wrong, 3 stopped by a limit, 4 run-time error in the model, 5 device fault,
 70 internal error, 130 interrupted.
 """
@@ -29,6 +30,7 @@ __all__ = ["main"]
 COMMANDS: Final = {
     "compile": "Turn an environment into a UPPAAL model and its queries.",
     "check": "Answer the queries of a model or an environment.",
+    "verify": "Check a trace or a certificate, independently of the search that found it.",
     "info": "Show what is in a model or an environment.",
     "explain": "Explain a diagnostic: what it means and how to mend it.",
     "plot": "Draw a scene, its plans or a run.",

@@ -83,6 +83,7 @@ class _Outputs:
     """Where evidence goes; ``None`` is nowhere."""
 
     trace: str | None
+    certificate: Path | None
     strategy: Path | None
     plans: Path | None
     ranking: str
@@ -111,6 +112,25 @@ class _Outputs:
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line, nothing else.")
 @click.option("--trace", metavar="FILE|-", help="Write witnesses and counterexamples; - is stdout.")
+@click.option(
+    "--shortest",
+    "wanted_trace",
+    flag_value="shortest",
+    help="Of E<> and A[]: the trace with the fewest transitions.",
+)
+@click.option(
+    "--fastest",
+    "wanted_trace",
+    flag_value="fastest",
+    help="Of E<> and A[]: the trace that takes the least time.",
+)
+@click.option(
+    "--certificate",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write the reached set of the (last) E<> that is not satisfied or A[] that is, for "
+    "`ntagen verify`.",
+)
 @click.option(
     "--strategy",
     metavar="FILE.json",
@@ -161,12 +181,14 @@ def command(
     query_file: Path | None,
     as_json: bool,
     trace: str | None,
+    wanted_trace: Any,  # noqa: ANN401  click gives a str where the engine wants literals
+    certificate: Path | None,
     strategy: Path | None,
     verify: bool,
     plans: Path | None,
     ranking: str,
     max_plans: int,
-    search: Any,  # noqa: ANN401  click gives a str where the engine wants literals
+    search: Any,  # noqa: ANN401
     seed: int,
     forced: Any,  # noqa: ANN401
     engine: Any,  # noqa: ANN401
@@ -185,6 +207,8 @@ def command(
       ntagen check model.xml --queries model.q --json --timeout 60s
       ntagen check game.xml --query "control: A<> Main.Won" --verify
       ntagen check model.xml --query "bounds{Gate.Open}: x"
+      ntagen check model.xml --query "E<> Gate.Open" --fastest --trace open.json
+      ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
 
     \b
     A trace has two parts: symbolic states as UPPAAL prints them, and a run with exact times, which
@@ -195,7 +219,7 @@ def command(
     pair of both; of several items the list of their values. It is null if no state counts. The
     message says where a clock comes near the value without reaching it.
     """  # noqa: D301  click wants the control character
-    outputs = _Outputs(trace, strategy, plans, ranking)
+    outputs = _Outputs(trace, certificate, strategy, plans, ranking)
     worst = 0
     with pointing_to_explanations(not as_json):
         loaded = load_model(model_path)
@@ -219,7 +243,9 @@ def command(
                     max_plans=max_plans,
                     strategy=strategy is not None,
                     verify=verify,
-                    trace=verify or trace is not None,
+                    trace=verify or trace is not None or wanted_trace is not None,
+                    wanted_trace=wanted_trace or "any",
+                    certificate=certificate is not None,
                     folder=query.folder,
                     progress=shown,
                 )
@@ -391,6 +417,11 @@ def _write_evidence(
     notes: list[str] = []
     if outputs.trace:
         notes += _write_trace(answer, query, outputs.trace)
+    certificate = answer.certificate_text() if outputs.certificate else None
+    if outputs.certificate and certificate is not None:
+        write_files({outputs.certificate: certificate})
+        states = certificate.count("\n") - 1
+        notes.append(f"certificate of {states} states written to {outputs.certificate}")
     strategy = answer.strategy_json() if outputs.strategy else None
     if outputs.strategy and strategy is not None:
         write_files({outputs.strategy: strategy + "\n"})

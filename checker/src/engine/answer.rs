@@ -7,7 +7,9 @@ use crate::exec::Executor;
 use crate::game::closed_loop::ClosedLoop;
 use crate::game::plans::Plan;
 use crate::game::strategy::Strategy;
-use crate::ir::{ClockAtom, Measure, Network, Predicate, Query, QueryKind};
+use crate::ir::{
+    Clock, ClockAtom, ClockId, ClockRange, Measure, Network, Predicate, Query, QueryKind,
+};
 use crate::network::bounds::is_difference;
 use crate::network::{
     Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, predicate,
@@ -16,16 +18,19 @@ use crate::search::extremum::{self, Extreme, Extremes, Question};
 use crate::search::leads_to::{self, Unanswered};
 use crate::search::limits::{Counters, StopReason};
 use crate::search::liveness::{self, Ending, Liveness};
+use crate::search::plain;
 use crate::search::reach::{self, Outcome, Trace};
 use crate::search::schedule::Stays;
 use crate::search::taking::Taking;
 use crate::verify::replay::Shown;
 use crate::verify::strategy::Outcome as StrategyCheck;
+use crate::zones::Bound;
 
-use super::evidence::{self, Proof, Shows, Witness};
+use super::certificate::{self, Certificate};
+use super::evidence::{self, Kind, Proof, Shows, Witness};
 use super::limits::LimitWatch;
 use super::verification::Verification;
-use super::{Options, games};
+use super::{Options, TraceWanted, games};
 
 /// What a query came out as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +52,8 @@ pub enum Verdict {
 pub struct Evidence {
     /// Witnesses, counterexamples, or the way to a failure: one, or one a value.
     pub witnesses: Vec<Witness>,
+    /// The states that a search for such a state has reached, if there is none and they were wanted.
+    pub certificate: Option<Certificate>,
     /// The strategy of the player who wins, if it was wanted.
     pub strategy: Option<Arc<Strategy>>,
     /// How the check of the strategy ended, if it was wanted.
@@ -314,11 +321,16 @@ impl<'w, 'a> Witnesses<'w, 'a> {
 
     /// Adds a trace, with its run if runs are wanted.
     fn add(&mut self, trace: Trace, ending: Option<Ending>, shows: Shows<'_>) {
-        let mut witness = Witness::new(trace, ending);
+        let kind = match shows {
+            Shows::Possible => Kind::Failure,
+            Shows::Reaches(..) | Shows::Stays(_) => Kind::Predicate,
+            Shows::Takes(item, _, _, shown, _) => Kind::Value(item, shown),
+        };
+        let mut witness = Witness::new(trace, ending, kind);
         // An initial state that cannot be entered is no run.
         // What is stuck under a strategy may go on in the model, which is what the replay knows.
         let is_dead = match shows {
-            Shows::Reaches(predicate) | Shows::Takes(predicate, ..) => {
+            Shows::Reaches(predicate, _) | Shows::Takes(_, predicate, ..) => {
                 predicate::has_deadlock(predicate)
             }
             Shows::Stays(_) => ending == Some(Ending::Stuck),
@@ -406,7 +418,9 @@ fn extremum(
         }
         Ok(extremum::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, trace)) => {
-            evidence.witnesses.push(Witness::new(trace, None));
+            evidence
+                .witnesses
+                .push(Witness::new(trace, None, Kind::Failure));
             Verdict::Error(failure)
         }
     };
@@ -433,7 +447,7 @@ fn value_witnesses<'a>(
     watch: &mut LimitWatch,
 ) -> Vec<Witness> {
     let mut found = Vec::new();
-    for ((measure, text), item) in question.items.iter().zip(&values.items) {
+    for (index, ((measure, text), item)) in question.items.iter().zip(&values.items).enumerate() {
         for (extreme, is_greatest) in [(item.least, false), (item.greatest, true)] {
             let Some(Extreme::Value { value, is_reached }) = extreme else {
                 continue;
@@ -460,7 +474,7 @@ fn value_witnesses<'a>(
                 is_greatest,
                 is_reached,
             };
-            let shows = Shows::Takes(question.predicate, measure, shown, &constraints);
+            let shows = Shows::Takes(index, question.predicate, measure, shown, &constraints);
             let mut witnesses = Witnesses::new(&mut symbolic, options);
             witnesses.add(trace, None, shows);
             let which = if is_greatest { "greatest" } else { "least" };
@@ -504,18 +518,123 @@ fn reachable(
     let mut symbolic = symbolic(subject, &[goal], &[], Abstraction::LowerUpper);
     let mut look = goal;
     let report = reach::search(&mut symbolic, &mut look, options.order, watch);
+    let counters = report.counters;
     let mut witnesses = Witnesses::new(&mut symbolic, options);
+    let mut certificate = None;
+    let mut message = None;
     let verdict = match report.outcome {
         Ok(Outcome::Found(trace)) => {
-            witnesses.add(trace, None, Shows::Reaches(goal));
+            let symbolic = &mut *witnesses.symbolic;
+            let (trace, deadline) = match best(subject, symbolic, goal, options, watch) {
+                Ok(None) => (trace, None),
+                Ok(Some((best, deadline))) => (best, deadline),
+                Err(reason) => {
+                    message = Some(format!("the trace is not the one wanted: {reason}"));
+                    (trace, None)
+                }
+            };
+            witnesses.add(trace, None, Shows::Reaches(goal, deadline));
             found(witnesses.symbolic.is_approximate())
         }
-        Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
+        Ok(Outcome::Exhausted) => {
+            if options.certificate && subject.under.is_some() {
+                message = Some("no certificate: it would be about the model alone".to_owned());
+            } else if options.certificate {
+                match certificate::reached(witnesses.symbolic, goal, counters, watch) {
+                    Ok(reached) => certificate = Some(reached),
+                    Err(reason) => message = Some(format!("no certificate: {reason}")),
+                }
+            }
+            Verdict::NotSatisfied
+        }
         Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, trace)) => {
             witnesses.add(trace, None, Shows::Possible);
             Verdict::Error(failure)
         }
     };
-    new_answer(verdict, witnesses.into_evidence(), report.counters)
+    let evidence = Evidence {
+        certificate,
+        ..witnesses.into_evidence()
+    };
+    let mut answer = new_answer(verdict, evidence, counters);
+    answer.message = message;
+    answer
 }
+
+/// The trace with the fewest moves or the least time, and its time; `None` if any trace will do.
+fn best(
+    subject: Subject<'_>,
+    symbolic: &mut Symbolic<'_>,
+    goal: &Predicate,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Result<Option<(Trace, Option<plain::Cost>)>, String> {
+    let none = Counters::default();
+    let way = match options.trace {
+        TraceWanted::Any => return Ok(None),
+        TraceWanted::Shortest => {
+            plain::Search::new(symbolic, goal, plain::Measure::Moves, none).run(watch)
+        }
+        TraceWanted::Fastest if subject.under.is_some() => {
+            return Err("there is none for fastest traces under a strategy".to_owned());
+        }
+        TraceWanted::Fastest => {
+            let (timed, clock) = with_time(subject.network);
+            let subject = Subject {
+                network: &timed,
+                ..subject
+            };
+            let mut zones = self::symbolic(
+                subject,
+                &[goal],
+                &[time_atom(clock)],
+                Abstraction::LowerUpper,
+            );
+            plain::Search::new(&mut zones, goal, plain::Measure::Time(clock), none).run(watch)
+        }
+    };
+    match way {
+        Ok(plain::Outcome::Found(way)) => {
+            let deadline = (options.trace == TraceWanted::Fastest).then_some(way.cost);
+            Ok(Some((way.trace(symbolic, goal), deadline)))
+        }
+        Ok(plain::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
+        Ok(plain::Outcome::Stopped(reason)) => Err(certificate::stop_text(reason).to_owned()),
+        // The search for any trace did not come to the state that fails.
+        Err(_) => Err("the model fails in a state beside it".to_owned()),
+    }
+}
+
+/// The network with a clock that nothing sets or compares, and its index.
+fn with_time(network: &Network) -> (Network, usize) {
+    let mut timed = network.clone();
+    while timed.clocks.len() < network.clocks.len().max(1) + 1 {
+        timed.clocks.push(Clock {
+            name: "time".to_owned(),
+            owner: None,
+            hybrid: false,
+        });
+    }
+    timed.initial_clocks.resize(timed.clocks.len(), 0);
+    let clock = timed.clocks.len() - 1;
+    (timed, clock)
+}
+
+/// A comparison that keeps the lower bounds of the clock apart.
+fn time_atom(clock: usize) -> ClockAtom {
+    let range = |clock: usize| ClockRange {
+        first: ClockId(clock as u32),
+        count: 1,
+    };
+    ClockAtom {
+        left: range(clock),
+        right: range(0),
+        low: LONGEST_TIME,
+        high: LONGEST_TIME,
+        strict: false,
+    }
+}
+
+/// Up to here times of traces are compared.
+const LONGEST_TIME: i32 = Bound::MAX_VALUE / 4;

@@ -287,25 +287,28 @@ pub fn run_text(network: &Network, run: &Run, states: &[State]) -> String {
 
 /// A state with exact clock values in one line.
 pub fn state_line(network: &Network, state: &State, ticks_per_unit: i64) -> String {
+    let mut line = words_line(network, &state.words);
+    for (clock, &value) in network.clocks.iter().zip(&state.clocks).skip(1) {
+        let value = fraction(value, ticks_per_unit);
+        let _ = write!(line, " {}={value}", clock.name);
+    }
+    line
+}
+
+/// Locations and variables in one line.
+pub fn words_line(network: &Network, words: &[i32]) -> String {
     let mut parts = vec!["(".to_owned()];
     for (index, process) in network.processes.iter().enumerate() {
-        let location = location_name(network, index, &state.words);
+        let location = location_name(network, index, words);
         parts.push(format!("{}.{location}", process.name));
     }
     parts.push(")".to_owned());
-    for_each_value(network, &state.words, |name, value| {
+    for_each_value(network, words, |name, value| {
         parts.push(match value {
             Value::Integer(value) => format!("{name}={value}"),
             Value::Double(value) => format!("{name}={value:?}"),
         });
     });
-    for (clock, &value) in network.clocks.iter().zip(&state.clocks).skip(1) {
-        parts.push(format!(
-            "{}={}",
-            clock.name,
-            fraction(value, ticks_per_unit)
-        ));
-    }
     parts.join(" ")
 }
 

@@ -32,18 +32,32 @@ pub struct Witness {
     pub ending: Option<Ending>,
     /// The move that fails in the last state, if it leads to a failure that is in one.
     pub failing: Option<Vec<Part>>,
+    /// Whether it shows what the query asks about, a value, or only the way to a failure.
+    pub kind: Kind,
     /// The run with exact times, if it was wanted.
     pub run: Option<Proof>,
 }
 
+/// What a witness is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The way to a failure of the model.
+    Failure,
+    /// What the query asks about.
+    Predicate,
+    /// A value of the item with this index.
+    Value(usize, Shown),
+}
+
 impl Witness {
     /// A symbolic run without anything.
-    pub fn new(trace: Trace, ending: Option<Ending>) -> Witness {
+    pub fn new(trace: Trace, ending: Option<Ending>, kind: Kind) -> Witness {
         Witness {
             title: None,
             trace,
             ending,
             failing: None,
+            kind,
             run: None,
         }
     }
@@ -84,12 +98,12 @@ pub enum Missing {
 pub enum Shows<'q> {
     /// That the model allows it.
     Possible,
-    /// A state in which the predicate holds.
-    Reaches(&'q Predicate),
+    /// A state in which the predicate holds; at the latest at this time: see [`Wanted::deadline`].
+    Reaches(&'q Predicate, Option<(i32, u32)>),
     /// A run that stays inside a predicate.
     Stays(Stays<'q>),
-    /// A state in which the predicate holds and the measure has a value; the constraints say so of the clocks.
-    Takes(&'q Predicate, &'q Measure, Shown, &'q [Constraint]),
+    /// A state in which the predicate holds and the item with this index has a value; the constraints say so of the clocks.
+    Takes(usize, &'q Predicate, &'q Measure, Shown, &'q [Constraint]),
 }
 
 /// Finds times for a trace and replays it.
@@ -110,16 +124,16 @@ pub fn prove(
             } else {
                 Finish::Stuck
             };
-            timed(symbolic, &trace.moves, Some(stays), finish)
+            timed(symbolic, &trace.moves, Some(stays), finish, None)
         }
-        (Shows::Possible, _) => timed(symbolic, &trace.moves, None, Finish::Entry),
-        (Shows::Reaches(goal), _) => {
+        (Shows::Possible, _) => timed(symbolic, &trace.moves, None, Finish::Entry, None),
+        (Shows::Reaches(goal, deadline), _) => {
             let finish = Finish::Holds(goal, Vec::new());
-            timed(symbolic, &trace.moves, None, finish)
+            timed(symbolic, &trace.moves, None, finish, deadline)
         }
-        (Shows::Takes(predicate, _, _, constraints), _) => {
+        (Shows::Takes(_, predicate, _, _, constraints), _) => {
             let finish = Finish::Holds(predicate, constraints.to_vec());
-            timed(symbolic, &trace.moves, None, finish)
+            timed(symbolic, &trace.moves, None, finish, None)
         }
     };
     let run = match result {
@@ -130,11 +144,11 @@ pub fn prove(
     let always = Predicate::Constant(true);
     let claim = match shows {
         Shows::Possible => Claim::Possible,
-        Shows::Reaches(goal) => Claim::Reaches(goal),
+        Shows::Reaches(goal, _) => Claim::Reaches(goal),
         Shows::Stays(Stays { from, keep }) => {
             Claim::Stays(from.map_or(&always, |(_, open)| open), keep)
         }
-        Shows::Takes(predicate, measure, shown, _) => Claim::Takes(predicate, measure, shown),
+        Shows::Takes(_, predicate, measure, shown, _) => Claim::Takes(predicate, measure, shown),
     };
     match replay::replay(network, &run, &claim) {
         Ok(Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),
@@ -160,11 +174,13 @@ fn timed(
     moves: &[Vec<Part>],
     stays: Option<Stays<'_>>,
     finish: Finish<'_>,
+    deadline: Option<(i32, u32)>,
 ) -> Result<Run, Missing> {
     let wanted = Wanted {
         moves,
         stays,
         finish,
+        deadline,
     };
     let schedule = schedule::schedule(symbolic, &wanted)?;
     let Schedule {
@@ -214,7 +230,7 @@ fn looped(
         for _ in 0..rounds {
             moves.extend_from_slice(cycle);
         }
-        let mut run = timed(symbolic, &moves, Some(stays), Finish::Entry)?;
+        let mut run = timed(symbolic, &moves, Some(stays), Finish::Entry, None)?;
         let replayed = replay::replay(network, &run, &Claim::Possible);
         let states = match replayed.map_err(Missing::NotCovered)? {
             Outcome::Replayed(states, _) => states,

@@ -11,7 +11,7 @@ use crate::search::reach::{self, Order, Trace};
 use crate::zones::Zone;
 
 use super::answer::{self, Answer, Subject, Verdict};
-use super::evidence::{self, Shows, Witness};
+use super::evidence::{self, Kind, Shows, Witness};
 use super::limits::{LimitWatch, Limits};
 use super::simulation::{Point, successors_or_failure};
 use super::{LoadedModel, Options};
@@ -32,7 +32,7 @@ impl LoadedModel {
         let (failure, witness) = match answer.evidence.witnesses.pop() {
             Some(witness) => (failure, witness),
             None => match self.shortest_way(&predicates, &query.kind, options, answer) {
-                Some((found, trace)) => (found, Witness::new(trace, None)),
+                Some((found, trace)) => (found, Witness::new(trace, None, Kind::Failure)),
                 None => return,
             },
         };

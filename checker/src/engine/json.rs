@@ -12,7 +12,7 @@ use crate::verify::replay::{End, Run};
 
 use super::answer::Values;
 use super::describe::{self, Value};
-use super::evidence::{Proof, Witness};
+use super::evidence::{Kind, Proof, Witness};
 
 /// An edge.
 pub fn part(network: &Network, part: Part) -> Json {
@@ -92,7 +92,8 @@ pub fn values(values: &Values) -> Json {
 
 /// The witnesses of an answer: one object, or, for values, one with a list of `traces`.
 ///
-/// A trace has `format` "ntagen-trace" and `version` 1. `states` are symbolic, `transitions` the edges between them, `ending` says why
+/// A trace has `format` "ntagen-trace" and `version` 1. `kind` is "failure" where it leads to a failure of the model, and `value` says
+/// which value it shows. `states` are symbolic, `transitions` the edges between them, `ending` says why
 /// the run never ends: `loop` is the index of the state that its last state leads back to. `run` has exact times, in ticks of
 /// which `ticks_per_unit` make a unit of time: its `steps` each wait and take edges, `end` says what comes then, `from` from which
 /// moment on what must stay does, and `states` are those on entry, with the one after the last wait. On the way to an error, `failing` has
@@ -126,6 +127,18 @@ fn witness(network: &Network, witness: &Witness) -> Json {
     let mut json = json!({});
     if let Some(title) = &witness.title {
         json["title"] = json!(title);
+    }
+    match witness.kind {
+        Kind::Failure => json["kind"] = json!("failure"),
+        Kind::Predicate => {}
+        Kind::Value(item, shown) => {
+            json["value"] = json!({
+                "item": item,
+                "value": shown.value,
+                "greatest": shown.is_greatest,
+                "reached": shown.is_reached,
+            });
+        }
     }
     json["states"] = states.collect();
     json["transitions"] = moves.collect();

@@ -4,6 +4,7 @@
 //! is the one for the time limit and the measured seconds.
 
 pub mod answer;
+pub mod certificate;
 pub mod describe;
 pub mod evidence;
 pub mod explain;
@@ -80,8 +81,21 @@ pub enum PlansWanted {
     All(usize),
 }
 
+/// Which trace to a state is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum TraceWanted {
+    /// The one that the search finds.
+    #[default]
+    Any,
+    /// One with the fewest moves.
+    Shortest,
+    /// One that takes the least time.
+    Fastest,
+}
+
 /// How a query is to be answered.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an independent wish")]
 pub struct Options {
     /// In which order states are explored.
     pub order: Order,
@@ -101,6 +115,10 @@ pub struct Options {
     pub runs: bool,
     /// Where the files of `saveStrategy` and `loadStrategy` lie; `None` is the folder of the model.
     pub folder: Option<PathBuf>,
+    /// Which trace to a state is wanted.
+    pub trace: TraceWanted,
+    /// Whether a certificate is wanted for the verdict that no reachable state is such.
+    pub certificate: bool,
 }
 
 impl Default for Options {
@@ -115,6 +133,8 @@ impl Default for Options {
             verify: false,
             runs: false,
             folder: None,
+            trace: TraceWanted::default(),
+            certificate: false,
         }
     }
 }

@@ -106,19 +106,22 @@ impl From<verify::Part> for Part {
 
 fn zones(federation: &Federation) -> Vec<Vec<Constraint>> {
     let dimension = federation.dimension();
-    let zones = federation.zones().map(|zone: &[Bound]| {
-        let mut constraints = Vec::new();
-        minimal::for_each_minimal(zone, dimension, |one| {
-            constraints.push(Constraint {
-                left: one.left,
-                right: one.right,
-                bound: one.bound.value(),
-                strict: one.bound.is_strict(),
-            });
+    let zones = federation.zones();
+    zones.map(|zone| constraints(zone, dimension)).collect()
+}
+
+/// The fewest constraints that make a zone.
+pub(super) fn constraints(zone: &[Bound], dimension: usize) -> Vec<Constraint> {
+    let mut constraints = Vec::new();
+    minimal::for_each_minimal(zone, dimension, |one| {
+        constraints.push(Constraint {
+            left: one.left,
+            right: one.right,
+            bound: one.bound.value(),
+            strict: one.bound.is_strict(),
         });
-        constraints
     });
-    zones.collect()
+    constraints
 }
 
 /// What a check covered, or what is wrong, for the user: one line, then those of the run.

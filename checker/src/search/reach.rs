@@ -18,6 +18,7 @@ use crate::zones::{Zone, dbm};
 
 use super::goal::{Goal, Look, Visited};
 use super::limits::{Counters, StopReason, Watch};
+use super::retrace::{self, Step};
 use super::store::{DiscreteId, StateStore};
 use super::zone_table::{ZoneId, ZoneTable};
 
@@ -75,9 +76,6 @@ pub struct Trace {
     /// The parts of each move.
     pub moves: Vec<Vec<Part>>,
 }
-
-/// A move of a state: its index.
-type Step = u32;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -468,73 +466,14 @@ impl<'s, 'a> Search<'s, 'a> {
             node = parent;
         }
         steps.reverse();
-        let mut trace = Trace::default();
-        // What cannot be computed again is the failure that the trace leads to.
-        let _ = self.retrace(&steps, is_found, &mut trace);
-        trace
-    }
-
-    /// Takes the steps from the initial state. Where a state has several zones, the first is taken from which the rest of the way
-    /// is possible, up to a state that the goal confirms if it found it.
-    fn retrace(
-        &mut self,
-        steps: &[Step],
-        is_found: bool,
-        trace: &mut Trace,
-    ) -> Result<(), Failure> {
-        let (mut words, zone, invariant) = self.symbolic.start()?;
-        let mut zones = vec![zone];
-        self.symbolic
-            .let_time_pass(&mut words, &invariant, &mut zones)?;
-        zones.reverse();
-        let mut open = vec![(words, zones)];
-        while let Some((words, zones)) = open.last_mut() {
-            let Some(zone) = zones.pop() else {
-                open.pop();
-                continue;
-            };
-            let mut words = words.clone();
-            trace.states.truncate(open.len() - 1);
-            trace.states.push((words.clone(), zone.clone()));
-            let Some(&step) = steps.get(open.len() - 1) else {
-                if !is_found || self.goal.confirms(self.symbolic, &mut words, &zone)? {
-                    return Ok(());
-                }
-                continue;
-            };
-            trace.moves.truncate(open.len() - 1);
-            if let Some((parts, next)) = self.retake(step, words, &zone)? {
-                trace.moves.push(parts);
-                open.push(next);
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes one step again: the parts of the move, the words after it, and the zones that it leads to, last first.
-    fn retake(
-        &mut self,
-        step: Step,
-        mut words: Vec<i32>,
-        zone: &Zone,
-    ) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
-        let mut moves = Moves::default();
-        self.symbolic.moves(&mut words, &mut moves)?;
-        let one = moves.get(step as usize);
-        let Some(effect) = self.symbolic.fire(one, &mut words)? else {
-            return Ok(None);
+        let goal: Option<&mut dyn Goal> = if is_found {
+            Some(&mut *self.goal)
+        } else {
+            None
         };
-        let mut entries = Vec::new();
-        effect.entry_zones(zone.bounds(), self.symbolic.dimension(), &mut entries);
-        self.symbolic
-            .let_time_pass(&mut words, &effect.invariant, &mut entries)?;
-        entries.reverse();
-        Ok(Some((one.parts.to_vec(), (words, entries))))
+        retrace::retrace(self.symbolic, &steps, goal)
     }
 }
-
-/// The words of a state that was entered, and its zones.
-type Entered = (Vec<i32>, Vec<Zone>);
 
 /// What became of a move.
 enum Taken {

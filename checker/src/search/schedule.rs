@@ -64,6 +64,8 @@ pub struct Wanted<'t> {
     pub stays: Option<Stays<'t>>,
     /// How it ends.
     pub finish: Finish<'t>,
+    /// When it ends at the latest; with 1, before one unit has passed since then.
+    pub deadline: Option<(i32, u32)>,
 }
 
 /// Exact times of a run.
@@ -182,7 +184,16 @@ impl<'s, 'a> Plan<'s, 'a> {
                 self.take(event, parts)?;
             }
         }
-        self.finish(&wanted.finish)
+        self.finish(&wanted.finish)?;
+        if let Some((time, is_open)) = wanted.deadline {
+            let time = i64::from(time) + i64::from(is_open);
+            self.require(Distance {
+                earlier: self.end,
+                later: 0,
+                apart: (-time, i64::from(is_open)),
+            })?;
+        }
+        Ok(())
     }
 
     /// From this event in the state at hand on the predicate stays.

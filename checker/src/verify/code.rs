@@ -1,6 +1,7 @@
 //! The code of a model on words: conditions, updates and the composition of edges into moves, from the definitions.
 //!
-//! What code says about clocks is handed on as constraints and assignments, which [`super::concrete`] evaluates.
+//! What code says about clocks is handed on as constraints and assignments. [`super::concrete`] evaluates them on clock values,
+//! [`super::certificate`] on sets of values.
 //!
 //! The definitions (the documentation's pages on semantics, edges and locations):
 //! * one of the participants of a move leaves a committed location if some process is in one;
@@ -33,6 +34,8 @@ pub(super) struct Candidate {
     pub(super) part: Part,
     /// The channel, and whether the edge sends.
     pub(super) sync: Option<(u32, bool)>,
+    /// What the guard asks of the clocks.
+    pub(super) guard: Vec<FixedConstraint>,
 }
 
 /// A combination of edges that are taken together.
@@ -40,6 +43,10 @@ pub(super) struct Candidate {
 pub(super) struct Combination {
     /// The participants, the sender (or the only process) first.
     pub(super) parts: Vec<Part>,
+    /// What the guards of the participants ask of the clocks.
+    pub(super) guard: Vec<FixedConstraint>,
+    /// The guards of receivers that do not take part: none of these conjunctions may hold.
+    pub(super) excluded: Vec<Vec<FixedConstraint>>,
     /// The channel.
     pub(super) channel: Option<u32>,
 }
@@ -76,6 +83,18 @@ impl<'a> Code<'a> {
         let location = words[process] as usize;
         let invariant = &self.network.processes[process].locations[location].invariant;
         self.condition(invariant, &[], words)
+    }
+
+    /// What all invariants ask of the clocks; `None` if the words break one.
+    pub(super) fn invariants(&self, words: &[i32]) -> Result<Option<Vec<FixedConstraint>>, Error> {
+        let mut all = Vec::new();
+        for process in 0..self.network.processes.len() {
+            match self.invariant(process, words)? {
+                None => return Ok(None),
+                Some(constraints) => all.extend(constraints),
+            }
+        }
+        Ok(Some(all))
     }
 
     /// What a guard asks of the clocks; `None` if the words break it.
@@ -135,7 +154,7 @@ impl<'a> Code<'a> {
                     branch: 0,
                     select: select as u32,
                 };
-                found.push(Candidate { part, sync });
+                found.push(Candidate { part, sync, guard });
             }
         }
         Ok(found)
@@ -151,7 +170,7 @@ impl<'a> Code<'a> {
         for (process, edges) in candidates.iter().enumerate() {
             for one in edges {
                 match one.sync {
-                    None => self.push(&[one], &mut found),
+                    None => self.push(&[one], &[], &mut found),
                     Some((channel, true)) => {
                         self.synchronise(process, one, channel, candidates, &mut found);
                     }
@@ -186,30 +205,40 @@ impl<'a> Code<'a> {
         let others = (0..candidates.len()).filter(|&process| process != sender);
         if !self.network.channels[channel as usize].broadcast {
             for receive in others.flat_map(receiving) {
-                self.push(&[send, receive], found);
+                self.push(&[send, receive], &[], found);
             }
             return;
         }
-        let mut open = vec![vec![send]];
+        let mut open = vec![(vec![send], Vec::new())];
         for choices in others.map(receiving).filter(|choices| !choices.is_empty()) {
-            open = open
-                .iter()
-                .flat_map(|taken| {
-                    choices.iter().map(|choice| {
-                        let mut taken = taken.clone();
-                        taken.push(*choice);
-                        taken
-                    })
-                })
-                .collect();
+            let may_abstain = choices.iter().all(|choice| !choice.guard.is_empty());
+            let mut next = Vec::new();
+            for (taken, excluded) in open {
+                for choice in &choices {
+                    let mut taken = taken.clone();
+                    taken.push(*choice);
+                    next.push((taken, excluded.clone()));
+                }
+                if may_abstain {
+                    let mut excluded = excluded;
+                    excluded.extend(choices.iter().map(|choice| choice.guard.clone()));
+                    next.push((taken, excluded));
+                }
+            }
+            open = next;
         }
-        for taken in open {
-            self.push(&taken, found);
+        for (taken, excluded) in open {
+            self.push(&taken, &excluded, found);
         }
     }
 
     /// Adds a combination for each choice of branches, the last participant's fastest.
-    fn push(&self, participants: &[&Candidate], found: &mut Vec<Combination>) {
+    fn push(
+        &self,
+        participants: &[&Candidate],
+        excluded: &[Vec<FixedConstraint>],
+        found: &mut Vec<Combination>,
+    ) {
         let mut choices: Vec<Vec<Part>> = vec![Vec::new()];
         for one in participants {
             let branches = 0..self.edge(one.part).branches.len() as u32;
@@ -224,8 +253,14 @@ impl<'a> Code<'a> {
                 })
                 .collect();
         }
+        let guard: Vec<_> = participants
+            .iter()
+            .flat_map(|one| one.guard.clone())
+            .collect();
         found.extend(choices.into_iter().map(|parts| Combination {
             parts,
+            guard: guard.clone(),
+            excluded: excluded.to_vec(),
             channel: participants[0].sync.map(|(channel, _)| channel),
         }));
     }

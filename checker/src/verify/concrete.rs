@@ -167,7 +167,12 @@ impl<'a> Semantics<'a> {
         let holds = |guard: &[FixedConstraint]| self.all_hold(guard, &state.clocks);
         let mut enabled = Vec::new();
         for process in 0..self.network().processes.len() {
-            enabled.push(self.code.candidates(process, &state.words, &holds)?);
+            let mut edges = self.code.candidates(process, &state.words, &holds)?;
+            for edge in &mut edges {
+                // It holds here, so nobody abstains because of it.
+                edge.guard.clear();
+            }
+            enabled.push(edges);
         }
         Ok(self.code.combinations(&enabled, &state.words))
     }

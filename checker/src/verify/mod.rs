@@ -2,17 +2,20 @@
 //!
 //! Nothing here uses the moves, zones, search or games of the engine. [`concrete`] computes the moves of a state with exact clock
 //! values straight from the definitions, running code on the interpreter; [`regions`] makes the set of valuations finite;
-//! [`strategy`] closes the loop between a strategy and every move of the environment; [`replay`] follows a single run.
+//! [`strategy`] closes the loop between a strategy and every move of the environment; [`replay`] follows a single run;
+//! [`certificate`] checks that a set of states is closed and avoids a predicate.
 //!
 //! A mistake in the front end or in the interpreter is shared with the engine and not found here; one in moves, zones,
 //! extrapolation, compiled code or the solver is.
 
+pub mod certificate;
 mod code;
 pub mod concrete;
 mod moments;
 pub mod regions;
 pub mod replay;
 pub mod strategy;
+mod zone;
 
 pub use concrete::{Error, Move, Part, Semantics, State};
 pub use regions::Regions;

@@ -1,0 +1,84 @@
+//! From the moves of a way to its states: the way is taken again, without extrapolation.
+
+use crate::network::{Failure, Moves, Part, Symbolic};
+use crate::zones::Zone;
+
+use super::goal::Goal;
+use super::reach::Trace;
+
+/// A move of a state: its index.
+pub(super) type Step = u32;
+
+/// The words of a state that was entered, and its zones.
+type Entered = (Vec<i32>, Vec<Zone>);
+
+/// Takes the steps from the initial state. Where a state has several zones, the first is taken from which the rest of the way
+/// is possible, up to a state that the goal confirms if there is one. What cannot be computed again is the failure that the trace
+/// leads to, and is left out.
+pub(super) fn retrace(
+    symbolic: &mut Symbolic<'_>,
+    steps: &[Step],
+    goal: Option<&mut dyn Goal>,
+) -> Trace {
+    let mut trace = Trace::default();
+    let _ = take_all(symbolic, steps, goal, &mut trace);
+    trace
+}
+
+fn take_all(
+    symbolic: &mut Symbolic<'_>,
+    steps: &[Step],
+    mut goal: Option<&mut dyn Goal>,
+    trace: &mut Trace,
+) -> Result<(), Failure> {
+    let (mut words, zone, invariant) = symbolic.start()?;
+    let mut zones = vec![zone];
+    symbolic.let_time_pass(&mut words, &invariant, &mut zones)?;
+    zones.reverse();
+    let mut open = vec![(words, zones)];
+    while let Some((words, zones)) = open.last_mut() {
+        let Some(zone) = zones.pop() else {
+            open.pop();
+            continue;
+        };
+        let mut words = words.clone();
+        trace.states.truncate(open.len() - 1);
+        trace.states.push((words.clone(), zone.clone()));
+        let Some(&step) = steps.get(open.len() - 1) else {
+            let is_end = match &mut goal {
+                None => true,
+                Some(goal) => goal.confirms(symbolic, &mut words, &zone)?,
+            };
+            if is_end {
+                return Ok(());
+            }
+            continue;
+        };
+        trace.moves.truncate(open.len() - 1);
+        if let Some((parts, next)) = take(symbolic, step, words, &zone)? {
+            trace.moves.push(parts);
+            open.push(next);
+        }
+    }
+    Ok(())
+}
+
+/// Takes one step: the parts of the move, the words after it, and the zones that it leads to, last first.
+fn take(
+    symbolic: &mut Symbolic<'_>,
+    step: Step,
+    mut words: Vec<i32>,
+    zone: &Zone,
+) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
+    let mut moves = Moves::default();
+    symbolic.moves(&mut words, &mut moves)?;
+    let one = moves.get(step as usize);
+    let Some(effect) = symbolic.fire(one, &mut words)? else {
+        return Ok(None);
+    };
+    let mut entries = Vec::new();
+    effect.entry_zones(zone.bounds(), symbolic.dimension(), &mut entries);
+    symbolic.let_time_pass(&mut words, &effect.invariant, &mut entries)?;
+    entries.reverse();
+    Ok(Some((one.parts.to_vec(), (words, entries))))
+}

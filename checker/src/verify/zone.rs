@@ -1,0 +1,264 @@
+//! Convex sets of clock values, for checking certificates: plain and slow on purpose.
+//!
+//! A zone is a matrix of bounds on all differences, closed by shortest paths after every change. It shares nothing with the zones of
+//! the engine.
+//!
+//! Invariant: the matrix is closed, or the zone is empty and marked so.
+
+use crate::exec::EmittedAssignment;
+use crate::ir::FixedConstraint;
+
+/// `difference < value`, or `<=` if weak; ordered from tight to loose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Limit {
+    value: i64,
+    is_weak: bool,
+}
+
+/// No limit.
+const NONE: Limit = Limit {
+    value: i64::MAX,
+    is_weak: true,
+};
+
+const ZERO: Limit = Limit {
+    value: 0,
+    is_weak: true,
+};
+
+fn sum(one: Limit, other: Limit) -> Limit {
+    if one == NONE || other == NONE {
+        return NONE;
+    }
+    Limit {
+        value: one.value + other.value,
+        is_weak: one.is_weak && other.is_weak,
+    }
+}
+
+/// A comparison `x_left - x_right ≺ bound` of clocks by index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Comparison {
+    pub(super) left: usize,
+    pub(super) right: usize,
+    pub(super) bound: i64,
+    pub(super) is_strict: bool,
+}
+
+impl Comparison {
+    /// The comparison that holds where this one fails.
+    pub(super) fn negated(self) -> Comparison {
+        Comparison {
+            left: self.right,
+            right: self.left,
+            bound: -self.bound,
+            is_strict: !self.is_strict,
+        }
+    }
+
+    /// What it says before the assignments if it is to hold after them.
+    pub(super) fn before(self, assignments: &[EmittedAssignment]) -> Comparison {
+        let mut one = self;
+        for assignment in assignments.iter().rev() {
+            let (target, source) = (assignment.target.0 as usize, assignment.source.0 as usize);
+            let value = i64::from(assignment.value);
+            if one.left == target {
+                (one.left, one.bound) = (source, one.bound - value);
+            }
+            if one.right == target {
+                (one.right, one.bound) = (source, one.bound + value);
+            }
+        }
+        one
+    }
+}
+
+impl From<&FixedConstraint> for Comparison {
+    fn from(one: &FixedConstraint) -> Comparison {
+        Comparison {
+            left: one.left.0 as usize,
+            right: one.right.0 as usize,
+            bound: one.bound.into(),
+            is_strict: one.strict,
+        }
+    }
+}
+
+/// A convex set of clock values.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Zone {
+    clocks: usize,
+    limits: Vec<Limit>,
+    is_empty: bool,
+}
+
+impl Zone {
+    /// All values from 0; the number of clocks includes the reference clock.
+    pub(super) fn universe(clocks: usize) -> Zone {
+        let mut zone = Zone {
+            clocks,
+            limits: vec![NONE; clocks * clocks],
+            is_empty: false,
+        };
+        for clock in 0..clocks {
+            *zone.at(clock, clock) = ZERO;
+            *zone.at(0, clock) = ZERO;
+        }
+        zone
+    }
+
+    fn at(&mut self, left: usize, right: usize) -> &mut Limit {
+        &mut self.limits[left * self.clocks + right]
+    }
+
+    fn get(&self, left: usize, right: usize) -> Limit {
+        self.limits[left * self.clocks + right]
+    }
+
+    /// Whether it contains no values.
+    pub(super) fn is_empty(&self) -> bool {
+        self.is_empty
+    }
+
+    /// Tightens every bound to the least sum over a third clock.
+    fn close(&mut self) {
+        for via in 0..self.clocks {
+            for left in 0..self.clocks {
+                for right in 0..self.clocks {
+                    let detour = sum(self.get(left, via), self.get(via, right));
+                    if detour < self.get(left, right) {
+                        *self.at(left, right) = detour;
+                    }
+                }
+            }
+        }
+        self.is_empty |= (0..self.clocks).any(|clock| self.get(clock, clock) < ZERO);
+    }
+
+    /// The part in which all comparisons hold.
+    pub(super) fn within(&self, comparisons: impl IntoIterator<Item = Comparison>) -> Zone {
+        let mut part = self.clone();
+        let mut has_changed = false;
+        for one in comparisons {
+            let limit = Limit {
+                value: one.bound,
+                is_weak: !one.is_strict,
+            };
+            if limit < part.get(one.left, one.right) {
+                *part.at(one.left, one.right) = limit;
+                has_changed = true;
+            }
+        }
+        if has_changed && !part.is_empty {
+            part.close();
+        }
+        part
+    }
+
+    /// The bounds that say something, as comparisons.
+    pub(super) fn comparisons(&self) -> Vec<Comparison> {
+        let mut found = Vec::new();
+        for left in 0..self.clocks {
+            for right in (0..self.clocks).filter(|&right| right != left) {
+                let limit = self.get(left, right);
+                if limit != NONE {
+                    found.push(Comparison {
+                        left,
+                        right,
+                        bound: limit.value,
+                        is_strict: !limit.is_weak,
+                    });
+                }
+            }
+        }
+        found
+    }
+
+    /// What both contain.
+    pub(super) fn intersection(&self, other: &Zone) -> Zone {
+        let mut both = self.within(other.comparisons());
+        both.is_empty |= other.is_empty;
+        both
+    }
+
+    /// What is left without the other zone: disjoint parts.
+    pub(super) fn without(&self, other: &Zone) -> Vec<Zone> {
+        let mut parts = Vec::new();
+        if self.intersection(other).is_empty() {
+            parts.extend((!self.is_empty).then(|| self.clone()));
+            return parts;
+        }
+        let mut rest = self.clone();
+        for one in other.comparisons() {
+            let part = rest.within([one.negated()]);
+            if !part.is_empty {
+                parts.push(part);
+                rest = rest.within([one]);
+            }
+        }
+        parts
+    }
+
+    /// Whether the others together contain it.
+    pub(super) fn is_covered(&self, others: &[Zone]) -> bool {
+        if self.is_empty {
+            return true;
+        }
+        let Some((first, others)) = others.split_first() else {
+            return false;
+        };
+        self.without(first)
+            .iter()
+            .all(|part| part.is_covered(others))
+    }
+
+    /// What it becomes while time passes.
+    pub(super) fn future(&self) -> Zone {
+        let mut later = self.clone();
+        for clock in 1..self.clocks {
+            *later.at(clock, 0) = NONE;
+        }
+        later.close();
+        later
+    }
+
+    /// What becomes it while time passes.
+    pub(super) fn past(&self) -> Zone {
+        let mut before = self.clone();
+        for clock in 1..self.clocks {
+            *before.at(0, clock) = ZERO;
+        }
+        before.close();
+        before
+    }
+
+    /// What it becomes by the assignments; what would make a clock negative is left out.
+    pub(super) fn after(&self, assignments: &[EmittedAssignment]) -> Zone {
+        let mut zone = self.clone();
+        for one in assignments {
+            let (target, source) = (one.target.0 as usize, one.source.0 as usize);
+            let value = i64::from(one.value);
+            // source + value >= 0
+            zone = zone.within([Comparison {
+                left: 0,
+                right: source,
+                bound: value,
+                is_strict: false,
+            }]);
+            let shifted = |limit: Limit, by: i64| match limit {
+                NONE => NONE,
+                _ => Limit {
+                    value: limit.value + by,
+                    ..limit
+                },
+            };
+            let before = zone.clone();
+            for other in (0..self.clocks).filter(|&other| other != target) {
+                *zone.at(target, other) = shifted(before.get(source, other), value);
+                *zone.at(other, target) = shifted(before.get(other, source), -value);
+            }
+            zone.close();
+        }
+        zone
+    }
+}

@@ -1,0 +1,52 @@
+"""`ntagen verify`: does a trace or a certificate show what it is said to?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import click
+
+from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.errors import InputError
+
+VIOLATED: Final = 1
+"""Exit code of evidence that does not hold."""
+
+NOT_COVERED: Final = 3
+"""Exit code where the check does not cover the model or the query."""
+
+
+@click.command(
+    "verify",
+    epilog="Exit codes: 0 the evidence holds, 1 it does not, 2 the input is rejected, 3 the check "
+    "does not cover the model or the query.",
+)
+@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+def command(model_path: Path, file: Path) -> int:
+    """Check a trace or a certificate, independently of the search that found it.
+
+    FILE is what `ntagen check` wrote for MODEL with --certificate FILE or --trace FILE.json. A
+    trace is replayed with its exact times, and must show what its query asks about. A certificate
+    is a set of states for E<> (not satisfied) or A[] (satisfied): it must contain the initial
+    state, no move and no delay may lead out of it, and it must not meet what is to be avoided.
+
+    \b
+    Examples:
+      ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
+      ntagen verify model.xml safe.jsonl
+    """  # noqa: D301  click wants the control character
+    with pointing_to_explanations(True):
+        loaded = load_model(model_path)
+        checked = loaded.model.verify(_read(file), str(file))
+    for line in checked.lines:
+        click.echo(line)
+    return {True: 0, False: VIOLATED, None: NOT_COVERED}[checked.holds]
+
+
+def _read(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{file}: it is no text: {error.reason}") from None

@@ -1,0 +1,130 @@
+"""`ntagen verify`: traces and certificates that hold, and those that were changed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ntagen.cli import main
+
+LAMP = """
+clock x;
+process Lamp() {
+  state Off, On { x <= 5 }, Dim;
+  init Off;
+  trans Off -> On { guard x > 1; assign x = 0; },
+        Off -> Dim { guard x >= 4; },
+        On -> Off { guard x >= 2; assign x = 0; },
+        On -> Dim { guard x > 3; };
+}
+system Lamp;
+"""
+
+
+DETOUR = """
+clock x;
+process P() {
+  state Start, Left, Right, End;
+  commit Left;
+  init Start;
+  trans Start -> End { guard x >= 10; },
+        Start -> Left { guard x >= 2; },
+        Left -> Right { },
+        Right -> End { };
+}
+system P;
+"""
+
+
+@pytest.fixture
+def lamp(tmp_path: Path) -> Path:
+    path = tmp_path / "lamp.xta"
+    path.write_text(LAMP)
+    return path
+
+
+def check_exit(code: int, *arguments: str | Path) -> None:
+    assert main([str(argument) for argument in arguments]) == code
+
+
+def test_trace_holds_until_a_wait_is_changed(
+    lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = tmp_path / "trace.json"
+    check_exit(0, "check", lamp, "--query", "E<> Lamp.Dim", "--fastest", "--trace", trace)
+    check_exit(0, "verify", lamp, trace)
+    assert "trace replayed: 2 states, 1 moves" in capsys.readouterr().out
+    file = json.loads(trace.read_text())
+    assert file["format"] == "ntagen-trace"
+    file["run"]["steps"][0]["wait"] -= 1
+    trace.write_text(json.dumps(file))
+    check_exit(1, "verify", lamp, trace)
+    assert "the move is not possible here" in capsys.readouterr().out
+
+
+def test_shortest_and_fastest_traces_differ(lamp: Path, tmp_path: Path) -> None:
+    def found(option: str) -> tuple[int, float]:
+        trace = tmp_path / "trace.json"
+        lamp.write_text(DETOUR)
+        check_exit(0, "check", lamp, "--query", "E<> P.End", option, "--trace", trace)
+        run = json.loads(trace.read_text())["run"]
+        waits = sum(step["wait"] for step in run["steps"]) + run["end"]["wait"]
+        return len(run["steps"]), waits / run["ticks_per_unit"]
+
+    assert found("--shortest") == (1, 10)
+    assert found("--fastest") == (3, 2)
+
+
+def test_traces_of_values_are_all_replayed(
+    lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = tmp_path / "trace.json"
+    check_exit(0, "check", lamp, "--query", "bounds{Lamp.On}: x", "--trace", trace)
+    check_exit(0, "verify", lamp, trace)
+    assert capsys.readouterr().out.count("trace replayed") == 2
+    file = json.loads(trace.read_text())
+    assert [one["title"] for one in file["traces"]] == ["least x", "greatest x"]
+    file["traces"][1]["value"]["value"] = 4
+    trace.write_text(json.dumps(file))
+    check_exit(1, "verify", lamp, trace)
+    assert "the value is another one" in capsys.readouterr().out
+
+
+def test_certificate_holds_until_a_state_is_taken_away(
+    lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    certificate = tmp_path / "safe.jsonl"
+    query = "A[] Lamp.On imply x <= 5"
+    check_exit(0, "check", lamp, "--query", query, "--certificate", certificate)
+    assert "certificate of 3 states written" in capsys.readouterr().out
+    check_exit(0, "verify", lamp, certificate)
+    assert "certificate verified: 3 words" in capsys.readouterr().out
+    lines = certificate.read_text().splitlines()
+    header = json.loads(lines[0])
+    assert (header["query"], header["clocks"]) == (query, ["x"])
+    header["states"] -= 1
+    certificate.write_text("\n".join([json.dumps(header), *lines[1:-1]]))
+    check_exit(1, "verify", lamp, certificate)
+    assert "a move leads out of it" in capsys.readouterr().out
+
+
+def test_file_that_is_no_evidence_is_rejected(
+    lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    for content in (b"no json", b"{}", b"\xff\xfe", b'{"format": "ntagen-trace", "version": 9}'):
+        file.write_bytes(content)
+        check_exit(2, "verify", lamp, file)
+        assert "error" in capsys.readouterr().err
+
+
+def test_certificate_of_another_model_is_rejected(
+    lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    certificate = tmp_path / "safe.jsonl"
+    check_exit(0, "check", lamp, "--query", "A[] true", "--certificate", certificate)
+    lamp.write_text(LAMP.replace("clock x;", "clock x; int n;"))
+    check_exit(2, "verify", lamp, certificate)
+    assert "a model with other processes, variables or clocks" in capsys.readouterr().err
