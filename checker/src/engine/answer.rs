@@ -28,6 +28,7 @@ use crate::zones::Bound;
 
 use super::certificate::{self, Certificate};
 use super::evidence::{self, Kind, Proof, Shows, Witness};
+use super::fastest::{Race, fastest};
 use super::limits::LimitWatch;
 use super::verification::Verification;
 use super::{Options, TraceWanted, games};
@@ -173,6 +174,19 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
                 further: subject.atoms(),
             };
             extremum(subject, question, options, &mut watch)
+        }
+        QueryKind::Control {
+            objective,
+            time_optimal: Some((limit, rest)),
+            ..
+        } => {
+            let (limit, rest) = (*limit, *rest);
+            let race = Race {
+                objective,
+                limit,
+                rest,
+            };
+            fastest(network, executor, &race, options, &mut watch)
         }
         QueryKind::Control {
             objective,

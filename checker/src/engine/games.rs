@@ -18,11 +18,19 @@ use super::limits::LimitWatch;
 use super::verification::{self, Verification};
 use super::{Options, PlansWanted};
 /// Names the part of a game query that there is no algorithm for.
-pub(super) fn unsupported_game(time_optimal: bool, observations: bool) -> Option<&'static str> {
-    match () {
-        () if time_optimal => Some("control_t*"),
-        () if observations => Some("partial observation"),
-        () => None,
+pub(super) fn unsupported_game(
+    objective: &Objective,
+    is_time_optimal: bool,
+    is_cooperative: bool,
+    has_observations: bool,
+) -> Option<&'static str> {
+    let can_race = matches!(objective, Objective::Reach(_) | Objective::Until(..));
+    if has_observations {
+        Some("partial observation")
+    } else if is_time_optimal && (is_cooperative || !can_race) {
+        Some("control_t* and other objectives than A<> and A[ U ]")
+    } else {
+        None
     }
 }
 
@@ -79,7 +87,7 @@ pub(super) fn game(
 }
 
 /// The clock comparisons of an objective.
-fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
+pub(super) fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
     let (one, other) = match objective {
         Objective::Reach(goal) => (goal, None),
         Objective::Safe(keep) => (keep, None),
@@ -115,6 +123,7 @@ fn played(
         goal,
         keep,
         must_progress: seeker == Player::Controller,
+        deadline: None,
     };
     let mut graph = match Graph::new(&mut symbolic, wanted) {
         Ok(graph) => graph,

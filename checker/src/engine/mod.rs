@@ -10,6 +10,7 @@ pub mod evidence;
 pub mod explain;
 pub mod facts;
 mod failure;
+mod fastest;
 mod games;
 pub mod json;
 pub mod limits;
@@ -427,10 +428,16 @@ impl LoadedModel {
             | QueryKind::SaveStrategy { .. }
             | QueryKind::LoadStrategy { .. } => None,
             QueryKind::Control {
+                objective,
+                cooperative,
                 time_optimal,
                 observations,
-                ..
-            } => games::unsupported_game(time_optimal.is_some(), observations.is_some()),
+            } => games::unsupported_game(
+                objective,
+                time_optimal.is_some(),
+                *cooperative,
+                observations.is_some(),
+            ),
         };
         let features = &self.model.network.features;
         let kind = kind.map(|kind| format!("queries with {kind}"));
@@ -452,7 +459,7 @@ impl LoadedModel {
                 query.span,
                 format!("{kind} are not supported"),
             )
-            .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control: and E<> control:")
+            .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, E<> control: and control_t*:")
         } else if let Some(construct) = construct {
             Diagnostic::new(
                 codes::UNSUPPORTED_CONSTRUCT,

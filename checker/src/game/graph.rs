@@ -12,12 +12,12 @@
 //! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly. Where two clocks are compared,
 //! zones are cut along the comparisons, and a move has an edge for each piece; there are no chains then.
 
-use crate::ir::Predicate;
+use crate::ir::{FunctionId, Predicate};
 use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
 use crate::search::store::{DiscreteId, StateStore};
 use crate::search::zone_table::{ZoneId, ZoneTable};
-use crate::zones::dbm;
-use crate::zones::{Bound, Federation, Zone};
+use crate::zones::dbm::{self, Constraint};
+use crate::zones::{Bound, Federation, Zone, clocks};
 
 use super::programs::{ProgramId, ProgramStep, Programs};
 use super::trails::{Ending, Root, Trails};
@@ -101,6 +101,20 @@ pub struct Objective<'q> {
     pub keep: Option<&'q Predicate>,
     /// Whether waiting for ever never helps the controller.
     pub must_progress: bool,
+    /// By when the goal must be reached.
+    pub deadline: Option<Deadline>,
+}
+
+/// A limit on the time that play takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Deadline {
+    /// The clock that measures the time; nothing sets it. It may start at any value up to the limit, so that the valuations of the
+    /// initial node show how much time is needed.
+    pub clock: usize,
+    /// The limit.
+    pub limit: i32,
+    /// How much time, at least, is still to be left in a state before the goal; a negative value counts as 0.
+    pub rest: Option<FunctionId>,
 }
 
 /// The game graph.
@@ -172,10 +186,24 @@ impl<'s, 'a> Graph<'s, 'a> {
             objective,
             symbolic,
         };
-        let (mut words, mut zone) = graph.symbolic.initial()?;
+        let (mut words, mut zone) = graph.initial()?;
         graph.symbolic.extrapolate(&words, zone.bounds_mut());
         graph.node(&mut words, &zone)?;
         Ok(graph)
+    }
+
+    /// The initial words and zone.
+    fn initial(&mut self) -> Result<(Vec<i32>, Zone), Failure> {
+        let Some(deadline) = self.objective.deadline else {
+            return self.symbolic.initial();
+        };
+        let (mut words, mut zone, invariant) = self.symbolic.start()?;
+        clocks::free_clock(zone.bounds_mut(), self.dimension(), deadline.clock);
+        zone.constrain(deadline.clock, 0, weak(deadline.limit)?);
+        let may_delay = self.symbolic.may_delay(&mut words)?;
+        self.symbolic
+            .delay(&words, may_delay, &invariant, zone.bounds_mut())?;
+        Ok((words, zone))
     }
 
     /// The number of clocks, the reference clock included.
@@ -286,7 +314,22 @@ impl<'s, 'a> Graph<'s, 'a> {
             Some(keep) => self.symbolic.extent(keep, words, zone.bounds())?,
             None => Extent::Everywhere,
         };
-        Ok((goal, keep))
+        let Some(deadline) = self.objective.deadline else {
+            return Ok((goal, keep));
+        };
+        let rest = match deadline.rest {
+            Some(rest) => self.symbolic.stepper.evaluate(rest, words)?.max(0),
+            None => 0,
+        };
+        let until = |limit: i32| {
+            Ok::<_, Failure>(Constraint {
+                left: deadline.clock,
+                right: 0,
+                bound: weak(limit)?,
+            })
+        };
+        let keep = within(&keep, until(deadline.limit.saturating_sub(rest))?, zone);
+        Ok((within(&goal, until(deadline.limit)?, zone), keep))
     }
 
     /// Computes the edges of a node. Nodes that this makes are behind the ones there were.
@@ -535,5 +578,24 @@ pub(super) fn push_step(steps: &mut Vec<ProgramStep>, delays: bool, effect: &Clo
     if delays || is_kept || !effect.is_trivial() {
         let effect = effect.clone();
         steps.push(ProgramStep { delays, effect });
+    }
+}
+
+fn weak(limit: i32) -> Result<Bound, Failure> {
+    Bound::weak(limit).ok_or(Failure::ClockLimit(limit))
+}
+
+/// The part of an extent that satisfies a constraint.
+fn within(extent: &Extent, constraint: Constraint, zone: &Zone) -> Extent {
+    let mut inside = zone.clone();
+    if inside.constrain_all(&[constraint]) && inside == *zone {
+        return extent.clone();
+    }
+    let mut part = extent.to_federation(zone.bounds(), zone.dimension());
+    part.constrain_all(&[constraint]);
+    if part.is_empty() {
+        Extent::Nowhere
+    } else {
+        Extent::Part(part)
     }
 }

@@ -76,6 +76,8 @@ pub struct Gain {
 pub enum Extent {
     /// Until the verdict is known.
     Verdict,
+    /// The winning valuations of the initial node.
+    Start,
     /// The winning valuations of all nodes that can be reached.
     Everything,
 }
@@ -181,7 +183,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             };
             self.is_waiting[node as usize] = false;
             if self.graph.nodes[node as usize].is_expanded
-                || (extent == Extent::Verdict && !self.is_relevant(node))
+                || (extent != Extent::Everything && !self.is_relevant(node))
             {
                 continue;
             }

@@ -99,7 +99,8 @@ impl Trails {
         let mut predicates = objective.goal.iter().chain(&objective.keep);
         Trails {
             is_useful,
-            is_objective_fixed: predicates.all(|predicate| hangs_on_locations(predicate)),
+            is_objective_fixed: objective.deadline.is_none()
+                && predicates.all(|predicate| hangs_on_locations(predicate)),
             ..Trails::default()
         }
     }

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use checker::engine::{LoadedModel, NamedStrategy, Options};
+use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict};
 use checker::game::strategy::Strategy;
 use checker::game::{Forced, Player};
+use checker::search::extremum::Extreme;
 use proptest::test_runner::TestCaseError;
 
 use crate::compare::{self, Tally};
@@ -188,4 +189,70 @@ fn games_equal_brute_force() {
         generate::formula(SHAPE),
     );
     compare::run("games", 150, &strategy, compare);
+}
+
+/// The least time of `control_t*` must be the least bound within which an ordinary game with a clock of its own is won.
+fn compare_times(
+    (network, goal, keep): &(Network, Formula, Formula),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let text = format!("clock t;\n{}", network.text());
+    let mut model = compare::load(&text);
+    let (goal, keep) = (network.formula(goal), network.formula(keep));
+    let mut ask = |query: &str| {
+        let query = model.add_query(query);
+        model.check(&query, &compare::options())
+    };
+    for limit in ["", "(4)", "(3, 1)"] {
+        let within = |value: i32| match limit {
+            // One unit is to be left wherever the goal does not hold yet.
+            "(3, 1)" => format!(
+                "control: A[ ({keep}) && t <= {} U ({goal}) && t <= {value} ]",
+                value - 1
+            ),
+            _ => format!("control: A[ {keep} U ({goal}) && t <= {value} ]"),
+        };
+        let query = format!("control_t*{limit}: A[ {keep} U {goal} ]");
+        let answer = ask(&query);
+        let describe = || format!("{text}{query}\n{answer:?}");
+        let value = answer.as_ref().ok().and_then(|answer| answer.value.clone());
+        let least = value.and_then(|values| values.items[0].least);
+        let expected = if let Some(Extreme::Value { value, is_reached }) = least {
+            // At the time itself it is won if the time is reached, before it never, after it always.
+            for (value, wins) in [(value, is_reached), (value - 1, false), (value + 1, true)] {
+                let game = within(value);
+                compare::check(&ask(&game), Ok(wins), tally, || {
+                    format!("{}\n{game}", describe())
+                })?;
+            }
+            true
+        } else {
+            let game = match limit {
+                "" => format!("control: A[ {keep} U {goal} ]"),
+                "(4)" => within(4),
+                _ => within(3),
+            };
+            let other = ask(&game);
+            let is_error = |answer: &Answer| matches!(answer.verdict, Verdict::Error(_));
+            if other.as_ref().is_ok_and(is_error) {
+                return Ok(());
+            }
+            compare::check(&other, Ok(false), tally, || {
+                format!("{}\n{game}", describe())
+            })?;
+            false
+        };
+        compare::check(&answer, Ok(expected), tally, describe)?;
+    }
+    Ok(())
+}
+
+#[test]
+fn least_times_are_the_bounds_of_ordinary_games() {
+    let strategy = (
+        generate::network(SHAPE),
+        generate::formula(SHAPE),
+        generate::formula(SHAPE),
+    );
+    compare::run("least times", 100, &strategy, compare_times);
 }
