@@ -71,6 +71,10 @@ bench: $(INSTALLED) ## Measure the engine: all plans of the paper's instance, a 
 	$(BIN)/python tests/benchmarks/syntheses.py
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
+.PHONY: bench-games
+bench-games: $(INSTALLED) ## Measure how far the solver of games gets: two families, up to 60 s or 4 GiB
+	$(BIN)/python tests/benchmarks/games.py
+
 .PHONY: clean
 clean: ## Remove all that was built, also .venv
 	rm -rf .venv build dist demo checker/target ntagen/_checker*.so

@@ -1,0 +1,133 @@
+"""How far the solver of timed games gets: time and memory against the size of two families.
+
+    python tests/benchmarks/games.py [--seconds 60] [--gibibytes 4] [--family cell|trains]
+
+*cell* is a production cell: plates come on a belt, an arm takes each to a press that is ready when
+it likes, and a plate that waits too long falls. *trains* is a gate in front of a bridge: trains
+that come can be stopped for a while. In the *uncontrollable* variants the environment says when plates
+and trains come, in the *controllable* ones the controller does. Each game grows, by a quarter once
+it is large, until the time or the memory is not enough; a line is printed for each size.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ntagen import checker
+
+CELL = """
+const int N = {size};
+typedef int[0, N - 1] id_t;
+const int GAP = 12;
+bool arm;
+bool press;
+process Plate(const id_t id) {{
+  clock x;
+  state Far {{ x <= GAP * id + 4 }}, Belt, Fallen, Arm, Press {{ x <= 8 }}, Ready, Done;
+  init Far;
+  trans Far {arrow} Belt {{ guard x >= GAP * id; assign x = 0; }},
+        Belt -u-> Fallen {{ guard x >= 12; }},
+        Belt -> Arm {{ guard x >= 2 && !arm; assign arm = true, x = 0; }},
+        Arm -> Press {{ guard x >= 2 && !press; assign arm = false, press = true, x = 0; }},
+        Press -u-> Ready {{ guard x >= 5; assign x = 0; }},
+        Ready -> Done {{ guard x >= 1; assign press = false; }};
+}}
+system Plate;
+"""
+
+TRAINS = """
+const int N = {size};
+typedef int[0, N - 1] id_t;
+chan come[N], stop[N], go[N], leave[N];
+process Train(const id_t id) {{
+  clock x;
+  state Away, Near {{ x <= 20 }}, Stopped, Starting {{ x <= 15 }}, Bridge {{ x <= 5 }};
+  init Away;
+  trans Away {arrow} Near {{ sync come[id]!; assign x = 0; }},
+        Near -u-> Bridge {{ guard x >= 10; assign x = 0; }},
+        Near -> Stopped {{ guard x <= 10; sync stop[id]?; }},
+        Stopped -> Starting {{ sync go[id]?; assign x = 0; }},
+        Starting -u-> Bridge {{ guard x >= 7; assign x = 0; }},
+        Bridge -u-> Away {{ guard x >= 3; sync leave[id]!; }};
+}}
+process Gate() {{
+  state Any;
+  init Any;
+  trans Any -> Any {{ select e : id_t; sync come[e]?; }},
+        Any -> Any {{ select e : id_t; sync leave[e]?; }},
+        Any -> Any {{ select e : id_t; sync stop[e]!; }},
+        Any -> Any {{ select e : id_t; sync go[e]!; }};
+}}
+system Train, Gate;
+"""
+
+ONE_ON_THE_BRIDGE = (
+    "control: A[] forall (i : id_t) forall (j : id_t) "
+    "(Train(i).Bridge && Train(j).Bridge imply i == j)"
+)
+
+
+@dataclass(frozen=True)
+class Game:
+    """A family of games with one query."""
+
+    family: str
+    variant: str
+    text: str
+    query: str
+
+    def at(self, size: int) -> str:
+        """The model of this size."""
+        arrow = "->" if self.variant == "controllable" else "-u->"
+        return self.text.format(size=size, arrow=arrow)
+
+
+GAMES = [
+    Game("cell", "uncontrollable", CELL, "control: A<> forall (i : id_t) Plate(i).Done"),
+    Game("cell", "controllable", CELL, "control: A<> forall (i : id_t) Plate(i).Done"),
+    Game("cell", "uncontrollable", CELL, "control: A[] forall (i : id_t) not Plate(i).Fallen"),
+    Game("cell", "controllable", CELL, "control: A[] forall (i : id_t) not Plate(i).Fallen"),
+    Game("trains", "uncontrollable", TRAINS, ONE_ON_THE_BRIDGE),
+    Game("trains", "controllable", TRAINS, ONE_ON_THE_BRIDGE),
+    Game("trains", "uncontrollable", TRAINS, "control: A<> Train(0).Bridge"),
+    Game("trains", "controllable", TRAINS, "control: A<> Train(0).Bridge"),
+]
+
+
+def rows(game: Game, timeout_s: float, memory_bytes: int) -> Iterator[tuple[int, checker.Answer]]:
+    """The answers by size, the last one stopped by a limit."""
+    size = 0
+    while True:
+        size = max(size + 1, size * 5 // 4)
+        model = checker.load(game.at(size))
+        answer = model.check(game.query, timeout_s=timeout_s, memory_bytes=memory_bytes)
+        yield size, answer
+        if answer.verdict == "unknown":
+            return
+
+
+def main() -> None:
+    """Prints a table for each game."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--gibibytes", type=float, default=4.0)
+    parser.add_argument("--family", choices=["cell", "trains"])
+    arguments = parser.parse_args()
+    memory_bytes = int(arguments.gibibytes * 2**30)
+    for game in GAMES:
+        if arguments.family not in (None, game.family):
+            continue
+        print(f"{game.family}, {game.variant}: {game.query}")
+        print("  size  verdict          explored      stored     seconds        MiB")
+        for size, answer in rows(game, arguments.seconds, memory_bytes):
+            print(
+                f"  {size:4}  {answer.stop or answer.verdict:<13}{answer.explored:12,}"
+                f"{answer.stored:12,}{answer.seconds:12.3f}{answer.peak_bytes / 2**20:11.1f}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
