@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import re
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -16,6 +14,7 @@ import click
 from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.files import write_files
 from ntagen.cli.models import load_model, pointing_to_explanations, show_warnings
+from ntagen.cli.progress import shown_progress
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
@@ -93,7 +92,7 @@ class _Outputs:
     "check",
     epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected, "
     "3 stopped by a limit or maybe, 4 run-time error in the model, 70 internal error "
-    "(a strategy or trace that fails its check is one).",
+    "(a strategy or trace that fails its check is one), 130 interrupted, with the counters so far.",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.option(
@@ -229,7 +228,7 @@ def command(
         if not as_json:
             _header(model_path, loaded.model)
         for query in todo:
-            with _progress(as_json) as shown:
+            with shown_progress(query.text, quiet=as_json) as report:
                 answer = loaded.model.check(
                     query.text,
                     search=search,
@@ -247,7 +246,7 @@ def command(
                     wanted_trace=wanted_trace or "any",
                     certificate=certificate is not None,
                     folder=query.folder,
-                    progress=shown,
+                    progress=report,
                 )
             if answer.verified is False:
                 click.echo("\n".join([query.text, *answer.verification]), err=True)
@@ -389,25 +388,6 @@ def _edge(edge: dict[str, Any]) -> str:
     )
     arrow = f"{edge['process']}.{edge['source']} -> {edge['target']}"
     return f"{arrow}  {{ {labels} }}" if labels else arrow
-
-
-@contextlib.contextmanager
-def _progress(as_json: bool) -> Iterator[Any]:
-    """What is shown while a query takes long: a line that is overwritten, on a terminal only."""
-    if as_json or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status("searching …") as status:
-
-        def show(explored: int, stored: int, waiting: int, size: int) -> None:
-            status.update(
-                f"{explored:,} explored, {stored:,} stored, {waiting:,} waiting, "
-                f"{size / 2**20:.0f} MiB"
-            )
-
-        yield show
 
 
 def _write_evidence(
