@@ -25,6 +25,7 @@ from ntagen.model.facts import (
     Variable,
     queries_from,
 )
+from ntagen.runs import Run, runs_of
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 SearchOrder = Literal["bfs", "dfs", "random"]
@@ -175,6 +176,21 @@ class Answer:
     def plans_json(self) -> str | None:
         """The plans as JSON text with every edge in full; ``None`` without plans."""
         return self._raw.plans_json()
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """The runs with exact times that the traces show: one, or for values one a value.
+
+        Empty without a trace, with ``trace=False``, and where no exact times were found (the end
+        of `trace_text` says why).
+        """
+        traces = self.trace_json()
+        return () if traces is None else runs_of(json.loads(traces))
+
+    @property
+    def trace(self) -> Run | None:
+        """The first of `runs`; ``None`` if there is none."""
+        return next(iter(self.runs), None)
 
     def trace_text(self) -> str | None:
         """The witness, counterexample or way to the failure as UPPAAL prints it, if any.

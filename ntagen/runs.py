@@ -1,0 +1,149 @@
+"""Runs with exact times: what the traces of answers show.
+
+Times are fractions of the model's unit of time. A run is a list of states and, between them, how
+long it waits and which edges are taken; it may end in a loop, or by waiting for ever.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+__all__ = ["Edge", "Run", "State", "Step", "runs_of"]
+
+End = Literal["after", "loop", "waits", "stuck"]
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """An edge that is taken.
+
+    Attributes:
+        process: The process, for example ``Train(1)``.
+        source: The location that it leaves.
+        target: The location that it enters.
+        sync: The synchronisation as written, for example ``go!``; empty for an internal edge.
+        guard: The guard as written.
+        update: The update as written.
+        select: The values of the select bindings.
+    """
+
+    process: str
+    source: str
+    target: str
+    sync: str
+    guard: str
+    update: str
+    select: dict[str, int]
+
+    def __str__(self) -> str:
+        label = f" [{self.sync}]" if self.sync else ""
+        return f"{self.process}.{self.source} -> {self.process}.{self.target}{label}"
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A state with exact clock values.
+
+    Attributes:
+        locations: The location of each process.
+        variables: The value of each variable; parts of arrays and structs by names such as
+            ``a[2].x``.
+        clocks: The value of each clock.
+    """
+
+    locations: dict[str, str]
+    variables: dict[str, int | float]
+    clocks: dict[str, Fraction]
+
+    def __str__(self) -> str:
+        places = " ".join(f"{process}.{place}" for process, place in self.locations.items())
+        values = {**self.variables, **self.clocks}.items()
+        return " ".join([f"( {places} )", *(f"{name}={value}" for name, value in values)])
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A step of a run: it waits for `delay`, then takes the edges, the sender's first."""
+
+    delay: Fraction
+    edges: tuple[Edge, ...]
+
+    def __str__(self) -> str:
+        return f"wait {self.delay}, then {', '.join(map(str, self.edges))}"
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run with exact times.
+
+    Attributes:
+        states: The states, each when it is entered; the first is the initial one.
+        steps: What happens between them, one less.
+        end: How it ends: ``after`` the last delay; in a ``loop``; it ``waits`` for ever; or it is
+            ``stuck``: nothing is possible any more.
+        loop: The index of the state that the last one leads back to, if it ends in a loop.
+        delay: How long it waits in the last state; ``end`` is about the moment after that.
+        title: What it shows, if an answer has several.
+    """
+
+    states: tuple[State, ...]
+    steps: tuple[Step, ...]
+    end: End
+    loop: int | None = None
+    delay: Fraction = Fraction(0)
+    title: str | None = None
+
+    @property
+    def duration(self) -> Fraction:
+        """The time from the beginning to the end."""
+        return sum((step.delay for step in self.steps), self.delay)
+
+    def __str__(self) -> str:
+        lines = [f"{self.title}:"] if self.title else []
+        for index, state in enumerate(self.states):
+            lines.append(f"{index}: {state}")
+            lines += [f"   {step}" for step in self.steps[index : index + 1]]
+        if self.delay:
+            lines.append(f"   wait {self.delay}")
+        last = {
+            "after": [],
+            "loop": [f"   as state {self.loop} from here on, for ever"],
+            "waits": ["   time passes for ever"],
+            "stuck": ["   nothing is possible any more"],
+        }
+        return "\n".join([*lines, *last[self.end]])
+
+
+def runs_of(traces: dict[str, Any]) -> tuple[Run, ...]:
+    """The runs with exact times in a trace as the engine writes it."""
+    found = traces.get("traces", [traces])
+    return tuple(_run(one["run"], one.get("title")) for one in found if "run" in one)
+
+
+def _run(raw: dict[str, Any], title: str | None) -> Run:
+    unit = raw["ticks_per_unit"]
+    steps = raw["steps"]
+    end = raw["end"]
+    return Run(
+        states=tuple(_state(state, unit) for state in raw["states"][: len(steps) + 1]),
+        steps=tuple(
+            Step(Fraction(step["wait"], unit), tuple(_edge(edge) for edge in step["edges"]))
+            for step in steps
+        ),
+        end=end["kind"],
+        loop=end.get("state"),
+        delay=Fraction(end.get("wait", 0), unit),
+        title=title,
+    )
+
+
+def _state(raw: dict[str, Any], unit: int) -> State:
+    clocks = {name: Fraction(ticks, unit) for name, ticks in raw["clocks"].items()}
+    return State(raw["locations"], raw["variables"], clocks)
+
+
+def _edge(raw: dict[str, Any]) -> Edge:
+    names = ("process", "source", "target", "sync", "guard", "update", "select")
+    return Edge(*(raw[name] for name in names))

@@ -1,0 +1,60 @@
+"""Runs with exact times as Python values."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from ntagen import checker
+
+LAMP = """
+clock x, y;
+process Lamp() {
+  state Off, On { x < 2 };
+  init Off;
+  trans Off -> On { select k : int[1,2]; guard y >= 3; assign x = 0; },
+        On -> Off { guard x > 1; assign y = 0; };
+}
+system Lamp;
+"""
+
+
+def test_trace_has_states_and_steps_with_exact_times() -> None:
+    answer = checker.load(LAMP).check("E<> Lamp.Off and y < 1 and x > 1")
+    assert answer.verified
+    run = answer.trace
+    assert run is not None
+    assert run.end == "after"
+    assert [step.delay for step in run.steps] == [3, Fraction(3, 2)]
+    assert run.duration == Fraction(9, 2)
+    assert run.states[-1].clocks == {"x": Fraction(3, 2), "y": 0}
+    edge = run.steps[0].edges[0]
+    assert (edge.process, edge.source, edge.target, edge.select) == ("Lamp", "Off", "On", {"k": 1})
+    assert str(run) == (
+        "0: ( Lamp.Off ) x=0 y=0\n"
+        "   wait 3, then Lamp.Off -> Lamp.On\n"
+        "1: ( Lamp.On ) x=0 y=3\n"
+        "   wait 3/2, then Lamp.On -> Lamp.Off\n"
+        "2: ( Lamp.Off ) x=3/2 y=0"
+    )
+
+
+def test_lasso_leads_back_to_a_state() -> None:
+    run = checker.load(LAMP).check("E[] (Lamp.Off and y <= 3) or Lamp.On").trace
+    assert run is not None
+    assert run.end == "loop"
+    assert run.loop is not None
+    assert run.states[run.loop].locations == run.states[-1].locations
+    assert str(run).endswith(f"as state {run.loop} from here on, for ever")
+
+
+def test_values_have_a_run_each() -> None:
+    answer = checker.load(LAMP).check("bounds{Lamp.On}: x")
+    assert [run.title for run in answer.runs] == ["least x", "greatest x"]
+    assert answer.runs[0].states[-1].clocks["x"] == 0
+
+
+def test_verdict_without_witness_has_no_trace() -> None:
+    answer = checker.load(LAMP).check("A[] Lamp.On imply x < 2")
+    assert (answer.verdict, answer.trace, answer.runs) == ("satisfied", None, ())
+    found = checker.load(LAMP).check("E<> Lamp.On", trace=False)
+    assert (found.verdict, found.trace) == ("satisfied", None)
