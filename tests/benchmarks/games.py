@@ -4,9 +4,9 @@
 
 *cell* is a production cell: plates come on a belt, an arm takes each to a press that is ready when
 it likes, and a plate that waits too long falls. *trains* is a gate in front of a bridge: trains
-that come can be stopped for a while. In the *uncontrollable* variants the environment says when plates
-and trains come, in the *controllable* ones the controller does. Each game grows, by a quarter once
-it is large, until the time or the memory is not enough; a line is printed for each size.
+that come can be stopped for a while. In the *uncontrollable* variants the environment says when
+plates and trains come, in the *controllable* ones the controller does. Each game grows, by a
+quarter once it is large, until the time or the memory is not enough. There is a line for each size.
 """
 
 from __future__ import annotations

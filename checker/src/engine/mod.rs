@@ -453,13 +453,25 @@ impl LoadedModel {
         } else {
             None
         };
+        let has_observations = matches!(
+            query.kind,
+            QueryKind::Control {
+                observations: Some(_),
+                ..
+            }
+        );
         let diagnostic = if let Some(kind) = kind.or(under) {
             Diagnostic::new(
                 codes::UNSUPPORTED_QUERY,
                 query.span,
                 format!("{kind} are not supported"),
             )
-            .help("supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, E<> control: and control_t*:")
+            .help(if has_observations {
+                "such a game is played on sets of states that the observations do not tell apart, which the engine does not \
+                 build; ask without them, for a controller that sees everything"
+            } else {
+                "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, E<> control: and control_t*:"
+            })
         } else if let Some(construct) = construct {
             Diagnostic::new(
                 codes::UNSUPPORTED_CONSTRUCT,
