@@ -450,6 +450,22 @@ proptest! {
     }
 
     #[test]
+    fn future_within_constraints_is_that_of_delays_that_keep_them(
+        (zone, within) in dimensions().prop_flat_map(|n| (zones(n), constraints(n, 4))),
+    ) {
+        let dimension = zone.dimension();
+        let mut entry = zone.bounds().to_vec();
+        prop_assume!(dbm::constrain_all(&mut entry, dimension, &within));
+        let mut expected = entry.clone();
+        clocks::up(&mut expected, dimension);
+        for one in &within {
+            dbm::constrain(&mut expected, dimension, one.left, one.right, one.bound);
+        }
+        clocks::up_within(&mut entry, dimension, &within);
+        prop_assert_eq!(entry, expected);
+    }
+
+    #[test]
     fn past_reaches_the_zone_by_a_delay(zone in dimensions().prop_flat_map(zones), seed: u64) {
         let mut past = zone.clone();
         past.down(&ClockSet::EMPTY);

@@ -100,6 +100,14 @@ impl Bound {
         }
     }
 
+    /// The sum of two bounds that are infinite or far from the ends of their range: as `+`, and without a branch.
+    #[inline]
+    pub(super) const fn plus(self, other: Bound) -> Bound {
+        let sum = (self.0 & !1).wrapping_add(other.0 & (self.0 | !1));
+        let is_infinite = -((self.0 == i32::MAX) as i32) | -((other.0 == i32::MAX) as i32);
+        Bound(sum & !is_infinite | i32::MAX & is_infinite)
+    }
+
     /// The lesser of `current` and `via + rest`; `via` must be finite.
     ///
     /// Both conditions are one mask, since vectors without a select would otherwise blend twice.

@@ -17,7 +17,7 @@
     reason = "the dimension is a constant at some calls"
 )]
 
-use super::dbm::{Constraint, constrain, is_empty, set_empty};
+use super::dbm::{Constraint, UpperBounds, constrain, is_empty, set_empty};
 use super::rows::{for_small_dimension, rows, rows_mut};
 use super::{Bound, ClockSet};
 
@@ -53,6 +53,17 @@ pub fn up(zone: &mut [Bound], dimension: usize) {
         .step_by(dimension)
         .skip(1)
         .for_each(|bound| *bound = Bound::INFINITY);
+}
+
+/// Lets time pass as long as the constraints hold, all of which the zone must satisfy.
+///
+/// Only upper bounds end a delay, and of the closed future within them only upper bounds are new: the least that a bound of
+/// another clock and the difference to it allow. Differences were possible before and stay so. Cost: O(n) for each upper bound.
+pub fn up_within(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) {
+    let upper_bounds = UpperBounds::new(dimension, constraints);
+    for row in rows_mut(zone, dimension).skip(1) {
+        row[0] = upper_bounds.least_over(row);
+    }
 }
 
 /// The least zone around the future of the zone when the clocks of `stopped` do not move.

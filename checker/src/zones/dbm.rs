@@ -180,15 +180,83 @@ fn tighten(zone: &mut [Bound], left: usize, right: usize, bound: Bound, dimensio
 
 /// Intersects the zone with all constraints; returns whether something is left.
 pub fn constrain_all(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) -> bool {
-    constraints.iter().all(|constraint| {
-        constrain(
-            zone,
-            dimension,
-            constraint.left,
-            constraint.right,
-            constraint.bound,
-        )
-    })
+    let tightens =
+        |zone: &[Bound], one: &Constraint| one.bound < zone[one.left * dimension + one.right];
+    let mut upper_bounds = 0;
+    for constraint in constraints {
+        if constraint.right == 0 && constraint.left != 0 {
+            upper_bounds += usize::from(tightens(zone, constraint));
+        } else if !constrain_by(zone, dimension, constraint) {
+            return false;
+        }
+    }
+    let mut upper = constraints
+        .iter()
+        .filter(|constraint| constraint.right == 0 && constraint.left != 0);
+    match upper_bounds {
+        0 => true,
+        1 => upper.all(|constraint| constrain_by(zone, dimension, constraint)),
+        _ => constrain_above(zone, dimension, constraints),
+    }
+}
+
+fn constrain_by(zone: &mut [Bound], dimension: usize, constraint: &Constraint) -> bool {
+    let Constraint { left, right, bound } = *constraint;
+    constrain(zone, dimension, left, right, bound)
+}
+
+/// Intersects the zone with all upper bounds among the constraints at once; returns whether something is left.
+///
+/// All the new bounds lead to the reference clock, so a path that uses two of them passes it twice and is no shorter than
+/// without what lies between. Each row is closed again by its new upper bound and the lower bounds.
+fn constrain_above(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) -> bool {
+    let upper_bounds = UpperBounds::new(dimension, constraints);
+    let (lower_bounds, others) = zone.split_at_mut(dimension);
+    if upper_bounds.least_over(lower_bounds) < Bound::LE_ZERO {
+        set_empty(zone);
+        return false;
+    }
+    for row in rows_mut(others, dimension) {
+        let bound = upper_bounds.least_over(row);
+        if bound < row[0] {
+            relax_row(row, bound, lower_bounds);
+        }
+    }
+    true
+}
+
+/// The upper bounds of clocks among some constraints.
+pub(super) struct UpperBounds {
+    /// By clock; infinite without one, and that of the reference clock.
+    bounds: [Bound; ClockSet::CAPACITY],
+    dimension: usize,
+}
+
+impl UpperBounds {
+    pub(super) fn new(dimension: usize, constraints: &[Constraint]) -> UpperBounds {
+        let mut bounds = [Bound::INFINITY; ClockSet::CAPACITY];
+        for constraint in constraints
+            .iter()
+            .filter(|constraint| constraint.right == 0)
+        {
+            let bound = &mut bounds[constraint.left];
+            *bound = (*bound).min(constraint.bound);
+        }
+        bounds[0] = Bound::INFINITY;
+        UpperBounds { bounds, dimension }
+    }
+
+    /// The least upper bound on the clock of a row that follows from the differences in it to the clocks with upper bounds,
+    /// its own among them: its bound against itself is `<= 0`.
+    #[inline]
+    pub(super) fn least_over(&self, row: &[Bound]) -> Bound {
+        let bounds = &self.bounds[..self.dimension];
+        let sums = row
+            .iter()
+            .zip(bounds)
+            .map(|(difference, bound)| difference.plus(*bound));
+        sums.fold(Bound::INFINITY, Bound::min)
+    }
 }
 
 /// Whether some valuation of the zone satisfies the constraint.

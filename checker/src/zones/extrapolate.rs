@@ -44,6 +44,14 @@ pub struct Ceilings {
     columns: Box<[Bound]>,
 }
 
+/// What one clock is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ceiling {
+    clock: usize,
+    row: Bound,
+    column: Bound,
+}
+
 impl Ceilings {
     /// The ceilings of clocks that nothing is compared with.
     pub fn none(dimension: usize) -> Ceilings {
@@ -112,6 +120,27 @@ impl Ceilings {
         for (column, other) in self.columns.iter_mut().zip(&other.columns) {
             *column = (*column).min(*other);
         }
+    }
+
+    /// Raises the ceilings of one clock: as [`Ceilings::raise`].
+    #[inline]
+    pub fn raise_one(&mut self, ceiling: &Ceiling) {
+        let (row, column) = (
+            &mut self.rows[ceiling.clock],
+            &mut self.columns[ceiling.clock],
+        );
+        *row = (*row).max(ceiling.row);
+        *column = (*column).min(ceiling.column);
+    }
+
+    /// The ceilings of the clocks that are compared with anything.
+    pub fn each(&self) -> Vec<Ceiling> {
+        let ceiling = |clock: usize| Ceiling {
+            clock,
+            row: self.rows[clock],
+            column: self.columns[clock],
+        };
+        self.compared().iter().map(ceiling).collect()
     }
 
     /// The same with M, the greater of L and U, for both.
