@@ -133,7 +133,8 @@ class Answer:
         warnings: What the user should know about the query, one text a warning.
         stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
         explored: States whose successors were computed.
-        stored: States that were stored.
+        stored: States that are stored at the end; one that a larger zone took the place of does
+            not count.
         seconds: Seconds of the search alone.
         load_seconds: Seconds of loading the model and compiling its code.
         peak_bytes: The greatest number of bytes that states and tables took.

@@ -15,7 +15,7 @@
 use crate::ir::{
     AssignedValue, ClockAssignment, ClockAtom, ClockRange, Edge, Network, Process, Update,
 };
-use crate::zones::extrapolate::Ceilings;
+use crate::zones::extrapolate::{Ceiling, Ceilings};
 use crate::zones::{Bound, Federation, extrapolate};
 
 use super::differences::Differences;
@@ -39,12 +39,13 @@ pub enum Abstraction {
 /// The bounds of all locations.
 #[derive(Clone, Debug)]
 pub struct ClockBounds {
-    /// By process and location; `None` where nothing is bounded.
-    ceilings: Vec<Vec<Option<Ceilings>>>,
+    /// By process and location: the clocks that have bounds there.
+    ceilings: Vec<Vec<Vec<Ceiling>>>,
     /// Bounds that hold everywhere: those of queries.
     everywhere: Ceilings,
     abstraction: Abstraction,
     differences: Differences,
+    greatest: i32,
 }
 
 /// Lower and upper bounds of all clocks in all locations of a process.
@@ -77,15 +78,26 @@ impl ClockBounds {
         }
         let ceilings = tables
             .iter()
-            .map(|table| table.iter().map(|bounds| ceilings_of(bounds)).collect())
+            .map(|table| {
+                let tables = table.iter();
+                tables.map(|bounds| to_ceilings(bounds).each()).collect()
+            })
             .collect();
+        let all = tables.iter().flatten().flatten().chain(&everywhere);
+        let greatest = all.map(|bound| bound.0.max(bound.1)).max().unwrap_or(0);
         let everywhere = to_ceilings(&everywhere);
         ClockBounds {
             ceilings,
             everywhere,
             abstraction,
             differences,
+            greatest: greatest.max(0),
         }
+    }
+
+    /// The greatest constant that a clock is compared with; 0 without any.
+    pub fn greatest(&self) -> i32 {
+        self.greatest
     }
 
     /// Whether zones are to be cut by [`ClockBounds::split`].
@@ -111,8 +123,8 @@ impl ClockBounds {
     fn ceilings_into(&self, words: &[i32], scratch: &mut Ceilings) {
         scratch.clone_from(&self.everywhere);
         for (locations, &location) in self.ceilings.iter().zip(words) {
-            if let Some(ceilings) = &locations[location as usize] {
-                scratch.raise(ceilings);
+            for ceiling in &locations[location as usize] {
+                scratch.raise_one(ceiling);
             }
         }
     }
@@ -143,13 +155,6 @@ impl ClockBounds {
     pub fn everywhere(&self) -> &Ceilings {
         &self.everywhere
     }
-}
-
-fn ceilings_of(bounds: &[(i32, i32)]) -> Option<Ceilings> {
-    bounds
-        .iter()
-        .any(|bound| *bound != (NONE, NONE))
-        .then(|| to_ceilings(bounds))
 }
 
 fn to_ceilings(bounds: &[(i32, i32)]) -> Ceilings {

@@ -33,6 +33,8 @@ pub struct Symbolic<'a> {
     is_approximate: bool,
     ceilings: Ceilings,
     pub(super) inner_moves: Moves,
+    /// The invariants of the state that [`Symbolic::take`] entered last.
+    invariant: Vec<Constraint>,
 }
 
 /// What a move does to clocks, from the source's zone to the zone on entry.
@@ -68,6 +70,7 @@ impl<'a> Symbolic<'a> {
             ceilings: bounds.everywhere().clone(),
             bounds,
             inner_moves: Moves::default(),
+            invariant: Vec::new(),
             stepper,
         }
     }
@@ -88,6 +91,11 @@ impl<'a> Symbolic<'a> {
     /// The number of clocks, the reference clock included.
     pub fn dimension(&self) -> usize {
         self.dimension
+    }
+
+    /// The greatest constant that a clock is compared with.
+    pub fn greatest_constant(&self) -> i32 {
+        self.bounds.greatest()
     }
 
     /// Whether some zone so far may contain more than what is reachable: delays of at least two running clocks beside
@@ -173,6 +181,61 @@ impl<'a> Symbolic<'a> {
         Ok(())
     }
 
+    /// Whether [`Symbolic::take`] and [`Symbolic::pass_time`] can take the move: the state that it leads to has one zone.
+    pub fn stays_whole(&self, one: MoveRef<'_>) -> bool {
+        one.excluded().next().is_none() && !self.has_barriers() && !self.bounds.splits()
+    }
+
+    /// Takes a move on words and zone at once; returns whether it is possible. If it is not, neither means anything, and no
+    /// update has run unless the guards leave something of the zone.
+    pub fn take(
+        &mut self,
+        one: MoveRef<'_>,
+        words: &mut [i32],
+        zone: &mut [Bound],
+    ) -> Result<bool, Failure> {
+        let dimension = self.dimension;
+        if !add_constraints(one.constraints, &mut self.invariant)?
+            || !dbm::constrain_all(zone, dimension, &self.invariant)
+        {
+            return Ok(false);
+        }
+        for assignment in self.stepper.fire(one.parts, words)? {
+            if !clocks::assign(zone, dimension, &[to_assignment(assignment)?]) {
+                return Ok(false);
+            }
+        }
+        Ok(match self.stepper.invariants(words)? {
+            Some(emitted) => {
+                add_constraints(emitted, &mut self.invariant)?
+                    && dbm::constrain_all(zone, dimension, &self.invariant)
+            }
+            None => false,
+        })
+    }
+
+    /// Lets time pass, if it may, in the state that [`Symbolic::take`] entered last.
+    pub fn pass_time(&mut self, words: &mut [i32], zone: &mut [Bound]) -> Result<(), Failure> {
+        if self.dimension == 1 {
+            return Ok(());
+        }
+        let may_delay = self.may_delay(words)?;
+        let invariant = std::mem::take(&mut self.invariant);
+        let result = self.delay(words, may_delay, &invariant, zone);
+        self.invariant = invariant;
+        result
+    }
+
+    /// Whether each constraint of the guards, for itself, leaves something of the zone.
+    pub fn may_satisfy(&self, one: MoveRef<'_>, zone: &[Bound]) -> Result<bool, Failure> {
+        for emitted in one.constraints {
+            if !dbm::satisfies(zone, self.dimension, &to_constraint(emitted)?) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
     /// The clock part of all invariants; `None` if they cannot hold.
     pub fn invariant(&mut self, words: &mut [i32]) -> Result<Option<Vec<Constraint>>, Failure> {
         match self.stepper.invariants(words)? {
@@ -214,6 +277,11 @@ impl<'a> Symbolic<'a> {
             self.is_approximate |= !stopped.is_empty() && self.dimension - 1 > stopped.len() + 1;
             clocks::up_stopped(zone, self.dimension, &stopped);
         } else {
+            let holds = |one: &Constraint| zone[one.left * self.dimension + one.right] <= one.bound;
+            if invariant.iter().all(holds) {
+                clocks::up_within(zone, self.dimension, invariant);
+                return Ok(());
+            }
             clocks::up(zone, self.dimension);
         }
         dbm::constrain_all(zone, self.dimension, invariant);
@@ -375,6 +443,20 @@ pub(super) fn to_constraints(
     Ok(add_constraints(emitted, &mut constraints)?.then_some(constraints))
 }
 
+/// An emitted constraint as one on zones, which may compare a clock with itself.
+fn to_constraint(emitted: &EmittedConstraint) -> Result<Constraint, Failure> {
+    let bound = if emitted.strict {
+        Bound::strict(emitted.bound)
+    } else {
+        Bound::weak(emitted.bound)
+    };
+    Ok(Constraint {
+        left: emitted.left.0 as usize,
+        right: emitted.right.0 as usize,
+        bound: bound.ok_or(Failure::ClockLimit(emitted.bound))?,
+    })
+}
+
 /// Replaces `constraints` by the emitted ones; returns false if one of them never holds.
 fn add_constraints(
     emitted: &[EmittedConstraint],
@@ -382,19 +464,10 @@ fn add_constraints(
 ) -> Result<bool, Failure> {
     constraints.clear();
     for one in emitted {
-        let bound = if one.strict {
-            Bound::strict(one.bound)
-        } else {
-            Bound::weak(one.bound)
-        };
-        let bound = bound.ok_or(Failure::ClockLimit(one.bound))?;
-        if one.left != one.right {
-            constraints.push(Constraint {
-                left: one.left.0 as usize,
-                right: one.right.0 as usize,
-                bound,
-            });
-        } else if bound < Bound::LE_ZERO {
+        let constraint = to_constraint(one)?;
+        if constraint.left != constraint.right {
+            constraints.push(constraint);
+        } else if constraint.bound < Bound::LE_ZERO {
             return Ok(false);
         }
     }

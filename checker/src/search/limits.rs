@@ -7,7 +7,7 @@
 pub struct Counters {
     /// States whose successors were computed.
     pub explored: u64,
-    /// States that were stored.
+    /// States that are stored: those that one with a larger zone took the place of do not count.
     pub stored: u64,
     /// Stored states that wait for their successors to be computed.
     pub waiting: u64,

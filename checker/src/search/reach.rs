@@ -2,32 +2,32 @@
 //!
 //! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one with the same words contains
 //! its zone, and stored ones that a new one contains are dropped from the waiting list. States with a committed location
-//! are explored where they arise and not stored: no time passes in them, and chains of them are short. A chain that is not
-//! short ([`LONGEST_CHAIN`]) or fans out ([`MOST_UNSTORED`]) is stored after all, so that loops of committed locations end.
+//! are explored where they arise, and stored only if they have a choice, so that choices one after the other do not multiply.
+//! The others are links of a chain; those that were explored last are remembered ([`RecentStates`]) and not explored again.
+//! Chains that are not short ([`LONGEST_CHAIN`], [`MOST_AT_ONCE`]) are stored after all, so that loops of them end.
 //!
 //! Each stored state remembers its parent and the moves from it, so that a trace is found by taking the moves again.
 //!
-//! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 3; G. Behrmann, J. Bengtsson, A. David,
-//! K. G. Larsen, P. Pettersson, W. Yi, "UPPAAL Implementation Secrets", 2002 (one list for passed and waiting states).
+//! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 3.
 
 use std::collections::VecDeque;
 
+use crate::ir::Urgency;
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::dbm::Constraint;
-use crate::zones::{Zone, dbm};
+use crate::zones::{Bound, Zone};
 
 use super::goal::{Goal, Look, Visited};
 use super::limits::{Counters, StopReason, Watch};
+use super::passed::{PassedList, Stored};
+use super::recent::RecentStates;
 use super::retrace::{self, Step};
-use super::store::{DiscreteId, StateStore};
-use super::zone_table::{ZoneId, ZoneTable};
 
-/// Committed states that are explored one below the other without being stored.
+/// Committed states that are explored one below the other without waiting.
 const LONGEST_CHAIN: usize = 64;
 
-/// Committed states that are explored below one stored state without being stored; those that follow are stored, so that
-/// choices in loops of committed locations do not multiply.
-const MOST_UNSTORED: u64 = 256;
+/// Committed states that are explored below one stored state without waiting.
+const MOST_AT_ONCE: u64 = 4096;
 
 /// States between two looks at the limits.
 const LOOK_EVERY: u64 = 256;
@@ -77,16 +77,16 @@ pub struct Trace {
     pub moves: Vec<Vec<Part>>,
 }
 
+/// How a stored state was reached.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    discrete: DiscreteId,
-    zone: ZoneId,
-    /// The next node with the same words.
-    next: u32,
     parent: u32,
-    path: (u32, u32),
-    is_covered: bool,
+    /// The only move from the parent; or, with [`MANY_STEPS`], where the number of moves stands in `paths`, and then they.
+    path: u32,
 }
+
+/// Marks a node to which several moves lead from its parent.
+const MANY_STEPS: u32 = 1 << 31;
 
 /// A state on the stack of unstored ones.
 #[derive(Debug)]
@@ -127,18 +127,21 @@ struct Search<'s, 'a> {
     goal: &'s mut dyn Goal,
     watch: &'s mut dyn Watch,
     order: Order,
-    store: StateStore,
-    zones: ZoneTable,
+    passed: PassedList,
+    /// The committed states that were explored last.
+    recent: RecentStates,
     nodes: Vec<Node>,
-    /// By discrete state: its first node.
-    heads: Vec<u32>,
     paths: Vec<Step>,
-    waiting: VecDeque<u32>,
+    waiting: VecDeque<Stored>,
     frames: Vec<Frame>,
     /// The moves from the node that is being explored to the state at hand.
     path: Vec<Step>,
     current: u32,
     entries: Vec<Zone>,
+    /// Whether some location is committed.
+    has_committed: bool,
+    /// The counters when the exploration of the current node began.
+    counters: Counters,
     explored: u64,
     /// The value of `explored` when the exploration of the current node began.
     explored_before: u64,
@@ -154,16 +157,20 @@ impl<'s, 'a> Search<'s, 'a> {
     ) -> Search<'s, 'a> {
         let network = symbolic.stepper.network();
         Search {
-            store: StateStore::new(network),
-            zones: ZoneTable::new(symbolic.dimension()),
+            passed: PassedList::new(network, symbolic.dimension(), symbolic.greatest_constant()),
+            recent: RecentStates::new(),
             nodes: Vec::new(),
-            heads: Vec::new(),
             paths: Vec::new(),
             waiting: VecDeque::new(),
             frames: Vec::new(),
             path: Vec::new(),
             current: NONE,
             entries: Vec::new(),
+            has_committed: network.processes.iter().any(|process| {
+                let mut locations = process.locations.iter();
+                locations.any(|location| location.urgency == Urgency::Committed)
+            }),
+            counters: Counters::default(),
             explored: 0,
             explored_before: 0,
             random: if let Order::Random(seed) = order {
@@ -183,13 +190,17 @@ impl<'s, 'a> Search<'s, 'a> {
     }
 
     fn own_counters(&self) -> Counters {
-        let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
-        let paths = self.paths.capacity() * size_of::<Step>() + self.waiting.capacity() * 4;
+        let nodes = self.nodes.len() * size_of::<Node>() + self.paths.len() * size_of::<Step>();
+        let waiting = self.waiting.capacity() * size_of::<Stored>();
         Counters {
             explored: self.explored,
-            stored: self.nodes.len() as u64,
+            stored: self.passed.len() as u64,
             waiting: self.waiting.len() as u64,
-            bytes: (self.store.bytes() + self.zones.bytes() + nodes + paths) as u64,
+            bytes: (self.passed.bytes()
+                + self.recent.bytes()
+                + self.symbolic.stepper.bytes()
+                + nodes
+                + waiting) as u64,
         }
     }
 
@@ -207,16 +218,16 @@ impl<'s, 'a> Search<'s, 'a> {
         }
         self.symbolic.extrapolate_all(&words, &mut zones);
         for zone in &zones {
-            self.add(&words, zone);
+            self.add_waiting(&words, zone.bounds());
         }
         let mut next_look = LOOK_EVERY;
-        while let Some(node) = self.next_node() {
-            if self.nodes[node as usize].is_covered {
+        while let Some(stored) = self.next_waiting() {
+            if self.passed.is_covered(stored) {
                 continue;
             }
-            self.current = node;
+            self.current = stored.node;
             let first = self.waiting.len();
-            match self.visit(node)? {
+            match self.visit(stored)? {
                 Visit::Done => {}
                 Visit::Found => return Ok(Outcome::Found(self.trace(true))),
                 Visit::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
@@ -233,7 +244,7 @@ impl<'s, 'a> Search<'s, 'a> {
         Ok(Outcome::Exhausted)
     }
 
-    fn next_node(&mut self) -> Option<u32> {
+    fn next_waiting(&mut self) -> Option<Stored> {
         match self.order {
             Order::BreadthFirst => self.waiting.pop_front(),
             Order::DepthFirst | Order::Random(_) => self.waiting.pop_back(),
@@ -259,30 +270,26 @@ impl<'s, 'a> Search<'s, 'a> {
     }
 
     fn look(&mut self, words: &mut [i32], zone: &Zone) -> Result<Look, Failure> {
-        let counters = self.own_counters();
         self.goal.look(Visited {
             symbolic: self.symbolic,
             words,
             zone,
-            counters,
+            counters: self.counters,
             watch: self.watch,
         })
     }
 
     /// Explores a stored state and, below it, all committed states.
-    fn visit(&mut self, node: u32) -> Result<Visit, Failure> {
+    fn visit(&mut self, stored: Stored) -> Result<Visit, Failure> {
         self.path.clear();
         self.explored_before = self.explored;
-        let Node { discrete, zone, .. } = self.nodes[node as usize];
+        self.counters = self.own_counters();
         let mut frames = std::mem::take(&mut self.frames);
         if frames.is_empty() {
             frames.push(self.new_frame());
         }
-        self.store.load(discrete, &mut frames[0].words);
-        frames[0]
-            .zone
-            .bounds_mut()
-            .copy_from_slice(self.zones.get(zone));
+        let Frame { words, zone, .. } = &mut frames[0];
+        self.passed.load(stored, words, zone.bounds_mut());
         let result = self.visit_frames(&mut frames);
         self.frames = frames;
         result
@@ -326,8 +333,12 @@ impl<'s, 'a> Search<'s, 'a> {
                 Taken::Found => return Ok(Visit::Found),
                 Taken::Stopped(reason) => return Ok(Visit::Stopped(reason)),
                 Taken::Down => {
-                    depth += 1;
-                    self.open(&mut frames[depth])?;
+                    self.open(&mut frames[depth + 1])?;
+                    if self.is_link_or_new(&frames[depth + 1]) {
+                        depth += 1;
+                    } else {
+                        self.path.pop();
+                    }
                 }
             }
         }
@@ -339,6 +350,16 @@ impl<'s, 'a> Search<'s, 'a> {
         self.symbolic.moves(&mut frame.words, &mut frame.moves)
     }
 
+    /// Stores a committed state that has a choice; returns false if a stored state contains it.
+    fn is_link_or_new(&mut self, frame: &Frame) -> bool {
+        if frame.moves.len() < 2 {
+            return true;
+        }
+        let added = self.add(&frame.words, frame.zone.bounds());
+        self.explored -= u64::from(added.is_none());
+        added.is_some()
+    }
+
     /// Takes the next move of `source`; a committed target is left in `target` to be explored at once.
     fn take_next(
         &mut self,
@@ -348,11 +369,24 @@ impl<'s, 'a> Search<'s, 'a> {
     ) -> Result<Taken, Failure> {
         let ordinal = source.next as u32;
         source.next += 1;
-        target.words.copy_from_slice(&source.words);
         let one = source.moves.get(ordinal as usize);
+        if self.symbolic.stays_whole(one) {
+            if !self.symbolic.may_satisfy(one, source.zone.bounds())? {
+                return Ok(Taken::Nothing);
+            }
+            target.words.copy_from_slice(&source.words);
+            let zone = target.zone.bounds_mut();
+            zone.copy_from_slice(source.zone.bounds());
+            if !self.symbolic.take(one, &mut target.words, zone)? {
+                return Ok(Taken::Nothing);
+            }
+            self.path.push(ordinal);
+            return self.enter_whole(target, depth);
+        }
         if !self.symbolic.is_enabled(one, source.zone.bounds())? {
             return Ok(Taken::Nothing);
         }
+        target.words.copy_from_slice(&source.words);
         let Some(effect) = self.symbolic.fire(one, &mut target.words)? else {
             return Ok(Taken::Nothing);
         };
@@ -365,13 +399,30 @@ impl<'s, 'a> Search<'s, 'a> {
         self.path.push(ordinal);
         let taken = self.enter(&effect.invariant, &mut entries, target, depth);
         self.entries = entries;
-        if let Ok(Taken::Nothing) = taken {
-            self.path.pop();
-        }
         taken
     }
 
-    /// Looks at the target of a move, whose words are in `target`, and stores it or leaves it there with its zone.
+    /// Looks at the target of a move, whose words and zone are in `target`, and stores it or leaves it there.
+    fn enter_whole(&mut self, target: &mut Frame, depth: usize) -> Result<Taken, Failure> {
+        let Frame { words, zone, .. } = target;
+        self.symbolic.pass_time(words, zone.bounds_mut())?;
+        let taken = match self.look(words, zone)? {
+            Look::Found => return Ok(Taken::Found),
+            Look::Stopped(reason) => Taken::Stopped(reason),
+            Look::Continue => {
+                self.symbolic.extrapolate(words, zone.bounds_mut());
+                if self.descends(words, depth) {
+                    return Ok(self.descend(words, zone.bounds()));
+                }
+                self.add_waiting(words, zone.bounds());
+                Taken::Nothing
+            }
+        };
+        self.path.pop();
+        Ok(taken)
+    }
+
+    /// As [`Search::enter_whole`], for the zones on entry before time passes, of which there may be several.
     fn enter(
         &mut self,
         invariant: &[Constraint],
@@ -389,70 +440,62 @@ impl<'s, 'a> Search<'s, 'a> {
             }
         }
         self.symbolic.extrapolate_all(&target.words, entries);
-        let descends = depth < LONGEST_CHAIN
-            && self.explored - self.explored_before < MOST_UNSTORED
-            && self.symbolic.stepper.is_committed(&target.words);
         if let [entry] = entries.as_slice()
-            && descends
+            && self.descends(&target.words, depth)
         {
             target.zone.bounds_mut().copy_from_slice(entry.bounds());
-            return Ok(Taken::Down);
+            return Ok(self.descend(&target.words, entry.bounds()));
         }
         for entry in &*entries {
-            self.add(&target.words, entry);
+            self.add_waiting(&target.words, entry.bounds());
         }
+        self.path.pop();
         Ok(Taken::Nothing)
     }
 
-    /// Stores a state and lets it wait, unless a stored one contains it.
-    fn add(&mut self, words: &[i32], zone: &Zone) {
-        let (discrete, is_new) = self.store.intern(words);
-        if is_new {
-            self.heads.push(NONE);
-        }
-        let id = self.zones.intern(zone.bounds());
-        if self.is_covered(discrete, id, zone) {
-            return;
-        }
-        let first = self.paths.len() as u32;
-        self.paths.extend_from_slice(&self.path);
-        let node = Node {
-            discrete,
-            zone: id,
-            next: self.heads[discrete.0 as usize],
-            parent: self.current,
-            path: (first, self.paths.len() as u32),
-            is_covered: false,
-        };
-        self.heads[discrete.0 as usize] = self.nodes.len() as u32;
-        self.waiting.push_back(self.nodes.len() as u32);
-        self.nodes.push(node);
+    /// Whether a state is to be explored at once and not stored.
+    fn descends(&self, words: &[i32], depth: usize) -> bool {
+        self.has_committed
+            && depth < LONGEST_CHAIN
+            && self.explored - self.explored_before < MOST_AT_ONCE
+            && self.symbolic.stepper.is_committed(words)
     }
 
-    /// Whether a stored state contains the new one; unlinks those that the new one contains.
-    fn is_covered(&mut self, discrete: DiscreteId, id: ZoneId, zone: &Zone) -> bool {
-        let mut previous = NONE;
-        let mut node = self.heads[discrete.0 as usize];
-        while node != NONE {
-            let Node {
-                zone: other, next, ..
-            } = self.nodes[node as usize];
-            if other == id || dbm::is_subset(zone.bounds(), self.zones.get(other)) {
-                return true;
-            }
-            if dbm::is_subset(self.zones.get(other), zone.bounds()) {
-                self.nodes[node as usize].is_covered = true;
-                if previous == NONE {
-                    self.heads[discrete.0 as usize] = next;
-                } else {
-                    self.nodes[previous as usize].next = next;
-                }
-            } else {
-                previous = node;
-            }
-            node = next;
+    /// Goes down to a committed state, unless it was explored lately.
+    fn descend(&mut self, words: &[i32], zone: &[Bound]) -> Taken {
+        let stored = self.passed.len();
+        if self.recent.enter(self.passed.pack(words), zone, stored) {
+            self.path.pop();
+            return Taken::Nothing;
         }
-        false
+        Taken::Down
+    }
+
+    /// Stores a state and lets it wait, unless a stored one contains it.
+    fn add_waiting(&mut self, words: &[i32], zone: &[Bound]) {
+        if let Some(stored) = self.add(words, zone) {
+            self.waiting.push_back(stored);
+        }
+    }
+
+    /// Stores a state with the way to it, unless a stored one contains it.
+    fn add(&mut self, words: &[i32], zone: &[Bound]) -> Option<Stored> {
+        let stored = self.passed.add(words, zone)?;
+        let path = if let [step] = *self.path
+            && step < MANY_STEPS
+        {
+            step
+        } else {
+            let first = self.paths.len() as u32;
+            self.paths.push(self.path.len() as u32);
+            self.paths.extend_from_slice(&self.path);
+            first | MANY_STEPS
+        };
+        self.nodes.push(Node {
+            parent: self.current,
+            path,
+        });
+        Some(stored)
     }
 
     /// The way to the state at hand: the parents of the current node, then the moves below it. The states are computed anew;
@@ -461,8 +504,14 @@ impl<'s, 'a> Search<'s, 'a> {
         let mut steps: Vec<Step> = self.path.iter().rev().copied().collect();
         let mut node = self.current;
         while node != NONE {
-            let Node { parent, path, .. } = self.nodes[node as usize];
-            steps.extend(self.paths[path.0 as usize..path.1 as usize].iter().rev());
+            let Node { parent, path } = self.nodes[node as usize];
+            if path < MANY_STEPS {
+                steps.push(path);
+            } else {
+                let first = (path - MANY_STEPS) as usize;
+                let length = self.paths[first] as usize;
+                steps.extend(self.paths[first + 1..=first + length].iter().rev());
+            }
             node = parent;
         }
         steps.reverse();

@@ -1,0 +1,463 @@
+//! Zones, each stored once, in as few bytes a bound as the widest one needs.
+//!
+//! Invariants:
+//! * Two zones get the same [`ZoneId`] exactly if their closed matrices are equal, that is, if they are the same set.
+//! * All matrices have entries of the same width: one byte until a bound does not fit, then two, then four. The order of
+//!   bounds is that of the entries, so inclusion is decided on the packed form.
+//! * A zone counts how often it is in use; after the last use its place is used again.
+//!
+//! Cost: packing and comparing touch each bound once, a vector of them at a time.
+
+use hashbrown::HashTable;
+
+use crate::zones::Bound;
+
+use super::store::{hash_bytes, spread, table_bytes};
+use super::zone_table::ZoneId;
+
+/// How many bytes a bound takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Width {
+    One,
+    Two,
+    Four,
+}
+
+/// A bound packed into `N` bytes; the greatest value stands for infinity.
+trait Entry<const N: usize>: Copy + Ord {
+    const INFINITY: Self;
+
+    /// The least value.
+    const LEAST: Self;
+
+    /// The lower bits of an encoded bound.
+    fn truncated(raw: i32) -> Self;
+
+    /// The encoded bound; meaningless for infinity.
+    fn raw(self) -> i32;
+
+    fn to_bytes(self) -> [u8; N];
+
+    fn of_bytes(bytes: [u8; N]) -> Self;
+}
+
+macro_rules! entry {
+    ($type:ty, $bytes:literal) => {
+        impl Entry<$bytes> for $type {
+            const INFINITY: $type = <$type>::MAX;
+            const LEAST: $type = <$type>::MIN;
+
+            fn truncated(raw: i32) -> $type {
+                raw as $type
+            }
+
+            fn raw(self) -> i32 {
+                self.into()
+            }
+
+            fn to_bytes(self) -> [u8; $bytes] {
+                self.to_le_bytes()
+            }
+
+            fn of_bytes(bytes: [u8; $bytes]) -> $type {
+                <$type>::from_le_bytes(bytes)
+            }
+        }
+    };
+}
+entry!(i8, 1);
+entry!(i16, 2);
+entry!(i32, 4);
+
+/// Packs a zone; returns whether all bounds fit.
+fn pack<T: Entry<N>, const N: usize>(zone: &[Bound], target: &mut [u8]) -> bool {
+    let (least, infinity) = (T::LEAST.raw(), T::INFINITY.raw());
+    let mut lost = 0;
+    for (bytes, bound) in target.as_chunks_mut::<N>().0.iter_mut().zip(zone) {
+        let raw = bound.raw();
+        let is_lost = raw < least || raw >= infinity && raw != i32::MAX;
+        lost |= i32::from(is_lost);
+        *bytes = T::truncated(raw.clamp(least, infinity)).to_bytes();
+    }
+    lost == 0
+}
+
+/// The sums of every eighth bound. A bound counts from the negated greatest one on, and infinity for one more than that.
+fn sums<T: Entry<N>, const N: usize>(matrix: &[u8], greatest: i32) -> [i32; 8] {
+    let mut sums = [0; 8];
+    let mut add = |entries: &[[u8; N]]| {
+        for (sum, bytes) in sums.iter_mut().zip(entries) {
+            let entry = T::of_bytes(*bytes);
+            let is_infinite = -i32::from(entry == T::INFINITY);
+            let counted = entry.raw().clamp(-greatest, greatest + 1);
+            *sum += counted & !is_infinite | (greatest + 1) & is_infinite;
+        }
+    };
+    let (blocks, rest) = matrix.as_chunks::<N>().0.as_chunks::<8>();
+    for block in blocks {
+        add(block);
+    }
+    add(rest);
+    sums
+}
+
+fn unpack<T: Entry<N>, const N: usize>(bytes: &[u8], zone: &mut [Bound]) {
+    for (bound, bytes) in zone.iter_mut().zip(bytes.as_chunks::<N>().0) {
+        let entry = T::of_bytes(*bytes);
+        *bound = if entry == T::INFINITY {
+            Bound::INFINITY
+        } else {
+            Bound::from_raw(entry.raw())
+        };
+    }
+}
+
+/// Whether no entry of the first matrix is greater than its counterpart.
+fn is_within<T: Entry<N>, const N: usize>(zone: &[u8], other: &[u8]) -> bool {
+    // Blocks are compared without a branch; most comparisons end in the first one.
+    const BLOCK_BYTES: usize = 32;
+    let exceeds = |block: &[u8], other: &[u8]| {
+        let entries = block.as_chunks::<N>().0.iter();
+        let pairs = entries.zip(other.as_chunks::<N>().0);
+        pairs.fold(0, |found, (entry, other)| {
+            found | u8::from(T::of_bytes(*entry) > T::of_bytes(*other))
+        }) != 0
+    };
+    let (blocks, rest) = zone.as_chunks::<BLOCK_BYTES>();
+    let (other_blocks, other_rest) = other.as_chunks::<BLOCK_BYTES>();
+    blocks
+        .iter()
+        .zip(other_blocks)
+        .all(|(block, other)| !exceeds(block, other))
+        && !exceeds(rest, other_rest)
+}
+
+/// A digest of a zone that grows with it: eight numbers of seven bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Signature([u32; 2]);
+
+impl Signature {
+    /// Whether a zone with this signature may be a subset of one with the other; false is certain.
+    #[inline]
+    pub(super) fn may_be_within(self, other: Signature) -> bool {
+        // No number borrows from its neighbour, and the eighth bit is left where it is not greater.
+        const EIGHTH_BITS: u64 = 0x8080_8080_8080_8080;
+        let difference = (other.bits() | EIGHTH_BITS) - self.bits();
+        difference & EIGHTH_BITS == EIGHTH_BITS
+    }
+
+    fn bits(self) -> u64 {
+        u64::from(self.0[0]) | u64::from(self.0[1]) << 32
+    }
+}
+
+/// Stored zones of one dimension.
+#[derive(Debug)]
+pub(super) struct PackedZones {
+    dimension: usize,
+    width: Width,
+    /// The matrices, one after the other.
+    bytes: Vec<u8>,
+    /// The matrix that was proposed last.
+    candidate: Vec<u8>,
+    /// By zone: how often it is in use.
+    uses: Vec<u32>,
+    free: Vec<u32>,
+    table: HashTable<u32>,
+    /// The greatest encoded bound that signatures tell from greater ones.
+    greatest: i32,
+    /// The factor from sums of bounds to the numbers of a signature, over 2^32.
+    scale: u64,
+}
+
+impl PackedZones {
+    /// An empty table of zones of this dimension, most of whose constants are at most `greatest`; signatures are best then.
+    pub(super) fn new(dimension: usize, greatest: i32) -> PackedZones {
+        let entries = (dimension * dimension).div_ceil(8) as i32;
+        // So that sums of so many bounds fit into a word.
+        let greatest = (2 * greatest.clamp(0, Bound::MAX_VALUE) + 1).min((1 << 29) / entries);
+        let most = i64::from(entries) * i64::from(2 * greatest + 1);
+        PackedZones {
+            dimension,
+            width: Width::One,
+            bytes: Vec::new(),
+            candidate: vec![0; dimension * dimension],
+            uses: Vec::new(),
+            free: Vec::new(),
+            table: HashTable::new(),
+            greatest,
+            scale: (127 << 32) / most as u64,
+        }
+    }
+
+    fn get(&self, id: u32) -> &[u8] {
+        of(&self.bytes, self.candidate.len(), id)
+    }
+
+    /// Makes a zone the candidate, which the following questions are about.
+    pub(super) fn propose(&mut self, zone: &[Bound]) {
+        while !self.pack(zone) {
+            self.widen();
+        }
+    }
+
+    /// The signature of the candidate.
+    pub(super) fn signature(&self) -> Signature {
+        let sums = match self.width {
+            Width::One => sums::<i8, 1>(&self.candidate, self.greatest),
+            Width::Two => sums::<i16, 2>(&self.candidate, self.greatest),
+            Width::Four => sums::<i32, 4>(&self.candidate, self.greatest),
+        };
+        let entries = self.dimension * self.dimension;
+        let number = |lane: usize| {
+            let least = -self.greatest * ((entries + 7 - lane) / 8) as i32;
+            (((sums[lane] - least) as u64 * self.scale) >> 32) as u32
+        };
+        let half =
+            |first: usize| (0..4).fold(0, |bits, lane| bits | number(first + lane) << (8 * lane));
+        Signature([half(0), half(4)])
+    }
+
+    fn pack(&mut self, zone: &[Bound]) -> bool {
+        match self.width {
+            Width::One => pack::<i8, 1>(zone, &mut self.candidate),
+            Width::Two => pack::<i16, 2>(zone, &mut self.candidate),
+            Width::Four => pack::<i32, 4>(zone, &mut self.candidate),
+        }
+    }
+
+    /// Whether a stored zone contains the candidate.
+    pub(super) fn contains_candidate(&self, id: ZoneId) -> bool {
+        self.is_within(&self.candidate, self.get(id.0))
+    }
+
+    /// Whether the candidate contains a stored zone.
+    pub(super) fn is_in_candidate(&self, id: ZoneId) -> bool {
+        self.is_within(self.get(id.0), &self.candidate)
+    }
+
+    fn is_within(&self, zone: &[u8], other: &[u8]) -> bool {
+        match self.width {
+            Width::One => is_within::<i8, 1>(zone, other),
+            Width::Two => is_within::<i16, 2>(zone, other),
+            Width::Four => is_within::<i32, 4>(zone, other),
+        }
+    }
+
+    /// Keeps the candidate, or counts one more use of it if it is stored.
+    pub(super) fn keep(&mut self) -> ZoneId {
+        let new_hash = hash(&self.candidate);
+        let is_candidate = |&id: &u32| self.get(id) == self.candidate;
+        if let Some(&id) = self.table.find(new_hash, is_candidate) {
+            self.uses[id as usize] += 1;
+            return ZoneId(id);
+        }
+        let size = self.candidate.len();
+        let id = if let Some(id) = self.free.pop() {
+            let first = id as usize * size;
+            self.bytes[first..first + size].copy_from_slice(&self.candidate);
+            self.uses[id as usize] = 1;
+            id
+        } else {
+            self.bytes.extend_from_slice(&self.candidate);
+            self.uses.push(1);
+            self.uses.len() as u32 - 1
+        };
+        let bytes = &self.bytes;
+        self.table
+            .insert_unique(new_hash, id, |&id| hash(of(bytes, size, id)));
+        ZoneId(id)
+    }
+
+    /// Gives up one use of a zone; without any it is forgotten. The candidate stays.
+    pub(super) fn release(&mut self, id: ZoneId) {
+        let uses = &mut self.uses[id.0 as usize];
+        *uses -= 1;
+        if *uses > 0 {
+            return;
+        }
+        let hash = hash(self.get(id.0));
+        let entry = self.table.find_entry(hash, |&other| other == id.0);
+        entry.expect("a zone in use is in the table").remove();
+        self.free.push(id.0);
+    }
+
+    /// Writes a stored zone.
+    pub(super) fn load(&self, id: ZoneId, zone: &mut [Bound]) {
+        let bytes = self.get(id.0);
+        match self.width {
+            Width::One => unpack::<i8, 1>(bytes, zone),
+            Width::Two => unpack::<i16, 2>(bytes, zone),
+            Width::Four => unpack::<i32, 4>(bytes, zone),
+        }
+    }
+
+    /// The bytes that the zones and their table take.
+    pub(super) fn bytes(&self) -> usize {
+        let ids = (self.uses.len() + self.free.capacity()) * size_of::<u32>();
+        self.bytes.len() + ids + table_bytes::<u32>(self.table.capacity())
+    }
+
+    /// Gives all matrices entries of twice as many bytes.
+    fn widen(&mut self) {
+        (self.bytes, self.width) = match self.width {
+            Width::One => (widened::<i8, i16, 1, 2>(&self.bytes), Width::Two),
+            Width::Two => (widened::<i16, i32, 2, 4>(&self.bytes), Width::Four),
+            Width::Four => unreachable!("every bound fits into four bytes"),
+        };
+        self.candidate.resize(2 * self.candidate.len(), 0);
+        let ids: Vec<u32> = self.table.drain().collect();
+        let (bytes, size) = (&self.bytes, self.candidate.len());
+        for id in ids {
+            self.table
+                .insert_unique(hash(of(bytes, size, id)), id, |&id| {
+                    hash(of(bytes, size, id))
+                });
+        }
+    }
+}
+
+fn of(bytes: &[u8], size: usize, id: u32) -> &[u8] {
+    &bytes[id as usize * size..][..size]
+}
+
+fn hash(matrix: &[u8]) -> u64 {
+    spread(hash_bytes(matrix))
+}
+
+fn widened<T: Entry<N>, W: Entry<M>, const N: usize, const M: usize>(bytes: &[u8]) -> Vec<u8> {
+    let entries = bytes.as_chunks::<N>().0.iter();
+    let widen = |bytes: &[u8; N]| {
+        let entry = T::of_bytes(*bytes);
+        if entry == T::INFINITY {
+            W::INFINITY.to_bytes()
+        } else {
+            W::truncated(entry.raw()).to_bytes()
+        }
+    };
+    entries.flat_map(widen).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::zones::{Zone, dbm};
+
+    /// Zones of three clocks with constants up to about `scale`, in a fixed order.
+    fn zones(scale: i32) -> Vec<Zone> {
+        let mut zones = Vec::new();
+        for index in 0..60_i32 {
+            let mut zone = Zone::universe(4);
+            let bound = |seed: i32| Bound::weak((index * seed) % 7 * scale / 7);
+            for clock in 1..4 {
+                let upper = bound(clock as i32 + 2).expect("a constant within the range");
+                zone.constrain(clock, index as usize % clock, upper);
+            }
+            zones.push(zone);
+        }
+        zones
+    }
+
+    type Kept = (ZoneId, Zone, Signature);
+
+    fn check_zones(packed: &mut PackedZones, zones: &[Zone], kept: &mut Vec<Kept>) {
+        for zone in zones {
+            packed.propose(zone.bounds());
+            let own = packed.signature();
+            for (id, other, signature) in &*kept {
+                let is_within = dbm::is_subset(zone.bounds(), other.bounds());
+                assert_eq!(packed.contains_candidate(*id), is_within);
+                let contains = dbm::is_subset(other.bounds(), zone.bounds());
+                assert_eq!(packed.is_in_candidate(*id), contains);
+                assert!(!is_within || own.may_be_within(*signature));
+                assert!(!contains || signature.may_be_within(own));
+            }
+            let id = packed.keep();
+            for (other_id, other, _) in &*kept {
+                assert_eq!(*other_id == id, other == zone);
+            }
+            kept.push((id, zone.clone(), own));
+        }
+        for (id, zone, _) in kept {
+            let mut loaded = Zone::zero(4);
+            packed.load(*id, loaded.bounds_mut());
+            assert_eq!(&loaded, zone);
+        }
+    }
+
+    #[test]
+    fn zones_stay_the_same_when_bounds_outgrow_their_width() {
+        let mut packed = PackedZones::new(4, 9);
+        let mut kept = Vec::new();
+        // Encoded, 63 is the greatest constant for one byte, 64 the first for two; 16383 and 16384 likewise.
+        for scale in [
+            9,
+            62 * 7 / 6,
+            64 * 7 / 6,
+            16_383 * 7 / 6,
+            16_384 * 7 / 6,
+            1_000_000,
+        ] {
+            check_zones(&mut packed, &zones(scale), &mut kept);
+        }
+        assert_eq!(packed.width, Width::Four);
+    }
+
+    #[test]
+    fn released_zones_are_forgotten_and_their_places_used_again() {
+        let mut packed = PackedZones::new(4, 9);
+        let mut kept = Vec::new();
+        check_zones(&mut packed, &zones(9), &mut kept);
+        let places = packed.uses.len();
+        for (id, ..) in kept.drain(..) {
+            packed.release(id);
+        }
+        assert!(packed.table.is_empty());
+        check_zones(&mut packed, &zones(10), &mut kept);
+        assert!(packed.uses.len() <= places.max(packed.table.len()));
+    }
+
+    #[test]
+    fn signatures_tell_zones_apart_without_comparing_them() {
+        let mut packed = PackedZones::new(4, 9);
+        let mut signature = |upper: i32| {
+            let mut zone = Zone::universe(4);
+            zone.constrain(
+                1,
+                0,
+                Bound::weak(upper).expect("a constant within the range"),
+            );
+            packed.propose(zone.bounds());
+            packed.signature()
+        };
+        assert!(signature(3).may_be_within(signature(9)));
+        assert!(!signature(9).may_be_within(signature(3)));
+    }
+
+    #[test]
+    fn every_bound_near_the_end_of_a_width_is_told_from_infinity() {
+        for raw in [
+            i32::MIN,
+            -32_769,
+            -32_768,
+            -129,
+            -128,
+            126,
+            127,
+            128,
+            32_766,
+            32_767,
+            32_768,
+        ] {
+            let mut packed = PackedZones::new(1, 9);
+            let zone = [Bound::from_raw(raw)];
+            packed.propose(&zone);
+            let id = packed.keep();
+            let mut loaded = [Bound::LE_ZERO];
+            packed.load(id, &mut loaded);
+            assert_eq!(loaded, zone);
+            packed.propose(&[Bound::INFINITY]);
+            assert!(!packed.contains_candidate(id) && packed.is_in_candidate(id));
+        }
+    }
+}

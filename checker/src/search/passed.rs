@@ -1,0 +1,194 @@
+//! The passed list: stored symbolic states, none of which contains another.
+//!
+//! Invariants:
+//! * Of two stored states with the same words neither zone contains the other. A state that a new one contains is
+//!   forgotten, and its node is covered from then on.
+//! * Nodes are numbered in the order in which they were stored; a number is never used again.
+//!
+//! Source: G. Behrmann, J. Bengtsson, A. David, K. G. Larsen, P. Pettersson, W. Yi, "UPPAAL Implementation Secrets", 2002
+//! (one list for passed and waiting states, by discrete state).
+//!
+//! Cost: one look-up of the words, one or two comparisons of zones for each zone stored with the same words, and a look-up
+//! of the zone if it is to be stored.
+
+use crate::ir::Network;
+use crate::zones::Bound;
+
+use super::packed_zones::{PackedZones, Signature};
+use super::store::{DiscreteId, StateStore};
+use super::zone_table::ZoneId;
+
+/// No entry.
+const NONE: u32 = u32::MAX;
+
+/// A stored state with its number.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stored {
+    /// The number of the state among all that were ever stored.
+    pub(super) node: u32,
+    discrete: DiscreteId,
+    zone: ZoneId,
+}
+
+/// A zone in the list of a discrete state.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    signature: Signature,
+    zone: ZoneId,
+    node: u32,
+    /// The next one with the same words.
+    next: u32,
+}
+
+/// Stored symbolic states.
+#[derive(Debug)]
+pub(super) struct PassedList {
+    store: StateStore,
+    zones: PackedZones,
+    entries: Vec<Entry>,
+    /// The first of the entries that are not in use.
+    free: u32,
+    /// By discrete state: its first entry.
+    heads: Vec<u32>,
+    /// By node: whether it is covered.
+    covered: Vec<u64>,
+    nodes: u32,
+    covered_count: u32,
+    /// Without clocks the words are the whole state.
+    has_clocks: bool,
+}
+
+impl PassedList {
+    /// An empty list for the states of a network, with zones of this dimension, most of whose constants are at most `greatest`.
+    pub(super) fn new(network: &Network, dimension: usize, greatest: i32) -> PassedList {
+        PassedList {
+            store: StateStore::new(network),
+            zones: PackedZones::new(dimension, greatest),
+            entries: Vec::new(),
+            free: NONE,
+            heads: Vec::new(),
+            covered: Vec::new(),
+            nodes: 0,
+            covered_count: 0,
+            has_clocks: dimension > 1,
+        }
+    }
+
+    /// How many states are stored now.
+    pub(super) fn len(&self) -> usize {
+        (self.nodes - self.covered_count) as usize
+    }
+
+    /// The bytes that the list takes.
+    pub(super) fn bytes(&self) -> usize {
+        let entries = self.entries.len() * size_of::<Entry>();
+        let words = self.heads.len() * size_of::<u32>() + self.covered.len() * size_of::<u64>();
+        self.store.bytes() + self.zones.bytes() + entries + words
+    }
+
+    /// Whether a state was contained by one that was stored later.
+    pub(super) fn is_covered(&self, stored: Stored) -> bool {
+        let node = stored.node as usize;
+        self.covered
+            .get(node / 64)
+            .is_some_and(|bits| bits >> (node % 64) & 1 == 1)
+    }
+
+    /// Writes a stored state that is not covered over another state of the same network.
+    pub(super) fn load(&self, stored: Stored, words: &mut [i32], zone: &mut [Bound]) {
+        self.store.load(stored.discrete, words);
+        if self.has_clocks {
+            self.zones.load(stored.zone, zone);
+        }
+    }
+
+    /// The bytes of a state's words that decide identity; see [`StateStore::pack`].
+    pub(super) fn pack(&mut self, words: &[i32]) -> &[u8] {
+        self.store.pack(words)
+    }
+
+    /// Stores a state, unless a stored one contains it.
+    pub(super) fn add(&mut self, words: &[i32], zone: &[Bound]) -> Option<Stored> {
+        let (discrete, is_new) = self.store.intern(words);
+        if !self.has_clocks {
+            return is_new.then(|| self.stored(discrete, ZoneId(0)));
+        }
+        if is_new {
+            self.heads.push(NONE);
+        }
+        self.zones.propose(zone);
+        let signature = self.zones.signature();
+        if !is_new && !self.make_room(discrete, signature) {
+            return None;
+        }
+        let zone = self.zones.keep();
+        let stored = self.stored(discrete, zone);
+        let head = &mut self.heads[discrete.0 as usize];
+        let entry = Entry {
+            signature,
+            zone,
+            node: stored.node,
+            next: *head,
+        };
+        if self.free == NONE {
+            *head = self.entries.len() as u32;
+            self.entries.push(entry);
+        } else {
+            *head = self.free;
+            let place = &mut self.entries[self.free as usize];
+            self.free = place.next;
+            *place = entry;
+        }
+        Some(stored)
+    }
+
+    fn stored(&mut self, discrete: DiscreteId, zone: ZoneId) -> Stored {
+        let node = self.nodes;
+        self.nodes += 1;
+        Stored {
+            node,
+            discrete,
+            zone,
+        }
+    }
+
+    /// Forgets the zones that the proposed one contains; returns false, with nothing forgotten, if one contains it.
+    fn make_room(&mut self, discrete: DiscreteId, proposed: Signature) -> bool {
+        let mut previous = NONE;
+        let mut place = self.heads[discrete.0 as usize];
+        while place != NONE {
+            let Entry {
+                signature,
+                zone,
+                node,
+                next,
+            } = self.entries[place as usize];
+            if proposed.may_be_within(signature) && self.zones.contains_candidate(zone) {
+                return false;
+            }
+            if signature.may_be_within(proposed) && self.zones.is_in_candidate(zone) {
+                self.cover(node);
+                self.zones.release(zone);
+                match previous {
+                    NONE => self.heads[discrete.0 as usize] = next,
+                    _ => self.entries[previous as usize].next = next,
+                }
+                self.entries[place as usize].next = self.free;
+                self.free = place;
+            } else {
+                previous = place;
+            }
+            place = next;
+        }
+        true
+    }
+
+    fn cover(&mut self, node: u32) {
+        let word = node as usize / 64;
+        if self.covered.len() <= word {
+            self.covered.resize(word + 1, 0);
+        }
+        self.covered[word] |= 1 << (node % 64);
+        self.covered_count += 1;
+    }
+}
