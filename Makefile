@@ -66,9 +66,10 @@ picture: $(INSTALLED) ## Draw examples/scene.png, the picture of the README
 	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10
 
 .PHONY: bench
-bench: $(INSTALLED) ## Measure the engine: all plans of the paper's instance, a thousand syntheses, then code, loading and zones
+bench: $(INSTALLED) ## Measure the engine: all plans, a thousand syntheses, whole state spaces, then code, loading and zones
 	$(BIN)/python tests/benchmarks/needle.py
 	$(BIN)/python tests/benchmarks/syntheses.py
+	$(BIN)/python tests/benchmarks/race.py
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
 .PHONY: bench-games

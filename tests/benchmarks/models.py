@@ -1,0 +1,222 @@
+"""The timed automata that are explored for measuring, written as XTA.
+
+Each function returns the text of a model. Those with a namesake among the example generators of
+TChecker are the same automata, edge by edge, so that the counts of both tools can be compared;
+the others are written for counts of their own.
+"""
+
+from __future__ import annotations
+
+
+def fischer(processes: int, delay: int = 10) -> str:
+    """Fischer's mutual exclusion: who waits waits longer than any other may take to write."""
+    return f"""
+const int N = {processes};
+const int K = {delay};
+int[0, N] id;
+
+process P(const int[1, N] pid) {{
+    clock x;
+    state idle, request {{ x <= K }}, waiting, critical;
+    init idle;
+    trans
+        idle -> request {{ guard id == 0; assign x = 0; }},
+        request -> waiting {{ guard x <= K; assign x = 0, id = pid; }},
+        waiting -> request {{ guard id == 0; assign x = 0; }},
+        waiting -> critical {{ guard x > K && id == pid; }},
+        critical -> idle {{ assign id = 0; }};
+}}
+system P;
+"""
+
+
+def csmacd(stations: int, transmission: int = 808, propagation: int = 26) -> str:
+    """Stations on one bus that detect collisions; it tells them one by one, committed."""
+    return f"""
+const int N = {stations};
+const int L = {transmission};
+const int S = {propagation};
+chan begin, busy, end, collision[N + 1];
+
+process Bus() {{
+    int[1, N + 1] next = 1;
+    clock y;
+    state idle, active, colliding {{ y < S }}, telling;
+    commit telling;
+    init idle;
+    trans
+        idle -> active {{ sync begin?; assign y = 0; }},
+        active -> colliding {{ guard y < S; sync begin?; assign y = 0; }},
+        active -> active {{ guard y >= S; sync busy?; }},
+        active -> idle {{ sync end?; assign y = 0; }},
+        colliding -> telling {{ guard y < S; assign next = 1; }},
+        telling -> idle {{ guard next == N + 1 && y < S; assign y = 0, next = 1; }},
+        telling -> telling {{ guard next <= N; sync collision[next - 1]!;
+            assign next = next + 1; }};
+}}
+
+process Station(const int[1, N] pid) {{
+    clock x;
+    state waiting, sending {{ x <= L }}, retrying {{ x < 2 * S }};
+    init waiting;
+    trans
+        waiting -> sending {{ sync begin!; assign x = 0; }},
+        waiting -> retrying {{ sync busy!; assign x = 0; }},
+        waiting -> waiting {{ sync collision[pid - 1]?; assign x = 0; }},
+        waiting -> retrying {{ sync collision[pid - 1]?; assign x = 0; }},
+        sending -> waiting {{ guard x == L; sync end!; assign x = 0; }},
+        sending -> retrying {{ guard x < S; sync collision[pid - 1]?; assign x = 0; }},
+        retrying -> sending {{ guard x < 2 * S; sync begin!; assign x = 0; }},
+        retrying -> retrying {{ guard x < 2 * S; sync busy!; assign x = 0; }},
+        retrying -> retrying {{ guard x < 2 * S; sync collision[pid - 1]?; assign x = 0; }};
+}}
+system Bus, Station;
+"""
+
+
+def train_gate(trains: int) -> str:
+    """Trains before a bridge, stopped and let go by a gate that keeps them in a ring buffer."""
+    return f"""
+const int N = {trains};
+chan appr[N + 1], stop[N + 1], go[N + 1], leave[N + 1];
+
+process Gate() {{
+    int[1, N] buffer[N] = {{ {", ".join(["1"] * trains)} }};
+    int[0, N - 1] head;
+    int[0, N] length;
+    state free, occupied, transient;
+    commit transient;
+    init free;
+    trans
+        free -> occupied {{ select e : int[1, N]; guard length > 0 && buffer[head] == e;
+            sync go[e]!; }},
+        free -> occupied {{ select e : int[1, N]; guard length == 0; sync appr[e]?;
+            assign buffer[(head + length) % N] = e, length = length + 1; }},
+        occupied -> transient {{ select e : int[1, N]; sync appr[e]?;
+            assign buffer[(head + length) % N] = e, length = length + 1; }},
+        occupied -> free {{ select e : int[1, N]; guard length > 0 && buffer[head] == e;
+            sync leave[e]?; assign head = (head + 1) % N, length = length - 1; }},
+        transient -> occupied {{ select e : int[1, N];
+            guard length > 0 && buffer[(head + length - 1) % N] == e; sync stop[e]!; }};
+}}
+
+process Train(const int[1, N] pid) {{
+    clock x;
+    state safe, approaching {{ x <= 20 }}, stopped, starting {{ x <= 15 }}, crossing {{ x <= 5 }};
+    init safe;
+    trans
+        safe -> approaching {{ sync appr[pid]!; assign x = 0; }},
+        approaching -> crossing {{ guard x >= 10; assign x = 0; }},
+        approaching -> stopped {{ guard x <= 10; sync stop[pid]?; }},
+        stopped -> starting {{ sync go[pid]?; assign x = 0; }},
+        starting -> crossing {{ guard x >= 7; assign x = 0; }},
+        crossing -> safe {{ guard x >= 3; sync leave[pid]!; }};
+}}
+system Gate, Train;
+"""
+
+
+def dining_philosophers(philosophers: int, timeout: int = 3, eating: int = 10) -> str:
+    """Philosophers who put the left fork back after a while, so that there is no deadlock."""
+    return f"""
+const int N = {philosophers};
+const int TIMEOUT = {timeout};
+const int EAT = {eating};
+chan take[N], release[N];
+
+process Philosopher(const int[1, N] pid) {{
+    clock x;
+    state idle, acquiring {{ x <= TIMEOUT }}, eating {{ x <= EAT }}, releasing {{ x <= 0 }};
+    init idle;
+    trans
+        idle -> acquiring {{ sync take[(pid + N - 2) % N]!; assign x = 0; }},
+        acquiring -> idle {{ guard x >= TIMEOUT; sync release[(pid + N - 2) % N]!; }},
+        acquiring -> eating {{ guard x <= TIMEOUT; sync take[pid - 1]!; assign x = 0; }},
+        eating -> releasing {{ guard x >= EAT; sync release[pid - 1]!; assign x = 0; }},
+        releasing -> idle {{ sync release[(pid + N - 2) % N]!; }};
+}}
+
+process Fork(const int[0, N - 1] f) {{
+    state free, taken;
+    init free;
+    trans
+        free -> taken {{ sync take[f]?; }},
+        taken -> free {{ sync release[f]?; }};
+}}
+system Philosopher, Fork;
+"""
+
+
+def fddi(stations: int, rotation: int | None = None, synchronous: int = 20, delay: int = 0) -> str:
+    """A token ring; each station measures the rotation of the token with three clocks."""
+    rotation = 50 * stations if rotation is None else rotation
+    waiting = ", ".join(f"q{i} {{ t <= TD }}, r{i}" for i in range(1, stations + 1))
+    edges = ",\n        ".join(
+        f"q{i} -> r{i} {{ guard t == TD; sync take[{i - 1}]!; }},\n"
+        f"        r{i} -> q{i % stations + 1} {{ sync give[{i - 1}]?; assign t = 0; }}"
+        for i in range(1, stations + 1)
+    )
+    return f"""
+const int N = {stations};
+const int TTRT = {rotation};
+const int SA = {synchronous};
+const int TD = {delay};
+chan take[N], give[N];
+
+process Station(const int[0, N - 1] i) {{
+    clock rotation, a, b;
+    state q0, q1 {{ rotation <= SA }}, q2 {{ rotation <= SA }}, q3 {{ a <= TTRT + SA }},
+        q4, q5 {{ rotation <= SA }}, q6 {{ rotation <= SA }}, q7 {{ b <= TTRT + SA }};
+    init q0;
+    trans
+        q0 -> q1 {{ guard rotation >= TTRT; sync take[i]?; assign rotation = 0, b = 0; }},
+        q0 -> q2 {{ guard rotation < TTRT; sync take[i]?; assign rotation = 0, b = 0; }},
+        q1 -> q4 {{ guard rotation == SA; sync give[i]!; }},
+        q2 -> q3 {{ guard rotation == SA; }},
+        q3 -> q4 {{ sync give[i]!; }},
+        q4 -> q5 {{ guard rotation >= TTRT; sync take[i]?; assign rotation = 0, a = 0; }},
+        q4 -> q6 {{ guard rotation < TTRT; sync take[i]?; assign rotation = 0, a = 0; }},
+        q5 -> q0 {{ guard rotation == SA; sync give[i]!; }},
+        q6 -> q7 {{ guard rotation == SA; }},
+        q7 -> q0 {{ sync give[i]!; }};
+}}
+
+process Ring() {{
+    clock t;
+    state {waiting};
+    init q1;
+    trans
+        {edges};
+}}
+system Station, Ring;
+"""
+
+
+def peterson(processes: int) -> str:
+    """Peterson's algorithm for several processes, without clocks: each climbs a ladder."""
+    return f"""
+const int N = {processes};
+int[0, N - 1] level[N];
+int[0, N - 1] last[N];
+
+process P(const int[0, N - 1] pid) {{
+    int[0, N - 1] rung;
+    int[0, N] other;
+    state outside, claiming, yielding, looking, critical;
+    init outside;
+    trans
+        outside -> claiming {{ assign rung = 1; }},
+        claiming -> yielding {{ assign level[pid] = rung; }},
+        yielding -> looking {{ assign last[rung] = pid, other = 0; }},
+        looking -> looking {{ guard other < N
+            && (other == pid || level[other] < rung || last[rung] != pid);
+            assign other = other + 1; }},
+        looking -> looking {{ guard other < N
+            && other != pid && level[other] >= rung && last[rung] == pid; assign other = 0; }},
+        looking -> claiming {{ guard other == N && rung < N - 1;
+            assign rung = rung + 1, other = 0; }},
+        looking -> critical {{ guard other == N && rung == N - 1; assign other = 0; }},
+        critical -> outside {{ assign level[pid] = 0, rung = 0; }};
+}}
+system P;
+"""
