@@ -111,7 +111,8 @@ impl Symbolic<'_> {
     /// A move is forbidden where one of a higher level is possible, its target's invariants included. Levels are those of
     /// channels first, then the greatest of the participating processes.
     pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
-        self.stepper.moves(words, out)?;
+        // Searches meet most location vectors a few times only: remembering moves would cost more than it saves.
+        self.stepper.put_together(words, out)?;
         if self.has_priorities && out.len() > 1 {
             self.apply_priorities(words, out)?;
         }

@@ -262,7 +262,12 @@ impl<'a> Stepper<'a> {
         self.offers.bytes()
     }
 
-    fn put_together(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
+    /// As [`Stepper::moves`], without remembering.
+    pub(super) fn put_together(
+        &mut self,
+        words: &mut [i32],
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
         out.clear();
         let committed = self.is_committed(words);
         for process in 0..self.tables.len() {
