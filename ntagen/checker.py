@@ -25,7 +25,7 @@ from ntagen.model.facts import (
     Variable,
     queries_from,
 )
-from ntagen.runs import Run, runs_of
+from ntagen.runs import Choose, Run, runs_of, simulated
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 SearchOrder = Literal["bfs", "dfs", "random"]
@@ -217,7 +217,8 @@ class Answer:
 class Model:
     """A model that the engine has accepted.
 
-    What is in it are its attributes; `check` answers queries and `simulate` walks through it.
+    What is in it are its attributes; `check` answers queries, `simulate` makes
+    random runs, and `walk` goes through symbolic states.
     """
 
     def __init__(self, raw: _checker.Model) -> None:
@@ -420,8 +421,29 @@ class Model:
             raise RejectedError(error.args[0]) from None
         return Verification(holds, tuple(lines))
 
-    def simulate(self, engine: CodeEngine = "jit") -> Simulation:
-        """Starts a walk through the model from its initial state.
+    def simulate(self, steps: int = 100, seed: int = 0, choose: Choose | None = None) -> Run:
+        """Makes a run with exact times from the initial state.
+
+        Without `choose`, each transition that is possible now or later is as likely as any other,
+        and so is each moment at which it is possible (of those without a last one, the first few
+        units).
+
+        Args:
+            steps: The run ends after so many transitions, or where none is possible any more.
+            seed: The same seed gives the same run.
+            choose: Is given each state and what can happen; says which choice is taken, with the
+                delay or without (then a random one), or ``None`` to end the run.
+
+        Raises:
+            ValueError: `choose` gives a delay that is no whole number of thousandths of the unit.
+            IndexError: `choose` gives what is not possible.
+            ModelError: The model fails on the way.
+        """
+        with _failing():
+            return simulated(self._raw.walk_exactly(), steps, seed, choose)
+
+    def walk(self, engine: CodeEngine = "jit") -> Simulation:
+        """Starts a symbolic walk through the model from its initial state.
 
         Args:
             engine: What runs the code of the model; states do not depend on it.

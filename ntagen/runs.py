@@ -1,4 +1,4 @@
-"""Runs with exact times: what the traces of answers show.
+"""Runs with exact times: what the traces of answers show, and simulated runs.
 
 Times are fractions of the model's unit of time. A run is a list of states and, between them, how
 long it waits and which edges are taken; it may end in a loop, or by waiting for ever.
@@ -6,11 +6,14 @@ long it waits and which edges are taken; it may end in a loop, or by waiting for
 
 from __future__ import annotations
 
+import json
+import random
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
-__all__ = ["Edge", "Run", "State", "Step", "runs_of"]
+__all__ = ["Choice", "Choose", "Edge", "Run", "State", "Step", "runs_of", "simulated"]
 
 End = Literal["after", "loop", "waits", "stuck"]
 
@@ -72,6 +75,24 @@ class Step:
 
     def __str__(self) -> str:
         return f"wait {self.delay}, then {', '.join(map(str, self.edges))}"
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What can happen next in a simulation.
+
+    Attributes:
+        edges: The edges, the sender's first.
+        windows: When: pairs of the least and the greatest delay, in ascending order; without a
+            greatest one, ``None``.
+    """
+
+    edges: tuple[Edge, ...]
+    windows: tuple[tuple[Fraction, Fraction | None], ...]
+
+
+Choose = Callable[[State, tuple[Choice, ...]], "int | tuple[int, Fraction] | None"]
+"""Is given a state and what can happen; says which, or which after what delay; ``None`` stops."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,3 +168,84 @@ def _state(raw: dict[str, Any], unit: int) -> State:
 def _edge(raw: dict[str, Any]) -> Edge:
     names = ("process", "source", "target", "sync", "guard", "update", "select")
     return Edge(*(raw[name] for name in names))
+
+
+OPEN_WINDOW_UNITS = 5
+"""How far a random delay reaches into a window without end, in units of time."""
+
+
+class Walk(Protocol):
+    """A run in the engine, at a state; times are whole numbers of ticks."""
+
+    @property
+    def ticks_per_unit(self) -> int:
+        """How many ticks make one unit of the model's time."""
+
+    def state_json(self) -> str:
+        """The state."""
+
+    def choices_json(self) -> tuple[str, int | None]:
+        """What can happen, and for how long time can pass; ``None`` for ever."""
+
+    def take(self, index: int, wait: int) -> None:
+        """Waits, and takes the choice with this index."""
+
+
+def simulated(walk: Walk, steps: int, seed: int, choose: Choose | None) -> Run:
+    """A run of at most so many steps; see `ntagen.checker.Model.simulate`."""
+    chance = random.Random(seed)
+    unit = walk.ticks_per_unit
+    states = [_state(json.loads(walk.state_json()), unit)]
+    taken: list[Step] = []
+    while len(taken) < steps:
+        text, longest = walk.choices_json()
+        raw = json.loads(text)
+        if not raw:
+            end: End = "waits" if longest is None else "stuck"
+            return Run(tuple(states), tuple(taken), end)
+        choices = tuple(_choice(one, unit) for one in raw)
+        index, ticks = _decision(states[-1], choices, choose, unit, chance)
+        if index is None:
+            break
+        if ticks is None:
+            ticks = _random_wait(raw[index]["windows"], unit, chance)
+        walk.take(index, ticks)
+        taken.append(Step(Fraction(ticks, unit), choices[index].edges))
+        states.append(_state(json.loads(walk.state_json()), unit))
+    return Run(tuple(states), tuple(taken), "after")
+
+
+def _choice(raw: dict[str, Any], unit: int) -> Choice:
+    windows = tuple(
+        (Fraction(first, unit), None if last is None else Fraction(last, unit))
+        for first, last in raw["windows"]
+    )
+    return Choice(tuple(_edge(edge) for edge in raw["edges"]), windows)
+
+
+def _decision(
+    state: State,
+    choices: tuple[Choice, ...],
+    choose: Choose | None,
+    unit: int,
+    chance: random.Random,
+) -> tuple[int | None, int | None]:
+    """Which choice is taken, and after how many ticks, as far as that is decided."""
+    if choose is None:
+        return chance.randrange(len(choices)), None
+    chosen = choose(state, choices)
+    index, delay = chosen if isinstance(chosen, tuple) else (chosen, None)
+    if index is not None and not 0 <= index < len(choices):
+        raise IndexError(f"there is no choice {index}; the state has {len(choices)}")
+    if delay is None:
+        return index, None
+    ticks = Fraction(delay) * unit
+    if ticks.denominator != 1:
+        raise ValueError(f"the delay {delay} is no whole number of 1/{unit}")
+    return index, int(ticks)
+
+
+def _random_wait(windows: list[list[int | None]], unit: int, chance: random.Random) -> int:
+    first, last = chance.choice(windows)
+    low = first or 0
+    return chance.randint(low, low + OPEN_WINDOW_UNITS * unit if last is None else last)

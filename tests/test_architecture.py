@@ -60,7 +60,7 @@ ONLY_IN: dict[str, set[str]] = {
     "time": {"drive", "cli"},
     "datetime": {"drive"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
-    "random": {"needle", "drive"},
+    "random": {"needle", "drive", "runs"},
 }
 """By library: the rooms that may import it. Libraries that are not listed may be used anywhere."""
 

@@ -14,7 +14,7 @@ use pyo3::types::PyBytes;
 
 use crate::diagnostics::Severity;
 use crate::engine::limits::Observer;
-use crate::engine::simulation::Point;
+use crate::engine::simulation::{Point, SIMULATED_TICKS_PER_UNIT};
 use crate::engine::verification;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, TraceWanted, Verdict,
@@ -197,6 +197,18 @@ impl Model {
         Ok((checked.holds, checked.lines))
     }
 
+    /// A run with exact times from the initial state.
+    fn walk_exactly(slf: &Bound<'_, Self>) -> PyResult<ExactWalk> {
+        let state = slf.get().with(|model| {
+            let start = model.choices().and_then(|choices| choices.initial());
+            start.map_err(|error| ExactWalk::failed(model, error))
+        })?;
+        Ok(ExactWalk {
+            model: slf.clone().unbind(),
+            state,
+        })
+    }
+
     /// Answers a query.
     #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, folder, progress))]
     #[expect(
@@ -374,6 +386,66 @@ impl Simulation {
                 .map_err(|failure| Simulation::failed(model, failure))
         })?;
         self.point = point;
+        Ok(())
+    }
+}
+
+/// A run that is simulated with exact times.
+#[pyclass(module = "ntagen._checker")]
+struct ExactWalk {
+    model: Py<Model>,
+    state: crate::verify::State,
+}
+
+impl ExactWalk {
+    fn failed(model: &LoadedModel, error: crate::verify::Error) -> PyErr {
+        FailedError::new_err(describe::error_text(model, error))
+    }
+}
+
+#[pymethods]
+impl ExactWalk {
+    /// How many ticks make one unit of the model's time.
+    #[classattr]
+    fn ticks_per_unit() -> i64 {
+        SIMULATED_TICKS_PER_UNIT
+    }
+
+    /// The state as JSON, clock values in ticks.
+    fn state_json(&self) -> String {
+        self.model
+            .get()
+            .with(|model| json::state(model.network(), &self.state).to_string())
+    }
+
+    /// What can happen as JSON, and for how many ticks time can pass; `None` for ever.
+    fn choices_json(&self) -> PyResult<(String, Option<i64>)> {
+        self.model.get().with(|model| {
+            let found = model.choices().and_then(|choices| choices.of(&self.state));
+            let (choices, longest) = found.map_err(|error| ExactWalk::failed(model, error))?;
+            Ok((
+                json::choices(model.network(), &choices).to_string(),
+                longest,
+            ))
+        })
+    }
+
+    /// Waits for so many ticks and takes the choice with this index.
+    fn take(&mut self, index: usize, wait: i64) -> PyResult<()> {
+        let next = self.model.get().with(|model| {
+            let choices = model.choices();
+            let taken = choices.and_then(|choices| {
+                let (all, _) = choices.of(&self.state)?;
+                match all.get(index) {
+                    Some(one) => choices.take(&self.state, wait, &one.parts),
+                    None => Ok(None),
+                }
+            });
+            taken.map_err(|error| ExactWalk::failed(model, error))
+        })?;
+        let impossible =
+            || PyIndexError::new_err(format!("choice {index} after {wait} ticks is not possible"));
+        self.state = next.ok_or_else(impossible)?;
         Ok(())
     }
 }
@@ -612,6 +684,7 @@ fn explanations() -> Vec<(&'static str, &'static str, &'static str, &'static str
 fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Model>()?;
     module.add_class::<Answer>()?;
+    module.add_class::<ExactWalk>()?;
     module.add_class::<Simulation>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;
     module.add("RejectedError", module.py().get_type::<RejectedError>())?;

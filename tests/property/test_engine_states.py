@@ -45,7 +45,7 @@ class Walker:
 
     def start(self) -> None:
         """To the first decision or end."""
-        self._simulation = self._model.simulate(self._engine)
+        self._simulation = self._model.walk(self._engine)
         self._simulation.settle()
 
     def decisions(self) -> list[int]:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import pytest
+
 from ntagen import checker
+from ntagen.runs import Choice, State
 
 LAMP = """
 clock x, y;
@@ -58,3 +61,42 @@ def test_verdict_without_witness_has_no_trace() -> None:
     assert (answer.verdict, answer.trace, answer.runs) == ("satisfied", None, ())
     found = checker.load(LAMP).check("E<> Lamp.On", trace=False)
     assert (found.verdict, found.trace) == ("satisfied", None)
+
+
+def test_simulated_runs_keep_to_the_model() -> None:
+    model = checker.load(LAMP)
+    for seed in range(5):
+        run = model.simulate(steps=20, seed=seed)
+        assert len(run.steps) == 20
+        for state, step in zip(run.states, run.steps, strict=False):
+            if state.locations["Lamp"] == "Off":
+                assert state.clocks["y"] + step.delay >= 3
+            else:
+                assert 1 < state.clocks["x"] + step.delay < 2
+    assert model.simulate(20, seed=1) == model.simulate(20, seed=1)
+    assert model.simulate(20, seed=1) != model.simulate(20, seed=2)
+
+
+def test_simulation_can_be_guided() -> None:
+    def first_possible(_state: State, choices: tuple[Choice, ...]) -> tuple[int, Fraction]:
+        return len(choices) - 1, choices[-1].windows[0][0]
+
+    model = checker.load(LAMP)
+    run = model.simulate(steps=2, choose=first_possible)
+    assert [step.delay for step in run.steps] == [3, Fraction(1001, 1000)]
+    assert run.steps[0].edges[0].select == {"k": 2}
+    assert model.simulate(choose=lambda _state, _choices: None).steps == ()
+    with pytest.raises(IndexError, match="not possible"):
+        model.simulate(choose=lambda _state, _choices: (0, Fraction(1)))
+    with pytest.raises(IndexError, match="there is no choice 7"):
+        model.simulate(choose=lambda _state, _choices: 7)
+    with pytest.raises(ValueError, match="no whole number"):
+        model.simulate(choose=lambda _state, _choices: (0, Fraction(1, 3)))
+
+
+def test_simulation_ends_where_nothing_is_possible() -> None:
+    model = checker.load(
+        "clock x; process P() { state A, B { x <= 4 }; init A; trans A -> B { }; } system P;"
+    )
+    run = model.simulate()
+    assert (len(run.steps), run.end) == (1, "stuck")

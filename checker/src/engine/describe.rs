@@ -346,6 +346,15 @@ pub fn missing_text(missing: Missing) -> String {
     }
 }
 
+/// What went wrong with a state that has exact clock values.
+pub fn error_text(model: &LoadedModel, error: verify::Error) -> String {
+    match error {
+        verify::Error::RunTime(error) => failure_text(model, Failure::RunTime(error)),
+        verify::Error::InitialInvariant => failure_text(model, Failure::InitialInvariant),
+        verify::Error::Unsupported(what) => format!("{what} are not supported here"),
+    }
+}
+
 /// What the replay of a run covered, or what is wrong with it.
 pub fn proof_lines(proof: &Proof) -> Vec<String> {
     let violated = |what: String| vec![format!("trace violated: {what}")];

@@ -8,6 +8,7 @@ use crate::network::Part;
 use crate::search::extremum::{Extreme, Extremes};
 use crate::search::liveness::Ending;
 use crate::verify::State;
+use crate::verify::choices::Choice;
 use crate::verify::replay::{End, Run};
 
 use super::answer::Values;
@@ -170,15 +171,7 @@ pub fn run(network: &Network, run: &Run, states: &[State]) -> Json {
         End::Waits(wait) => json!({ "kind": "waits", "wait": wait }),
         End::Stuck(wait) => json!({ "kind": "stuck", "wait": wait }),
     };
-    let states = states.iter().map(|state| {
-        let clocks = network.clocks.iter().zip(&state.clocks).skip(1);
-        let clocks = clocks.map(|(clock, value)| (clock.name.clone(), json!(value)));
-        json!({
-            "locations": locations(network, &state.words),
-            "variables": variables(network, &state.words),
-            "clocks": clocks.collect::<Map<_, _>>(),
-        })
-    });
+    let states = states.iter().map(|one| state(network, one));
     json!({
         "ticks_per_unit": run.ticks_per_unit,
         "steps": steps.collect::<Vec<_>>(),
@@ -186,6 +179,26 @@ pub fn run(network: &Network, run: &Run, states: &[State]) -> Json {
         "from": { "state": run.from.state, "wait": run.from.wait },
         "states": states.collect::<Vec<_>>(),
     })
+}
+
+/// A state with clock values in ticks.
+pub fn state(network: &Network, state: &State) -> Json {
+    let clocks = network.clocks.iter().zip(&state.clocks).skip(1);
+    let clocks = clocks.map(|(clock, value)| (clock.name.clone(), json!(value)));
+    json!({
+        "locations": locations(network, &state.words),
+        "variables": variables(network, &state.words),
+        "clocks": clocks.collect::<Map<_, _>>(),
+    })
+}
+
+/// What can happen in a state: of each choice the edges, and the windows of waits in ticks, null for one without end.
+pub fn choices(network: &Network, choices: &[Choice]) -> Json {
+    let list = choices.iter().map(|choice| {
+        let edges = choice.parts.iter().map(|&one| part(network, one.into()));
+        json!({ "edges": edges.collect::<Vec<_>>(), "windows": choice.windows })
+    });
+    list.collect()
 }
 
 /// Plans: of each, the transitions that leave a state without committed locations; all others follow from them.

@@ -6,9 +6,14 @@
 use crate::exec::Executor;
 use crate::ir::Network;
 use crate::network::{Abstraction, ClockBounds, Failure, MoveRef, Moves, Part, Stepper, Symbolic};
+use crate::verify;
+use crate::verify::choices::Choices;
 use crate::zones::Zone;
 
 use super::{CodeEngine, LoadedModel, Rejection};
+
+/// How finely the times of simulated runs are chosen.
+pub const SIMULATED_TICKS_PER_UNIT: i64 = 1000;
 
 /// Moves that [`LoadedModel::settle`] takes at most.
 const LONGEST_WAY: usize = 100_000;
@@ -26,6 +31,11 @@ pub struct Point {
 pub type Successors = Vec<(Vec<Part>, Point)>;
 
 impl LoadedModel {
+    /// What can happen next in states with exact clock values, for simulating runs.
+    pub fn choices(&self) -> Result<Choices<'_>, verify::Error> {
+        Choices::new(self.network(), SIMULATED_TICKS_PER_UNIT)
+    }
+
     /// Makes the code ready to run; needed once before the other functions here.
     pub fn prepare_simulation(&mut self, code: CodeEngine) -> Result<(), Rejection> {
         self.prepare_code(code, crate::diagnostics::Span::default())

@@ -3,12 +3,14 @@
 //! Nothing here uses the moves, zones, search or games of the engine. [`concrete`] computes the moves of a state with exact clock
 //! values straight from the definitions, running code on the interpreter; [`regions`] makes the set of valuations finite;
 //! [`strategy`] closes the loop between a strategy and every move of the environment; [`replay`] follows a single run;
-//! [`certificate`] checks that a set of states is closed and avoids a predicate.
+//! [`certificate`] checks that a set of states is closed and avoids a predicate;
+//! [`choices`] says what can happen next in a state, for simulating runs.
 //!
 //! A mistake in the front end or in the interpreter is shared with the engine and not found here; one in moves, zones,
 //! extrapolation, compiled code or the solver is.
 
 pub mod certificate;
+pub mod choices;
 mod code;
 pub mod concrete;
 mod moments;
