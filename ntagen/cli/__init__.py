@@ -30,7 +30,7 @@ __all__ = ["main"]
 COMMANDS: Final = {
     "compile": "Turn an environment into a UPPAAL model and its queries.",
     "check": "Answer the queries of a model or an environment.",
-    "verify": "Check a trace or a certificate, independently of the search that found it.",
+    "verify": "Check a trace or a certificate independently.",
     "info": "Show what is in a model or an environment.",
     "explain": "Explain a diagnostic: what it means and how to mend it.",
     "plot": "Draw a scene, its plans or a run.",
