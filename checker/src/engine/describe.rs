@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use super::LoadedModel;
 use super::evidence::{Missing, Proof, Witness};
 use crate::ir::{EdgeLabels, Network, RunTimeErrorKind, Shape};
-use crate::network::stepper::{select_count, select_values};
+use crate::network::selects::{select_count, select_values};
 use crate::network::{Failure, Part};
 use crate::search::liveness::Ending;
 use crate::search::reach::Trace;

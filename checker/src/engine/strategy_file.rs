@@ -11,7 +11,7 @@ use crate::game::strategy::{Decision, Selection, Strategy, StrategyState};
 use crate::game::{Player, closed_loop};
 use crate::ir::{EdgeId, Network, Shape};
 use crate::network::Part;
-use crate::network::stepper::{select_count, select_values};
+use crate::network::selects::{select_count, select_values};
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
 

@@ -6,7 +6,7 @@
 use crate::exec::{EmittedConstraint, RunTimeError};
 use crate::ir::{FunctionId, Update};
 
-use super::stepper::select_values;
+use super::selects::select_values;
 use super::symbolic::to_constraints;
 use super::{ClockEffect, MoveRef, Stepper, Symbolic};
 use crate::zones::clocks::Assignment;

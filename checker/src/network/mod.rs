@@ -12,11 +12,13 @@ pub mod bounds;
 pub mod differences;
 pub mod failure;
 mod fixed;
+mod listening;
 pub mod moves;
 mod offers;
 mod passage;
 pub mod predicate;
 pub mod restriction;
+pub mod selects;
 pub mod stepper;
 pub mod symbolic;
 

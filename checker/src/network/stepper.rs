@@ -13,8 +13,10 @@ use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTi
 use crate::ir::{ChannelId, Edge, FunctionId, Guard, Location, Network, Process, Update, Urgency};
 
 use super::failure::Failure;
+use super::listening::Listening;
 use super::moves::{MoveRef, Moves, Part};
 use super::offers::{Next, OfferId, Offers, Record, VectorId};
+use super::selects::{select_count, select_values};
 
 /// An edge with what is asked of it most.
 #[derive(Clone, Copy, Debug)]
@@ -94,6 +96,11 @@ pub struct Stepper<'a> {
     /// The receiving processes of the broadcast that is being put together.
     groups: Vec<Group>,
     parts: Vec<Part>,
+    /// By process: the channels of its receiving instances in the state at hand, whose number is `round`.
+    listening: Vec<Listening>,
+    round: u64,
+    /// The channels of the instances of one edge.
+    channels: Vec<u32>,
     /// Moves that were put together before.
     offers: Offers,
     /// What is evaluated while moves are put together to be remembered.
@@ -143,6 +150,13 @@ impl<'a> Stepper<'a> {
             chosen: Vec::new(),
             groups: Vec::new(),
             parts: Vec::new(),
+            listening: network
+                .processes
+                .iter()
+                .map(|_| Listening::default())
+                .collect(),
+            round: 0,
+            channels: Vec::new(),
             offers: Offers::new(network.processes.len()),
             record: None,
         }
@@ -269,6 +283,7 @@ impl<'a> Stepper<'a> {
         out: &mut Moves,
     ) -> Result<(), Failure> {
         out.clear();
+        self.round += 1;
         let committed = self.is_committed(words);
         for process in 0..self.tables.len() {
             let location = words[process] as usize;
@@ -300,7 +315,7 @@ impl<'a> Stepper<'a> {
         self.candidates.clear();
         self.constraints.clear();
         self.channel = None;
-        self.enabled_instances(process, entry, words, None)?;
+        self.enabled_instances(process, entry, words)?;
         for index in 0..self.candidates.len() {
             self.chosen.clear();
             self.chosen.push(Choice::Takes(index as u32));
@@ -480,30 +495,60 @@ impl<'a> Stepper<'a> {
             let listens = entry.edge.sync.is_some_and(|sync| {
                 (sync.channel.0..sync.channel.0 + sync.count).contains(&channel)
             });
-            if listens {
-                self.enabled_instances(process, entry, words, Some(channel))?;
+            if !listens {
+                continue;
+            }
+            if !self.hears(process, index, words)? {
+                self.enabled_instances(process, entry, words)?;
+                continue;
+            }
+            for place in self.listening[process as usize].listeners(index, channel) {
+                let select = self.listening[process as usize].instance(place);
+                self.enabled_instance(process, entry, select, words)?;
             }
         }
         Ok(())
     }
 
-    /// Adds every enabled instance of an edge to the candidates; of a receiving edge, those that listen to `channel`.
+    /// Makes sure that the channels of the instances of a receiving edge, the one with this index in its location, are known;
+    /// returns false if all have the same channel.
+    fn hears(
+        &mut self,
+        process: u32,
+        index: usize,
+        words: &mut [i32],
+    ) -> Result<bool, RunTimeError> {
+        let receives = &self.tables[process as usize][words[process as usize] as usize].receives;
+        let entry = receives[index];
+        let Some((sync, function)) = entry.edge.sync.and_then(|sync| Some((sync, sync.index?)))
+        else {
+            return Ok(false);
+        };
+        let listening = &mut self.listening[process as usize];
+        listening.turn_to(self.round, receives.len());
+        if listening.knows(index) {
+            return Ok(true);
+        }
+        let mut channels = std::mem::take(&mut self.channels);
+        channels.clear();
+        for select in 0..entry.instances {
+            select_values(entry.edge, select, &mut self.arguments);
+            let offset = self.call(self.executor, function, words)?;
+            channels.push(sync.channel.0 + offset as u32);
+        }
+        self.listening[process as usize].learn(index, &channels);
+        self.channels = channels;
+        Ok(true)
+    }
+
+    /// Adds every enabled instance of an edge to the candidates.
     fn enabled_instances(
         &mut self,
         process: u32,
         entry: EdgeEntry<'a>,
         words: &mut [i32],
-        channel: Option<u32>,
     ) -> Result<(), RunTimeError> {
         for select in 0..entry.instances {
-            if let (Some(channel), Some(sync)) = (channel, entry.edge.sync)
-                && let Some(function) = sync.index
-            {
-                select_values(entry.edge, select, &mut self.arguments);
-                if sync.channel.0 + self.call(self.executor, function, words)? as u32 != channel {
-                    continue;
-                }
-            }
             self.enabled_instance(process, entry, select, words)?;
         }
         Ok(())
@@ -760,14 +805,6 @@ fn receivers(network: &Network) -> Vec<Vec<u32>> {
     receivers
 }
 
-/// How many combinations of select values an edge has.
-pub fn select_count(edge: &Edge) -> u32 {
-    edge.select
-        .iter()
-        .map(|select| (select.high - select.low + 1) as u32)
-        .product()
-}
-
 /// The most moves of a state: receivers of a broadcast that have a choice each multiply.
 const MOST_MOVES: usize = 1 << 20;
 
@@ -776,17 +813,6 @@ fn check_count(moves: &Moves) -> Result<(), Failure> {
         return Err(Failure::Moves(MOST_MOVES));
     }
     Ok(())
-}
-
-/// The select values of a combination.
-pub fn select_values(edge: &Edge, mut combination: u32, values: &mut Vec<i32>) {
-    values.clear();
-    values.resize(edge.select.len(), 0);
-    for (value, select) in values.iter_mut().zip(&edge.select).rev() {
-        let size = (select.high - select.low + 1) as u32;
-        *value = select.low + (combination % size) as i32;
-        combination /= size;
-    }
 }
 
 /// Goes to the next combination of branches, the last part fastest; false after the last one.
