@@ -27,6 +27,24 @@ class Model:
     def queries_json(self) -> str: ...
     def edges(self) -> list[list[tuple[str, str, list[str], list[str], str, bool]]]: ...
     def simulate(self, engine: str) -> Simulation: ...
+    def states(
+        self,
+        engine: str,
+        *,
+        states: int | None,
+        memory_bytes: int | None,
+        timeout_s: float | None,
+    ) -> tuple[
+        list[
+            tuple[
+                str,
+                list[str],
+                list[list[tuple[int, bool] | None]],
+                tuple[int, list[tuple[int, int, int, list[int]]]] | None,
+            ]
+        ],
+        Literal["states", "memory", "time"] | None,
+    ]: ...
     def walk_exactly(self) -> ExactWalk: ...
     def read_queries_json(self, path: str, data: bytes) -> str: ...
     def verify(self, path: str, text: str) -> tuple[bool | None, list[str]]: ...

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from ntagen import _checker
-from ntagen.errors import InputError, ModelError
+from ntagen.errors import InputError, LimitError, ModelError
 from ntagen.model.facts import (
     Channel,
     Clock,
@@ -43,6 +43,14 @@ and the greatest; of several items a list of these."""
 
 Progress = Callable[[int, int, int, int], object]
 """Is shown explored, stored and waiting states, and bytes."""
+
+_ReachedEntry = tuple[
+    str,
+    list[str],
+    list[list[tuple[int, bool] | None]],
+    tuple[int, list[tuple[int, int, int, list[int]]]] | None,
+]
+"""A state as the engine gives it."""
 
 MAX_PLANS = 1_000_000
 """Plans that are listed at most, unless the caller says otherwise."""
@@ -117,6 +125,40 @@ class Verification:
 
     holds: bool | None
     lines: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolicState:
+    """A reachable symbolic state: discrete values, and a convex set of clock values.
+
+    Attributes:
+        index: Its place among the states, from 0.
+        locations: The location of each process.
+        variables: The value of each variable; parts of arrays and structs by names such as
+            ``a[2].x``.
+        zone: The fewest constraints on the clocks, such as ``x-y == 2`` and ``x <= 3``, in units
+            of the model's time; the equalities first. That clocks are not negative is left out.
+        predecessor: The index of the state that was left for it; ``None`` for the initial one.
+        step: The transition that was taken there; ``None`` for the initial one.
+    """
+
+    index: int
+    locations: dict[str, str] = field(hash=False)
+    variables: dict[str, int | float] = field(hash=False)
+    zone: tuple[str, ...]
+    predecessor: int | None
+    step: EngineStep | None
+    _bounds: tuple[tuple[tuple[int, bool] | None, ...], ...] = field(repr=False)
+
+    def dbm(self) -> tuple[tuple[tuple[int, bool] | None, ...], ...]:
+        """The zone as a closed difference bound matrix.
+
+        Returns:
+            Rows; the entry in row i and column j is ``(bound, strict)``: clock i minus clock j is
+            at most `bound`, or less if `strict`; ``None`` without a bound. Bounds are in units
+            of the model's time. Clock 0 is the number 0, clock i is ``model.clocks[i - 1]``.
+        """
+        return self._bounds
 
 
 class Answer:
@@ -217,8 +259,8 @@ class Answer:
 class Model:
     """A model that the engine has accepted.
 
-    What is in it are its attributes; `check` answers queries, `simulate` makes
-    random runs, and `walk` goes through symbolic states.
+    What is in it are its attributes; `check` answers queries, `simulate` makes random runs,
+    `states` lists the reachable symbolic states, and `walk` goes through them by hand.
     """
 
     def __init__(self, raw: _checker.Model) -> None:
@@ -441,6 +483,60 @@ class Model:
         """
         with _failing():
             return simulated(self._raw.walk_exactly(), steps, seed, choose)
+
+    def states(
+        self,
+        limit: int | None = None,
+        *,
+        timeout_s: float | None = None,
+        memory_bytes: int | None = None,
+        engine: CodeEngine = "jit",
+    ) -> Iterator[SymbolicState]:
+        """The reachable symbolic states, those with the fewest transitions first.
+
+        They are all computed before the first is given. One that an earlier one contains is left
+        out. Zones are extrapolated by the constants of the model, so that they are finitely many:
+        beyond these constants, and where stopwatches stand, a zone may contain clock values that
+        are not reachable.
+
+        Args:
+            limit: At most so many; there may be more.
+            timeout_s: The search gives up after this time.
+            memory_bytes: The search gives up when its states take this much.
+            engine: What runs the code of the model; states do not depend on it.
+
+        Raises:
+            ValueError: A limit is negative.
+            LimitError: Time or memory ran out.
+            ModelError: The model fails in a state.
+            KeyboardInterrupt: The user interrupted.
+        """
+        if any(one is not None and one < 0 for one in (limit, timeout_s, memory_bytes)):
+            raise ValueError("a limit cannot be negative")
+        with _failing():
+            found, stop = self._raw.states(
+                engine, states=limit, memory_bytes=memory_bytes, timeout_s=timeout_s
+            )
+        if stop in ("memory", "time"):
+            raise LimitError(
+                f"the search was stopped by the limit of {stop}; "
+                "raise it, or ask for fewer states with `limit`"
+            )
+        return self._symbolic_states(found)
+
+    def _symbolic_states(self, found: list[_ReachedEntry]) -> Iterator[SymbolicState]:
+        edges = self._edge_table()
+        for index, (discrete, zone, bounds, origin) in enumerate(found):
+            raw = json.loads(discrete)
+            yield SymbolicState(
+                index=index,
+                locations=raw["locations"],
+                variables=raw["variables"],
+                zone=tuple(zone),
+                predecessor=None if origin is None else origin[0],
+                step=None if origin is None else _step(edges, origin[1]),
+                _bounds=tuple(map(tuple, bounds)),
+            )
 
     def walk(self, engine: CodeEngine = "jit") -> Simulation:
         """Starts a symbolic walk through the model from its initial state.

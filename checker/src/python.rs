@@ -23,6 +23,7 @@ use crate::engine::{
 use crate::game::Forced;
 use crate::network::Failure;
 use crate::search::limits::StopReason;
+use crate::search::plain::Met;
 use crate::search::reach::Order;
 
 pyo3::create_exception!(
@@ -52,6 +53,20 @@ fn code_engine(name: &str) -> PyResult<CodeEngine> {
         "jit" => Ok(CodeEngine::Jit),
         "interpreter" => Ok(CodeEngine::Interpreter),
         other => Err(unknown("engine", other)),
+    }
+}
+
+fn time_limit(seconds: Option<f64>) -> PyResult<Option<Duration>> {
+    let limit = seconds.map(Duration::try_from_secs_f64).transpose();
+    limit.map_err(|_| unknown("time limit", &format!("{seconds:?}")))
+}
+
+fn stop_name(reason: StopReason) -> Option<&'static str> {
+    match reason {
+        StopReason::States => Some("states"),
+        StopReason::Memory => Some("memory"),
+        StopReason::Time => Some("time"),
+        StopReason::Interrupted => None,
     }
 }
 
@@ -103,6 +118,33 @@ type EdgeEntry = (String, String, Vec<String>, Vec<String>, String, bool);
 
 /// A step of a plan: for each edge that is taken, process, edge, branch and select values.
 type StepEntry = Vec<(u32, u32, u32, Vec<i32>)>;
+
+/// A row of a matrix of bounds: of each the value and whether it is strict, `None` for one that is infinite.
+type BoundRow = Vec<Option<(i32, bool)>>;
+
+/// A reached state: locations and variables as JSON, the constraints, the matrix, and the state and move that led to it.
+type ReachedEntry = (
+    String,
+    Vec<String>,
+    Vec<BoundRow>,
+    Option<(usize, StepEntry)>,
+);
+
+fn reached_entry(network: &crate::ir::Network, met: Met) -> ReachedEntry {
+    let clocks = 0..met.zone.dimension();
+    let bound = |left: usize, right: usize| {
+        let bound = met.zone.bound(left, right);
+        (!bound.is_infinite()).then(|| (bound.value(), bound.is_strict()))
+    };
+    let row = |left: usize| clocks.clone().map(|right| bound(left, right)).collect();
+    (
+        json::discrete(network, &met.words).to_string(),
+        describe::minimal_constraints(network, &met.zone),
+        clocks.clone().map(row).collect(),
+        met.from
+            .map(|(source, parts)| (source, step_entry(network, &parts))),
+    )
+}
 
 #[pymethods]
 impl Model {
@@ -158,6 +200,41 @@ impl Model {
             });
             processes.collect()
         })
+    }
+
+    /// The reachable symbolic states, and "states", "memory" or "time" if a limit stopped the search.
+    #[pyo3(signature = (engine, *, states, memory_bytes, timeout_s))]
+    fn states(
+        slf: &Bound<'_, Self>,
+        engine: &str,
+        states: Option<u64>,
+        memory_bytes: Option<u64>,
+        timeout_s: Option<f64>,
+    ) -> PyResult<(Vec<ReachedEntry>, Option<&'static str>)> {
+        let code = code_engine(engine)?;
+        let limits = Limits {
+            states,
+            memory_bytes,
+            timeout: time_limit(timeout_s)?,
+            observer: Some(observer(None)),
+        };
+        let model = slf.get();
+        let found = slf.py().detach(|| {
+            model.with(|model| {
+                model.prepare_simulation(code).map_err(rejected)?;
+                let (met, stop) = model
+                    .reached(limits)
+                    .map_err(|failure| Simulation::failed(model, failure))?;
+                let network = model.network();
+                let states = met.into_iter().map(|one| reached_entry(network, one));
+                Ok::<_, PyErr>((states.collect(), stop))
+            })
+        });
+        let (states, stop): (Vec<ReachedEntry>, _) = found?;
+        match stop {
+            Some(StopReason::Interrupted) => Err(PyKeyboardInterrupt::new_err(())),
+            stop => Ok((states, stop.and_then(stop_name))),
+        }
     }
 
     /// A walk through the model from its initial state.
@@ -235,13 +312,7 @@ impl Model {
         folder: Option<PathBuf>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
-        let unknown =
-            |what: &str, value: &str| PyValueError::new_err(format!("unknown {what}: {value}"));
-        let timeout = match timeout_s.map(Duration::try_from_secs_f64) {
-            None => None,
-            Some(Ok(timeout)) => Some(timeout),
-            Some(Err(_)) => return Err(unknown("time limit", &format!("{timeout_s:?}"))),
-        };
+        let timeout = time_limit(timeout_s)?;
         let options = Options {
             order: match search {
                 "bfs" => Order::BreadthFirst,
@@ -493,9 +564,7 @@ impl Answer {
     #[getter]
     fn stop(&self) -> Option<&'static str> {
         match self.inner.verdict {
-            Verdict::Unknown(StopReason::States) => Some("states"),
-            Verdict::Unknown(StopReason::Memory) => Some("memory"),
-            Verdict::Unknown(StopReason::Time) => Some("time"),
+            Verdict::Unknown(reason) => stop_name(reason),
             _ => None,
         }
     }

@@ -13,7 +13,7 @@ use crate::search::liveness::Ending;
 use crate::search::reach::Trace;
 use crate::verify::replay::{Defect, End, Run};
 use crate::verify::{self, State};
-use crate::zones::{Bound, Zone};
+use crate::zones::{Bound, Zone, minimal};
 
 /// Calls `visit` with the name and the value of every scalar part of every variable.
 pub fn for_each_value(network: &Network, words: &[i32], mut visit: impl FnMut(&str, Value)) {
@@ -134,6 +134,37 @@ pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
         }
     }
     constraints
+}
+
+/// The fewest constraints that make a zone: first the equalities, as `x == 3` and `x-y == 2`, then the others, as `x <= 3`.
+pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
+    let ties = |left: usize, right: usize| {
+        zone.bound(left, right) + zone.bound(right, left) == Bound::LE_ZERO
+    };
+    let name = |clock: usize| network.clocks[clock].name.as_str();
+    let difference = |left: usize, right: usize| match right {
+        0 => name(left).to_owned(),
+        _ => format!("{}-{}", name(left), name(right)),
+    };
+    let mut texts = Vec::new();
+    for left in 1..zone.dimension() {
+        if let Some(right) = (0..left).find(|&right| ties(left, right)) {
+            let value = zone.bound(left, right).value();
+            texts.push(format!("{} == {value}", difference(left, right)));
+        }
+    }
+    minimal::for_each_minimal(zone.bounds(), zone.dimension(), |one| {
+        if ties(one.left, one.right) {
+            return;
+        }
+        let equal = if one.bound.is_strict() { "" } else { "=" };
+        let value = one.bound.value();
+        texts.push(match one.left {
+            0 => format!("{} >{equal} {}", name(one.right), -value),
+            left => format!("{} <{equal} {value}", difference(left, one.right)),
+        });
+    });
+    texts
 }
 
 /// An edge as `P.a->P.b { guard, sync, update }`, with the select values.

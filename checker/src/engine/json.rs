@@ -192,6 +192,11 @@ pub fn state(network: &Network, state: &State) -> Json {
     })
 }
 
+/// The discrete part of a state.
+pub fn discrete(network: &Network, words: &[i32]) -> Json {
+    json!({ "locations": locations(network, words), "variables": variables(network, words) })
+}
+
 /// What can happen in a state: of each choice the edges, and the windows of waits in ticks, null for one without end.
 pub fn choices(network: &Network, choices: &[Choice]) -> Json {
     let list = choices.iter().map(|choice| {

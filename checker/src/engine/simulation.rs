@@ -1,15 +1,20 @@
 //! Walking through a model by hand: a state, its moves, the state after one of them.
 //!
 //! A state is symbolic: its zone holds all clock values that the moves so far allow. A move is listed if it is possible at some
-//! of them. Nothing is extrapolated.
+//! of them. Nothing is extrapolated, except in the list of all states, which would have no end otherwise.
 
 use crate::exec::Executor;
-use crate::ir::Network;
+use crate::ir::{Network, Predicate};
 use crate::network::{Abstraction, ClockBounds, Failure, MoveRef, Moves, Part, Stepper, Symbolic};
+use crate::search::StopReason;
+use crate::search::limits::Counters;
+use crate::search::plain::{Measure, Met, Outcome, Search};
 use crate::verify;
 use crate::verify::choices::Choices;
 use crate::zones::Zone;
 
+use super::answer::has_differences;
+use super::limits::{LimitWatch, Limits};
 use super::{CodeEngine, LoadedModel, Rejection};
 
 /// How finely the times of simulated runs are chosen.
@@ -66,6 +71,31 @@ impl LoadedModel {
             point = successors.swap_remove(0).1;
         }
         Ok(point)
+    }
+
+    /// The reachable states, breadth first, the fewest moves first, at most `limits.states` of them; and what stopped the search,
+    /// if they are not all. A state that an earlier one contains is left out. Zones are extrapolated by the constants of the model.
+    pub fn reached(&self, limits: Limits) -> Result<(Vec<Met>, Option<StopReason>), Failure> {
+        let network = self.network();
+        let abstraction = if has_differences(network, &[]) {
+            Abstraction::Differences
+        } else {
+            Abstraction::Maximum
+        };
+        let bounds = ClockBounds::new(network, &[], abstraction);
+        let mut symbolic = Symbolic::new(Stepper::new(network, self.executor()), bounds);
+        let nothing = Predicate::Constant(false);
+        let most = limits.states.map_or(usize::MAX, |most| most as usize);
+        let mut watch = LimitWatch::new(limits);
+        let mut search = Search::new(&mut symbolic, &nothing, Measure::Moves, Counters::default());
+        let stop = match search.run(&mut watch)? {
+            Outcome::Stopped(reason) => Some(reason),
+            Outcome::Found(_) | Outcome::Exhausted => None,
+        };
+        // The search looks at its limits now and then only, so that it may have met more.
+        let is_cut = search.counters().stored > most as u64;
+        let states = search.into_met(most)?;
+        Ok((states, stop.or(is_cut.then_some(StopReason::States))))
     }
 
     /// Zones as they are, without abstraction.

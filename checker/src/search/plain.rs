@@ -18,7 +18,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::ir::Predicate;
-use crate::network::{Failure, Moves, Symbolic};
+use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::{Bound, Zone, dbm};
 
 use super::limits::{Counters, StopReason, Watch};
@@ -73,6 +73,17 @@ pub enum Outcome {
 
 /// The stored states: words with their zones.
 pub type Reached = Vec<(Vec<i32>, Vec<Zone>)>;
+
+/// A state as it was met.
+#[derive(Clone, Debug)]
+pub struct Met {
+    /// Its words.
+    pub words: Vec<i32>,
+    /// Its zone, extrapolated.
+    pub zone: Zone,
+    /// Which state was left for it, an earlier one, and by which move; `None` for the initial one.
+    pub from: Option<(usize, Vec<Part>)>,
+}
 
 struct Node {
     discrete: DiscreteId,
@@ -294,6 +305,36 @@ impl<'s, 'a> Search<'s, 'a> {
             reached.push((words, zones.collect()));
         }
         reached
+    }
+
+    /// The first `most` states in the order in which they were met, also those that a later one contains.
+    pub fn into_met(self, most: usize) -> Result<Vec<Met>, Failure> {
+        let initial = &self.symbolic.stepper.network().initial;
+        let mut moves = Moves::default();
+        let mut moves_of = NONE;
+        let mut met: Vec<Met> = Vec::new();
+        for node in self.nodes.into_iter().take(most) {
+            let mut words = initial.clone();
+            self.store.load(node.discrete, &mut words);
+            let mut from = None;
+            if node.parent != NONE {
+                let parent = node.parent as usize;
+                // What a state leads to was met in one go.
+                if moves_of != node.parent {
+                    let mut source = met[parent].words.clone();
+                    self.symbolic.moves(&mut source, &mut moves)?;
+                    moves_of = node.parent;
+                }
+                let taken = moves.iter().nth(node.step as usize);
+                from = taken.map(|one| (parent, one.parts.to_vec()));
+            }
+            met.push(Met {
+                words,
+                zone: node.zone,
+                from,
+            });
+        }
+        Ok(met)
     }
 }
 
