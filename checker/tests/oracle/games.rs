@@ -138,13 +138,16 @@ fn wins(
     winning(graph, &objective, rule)
 }
 
-/// What holds in every run under a strategy of the winner, as far as it can be said without play ending on the way.
+/// What holds under a strategy of the winner, as far as it can be said without play ending on the way: in every run if it is the
+/// controller's, and in some run if it is the environment's. In a game the environment is faster where both act at the same
+/// instant, but the closed loop leaves all moves of the other player possible, so that it also has the runs in which the controller
+/// was faster.
 fn enforced(kind: Kind, owner: Player, (goal, keep): (&str, &str)) -> Vec<String> {
     match (kind, owner) {
         (Kind::Reach | Kind::Until, Player::Controller) => vec![format!("A<> {goal}")],
-        (Kind::Reach, Player::Environment) => vec![format!("A[] not ({goal})")],
+        (Kind::Reach, Player::Environment) => vec![format!("E[] not ({goal})")],
         (Kind::Safe, Player::Controller) => vec![format!("A[] {keep}")],
-        (Kind::Safe, Player::Environment) => vec![format!("A<> not ({keep})")],
+        (Kind::Safe, Player::Environment) => vec![format!("E<> not ({keep})")],
         (Kind::Recur, Player::Controller) => {
             vec![format!("A[] {keep}"), format!("not ({goal}) --> {goal}")]
         }
