@@ -94,7 +94,7 @@ fn verdict_of(path: &Path, bytes: &[u8], case: &Case, options: &Options) -> Stri
         Ok(answer) if answer.evidence.is_verified() == Some(false) => {
             let runs = answer.evidence.witnesses.iter().map(|one| &one.run);
             format!(
-                "a trace that fails its replay: {:?}",
+                "a strategy or a trace that fails its check: {:?}",
                 runs.collect::<Vec<_>>()
             )
         }
@@ -142,6 +142,7 @@ fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>
                     code,
                     forced: forced.unwrap_or_default(),
                     strategy: true,
+                    verify: true,
                     runs: true,
                     ..Options::default()
                 };

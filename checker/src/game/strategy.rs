@@ -34,8 +34,8 @@ pub struct Decision {
     pub zones: Federation,
     /// The move to take; `None` is to wait.
     pub action: Option<Vec<Part>>,
-    /// The rank of the valuations: moves between nodes lead to smaller ones, and inside chains it never grows. 0 is where what was
-    /// sought is reached, and everywhere in a strategy that only has to avoid.
+    /// The rank of the valuations: all moves lead to smaller ones, also inside chains. 0 is where what was sought is reached, and
+    /// everywhere in a strategy that only has to avoid.
     pub rank: u32,
 }
 
@@ -85,6 +85,7 @@ pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
         },
         states: Vec::new(),
     };
+    let mut steps_to_end = Vec::new();
     let mut seen = vec![false; solver.graph.nodes.len()];
     let mut waiting = vec![0_u32];
     seen[0] = true;
@@ -103,9 +104,12 @@ pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
             decisions,
             is_goal: standing == won_standing(owner) && solver.targets.is_none(),
         });
+        steps_to_end.resize(strategy.states.len(), 0);
         for edge in taken {
             if is_seeking {
                 inner_states(solver, edge, &source, &mut strategy)?;
+                let inner = strategy.states.len() - steps_to_end.len();
+                steps_to_end.extend((1..=inner as u32).rev());
             } else {
                 evasion::inner_states(solver, edge, &source, &mut strategy)?;
             }
@@ -115,7 +119,28 @@ pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
             }
         }
     }
+    if is_seeking {
+        rank_chains(&mut strategy, &steps_to_end);
+    }
     Ok(strategy)
+}
+
+/// Ranks states inside chains above the end of their chain, by their steps to it. Their words may be those of a node as well; at
+/// equal ranks the chain could be entered again from where it has led.
+fn rank_chains(strategy: &mut Strategy, steps_to_end: &[u32]) {
+    let states = strategy.states.iter().zip(steps_to_end);
+    let mut ranks: Vec<(u32, u32)> = states
+        .flat_map(|(state, &steps)| state.decisions.iter().map(move |one| (one.rank, steps)))
+        .chain([(0, 0)])
+        .collect();
+    ranks.sort_unstable();
+    ranks.dedup();
+    for (state, &steps) in strategy.states.iter_mut().zip(steps_to_end) {
+        for decision in &mut state.decisions {
+            let rank = ranks.partition_point(|&rank| rank < (decision.rank, steps));
+            decision.rank = rank as u32;
+        }
+    }
 }
 
 /// The nodes in which play has ended in favour of a player.
