@@ -6,7 +6,7 @@
 
 use crate::ir::{Objective, Predicate, Query, QueryKind};
 use crate::network::{Abstraction, Extent, Failure, Part, Symbolic};
-use crate::search::goal::{Goal, Look, Visited};
+use crate::search::goal::Goal;
 use crate::search::reach::{self, Order, Trace};
 use crate::zones::Zone;
 
@@ -193,17 +193,6 @@ struct Probe<'q> {
 }
 
 impl Goal for Probe<'_> {
-    fn look(&mut self, visited: Visited<'_, '_>) -> Result<Look, Failure> {
-        let Visited {
-            symbolic,
-            words,
-            zone,
-            ..
-        } = visited;
-        self.confirms(symbolic, words, zone)?;
-        Ok(Look::Continue)
-    }
-
     fn confirms(
         &mut self,
         symbolic: &mut Symbolic<'_>,

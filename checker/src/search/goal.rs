@@ -33,8 +33,17 @@ pub enum Look {
 
 /// Looks at every state that a search comes to.
 pub trait Goal {
-    /// Looks at a state.
-    fn look(&mut self, visited: Visited<'_, '_>) -> Result<Look, Failure>;
+    /// Looks at a state; by default the search ends where [`Goal::confirms`] says so.
+    fn look(&mut self, visited: Visited<'_, '_>) -> Result<Look, Failure> {
+        let Visited {
+            symbolic,
+            words,
+            zone,
+            ..
+        } = visited;
+        let holds = self.confirms(symbolic, words, zone)?;
+        Ok(if holds { Look::Found } else { Look::Continue })
+    }
 
     /// Whether a state in which the search ended, computed again without extrapolation, is what was looked for.
     fn confirms(
@@ -52,17 +61,6 @@ pub trait Goal {
 
 /// A predicate is looked for: some valuation of the zone satisfies it.
 impl Goal for &Predicate {
-    fn look(&mut self, visited: Visited<'_, '_>) -> Result<Look, Failure> {
-        let Visited {
-            symbolic,
-            words,
-            zone,
-            ..
-        } = visited;
-        let holds = self.confirms(symbolic, words, zone)?;
-        Ok(if holds { Look::Found } else { Look::Continue })
-    }
-
     fn confirms(
         &mut self,
         symbolic: &mut Symbolic<'_>,

@@ -5,7 +5,7 @@ use crate::network::{Failure, Symbolic};
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Zone};
 
-use super::goal::{Goal, Look, Visited};
+use super::goal::Goal;
 
 /// A value of a measure that some state has, or comes near to.
 #[derive(Clone, Copy, Debug)]
@@ -87,17 +87,6 @@ impl Taking<'_> {
 }
 
 impl Goal for Taking<'_> {
-    fn look(&mut self, visited: Visited<'_, '_>) -> Result<Look, Failure> {
-        let Visited {
-            symbolic,
-            words,
-            zone,
-            ..
-        } = visited;
-        let holds = self.confirms(symbolic, words, zone)?;
-        Ok(if holds { Look::Found } else { Look::Continue })
-    }
-
     fn confirms(
         &mut self,
         symbolic: &mut Symbolic<'_>,
