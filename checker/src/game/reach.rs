@@ -637,20 +637,31 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         )
     }
 
-    /// The valuations from which a move of the evader is not known to lead into won ones. In a chain somebody may still wait or
-    /// get stuck, so there it is what is not led into won valuations.
+    /// The valuations from which a move of the evader is not known to lead into won ones.
     pub(super) fn spoiling(&self, edge: &Edge) -> Federation {
+        self.missing(edge, &self.win[edge.target as usize])
+    }
+
+    /// The valuations from which an edge is possible and does not lead into the given valuations of its target. In a chain somebody
+    /// may still wait or get stuck, so there it is what is not led into them; other edges may be pieces of a move, and lead into
+    /// the rest of their own target.
+    pub(super) fn missing(&self, edge: &Edge, hit: &Win) -> Federation {
         if edge.length == 1 {
-            return self.before(edge, &self.lost(edge.target));
+            return self.before(edge, &self.complement(edge.target, hit));
         }
-        let mut spoiling = self.enabled(edge);
-        spoiling.subtract(&self.before(edge, &self.win[edge.target as usize]));
-        spoiling
+        let mut missing = self.enabled(edge);
+        missing.subtract(&self.before(edge, hit));
+        missing
     }
 
     /// The valuations of a node that are not known to be won.
     pub(super) fn lost(&self, node: u32) -> Win {
-        match &self.win[node as usize] {
+        self.complement(node, &self.win[node as usize])
+    }
+
+    /// The other valuations of a node.
+    fn complement(&self, node: u32, part: &Win) -> Win {
+        match part {
             Win::Nothing => Win::Everything,
             Win::Everything => Win::Nothing,
             Win::Part(part) => {

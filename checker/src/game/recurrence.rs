@@ -128,13 +128,11 @@ fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Wi
     let mut back = Federation::empty(solver.graph.dimension());
     for index in solver.graph.edges_of(node) {
         let edge = solver.graph.edges[index];
-        let into = solver.before(&edge, &kept[edge.target as usize]);
+        let kept = &kept[edge.target as usize];
         if edge.controllable {
-            back.unite(&into);
+            back.unite(&solver.before(&edge, kept));
         } else {
-            let mut spoiling = solver.enabled(&edge);
-            spoiling.subtract(&into);
-            out.unite(&spoiling);
+            out.unite(&solver.missing(&edge, kept));
         }
     }
     back.subtract(&out);
