@@ -53,6 +53,26 @@ pub struct Decisions {
     pub decisions: Vec<Decision>,
 }
 
+impl Decisions {
+    /// The decisions that apply at clock values in ticks; only the first of them unless the strategy is permissive.
+    pub(super) fn at(
+        &self,
+        clocks: &[i64],
+        ticks_per_unit: i64,
+        is_permissive: bool,
+    ) -> Vec<&Decision> {
+        let holds = |one: &Constraint| {
+            let difference = clocks[one.left] - clocks[one.right];
+            let bound = i64::from(one.bound) * ticks_per_unit;
+            difference < bound || (!one.strict && difference == bound)
+        };
+        let applies =
+            |decision: &&Decision| decision.zones.iter().any(|zone| zone.iter().all(holds));
+        let most = if is_permissive { usize::MAX } else { 1 };
+        self.decisions.iter().filter(applies).take(most).collect()
+    }
+}
+
 /// When the environment must move at a point where time cannot pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Forcing {
@@ -190,13 +210,8 @@ pub fn verify(
     let mut zones = zones;
     let has_differences = claim.has_differences || zones.any(|one| one.left != 0 && one.right != 0);
     let mut play = Play {
-        semantics: Semantics::new(network, Regions::ticks_per_unit(network)),
+        rules: Rules::new(network, Regions::ticks_per_unit(network), strategy, claim),
         regions: Regions::new(network, constant, has_differences)?,
-        strategy: strategy
-            .iter()
-            .map(|state| (identity(network, &state.words), state))
-            .collect(),
-        claim,
         seen: HashMap::new(),
         path: Vec::new(),
         goals: Vec::new(),
@@ -226,11 +241,25 @@ struct Frame {
     taken: Option<Step>,
 }
 
-struct Play<'a> {
-    semantics: Semantics<'a>,
-    regions: Regions,
+/// Who may do what in a state, and who has won.
+pub(super) struct Rules<'a> {
+    pub(super) semantics: Semantics<'a>,
     strategy: HashMap<&'a [i32], &'a Decisions>,
-    claim: &'a Claim<'a>,
+    pub(super) claim: &'a Claim<'a>,
+}
+
+/// What becomes of play where time cannot pass and nobody wants to move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rest {
+    /// This player has to move nevertheless.
+    Must(Owner),
+    /// Play stops, and this player has won.
+    Won(Owner),
+}
+
+struct Play<'a> {
+    rules: Rules<'a>,
+    regions: Regions,
     seen: HashMap<State, Mark>,
     path: Vec<Frame>,
     /// Goals that are to recur and were met, with their successors.
@@ -240,9 +269,9 @@ struct Play<'a> {
     coverage: Coverage,
 }
 
-impl<'a> Play<'a> {
+impl Play<'_> {
     fn run(&mut self, most_regions: u64) -> Result<Outcome, Error> {
-        let mut initial = self.semantics.initial()?;
+        let mut initial = self.rules.semantics.initial()?;
         self.regions.represent_state(&mut initial);
         if let Some(defect) = self.enter(&initial)? {
             return self.violated(defect);
@@ -265,7 +294,7 @@ impl<'a> Play<'a> {
             frame.taken = Some(step);
             match self.seen.get(&target) {
                 Some(Mark::Done) => continue,
-                Some(Mark::Open) if !self.claim.must_end() => continue,
+                Some(Mark::Open) if !self.rules.claim.must_end() => continue,
                 Some(Mark::Open) => {
                     self.push(target, Vec::new());
                     return self.violated(Defect::Endless);
@@ -304,14 +333,14 @@ impl<'a> Play<'a> {
             defect,
             states,
             steps,
-            ticks_per_unit: self.semantics.ticks_per_unit(),
+            ticks_per_unit: self.rules.semantics.ticks_per_unit(),
         };
         Ok(Outcome::Violated(Box::new(violation), self.coverage))
     }
 
     /// A run of the closed loop from the initial state to a region that it reaches; the last state is left out.
     fn way_to(&mut self, end: &State) -> Result<(Vec<State>, Vec<Step>), Error> {
-        let mut initial = self.semantics.initial()?;
+        let mut initial = self.rules.semantics.initial()?;
         self.regions.represent_state(&mut initial);
         let mut origins: HashMap<State, Option<(State, Step)>> = HashMap::new();
         let mut waiting = std::collections::VecDeque::from([initial.clone()]);
@@ -342,8 +371,8 @@ impl<'a> Play<'a> {
         self.coverage.regions += 1;
         self.seen.insert(state.clone(), Mark::Open);
         self.push(state.clone(), Vec::new());
-        if let Some(winner) = self.winner(state)? {
-            return Ok(if winner == self.claim.owner {
+        if let Some(winner) = self.rules.winner(state)? {
+            return Ok(if winner == self.rules.claim.owner {
                 self.coverage.goals += 1;
                 None
             } else if winner == Owner::Controller {
@@ -354,7 +383,9 @@ impl<'a> Play<'a> {
         }
         match self.successors(state)? {
             Err(defect) => Ok(Some(defect)),
-            Ok(successors) if self.claim.aim == Aim::Recur && self.is_goal(state)? => {
+            Ok(successors)
+                if self.rules.claim.aim == Aim::Recur && self.rules.is_goal(state)? =>
+            {
                 self.coverage.goals += 1;
                 self.goals.push((state.clone(), successors));
                 Ok(None)
@@ -366,9 +397,28 @@ impl<'a> Play<'a> {
             }
         }
     }
+}
+
+impl<'a> Rules<'a> {
+    /// The rules for a strategy and what is claimed of it, at this resolution of time.
+    pub(super) fn new(
+        network: &'a Network,
+        ticks_per_unit: i64,
+        strategy: &'a [Decisions],
+        claim: &'a Claim<'a>,
+    ) -> Rules<'a> {
+        let states = strategy.iter();
+        Rules {
+            semantics: Semantics::new(network, ticks_per_unit),
+            strategy: states
+                .map(|state| (identity(network, &state.words), state))
+                .collect(),
+            claim,
+        }
+    }
 
     /// Who has won in a state; `None` if play goes on.
-    fn winner(&self, state: &State) -> Result<Option<Owner>, Error> {
+    pub(super) fn winner(&self, state: &State) -> Result<Option<Owner>, Error> {
         if self.claim.aim != Aim::Recur && self.is_goal(state)? {
             return Ok(Some(Owner::Controller));
         }
@@ -378,28 +428,27 @@ impl<'a> Play<'a> {
         })
     }
 
-    fn is_goal(&self, state: &State) -> Result<bool, Error> {
+    pub(super) fn is_goal(&self, state: &State) -> Result<bool, Error> {
         match self.claim.goal {
             Some(goal) => self.semantics.holds(goal, state),
             None => Ok(false),
         }
     }
+}
 
+impl Play<'_> {
     /// Where play may go from a region under the strategy.
     fn successors(&mut self, state: &State) -> Result<Result<Vec<(Step, State)>, Defect>, Error> {
-        let moves = self.semantics.moves(state)?;
-        let mut possible = Vec::new();
-        for one in &moves {
-            if let Some(mut target) = self.semantics.take(state, &one.parts)? {
-                self.regions.represent_state(&mut target);
-                possible.push((one, target));
-            }
+        let moves = self.rules.semantics.moves(state)?;
+        let mut possible = self.rules.possible(state, &moves)?;
+        for (_, target) in &mut possible {
+            self.regions.represent_state(target);
         }
-        let decisions = self.decisions(state);
+        let decisions = self.rules.decisions(state);
         if decisions.is_empty() {
             return Ok(Err(Defect::NoDecision));
         }
-        let is_own = |one: &Move| one.controllable == (self.claim.owner == Owner::Controller);
+        let is_own = |one: &Move| self.rules.is_own(one);
         let mut successors: Vec<(Step, State)> = Vec::new();
         let mut acts_first = false;
         for action in decisions.iter().filter_map(|one| one.action.as_ref()) {
@@ -408,7 +457,7 @@ impl<'a> Play<'a> {
                 return Ok(Err(Defect::ImpossibleAction));
             };
             self.coverage.own_moves += 1;
-            acts_first = self.claim.owner == Owner::Environment;
+            acts_first = self.rules.claim.owner == Owner::Environment;
             successors.push((Step::Move((*one).clone()), target.clone()));
         }
         if !acts_first {
@@ -421,15 +470,37 @@ impl<'a> Play<'a> {
         if decisions.iter().any(|one| one.action.is_none()) {
             let mut later = state.clone();
             self.regions.pass(&mut later.clocks);
-            if !self.semantics.is_time_stopped(state, &moves)
-                && self.semantics.invariants_hold(&later)?
+            if !self.rules.semantics.is_time_stopped(state, &moves)
+                && self.rules.semantics.invariants_hold(&later)?
             {
                 successors.push((Step::Time, later));
-            } else if !self.may_rest(state, &later, &moves, &possible)? {
+            } else if !self.rules.may_rest(state, &later, &moves, &possible)? {
                 return Ok(Err(Defect::Stuck));
             }
         }
         Ok(Ok(successors))
+    }
+}
+
+impl<'a> Rules<'a> {
+    /// The moves whose targets satisfy the invariants, with these.
+    pub(super) fn possible<'m>(
+        &self,
+        state: &State,
+        moves: &'m [Move],
+    ) -> Result<Vec<(&'m Move, State)>, Error> {
+        let mut possible = Vec::new();
+        for one in moves {
+            if let Some(target) = self.semantics.take(state, &one.parts)? {
+                possible.push((one, target));
+            }
+        }
+        Ok(possible)
+    }
+
+    /// Whether the owner of the strategy makes the move.
+    pub(super) fn is_own(&self, one: &Move) -> bool {
+        one.controllable == (self.claim.owner == Owner::Controller)
     }
 
     /// Whether the owner may wait in a state in which time cannot pass.
@@ -440,46 +511,50 @@ impl<'a> Play<'a> {
         moves: &[Move],
         possible: &[(&Move, State)],
     ) -> Result<bool, Error> {
+        let owner = self.claim.owner;
+        Ok(match self.rest(state, later, moves, possible)? {
+            Rest::Must(player) => player != owner,
+            Rest::Won(player) => player == owner,
+        })
+    }
+
+    /// What becomes of play in a state in which time cannot pass if nobody wants to move. `later` is the state a little later,
+    /// `moves` are those whose guards hold.
+    pub(super) fn rest(
+        &self,
+        state: &State,
+        later: &State,
+        moves: &[Move],
+        possible: &[(&Move, State)],
+    ) -> Result<Rest, Error> {
         let has_own = possible.iter().any(|(one, _)| one.controllable);
         let has_other = possible.iter().any(|(one, _)| !one.controllable);
-        let must_controller_move = has_own && !has_other;
         // Where play stops at a goal that is to recur, nothing is owed.
         let aim = match self.claim.aim {
             Aim::Recur if self.is_goal(state)? => Aim::Keep,
             other => other,
         };
-        Ok(match (self.claim.owner, aim) {
-            (Owner::Controller, Aim::Keep) => !must_controller_move,
-            (Owner::Environment, Aim::Keep) => must_controller_move,
-            (owner, Aim::Reach | Aim::Recur) => {
-                let must_environment_move =
-                    has_other && self.is_forced(state, later, moves, possible)?;
-                must_environment_move == (owner == Owner::Controller)
+        Ok(match aim {
+            Aim::Keep if has_own && !has_other => Rest::Must(Owner::Controller),
+            Aim::Keep => Rest::Won(Owner::Controller),
+            Aim::Reach | Aim::Recur => {
+                if has_other && self.is_forced(state, later, moves, possible)? {
+                    Rest::Must(Owner::Environment)
+                } else {
+                    Rest::Won(Owner::Environment)
+                }
             }
         })
     }
 
     /// The decisions that apply.
-    fn decisions(&self, state: &State) -> Vec<&'a Decision> {
+    pub(super) fn decisions(&self, state: &State) -> Vec<&'a Decision> {
         let words = identity(self.semantics.network(), &state.words);
-        let unit = self.semantics.ticks_per_unit();
-        let holds = |one: &Constraint| {
-            let difference = state.clocks[one.left] - state.clocks[one.right];
-            let bound = i64::from(one.bound) * unit;
-            difference < bound || (!one.strict && difference == bound)
-        };
         let Some(&decisions) = self.strategy.get(words) else {
             return Vec::new();
         };
-        let applies =
-            |decision: &&Decision| decision.zones.iter().any(|zone| zone.iter().all(holds));
-        let most = if self.claim.is_permissive {
-            usize::MAX
-        } else {
-            1
-        };
-        let all: &'a [Decision] = &decisions.decisions;
-        all.iter().filter(applies).take(most).collect()
+        let unit = self.semantics.ticks_per_unit();
+        decisions.at(&state.clocks, unit, self.claim.is_permissive)
     }
 
     /// Whether the environment must move in a state in which time cannot pass.
