@@ -1,5 +1,6 @@
 //! Search over symbolic states: stores, orders, limits, reachability, liveness, extrema and traces.
 
+mod explore;
 pub mod extremum;
 pub mod goal;
 pub mod leads_to;
@@ -14,6 +15,7 @@ mod retrace;
 pub mod schedule;
 pub mod store;
 pub mod taking;
+mod tree;
 pub mod zone_table;
 
 pub use limits::{Counters, StopReason, Watch};

@@ -47,18 +47,22 @@ macro_rules! entry {
             const INFINITY: $type = <$type>::MAX;
             const LEAST: $type = <$type>::MIN;
 
+            #[inline]
             fn truncated(raw: i32) -> $type {
                 raw as $type
             }
 
+            #[inline]
             fn raw(self) -> i32 {
                 self.into()
             }
 
+            #[inline]
             fn to_bytes(self) -> [u8; $bytes] {
                 self.to_le_bytes()
             }
 
+            #[inline]
             fn of_bytes(bytes: [u8; $bytes]) -> $type {
                 <$type>::from_le_bytes(bytes)
             }

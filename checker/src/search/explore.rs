@@ -1,0 +1,360 @@
+//! The successors of a stored state, and of all committed ones below it.
+//!
+//! States with a committed location are explored where they arise, and stored only if they have a choice, so that choices one
+//! after the other do not multiply. The others are links of a chain; those that were explored last are remembered
+//! ([`RecentStates`]) and not explored again. Chains that are not short ([`LONGEST_CHAIN`], [`MOST_AT_ONCE`]) are stored after
+//! all, so that loops of them end.
+//!
+//! Where states are stored, and when they are explored, the [`Sink`] decides.
+
+use crate::ir::{Network, Urgency};
+use crate::network::{Failure, Moves, Symbolic};
+use crate::zones::dbm::Constraint;
+use crate::zones::{Bound, Zone};
+
+use super::goal::{Goal, Look, Visited};
+use super::limits::{Counters, StopReason, Watch};
+use super::recent::RecentStates;
+use super::retrace::Step;
+
+/// Committed states that are explored one below the other without waiting.
+const LONGEST_CHAIN: usize = 64;
+
+/// Committed states that are explored below one stored state without waiting.
+const MOST_AT_ONCE: u64 = 4096;
+
+/// Takes the states that exploration comes to. Ways begin at the state that is being explored.
+pub(super) trait Sink {
+    /// Stores a state and lets it wait, unless a stored one contains it.
+    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]);
+
+    /// Stores a committed state that has a choice; returns whether it is to be explored at once, and not if a stored state
+    /// contains it.
+    fn add_choice(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool;
+
+    /// The bytes of a state's words that decide identity.
+    fn pack(&mut self, words: &[i32]) -> &[u8];
+
+    /// How many states are stored, about.
+    fn stored(&self) -> usize;
+}
+
+/// What exploration needs beside its own buffers.
+pub(super) struct Scene<'x, 'a, S> {
+    pub(super) symbolic: &'x mut Symbolic<'a>,
+    pub(super) goal: &'x mut dyn Goal,
+    pub(super) watch: &'x mut dyn Watch,
+    /// The counters when the exploration of the stored state began.
+    pub(super) counters: Counters,
+    pub(super) sink: &'x mut S,
+}
+
+impl<S> Scene<'_, '_, S> {
+    /// Asks the goal about a state.
+    pub(super) fn look(&mut self, words: &mut [i32], zone: &Zone) -> Result<Look, Failure> {
+        self.goal.look(Visited {
+            symbolic: self.symbolic,
+            words,
+            zone,
+            counters: self.counters,
+            watch: self.watch,
+        })
+    }
+}
+
+/// How far the exploration of a stored state has come.
+pub(super) enum Visit {
+    /// To its end.
+    Done,
+    /// As far as was allowed; it can go on.
+    Paused,
+    /// To a state that was looked for.
+    Found,
+    /// To a limit.
+    Stopped(StopReason),
+}
+
+/// What became of a move.
+enum Taken {
+    /// Nothing more to do: impossible, stored, or covered.
+    Nothing,
+    /// The goal was found in the target.
+    Found,
+    /// A limit came first.
+    Stopped(StopReason),
+    /// The target is committed and is explored at once.
+    Down,
+}
+
+/// A state on the stack of unstored ones.
+#[derive(Debug)]
+struct Frame {
+    words: Vec<i32>,
+    zone: Zone,
+    moves: Moves,
+    next: usize,
+}
+
+/// Explores one stored state after the other.
+#[derive(Debug)]
+pub(super) struct Explorer {
+    /// The committed states that were explored last.
+    recent: RecentStates,
+    frames: Vec<Frame>,
+    /// The frame at hand.
+    depth: usize,
+    /// The moves from the stored state to the state at hand.
+    way: Vec<Step>,
+    entries: Vec<Zone>,
+    /// Whether some location is committed.
+    has_committed: bool,
+    explored: u64,
+    /// The value of `explored` when the exploration of the stored state began.
+    explored_before: u64,
+}
+
+impl Explorer {
+    pub(super) fn new(network: &Network) -> Explorer {
+        Explorer {
+            recent: RecentStates::new(),
+            frames: Vec::new(),
+            depth: 0,
+            way: Vec::new(),
+            entries: Vec::new(),
+            has_committed: network.processes.iter().any(|process| {
+                let mut locations = process.locations.iter();
+                locations.any(|location| location.urgency == Urgency::Committed)
+            }),
+            explored: 0,
+            explored_before: 0,
+        }
+    }
+
+    /// States whose successors were computed.
+    pub(super) fn explored(&self) -> u64 {
+        self.explored
+    }
+
+    /// The bytes that remembered states take.
+    pub(super) fn bytes(&self) -> usize {
+        self.recent.bytes()
+    }
+
+    /// The moves from the stored state to the state at hand.
+    pub(super) fn way(&self) -> &[Step] {
+        &self.way
+    }
+
+    /// Begins with a stored state, which `load` writes over another one.
+    pub(super) fn begin(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        load: impl FnOnce(&mut [i32], &mut [Bound]),
+    ) -> Result<(), Failure> {
+        self.way.clear();
+        self.explored_before = self.explored;
+        self.depth = 0;
+        if self.frames.is_empty() {
+            self.frames.push(new_frame(symbolic));
+        }
+        let frame = &mut self.frames[0];
+        load(&mut frame.words, frame.zone.bounds_mut());
+        self.explored += 1;
+        open(symbolic, frame)
+    }
+
+    /// Explores what has begun, for at most so many moves.
+    pub(super) fn explore<S: Sink>(
+        &mut self,
+        scene: &mut Scene<'_, '_, S>,
+        most_moves: u64,
+    ) -> Result<Visit, Failure> {
+        let mut frames = std::mem::take(&mut self.frames);
+        let result = self.explore_frames(&mut frames, scene, most_moves);
+        self.frames = frames;
+        result
+    }
+
+    fn explore_frames<S: Sink>(
+        &mut self,
+        frames: &mut Vec<Frame>,
+        scene: &mut Scene<'_, '_, S>,
+        most_moves: u64,
+    ) -> Result<Visit, Failure> {
+        let mut depth = self.depth;
+        for _ in 0..most_moves {
+            if frames[depth].next == frames[depth].moves.len() {
+                if depth == 0 {
+                    return Ok(Visit::Done);
+                }
+                depth -= 1;
+                self.way.pop();
+                continue;
+            }
+            if frames.len() == depth + 1 {
+                frames.push(new_frame(scene.symbolic));
+            }
+            let (above, below) = frames.split_at_mut(depth + 1);
+            match self.take_next(scene, &mut above[depth], &mut below[0], depth)? {
+                Taken::Nothing => {}
+                Taken::Found => return Ok(Visit::Found),
+                Taken::Stopped(reason) => return Ok(Visit::Stopped(reason)),
+                Taken::Down => {
+                    let frame = &mut frames[depth + 1];
+                    self.explored += 1;
+                    open(scene.symbolic, frame)?;
+                    if self.is_link_or_new(scene, frame) {
+                        depth += 1;
+                    } else {
+                        self.way.pop();
+                    }
+                }
+            }
+        }
+        self.depth = depth;
+        Ok(Visit::Paused)
+    }
+
+    /// Stores a committed state that has a choice; returns false if it is not to be explored here.
+    fn is_link_or_new<S: Sink>(&mut self, scene: &mut Scene<'_, '_, S>, frame: &Frame) -> bool {
+        if frame.moves.len() < 2 {
+            return true;
+        }
+        let (words, zone) = (&frame.words, frame.zone.bounds());
+        let is_new = scene.sink.add_choice(words, zone, &self.way);
+        self.explored -= u64::from(!is_new);
+        is_new
+    }
+
+    /// Takes the next move of `source`; a committed target is left in `target` to be explored at once.
+    fn take_next<S: Sink>(
+        &mut self,
+        scene: &mut Scene<'_, '_, S>,
+        source: &mut Frame,
+        target: &mut Frame,
+        depth: usize,
+    ) -> Result<Taken, Failure> {
+        let ordinal = source.next as Step;
+        source.next += 1;
+        let symbolic = &mut *scene.symbolic;
+        let one = source.moves.get(ordinal as usize);
+        if symbolic.stays_whole(one) {
+            if !symbolic.may_satisfy(one, source.zone.bounds())? {
+                return Ok(Taken::Nothing);
+            }
+            target.words.copy_from_slice(&source.words);
+            let zone = target.zone.bounds_mut();
+            zone.copy_from_slice(source.zone.bounds());
+            if !symbolic.take(one, &mut target.words, zone)? {
+                return Ok(Taken::Nothing);
+            }
+            self.way.push(ordinal);
+            return self.enter_whole(scene, target, depth);
+        }
+        if !symbolic.is_enabled(one, source.zone.bounds())? {
+            return Ok(Taken::Nothing);
+        }
+        target.words.copy_from_slice(&source.words);
+        let Some(effect) = symbolic.fire(one, &mut target.words)? else {
+            return Ok(Taken::Nothing);
+        };
+        let mut entries = std::mem::take(&mut self.entries);
+        effect.entry_zones(source.zone.bounds(), symbolic.dimension(), &mut entries);
+        self.way.push(ordinal);
+        let taken = self.enter(scene, &effect.invariant, &mut entries, target, depth);
+        self.entries = entries;
+        taken
+    }
+
+    /// Looks at the target of a move, whose words and zone are in `target`, and stores it or leaves it there.
+    fn enter_whole<S: Sink>(
+        &mut self,
+        scene: &mut Scene<'_, '_, S>,
+        target: &mut Frame,
+        depth: usize,
+    ) -> Result<Taken, Failure> {
+        let Frame { words, zone, .. } = target;
+        scene.symbolic.pass_time(words, zone.bounds_mut())?;
+        let taken = match scene.look(words, zone)? {
+            Look::Found => return Ok(Taken::Found),
+            Look::Stopped(reason) => Taken::Stopped(reason),
+            Look::Continue => {
+                scene.symbolic.extrapolate(words, zone.bounds_mut());
+                if self.descends(scene.symbolic, words, depth) {
+                    return Ok(self.descend(scene.sink, words, zone.bounds()));
+                }
+                scene.sink.add_waiting(words, zone.bounds(), &self.way);
+                Taken::Nothing
+            }
+        };
+        self.way.pop();
+        Ok(taken)
+    }
+
+    /// As [`Explorer::enter_whole`], for the zones on entry before time passes, of which there may be several.
+    fn enter<S: Sink>(
+        &mut self,
+        scene: &mut Scene<'_, '_, S>,
+        invariant: &[Constraint],
+        entries: &mut Vec<Zone>,
+        target: &mut Frame,
+        depth: usize,
+    ) -> Result<Taken, Failure> {
+        scene
+            .symbolic
+            .let_time_pass(&mut target.words, invariant, entries)?;
+        for entry in &*entries {
+            match scene.look(&mut target.words, entry)? {
+                Look::Continue => {}
+                Look::Found => return Ok(Taken::Found),
+                Look::Stopped(reason) => return Ok(Taken::Stopped(reason)),
+            }
+        }
+        scene.symbolic.extrapolate_all(&target.words, entries);
+        if let [entry] = entries.as_slice()
+            && self.descends(scene.symbolic, &target.words, depth)
+        {
+            target.zone.bounds_mut().copy_from_slice(entry.bounds());
+            return Ok(self.descend(scene.sink, &target.words, entry.bounds()));
+        }
+        for entry in &*entries {
+            let zone = entry.bounds();
+            scene.sink.add_waiting(&target.words, zone, &self.way);
+        }
+        self.way.pop();
+        Ok(Taken::Nothing)
+    }
+
+    /// Whether a state is to be explored at once and not stored.
+    fn descends(&self, symbolic: &Symbolic<'_>, words: &[i32], depth: usize) -> bool {
+        self.has_committed
+            && depth < LONGEST_CHAIN
+            && self.explored - self.explored_before < MOST_AT_ONCE
+            && symbolic.stepper.is_committed(words)
+    }
+
+    /// Goes down to a committed state, unless it was explored lately.
+    fn descend<S: Sink>(&mut self, sink: &mut S, words: &[i32], zone: &[Bound]) -> Taken {
+        let stored = sink.stored();
+        if self.recent.enter(sink.pack(words), zone, stored) {
+            self.way.pop();
+            return Taken::Nothing;
+        }
+        Taken::Down
+    }
+}
+
+fn new_frame(symbolic: &Symbolic<'_>) -> Frame {
+    Frame {
+        words: symbolic.stepper.network().initial.clone(),
+        zone: Zone::zero(symbolic.dimension()),
+        moves: Moves::default(),
+        next: 0,
+    }
+}
+
+/// Finds the moves of a state.
+fn open(symbolic: &mut Symbolic<'_>, frame: &mut Frame) -> Result<(), Failure> {
+    frame.next = 0;
+    symbolic.moves(&mut frame.words, &mut frame.moves)
+}
