@@ -55,6 +55,7 @@ class Model:
         search: str,
         seed: int,
         forced: str,
+        priorities: str,
         engine: str,
         states: int | None,
         memory_bytes: int | None,

@@ -30,6 +30,7 @@ from ntagen.runs import Choose, Run, runs_of, simulated
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 SearchOrder = Literal["bfs", "dfs", "random"]
 ForcedRule = Literal["tiga", "product", "neutral"]
+PriorityRule = Literal["ignore", "keep"]
 CodeEngine = Literal["jit", "interpreter"]
 PlansWanted = Literal["none", "first", "all"]
 TraceWanted = Literal["any", "shortest", "fastest"]
@@ -372,6 +373,7 @@ class Model:
         search: SearchOrder = "bfs",
         seed: int = 0,
         forced: ForcedRule = "tiga",
+        priorities: PriorityRule = "ignore",
         engine: CodeEngine = "jit",
         states: int | None = None,
         memory_bytes: int | None = None,
@@ -396,6 +398,8 @@ class Model:
             search: The order of the search; verdicts do not depend on it.
             seed: For ``search="random"``.
             forced: What happens where time cannot pass and only the environment can move.
+            priorities: Whether priorities of channels and processes count in games and under
+                strategies; in all other queries they do.
             engine: What runs the code of the model; answers do not depend on it.
             states: The search stops after this many stored states.
             memory_bytes: The search stops when its states take this much.
@@ -430,6 +434,7 @@ class Model:
                 search=search,
                 seed=seed,
                 forced=forced,
+                priorities=priorities,
                 engine=engine,
                 states=states,
                 memory_bytes=memory_bytes,

@@ -20,7 +20,7 @@ use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, TraceWanted, Verdict,
     describe, explain, facts, json, strategy_file,
 };
-use crate::game::Forced;
+use crate::game::{Forced, Priorities};
 use crate::network::Failure;
 use crate::search::limits::StopReason;
 use crate::search::plain::Met;
@@ -287,7 +287,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, seed, forced, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, folder, progress))]
+    #[pyo3(signature = (query, *, search, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, folder, progress))]
     #[expect(
         clippy::too_many_arguments,
         clippy::fn_params_excessive_bools,
@@ -299,6 +299,7 @@ impl Model {
         search: &str,
         seed: u64,
         forced: &str,
+        priorities: &str,
         engine: &str,
         states: Option<u64>,
         memory_bytes: Option<u64>,
@@ -325,6 +326,11 @@ impl Model {
                 "product" => Forced::Product,
                 "neutral" => Forced::Neutral,
                 other => return Err(unknown("rule for forced moves", other)),
+            },
+            priorities: match priorities {
+                "ignore" => Priorities::Ignored,
+                "keep" => Priorities::Kept,
+                other => return Err(unknown("rule for priorities", other)),
             },
             code: code_engine(engine)?,
             limits: Limits {

@@ -1,7 +1,7 @@
 //! Models with the verdicts of their queries: `tests/corpus/verdicts` and `tests/corpus/games`.
 //!
 //! A file begins with lines `// query: …`, each followed by `// verdict: …` (`// verdict neutral: …` and `// verdict product: …`
-//! where the rule for forced moves matters) and `// origin: …`, which says how the verdict is known. A line `// given: …` is a query that
+//! where the rule for forced moves matters, `// verdict priorities: …` where priorities are to count) and `// origin: …`, which says how the verdict is known. A line `// given: …` is a query that
 //! is answered before those below it, for the strategy that it defines. Other comment lines are
 //! prose. The verdict of a query for values is the values. Every trace must pass its replay. Every query is answered with every search order and with the interpreter and compiled code, and must come out
 //! the same.
@@ -11,15 +11,17 @@ use std::path::{Path, PathBuf};
 
 use checker::engine::answer::Values;
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
-use checker::game::Forced;
+use checker::game::{Forced, Priorities};
 use checker::search::extremum::Extreme;
 use checker::search::reach::Order;
+
+type Rules = (Forced, Priorities);
 
 struct Case {
     /// The queries that come before it.
     given: Vec<String>,
     query: String,
-    verdicts: Vec<(Option<Forced>, String)>,
+    verdicts: Vec<(Rules, String)>,
     origin: String,
 }
 
@@ -35,7 +37,7 @@ fn cases(path: &Path, text: &str) -> Vec<Case> {
             continue;
         };
         let (key, value) = (key.trim(), value.trim().to_owned());
-        let forced = match key {
+        let rules = match key {
             "query" => {
                 cases.push(Case {
                     given: given.clone(),
@@ -56,9 +58,10 @@ fn cases(path: &Path, text: &str) -> Vec<Case> {
                     .origin = value;
                 continue;
             }
-            "verdict" => None,
-            "verdict neutral" => Some(Forced::Neutral),
-            "verdict product" => Some(Forced::Product),
+            "verdict" => Rules::default(),
+            "verdict neutral" => (Forced::Neutral, Priorities::Ignored),
+            "verdict product" => (Forced::Product, Priorities::Ignored),
+            "verdict priorities" => (Forced::Tiga, Priorities::Kept),
             _ if key.starts_with("verdict") => {
                 panic!("{}: unknown directive {key}", path.display())
             }
@@ -67,7 +70,7 @@ fn cases(path: &Path, text: &str) -> Vec<Case> {
         let case = cases
             .last_mut()
             .unwrap_or_else(|| panic!("{}: verdict without query", path.display()));
-        case.verdicts.push((forced, value));
+        case.verdicts.push((rules, value));
     }
     cases
 }
@@ -134,13 +137,14 @@ fn value_text(values: &Values) -> String {
 }
 
 fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>) {
-    for (forced, expected) in &case.verdicts {
+    for (rules, expected) in &case.verdicts {
         for code in engines() {
             for order in [Order::BreadthFirst, Order::DepthFirst, Order::Random(7)] {
                 let options = Options {
                     order,
                     code,
-                    forced: forced.unwrap_or_default(),
+                    forced: rules.0,
+                    priorities: rules.1,
                     strategy: true,
                     verify: true,
                     runs: true,
@@ -149,7 +153,7 @@ fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>
                 let found = verdict_of(path, bytes, case, &options);
                 if &found != expected {
                     failures.push(format!(
-                        "{}: {}\n  expected {expected} ({}), found {found} with {order:?}, {code:?}, {forced:?}",
+                        "{}: {}\n  expected {expected} ({}), found {found} with {order:?}, {code:?}, {rules:?}",
                         path.display(),
                         case.query,
                         case.origin

@@ -168,6 +168,13 @@ class _Outputs:
     default="tiga",
     help="When the environment must move because time cannot pass.",
 )
+@click.option(
+    "--priorities",
+    type=click.Choice(["ignore", "keep"]),
+    default="ignore",
+    help="Whether priorities of channels and processes count in games and under strategies. TIGA "
+    "ignores them; in all other queries they count.",
+)
 @click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
 @click.option("--states", type=click.IntRange(1), help="Stop after so many stored states.")
 @click.option("--memory", metavar="SIZE", type=_Quantity("size", _BYTES_PER), help="Such as 4GiB.")
@@ -190,6 +197,7 @@ def command(
     search: Any,  # noqa: ANN401
     seed: int,
     forced: Any,  # noqa: ANN401
+    priorities: Any,  # noqa: ANN401
     engine: Any,  # noqa: ANN401
     states: int | None,
     memory: float | None,
@@ -234,6 +242,7 @@ def command(
                     search=search,
                     seed=seed,
                     forced=forced,
+                    priorities=priorities,
                     engine=engine,
                     states=states,
                     memory_bytes=None if memory is None else int(memory),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::exec::Executor;
+use crate::game::Priorities;
 use crate::game::closed_loop::ClosedLoop;
 use crate::game::plans::Plan;
 use crate::game::strategy::Strategy;
@@ -128,6 +129,8 @@ pub(super) struct Subject<'a> {
     pub(super) executor: &'a dyn Executor,
     /// The strategy that the controller follows.
     pub(super) under: Option<&'a ClosedLoop>,
+    /// Whether priorities count under the strategy.
+    pub(super) priorities: Priorities,
 }
 
 impl<'a> Subject<'a> {
@@ -250,6 +253,7 @@ pub(super) fn symbolic<'a>(
         network,
         executor,
         under,
+        priorities,
     } = subject;
     let mut atoms: Vec<ClockAtom> = predicates
         .iter()
@@ -274,8 +278,13 @@ pub(super) fn symbolic<'a>(
         wanted
     };
     let bounds = ClockBounds::new(network, &atoms, abstraction);
-    Symbolic::new(Stepper::new(network, executor), bounds)
-        .restricted(under.map(|one| one as &dyn Restriction))
+    let symbolic = Symbolic::new(Stepper::new(network, executor), bounds)
+        .restricted(under.map(|one| one as &dyn Restriction));
+    if under.is_some() && priorities == Priorities::Ignored {
+        symbolic.without_priorities()
+    } else {
+        symbolic
+    }
 }
 
 /// The verdict on something that was found, in zones that may be too large.
@@ -342,7 +351,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         };
         let mut witness = Witness::new(trace, ending, kind);
         // An initial state that cannot be entered is no run.
-        // What is stuck under a strategy may go on in the model, which is what the replay knows.
+        // What is stuck under a strategy may go on in the model, which is what the replay knows, and priorities count in the model.
         let is_dead = match shows {
             Shows::Reaches(predicate, _) | Shows::Takes(_, predicate, ..) => {
                 predicate::has_deadlock(predicate)
@@ -350,7 +359,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
             Shows::Stays(_) => ending == Some(Ending::Stuck),
             Shows::Possible => false,
         };
-        let is_comparable = !(self.is_restricted && is_dead);
+        let is_comparable = !(self.is_restricted && is_dead || self.symbolic.ignores_priorities());
         if self.has_runs && is_comparable && !witness.trace.states.is_empty() {
             let network = self.symbolic.stepper.network();
             let proof = evidence::prove(self.symbolic, network, &witness.trace, ending, shows);

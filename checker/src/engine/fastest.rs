@@ -10,7 +10,7 @@ use crate::game::Player;
 use crate::game::graph::{Deadline, Graph, Objective as GameObjective};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver, Win};
 use crate::ir::{Clock, ClockAtom, ClockId, ClockRange, FunctionId, Network, Objective, Predicate};
-use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic};
+use crate::network::{Abstraction, ClockBounds, Failure, Stepper};
 use crate::search::extremum::{Extreme, Extremes};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::{Bound, Zone};
@@ -62,6 +62,7 @@ pub(super) fn fastest(
         let plain = Options {
             limits: options.limits.clone(),
             forced: options.forced,
+            priorities: options.priorities,
             ..Options::default()
         };
         let answer = games::game(network, executor, asked, &plain, watch);
@@ -144,7 +145,7 @@ fn within(
         Abstraction::Maximum
     };
     let bounds = ClockBounds::new(timed, &atoms, abstraction);
-    let mut symbolic = Symbolic::new(Stepper::new(timed, executor), bounds);
+    let mut symbolic = games::zones_of(timed, executor, bounds, options);
     let (goal, keep): (&Predicate, _) = match race.objective {
         Objective::Until(keep, goal) => (goal, Some(keep)),
         Objective::Reach(goal) => (goal, None),

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use crate::exec::Executor;
-use crate::game::Player;
 use crate::game::graph::{Graph, Objective as GameObjective};
 use crate::game::plans::{NoPlans, Plan, Plans};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
 use crate::game::recurrence;
 use crate::game::strategy::{self, Strategy};
+use crate::game::{Player, Priorities};
 use crate::ir::{ClockAtom, Network, Objective, Predicate};
 use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic, predicate};
 use crate::search::limits::{Counters, StopReason, Watch};
@@ -67,7 +67,7 @@ pub(super) fn game(
     let atoms = objective_atoms(asked.0);
     let zones = |abstraction| {
         let bounds = ClockBounds::new(network, &atoms, abstraction);
-        Symbolic::new(Stepper::new(network, executor), bounds)
+        zones_of(network, executor, bounds, options)
     };
     if !has_differences(network, &atoms) {
         return played(zones(Abstraction::Maximum), asked, options, watch);
@@ -84,6 +84,20 @@ pub(super) fn game(
     let mut second = played(zones(Abstraction::Differences), asked, options, watch);
     second.counters.explored += first.counters.explored;
     second
+}
+
+/// The zones of games: with the priorities of the network, if they are to count.
+pub(super) fn zones_of<'a>(
+    network: &'a Network,
+    executor: &'a dyn Executor,
+    bounds: ClockBounds,
+    options: &Options,
+) -> Symbolic<'a> {
+    let symbolic = Symbolic::new(Stepper::new(network, executor), bounds);
+    match options.priorities {
+        Priorities::Kept => symbolic,
+        Priorities::Ignored => symbolic.without_priorities(),
+    }
 }
 
 /// The clock comparisons of an objective.
@@ -169,8 +183,9 @@ fn played(
         Player::Environment => Verdict::NotSatisfied,
     };
     let mut answer = new_answer(verdict, Evidence::default(), counters);
-    if network.features.priorities {
-        answer.message = Some("games ignore the priorities of the model".to_owned());
+    if solver.graph.symbolic.ignores_priorities() {
+        let message = "games ignore the priorities of the model, unless they are told to keep them";
+        answer.message = Some(message.to_owned());
     }
     if is_planned {
         add_plans(&mut answer, &mut solver, options);
@@ -204,7 +219,8 @@ fn verified(
     let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
     let decisions = verification::decisions(network, strategy);
     let played = (&decisions[..], strategy.owner, strategy.selection);
-    verification::verify(network, objective, played, options.forced, most)
+    let rules = (options.forced, options.priorities);
+    verification::verify(network, objective, played, rules, most)
 }
 
 /// Adds the plans that are wanted to the answer for a solved game.

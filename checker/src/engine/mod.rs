@@ -41,7 +41,7 @@ pub use strategies::NamedStrategy;
 pub use verification::Verification;
 
 use crate::game::strategy::Selection;
-use crate::game::{Forced, Player};
+use crate::game::{Forced, Player, Priorities};
 use crate::search::reach::Order;
 
 /// Codes of what the engine refuses to answer although the model is right.
@@ -102,6 +102,8 @@ pub struct Options {
     pub order: Order,
     /// The rule for forced moves of the environment.
     pub forced: Forced,
+    /// Whether priorities count in games and under strategies.
+    pub priorities: Priorities,
     /// What runs the code of the model.
     pub code: CodeEngine,
     /// When to give up.
@@ -127,6 +129,7 @@ impl Default for Options {
         Options {
             order: Order::BreadthFirst,
             forced: Forced::default(),
+            priorities: Priorities::default(),
             code: CodeEngine::default(),
             limits: Limits::default(),
             plans: PlansWanted::default(),
@@ -304,6 +307,7 @@ impl LoadedModel {
             network: &self.model.network,
             executor: self.executor(),
             under: under.as_ref(),
+            priorities: options.priorities,
         };
         let Some(name) = &query.strategy else {
             return Ok(answer::answer(subject, query, options));
@@ -350,14 +354,14 @@ impl LoadedModel {
         &mut self,
         text: &QueryText,
         strategy: (&[Decisions], Player, Selection),
-        forced: Forced,
+        rules: (Forced, Priorities),
         most_regions: u64,
     ) -> Result<Verification, Rejection> {
         let (query, _) = self.compile(text.span)?;
         let network = &self.model.network;
         Ok(match &query.kind {
             QueryKind::Control { objective, .. } => {
-                verification::verify(network, objective, strategy, forced, most_regions)
+                verification::verify(network, objective, strategy, rules, most_regions)
             }
             _ => Err(verify::Error::Unsupported("queries other than control")),
         })

@@ -2,7 +2,7 @@
 
 use crate::game::closed_loop;
 use crate::game::strategy::{Decision, Selection, Strategy};
-use crate::game::{Forced, Player};
+use crate::game::{Forced, Player, Priorities};
 use crate::ir::{Network, Objective, Predicate};
 use crate::network::{Part, predicate};
 use crate::verify::strategy::{
@@ -24,7 +24,7 @@ pub fn verify(
     network: &Network,
     objective: &Objective,
     (strategy, owner, selection): (&[Decisions], Player, Selection),
-    forced: Forced,
+    (forced, priorities): (Forced, Priorities),
     most_regions: u64,
 ) -> Verification {
     let (goal, keep, aim) = match objective {
@@ -49,6 +49,7 @@ pub fn verify(
             Forced::Product => Forcing::Network,
             Forced::Neutral => Forcing::Always,
         },
+        has_priorities: priorities == Priorities::Kept,
         constant,
         has_differences,
     };

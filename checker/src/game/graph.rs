@@ -182,7 +182,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             effect: ClockEffect::default(),
             entries: Vec::new(),
             chains_delays: objective.must_progress && !network.features.stopwatches,
-            trails: Trails::new(symbolic.has_fixed_delays(), &objective),
+            trails: Trails::new(symbolic.is_fixed(), &objective),
             objective,
             symbolic,
         };
@@ -351,7 +351,7 @@ impl<'s, 'a> Graph<'s, 'a> {
     ) -> Result<(), Failure> {
         self.explored += 1;
         let root = self.moves_of(node, words, moves)?;
-        let delays = self.symbolic.stepper.may_delay(words, moves);
+        let delays = self.symbolic.may_delay_with(words, moves)?;
         let first = self.edges.len() as u32;
         for ordinal in 0..moves.len() as u32 {
             let controllable = moves.get(ordinal as usize).controllable;
@@ -389,7 +389,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             let zone = self.nodes[node as usize].zone;
             return Ok(self.trails.root(offer, zone, moves));
         }
-        stepper.moves(words, moves)?;
+        self.symbolic.remembered_moves(words, moves)?;
         Ok(None)
     }
 
@@ -456,7 +456,8 @@ impl<'s, 'a> Graph<'s, 'a> {
         if !self.is_open(words, zone)? {
             return Ok(false);
         }
-        self.symbolic.stepper.moves(words, &mut self.chain_moves)?;
+        self.symbolic
+            .remembered_moves(words, &mut self.chain_moves)?;
         if self.chain_moves.len() != 1 || (may_delay && !self.chain_moves.get(0).controllable) {
             return Ok(false);
         }

@@ -39,6 +39,16 @@ impl Player {
     }
 }
 
+/// Whether the priorities of channels and processes count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Priorities {
+    /// TIGA's rule: they do not, neither in games nor under the strategies that come from them.
+    #[default]
+    Ignored,
+    /// A move is possible only where none of a higher level is, whoever owns either, as in all other queries.
+    Kept,
+}
+
 /// What happens at a point where time cannot pass and the environment has a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Forced {

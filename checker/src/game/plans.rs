@@ -130,18 +130,18 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
     /// The transitions of a path, and the words at its end.
     pub fn spell(&mut self, path: &[u32]) -> Result<Plan, Failure> {
         let graph = &mut *self.solver.graph;
-        let stepper = &mut graph.symbolic.stepper;
-        let mut words = stepper.network().initial.clone();
+        let symbolic = &mut *graph.symbolic;
+        let mut words = symbolic.stepper.network().initial.clone();
         let mut moves = Moves::default();
         let mut steps = Vec::new();
         for &index in path {
             let edge = graph.edges[index as usize];
             for position in 0..edge.length {
-                stepper.moves(&mut words, &mut moves)?;
+                symbolic.remembered_moves(&mut words, &mut moves)?;
                 let chosen = if position == 0 { edge.ordinal } else { 0 };
                 let parts = moves.get(chosen as usize).parts.to_vec();
-                let was_committed = stepper.is_committed(&words);
-                stepper.fire(&parts, &mut words)?;
+                let was_committed = symbolic.stepper.is_committed(&words);
+                symbolic.stepper.fire(&parts, &mut words)?;
                 steps.push(PlanStep {
                     parts,
                     was_committed,

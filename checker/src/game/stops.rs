@@ -108,7 +108,7 @@ impl Solver<'_, '_, '_> {
         words: &mut [i32],
     ) -> Result<Vec<(Vec<u32>, usize)>, Failure> {
         let mut moves = crate::network::Moves::default();
-        self.graph.symbolic.stepper.moves(words, &mut moves)?;
+        self.graph.symbolic.remembered_moves(words, &mut moves)?;
         let edges = self
             .graph
             .edges_of(node)

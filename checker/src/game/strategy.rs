@@ -215,8 +215,7 @@ pub(super) fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Mov
     solver
         .graph
         .symbolic
-        .stepper
-        .moves(&mut words, &mut moves)?;
+        .remembered_moves(&mut words, &mut moves)?;
     Ok(moves)
 }
 
@@ -316,7 +315,7 @@ pub(super) fn walk(
     let symbolic = &mut *solver.graph.symbolic;
     let mut words = source.to_vec();
     let mut moves = Moves::default();
-    symbolic.stepper.moves(&mut words, &mut moves)?;
+    symbolic.remembered_moves(&mut words, &mut moves)?;
     let mut inside = Vec::new();
     let Some(first) = symbolic.fire(moves.get(edge.ordinal as usize), &mut words)? else {
         return Ok(inside);
@@ -324,7 +323,7 @@ pub(super) fn walk(
     let mut invariant = first.invariant;
     for _ in 1..edge.length {
         let delays = symbolic.may_delay(&mut words)?;
-        symbolic.stepper.moves(&mut words, &mut moves)?;
+        symbolic.remembered_moves(&mut words, &mut moves)?;
         let before = words.clone();
         let one = moves.get(0);
         let Some(effect) = symbolic.fire(one, &mut words)? else {

@@ -109,8 +109,11 @@ impl Symbolic<'_> {
         to_constraints(&emitted).ok()?
     }
 
-    /// Whether locations alone decide how time passes.
-    pub fn has_fixed_delays(&self) -> bool {
+    /// Whether locations and the answers of guards decide which moves there are, and locations alone how time passes.
+    pub fn is_fixed(&self) -> bool {
+        if self.has_priorities {
+            return false;
+        }
         let network = self.stepper.network();
         let is_urgent = network.channels.iter().any(|channel| channel.urgent);
         let locations = network

@@ -113,16 +113,23 @@ impl Symbolic<'_> {
     pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         // Searches meet most location vectors a few times only: remembering moves would cost more than it saves.
         self.stepper.put_together(words, out)?;
-        if self.has_priorities && out.len() > 1 {
-            self.apply_priorities(words, out)?;
-        }
+        self.apply_priorities(words, out)?;
         if let Some(restriction) = self.restriction {
             restriction::apply(restriction, words, out);
         }
         Ok(())
     }
 
+    /// As [`Symbolic::moves`] without a restriction, for whoever asks for the moves of the same state again.
+    pub fn remembered_moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
+        self.stepper.moves(words, out)?;
+        self.apply_priorities(words, out)
+    }
+
     fn apply_priorities(&mut self, words: &[i32], moves: &mut Moves) -> Result<(), Failure> {
+        if !self.has_priorities || moves.len() < 2 {
+            return Ok(());
+        }
         let levels: Vec<(u32, u32)> = moves.iter().map(|one| self.stepper.level(one)).collect();
         let lowest = levels.iter().min().copied();
         let mut possible = Vec::with_capacity(levels.len());

@@ -4,7 +4,8 @@
 //! waiting. All other moves stay as they are. Where waiting ends without a first moment (wait while `x <= 1`, act when `x > 1`),
 //! time runs on inside the valuations of one decision to act: the restriction leaves open which of its moments is taken.
 //!
-//! Priorities do not count under a restriction, since they do not count in the games that strategies come from.
+//! What priorities leave of the moves is restricted further: a move that the restriction forbids still goes before those of lower
+//! levels. Whether priorities count is said elsewhere ([`super::Symbolic::without_priorities`]).
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ClockAtom;

@@ -78,9 +78,20 @@ impl<'a> Symbolic<'a> {
     /// The same under a restriction, whose atoms `bounds` must have been made with.
     #[must_use]
     pub fn restricted(mut self, restriction: Option<&'a dyn Restriction>) -> Symbolic<'a> {
-        self.has_priorities &= restriction.is_none();
         self.restriction = restriction;
         self
+    }
+
+    /// The same with all moves of the same priority.
+    #[must_use]
+    pub fn without_priorities(mut self) -> Self {
+        self.has_priorities = false;
+        self
+    }
+
+    /// Whether the network has priorities that do not count here.
+    pub fn ignores_priorities(&self) -> bool {
+        self.stepper.network().features.priorities && !self.has_priorities
     }
 
     /// Whether it is under a restriction.
@@ -259,6 +270,15 @@ impl<'a> Symbolic<'a> {
             .map(|()| self.stepper.may_delay(words, &moves));
         self.inner_moves = moves;
         result
+    }
+
+    /// The same; `moves` are those of the state as [`Symbolic::remembered_moves`] gives them.
+    pub fn may_delay_with(&mut self, words: &mut [i32], moves: &Moves) -> Result<bool, Failure> {
+        if self.has_priorities && self.has_urgent_channels {
+            // Priorities do not let time pass where a synchronisation of a lower level is urgent.
+            return self.may_delay(words);
+        }
+        Ok(self.stepper.may_delay(words, moves))
     }
 
     /// Lets time pass within the invariant if it may.

@@ -8,7 +8,7 @@
 //!   no move of a higher priority is possible;
 //! * time passes neither in urgent and committed locations nor while a synchronisation on an urgent channel is enabled.
 //!
-//! Games ignore priorities: [`Semantics::moves`] and [`Semantics::take`] do, [`Semantics::successors`] does not.
+//! [`Semantics::moves`] and [`Semantics::take`] ignore priorities, [`Semantics::successors`] does not.
 //!
 //! Cost: written to be read; every state allocates.
 
@@ -67,6 +67,8 @@ pub struct Move {
     pub controllable: bool,
     /// Whether it synchronises on an urgent channel.
     pub is_urgent: bool,
+    /// The priority of its channel, then the greatest of its participants.
+    pub level: (u32, u32),
 }
 
 /// The semantics of a network.
@@ -183,6 +185,7 @@ impl<'a> Semantics<'a> {
         Move {
             controllable: one.parts.iter().all(|&part| self.edge(part).controllable),
             is_urgent: one.channel.is_some_and(is_urgent),
+            level: self.code.level(&one.parts, one.channel),
             parts: one.parts,
         }
     }
@@ -191,17 +194,14 @@ impl<'a> Semantics<'a> {
     /// among these.
     pub fn successors(&self, state: &State) -> Result<Vec<(Move, State)>, Error> {
         let mut found = Vec::new();
-        for one in self.combinations(state)? {
-            let level = self.code.level(&one.parts, one.channel);
+        for one in self.moves(state)? {
             if let Some(target) = self.take(state, &one.parts)? {
-                found.push((level, (self.to_move(one), target)));
+                found.push((one, target));
             }
         }
-        if self.network().features.priorities {
-            let highest = found.iter().map(|(level, _)| *level).max();
-            found.retain(|(level, _)| Some(*level) == highest);
-        }
-        Ok(found.into_iter().map(|(_, successor)| successor).collect())
+        let highest = found.iter().map(|(one, _)| one.level).max();
+        found.retain(|(one, _)| Some(one.level) == highest);
+        Ok(found)
     }
 
     /// The edge of a part.

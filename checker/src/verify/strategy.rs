@@ -120,6 +120,8 @@ pub struct Claim<'a> {
     pub keep: Option<&'a Predicate>,
     /// When the environment must move.
     pub forcing: Forcing,
+    /// Whether priorities count.
+    pub has_priorities: bool,
     /// The greatest constant, in absolute value, of the clock comparisons of the two predicates.
     pub constant: i64,
     /// Whether the predicates compare differences of clocks.
@@ -483,7 +485,7 @@ impl Play<'_> {
 }
 
 impl<'a> Rules<'a> {
-    /// The moves whose targets satisfy the invariants, with these.
+    /// The moves whose targets satisfy the invariants, with these; if priorities count, those of the highest among them.
     pub(super) fn possible<'m>(
         &self,
         state: &State,
@@ -494,6 +496,10 @@ impl<'a> Rules<'a> {
             if let Some(target) = self.semantics.take(state, &one.parts)? {
                 possible.push((one, target));
             }
+        }
+        if self.claim.has_priorities {
+            let highest = possible.iter().map(|(one, _)| one.level).max();
+            possible.retain(|(one, _)| Some(one.level) == highest);
         }
         Ok(possible)
     }

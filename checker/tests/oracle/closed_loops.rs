@@ -26,6 +26,7 @@ const SHAPE: Shape = Shape {
     strict_invariants: true,
     uncontrollable: true,
     deadlock: true,
+    priorities: false,
 };
 
 /// Regions that brute force explores before it gives a case up.

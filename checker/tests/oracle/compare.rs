@@ -112,9 +112,10 @@ pub(crate) fn regions(
     tally: &Tally,
 ) -> Result<Option<Graph>, Error> {
     let network = model.network();
+    let has_priorities = network.features.priorities;
     let semantics = Semantics::new(network, Regions::ticks_per_unit(network));
     let regions = Regions::new(network, constant, has_differences)?;
-    match explore(&semantics, &regions, MOST_REGIONS) {
+    match explore(&semantics, &regions, has_priorities, MOST_REGIONS) {
         Ok(graph) => Ok(Some(graph)),
         Err(NoGraph::TooLarge) => {
             count(&tally.too_large);

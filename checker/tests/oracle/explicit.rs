@@ -67,10 +67,11 @@ impl Known {
     }
 }
 
-/// Explores all regions, up to a number.
+/// Explores all regions, up to a number. If priorities count, only moves of the highest level are possible in each.
 pub(crate) fn explore(
     semantics: &Semantics<'_>,
     regions: &Regions,
+    has_priorities: bool,
     most: usize,
 ) -> Result<Graph, NoGraph> {
     let mut known = Known::default();
@@ -83,7 +84,7 @@ pub(crate) fn explore(
             return Err(NoGraph::TooLarge);
         }
         let state = known.states[nodes.len()].clone();
-        let node = successors(semantics, regions, state, &mut known)?;
+        let node = successors(semantics, regions, has_priorities, state, &mut known)?;
         nodes.push(node);
     }
     Ok(Graph {
@@ -95,20 +96,29 @@ pub(crate) fn explore(
 fn successors(
     semantics: &Semantics<'_>,
     regions: &Regions,
+    has_priorities: bool,
     state: State,
     known: &mut Known,
 ) -> Result<Node, Error> {
     let moves = semantics.moves(&state)?;
-    let mut steps = Vec::new();
+    let mut possible = Vec::new();
     for one in &moves {
-        if let Some(mut target) = semantics.take(&state, &one.parts)? {
-            regions.represent_state(&mut target);
-            steps.push(Step {
-                target: known.id(target),
-                controllable: one.controllable,
-                processes: one.parts.iter().map(|part| part.process).collect(),
-            });
+        if let Some(target) = semantics.take(&state, &one.parts)? {
+            possible.push((one, target));
         }
+    }
+    if has_priorities {
+        let highest = possible.iter().map(|(one, _)| one.level).max();
+        possible.retain(|(one, _)| Some(one.level) == highest);
+    }
+    let mut steps = Vec::new();
+    for (one, mut target) in possible {
+        regions.represent_state(&mut target);
+        steps.push(Step {
+            target: known.id(target),
+            controllable: one.controllable,
+            processes: one.parts.iter().map(|part| part.process).collect(),
+        });
     }
     let mut next = state.clone();
     regions.pass(&mut next.clocks);

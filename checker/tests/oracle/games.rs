@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict};
 use checker::game::strategy::Strategy;
-use checker::game::{Forced, Player};
+use checker::game::{Forced, Player, Priorities};
 use checker::search::extremum::Extreme;
 use proptest::test_runner::TestCaseError;
 
@@ -18,6 +18,7 @@ const SHAPE: Shape = Shape {
     strict_invariants: false,
     uncontrollable: true,
     deadlock: false,
+    priorities: true,
 };
 
 fn compare(
@@ -74,6 +75,7 @@ fn compare(
                 };
                 let options = Options {
                     forced,
+                    priorities: Priorities::Kept,
                     verify: true,
                     ..compare::options()
                 };
@@ -169,7 +171,11 @@ fn check_under(
     });
     let query = format!("{query} under S");
     let text = model.add_query(&query);
-    let answer = model.check(&text, &compare::options());
+    let options = Options {
+        priorities: Priorities::Kept,
+        ..compare::options()
+    };
+    let answer = model.check(&text, &options);
     compare::check(&answer, Ok(true), tally, || query.clone())
 }
 
@@ -204,7 +210,11 @@ fn compare_times(
     let (goal, keep) = (network.formula(goal), network.formula(keep));
     let mut ask = |query: &str| {
         let query = model.add_query(query);
-        model.check(&query, &compare::options())
+        let options = Options {
+            priorities: Priorities::Kept,
+            ..compare::options()
+        };
+        model.check(&query, &options)
     };
     for limit in ["", "(4)", "(3, 1)"] {
         let within = |value: i32| match limit {

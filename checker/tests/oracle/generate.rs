@@ -17,6 +17,8 @@ pub(crate) struct Network {
     pub clocks: usize,
     pub variables: usize,
     pub processes: Vec<Process>,
+    /// An index into [`PRIORITIES`].
+    priority: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -99,6 +101,16 @@ const CHANNELS: [(&str, &str); 5] = [
     ("c", "broadcast chan"),
     ("u", "urgent chan"),
     ("w", "urgent broadcast chan"),
+];
+
+/// Declarations of channel priorities, each with whether processes have priorities too. The first is for networks without any.
+const PRIORITIES: [(&str, bool); 6] = [
+    ("", false),
+    ("", true),
+    ("chan priority default < c;", false),
+    ("chan priority a, c < default < b;", false),
+    ("chan priority u < default < d[1] < a;", true),
+    ("chan priority default < w < b;", true),
 ];
 
 /// A comparison.
@@ -200,12 +212,17 @@ pub(crate) enum Formula {
 
 /// How rich the networks are.
 #[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an independent part of the language"
+)]
 pub(crate) struct Shape {
     pub clocks: usize,
     pub(crate) constant: i32,
     pub strict_invariants: bool,
     pub uncontrollable: bool,
     pub deadlock: bool,
+    pub priorities: bool,
 }
 
 fn any_index() -> impl Strategy<Value = usize> {
@@ -335,13 +352,18 @@ fn process(shape: Shape) -> impl Strategy<Value = Process> {
 
 /// Networks.
 pub(crate) fn network(shape: Shape) -> impl Strategy<Value = Network> {
-    (1..=shape.clocks, 1..=2_usize, vec(process(shape), 1..=3)).prop_map(
-        |(clocks, variables, processes)| Network {
-            clocks,
-            variables,
-            processes,
-        },
-    )
+    let priority = if shape.priorities {
+        prop_oneof![2 => Just(0), 1 => 1..PRIORITIES.len()].boxed()
+    } else {
+        Just(0).boxed()
+    };
+    let parts = (1..=shape.clocks, 1..=2_usize, vec(process(shape), 1..=3));
+    (parts, priority).prop_map(|((clocks, variables, processes), priority)| Network {
+        clocks,
+        variables,
+        processes,
+        priority,
+    })
 }
 
 /// State formulas.
@@ -379,11 +401,14 @@ impl Network {
             writeln!(text, "{declaration} {name};").expect("strings take everything");
         }
         writeln!(text, "chan d[{VALUES}];").expect("strings take everything");
+        let (channels, has_levels) = PRIORITIES[self.priority];
+        text.push_str(channels);
         for (index, process) in self.processes.iter().enumerate() {
             self.process(index, process, &mut text);
         }
         let names: Vec<String> = (0..self.processes.len()).map(|p| format!("P{p}")).collect();
-        writeln!(text, "system {};", names.join(", ")).expect("strings take everything");
+        let names = names.join(if has_levels { " < " } else { ", " });
+        writeln!(text, "system {names};").expect("strings take everything");
         text
     }
 

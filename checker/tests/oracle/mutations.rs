@@ -4,7 +4,7 @@
 
 use checker::engine::{LoadedModel, verification};
 use checker::game::strategy::Selection;
-use checker::game::{Forced, Player};
+use checker::game::{Forced, Player, Priorities};
 use checker::syntax::ast::QueryText;
 use checker::verify::Part;
 use checker::verify::strategy::{Decision, Decisions, Defect, Outcome};
@@ -80,7 +80,12 @@ fn defect_of(
     let played = (&solved.strategy[..], solved.owner, solved.selection);
     let verification = solved
         .model
-        .verify_strategy(&solved.query, played, Forced::Tiga, 10_000)
+        .verify_strategy(
+            &solved.query,
+            played,
+            (Forced::Tiga, Priorities::Ignored),
+            10_000,
+        )
         .expect("the query is right");
     match verification.expect("the model can be checked") {
         Outcome::Verified(_) => None,

@@ -15,6 +15,7 @@ const SHAPE: Shape = Shape {
     strict_invariants: true,
     uncontrollable: false,
     deadlock: true,
+    priorities: false,
 };
 
 fn compare(
