@@ -759,6 +759,21 @@ proptest! {
     }
 
     #[test]
+    fn a_conjunction_is_removed_as_its_zone_is((minuend, _) in two_federations(), seed: u64, drawn in constraints(5, 6), has_differences: bool) {
+        let dimension = minuend.dimension();
+        let is_kept = |one: &Constraint| one.left.max(one.right) < dimension && (has_differences || one.left.min(one.right) == 0);
+        let drawn: Vec<_> = drawn.into_iter().filter(is_kept).collect();
+        let mut difference = minuend.clone();
+        difference.subtract_conjunction(&drawn);
+        check_federation(&difference, seed, |point| {
+            federation_contains(&minuend, point) && !drawn.iter().all(|one| satisfies(point, one))
+        });
+        let mut by_zone = minuend.clone();
+        by_zone.subtract_zone(Zone::of_constraints(dimension, &drawn).bounds());
+        assert!(difference.is_same_set(&by_zone));
+    }
+
+    #[test]
     fn union_and_intersection_are_those_of_the_sets((one, other) in two_federations(), seed: u64) {
         let mut union = one.clone();
         let is_new = union.unite(&other);

@@ -122,7 +122,7 @@ pub(super) fn successors_or_failure(
 ) -> Result<Successors, (Failure, Option<Vec<Part>>)> {
     let mut words = point.words.clone();
     let mut moves = Moves::default();
-    let found = symbolic.stepper.moves(&mut words, &mut moves);
+    let found = symbolic.moves_within(&mut words, point.zone.bounds(), &mut moves);
     found.map_err(|error| (error, None))?;
     let mut successors = Vec::new();
     for one in moves.iter() {

@@ -9,7 +9,9 @@
 //! enabled receiving edge.
 
 pub mod bounds;
+mod combinations;
 pub mod differences;
+mod enumeration;
 pub mod failure;
 mod fixed;
 mod listening;
@@ -18,9 +20,11 @@ mod offers;
 mod passage;
 pub mod predicate;
 pub mod restriction;
+mod scope;
 pub mod selects;
 pub mod stepper;
 pub mod symbolic;
+mod tables;
 
 pub use bounds::{Abstraction, ClockBounds};
 pub use failure::Failure;

@@ -22,11 +22,33 @@ struct Header {
     parts: (u32, u32),
     constraints: (u32, u32),
     excluded: (u32, u32),
-    channel: Option<ChannelId>,
-    controllable: bool,
+    label: Label,
 }
 
-/// The moves of a state.
+/// What is said of a move beside its parts and constraints.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Label {
+    /// The channel of the synchronisation.
+    pub(super) channel: Option<ChannelId>,
+    /// Whether the controller owns it.
+    pub(super) controllable: bool,
+    /// See [`MoveRef::rank`].
+    pub(super) rank: u64,
+    /// Whether it is known that its guards leave something of the zone that the moves are asked for.
+    pub(super) is_possible: bool,
+}
+
+impl Label {
+    /// The same for a move whose constraints were changed.
+    pub(super) fn unsettled(self) -> Label {
+        Label {
+            is_possible: false,
+            ..self
+        }
+    }
+}
+
+/// The moves of a state, by ascending rank.
 #[derive(Clone, Debug, Default)]
 pub struct Moves {
     headers: Vec<Header>,
@@ -47,6 +69,9 @@ pub struct MoveRef<'a> {
     pub channel: Option<ChannelId>,
     /// Whether the controller owns the move: all participating edges are controllable.
     pub controllable: bool,
+    /// The place of the move among all that the locations and variables of the state allow, whatever the zone.
+    pub rank: u64,
+    pub(super) label: Label,
     moves: &'a Moves,
     excluded: (u32, u32),
 }
@@ -108,8 +133,10 @@ impl Moves {
             parts: &self.parts[header.parts.0 as usize..header.parts.1 as usize],
             constraints: &self.constraints
                 [header.constraints.0 as usize..header.constraints.1 as usize],
-            channel: header.channel,
-            controllable: header.controllable,
+            channel: header.label.channel,
+            controllable: header.label.controllable,
+            rank: header.label.rank,
+            label: header.label,
             moves: self,
             excluded: header.excluded,
         }
@@ -120,14 +147,21 @@ impl Moves {
         (0..self.len()).map(|index| self.get(index))
     }
 
+    /// The move with this rank.
+    pub fn with_rank(&self, rank: u64) -> Option<MoveRef<'_>> {
+        let found = self
+            .headers
+            .binary_search_by_key(&rank, |header| header.label.rank);
+        found.ok().map(|index| self.get(index))
+    }
+
     /// Adds a move.
     pub(super) fn push<'c>(
         &mut self,
         parts: &[Part],
         constraints: impl IntoIterator<Item = &'c [EmittedConstraint]>,
         excluded: impl IntoIterator<Item = &'c [EmittedConstraint]>,
-        channel: Option<ChannelId>,
-        controllable: bool,
+        label: Label,
     ) {
         let first_part = self.parts.len() as u32;
         self.parts.extend_from_slice(parts);
@@ -146,8 +180,7 @@ impl Moves {
             parts: (first_part, self.parts.len() as u32),
             constraints: (first_constraint, last_constraint),
             excluded: (first_excluded, self.excluded.len() as u32),
-            channel,
-            controllable,
+            label,
         });
     }
 }

@@ -12,8 +12,9 @@ use crate::zones::dbm::{self, Constraint};
 use crate::zones::future::{self, Barriers};
 use crate::zones::{Bound, Federation, Zone, minimal};
 
+use super::scope::Scope;
 use super::symbolic::to_constraints;
-use super::{Failure, MoveRef, Moves, Symbolic, restriction};
+use super::{Failure, MoveRef, Moves, Part, Symbolic, restriction};
 
 impl Symbolic<'_> {
     /// The part of the zone in which time cannot pass because of a clock-guarded urgent synchronisation or a restriction.
@@ -49,7 +50,9 @@ impl Symbolic<'_> {
     fn urgent_part(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Federation, Failure> {
         let mut urgent = Federation::empty(self.dimension());
         let mut moves = std::mem::take(&mut self.inner_moves);
-        let result = self.stepper.moves(words, &mut moves);
+        let result = self
+            .stepper
+            .put_together(words, Scope::Within(zone), &mut moves);
         if result.is_ok() {
             for one in moves.iter().filter(|one| self.stepper.is_urgent_move(*one)) {
                 urgent.unite(&guarded_part(one, zone, self.dimension())?);
@@ -111,8 +114,43 @@ impl Symbolic<'_> {
     /// A move is forbidden where one of a higher level is possible, its target's invariants included. Levels are those of
     /// channels first, then the greatest of the participating processes.
     pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
+        self.moves_in(words, Scope::Everything, out)
+    }
+
+    /// As [`Symbolic::moves`], without some of those that no valuation of the zone allows.
+    pub fn moves_within(
+        &mut self,
+        words: &mut [i32],
+        zone: &[Bound],
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        self.moves_in(words, Scope::Within(zone), out)
+    }
+
+    /// As [`Symbolic::moves`], without some of those that have other parts.
+    pub fn moves_of(
+        &mut self,
+        words: &mut [i32],
+        parts: &[Part],
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        // What priorities forbid depends on all moves.
+        let scope = if self.has_priorities {
+            Scope::Everything
+        } else {
+            Scope::Of(parts)
+        };
+        self.moves_in(words, scope, out)
+    }
+
+    fn moves_in(
+        &mut self,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
         // Searches meet most location vectors a few times only: remembering moves would cost more than it saves.
-        self.stepper.put_together(words, out)?;
+        self.stepper.put_together(words, scope, out)?;
         self.apply_priorities(words, out)?;
         if let Some(restriction) = self.restriction {
             restriction::apply(restriction, words, out);
@@ -160,18 +198,17 @@ impl Symbolic<'_> {
                 one.parts,
                 [one.constraints],
                 excluded,
-                one.channel,
-                one.controllable,
+                one.label.unsettled(),
             );
         }
         *moves = allowed;
         Ok(())
     }
 
-    /// Whether the guards of a move leave anything of the zone. Asked before a move is taken, so that no update runs that
-    /// cannot happen.
+    /// Whether the guards of a move leave anything of the zone that the moves were asked for. Asked before a move is taken, so that no
+    /// update runs that cannot happen.
     pub fn is_enabled(&self, one: MoveRef<'_>, zone: &[Bound]) -> Result<bool, Failure> {
-        if one.is_unconditional() {
+        if one.is_unconditional() || one.label.is_possible {
             return Ok(true);
         }
         let Some(guard) = to_constraints(one.constraints)? else {
@@ -197,7 +234,7 @@ fn guarded_part(one: MoveRef<'_>, zone: &[Bound], dimension: usize) -> Result<Fe
     }
     for conjunction in one.excluded() {
         if let Some(excluded) = to_constraints(conjunction)? {
-            part.subtract_zone(Zone::of_constraints(dimension, &excluded).bounds());
+            part.subtract_conjunction(&excluded);
         }
     }
     Ok(part)

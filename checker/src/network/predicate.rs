@@ -182,8 +182,6 @@ impl Symbolic<'_> {
 
     /// The valuations from which no move is possible, now or after any delay.
     fn deadlock_extent(&mut self, words: &mut [i32], own: &[Bound]) -> Result<Extent, Failure> {
-        let mut moves = Moves::default();
-        self.moves(words, &mut moves)?;
         let may_delay = self.may_delay(words)?;
         let stopped = self.stopped(words)?;
         // Beside barriers the zone may be one of several pieces of what time reaches.
@@ -194,6 +192,8 @@ impl Symbolic<'_> {
         } else {
             Barriers::none(self.dimension())
         };
+        let mut moves = Moves::default();
+        self.moves_within(words, zone, &mut moves)?;
         let mut alive = Federation::empty(self.dimension());
         let mut target = words.to_vec();
         for one in moves.iter() {

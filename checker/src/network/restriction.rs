@@ -68,8 +68,7 @@ pub(super) fn apply(restriction: &dyn Restriction, words: &[i32], moves: &mut Mo
                 one.parts,
                 [one.constraints],
                 excluded,
-                one.channel,
-                one.controllable,
+                one.label.unsettled(),
             );
         }
     }

@@ -16,6 +16,7 @@ use crate::zones::extrapolate::Ceilings;
 use crate::zones::{Bound, ClockSet, Federation, Zone};
 
 use super::bounds::ClockBounds;
+use super::scope::Scope;
 use super::{Failure, MoveRef, Moves, Part, Restriction, Stepper};
 
 /// Zones on top of the moves of a network. One per thread.
@@ -266,7 +267,7 @@ impl<'a> Symbolic<'a> {
         let mut moves = std::mem::take(&mut self.inner_moves);
         let result = self
             .stepper
-            .moves(words, &mut moves)
+            .put_together(words, Scope::Unconditional, &mut moves)
             .map(|()| self.stepper.may_delay(words, &moves));
         self.inner_moves = moves;
         result
@@ -439,10 +440,7 @@ impl ClockEffect {
 
     fn subtract_excluded(&self, federation: &mut Federation) {
         for conjunction in &self.excluded {
-            let excluded = Zone::of_constraints(federation.dimension(), conjunction);
-            if !excluded.is_empty() {
-                federation.subtract_zone(excluded.bounds());
-            }
+            federation.subtract_conjunction(conjunction);
         }
     }
 }
@@ -478,7 +476,7 @@ fn to_constraint(emitted: &EmittedConstraint) -> Result<Constraint, Failure> {
 }
 
 /// Replaces `constraints` by the emitted ones; returns false if one of them never holds.
-fn add_constraints(
+pub(super) fn add_constraints(
     emitted: &[EmittedConstraint],
     constraints: &mut Vec<Constraint>,
 ) -> Result<bool, Failure> {

@@ -234,10 +234,9 @@ impl Explorer {
         target: &mut Frame,
         depth: usize,
     ) -> Result<Taken, Failure> {
-        let ordinal = source.next as Step;
+        let one = source.moves.get(source.next);
         source.next += 1;
         let symbolic = &mut *scene.symbolic;
-        let one = source.moves.get(ordinal as usize);
         if symbolic.stays_whole(one) {
             if !symbolic.may_satisfy(one, source.zone.bounds())? {
                 return Ok(Taken::Nothing);
@@ -248,7 +247,7 @@ impl Explorer {
             if !symbolic.take(one, &mut target.words, zone)? {
                 return Ok(Taken::Nothing);
             }
-            self.way.push(ordinal);
+            self.way.push(one.rank);
             return self.enter_whole(scene, target, depth);
         }
         if !symbolic.is_enabled(one, source.zone.bounds())? {
@@ -260,7 +259,7 @@ impl Explorer {
         };
         let mut entries = std::mem::take(&mut self.entries);
         effect.entry_zones(source.zone.bounds(), symbolic.dimension(), &mut entries);
-        self.way.push(ordinal);
+        self.way.push(one.rank);
         let taken = self.enter(scene, &effect.invariant, &mut entries, target, depth);
         self.entries = entries;
         taken
@@ -356,5 +355,8 @@ fn new_frame(symbolic: &Symbolic<'_>) -> Frame {
 /// Finds the moves of a state.
 fn open(symbolic: &mut Symbolic<'_>, frame: &mut Frame) -> Result<(), Failure> {
     frame.next = 0;
-    symbolic.moves(&mut frame.words, &mut frame.moves)
+    let Frame {
+        words, zone, moves, ..
+    } = frame;
+    symbolic.moves_within(words, zone.bounds(), moves)
 }

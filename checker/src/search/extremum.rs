@@ -467,7 +467,7 @@ impl Pump<'_> {
         parts: &[Part],
     ) -> Result<Taken, Failure> {
         let mut moves = Moves::default();
-        symbolic.moves(words, &mut moves)?;
+        symbolic.moves_of(words, parts, &mut moves)?;
         let Some(one) = moves.iter().find(|one| one.parts == parts) else {
             return Ok(Taken::Nothing);
         };

@@ -372,7 +372,7 @@ impl<'p> Liveness<'p> {
             pending: Vec::new(),
             parts: Vec::new(),
         };
-        let moves = symbolic.moves(&mut frame.words, &mut frame.moves);
+        let moves = symbolic.moves_within(&mut frame.words, frame.zone.bounds(), &mut frame.moves);
         self.frames.push(frame);
         moves
     }
@@ -590,7 +590,7 @@ impl Passage {
     ) -> Result<Federation, Failure> {
         let dimension = self.whole.dimension();
         let mut moves = Moves::default();
-        symbolic.moves(words, &mut moves)?;
+        symbolic.moves_within(words, self.whole.bounds(), &mut moves)?;
         let mut exits = self.outside.clone();
         let mut target = words.to_vec();
         for one in moves.iter() {

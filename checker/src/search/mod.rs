@@ -8,6 +8,7 @@ pub mod limits;
 pub mod liveness;
 mod packed_zones;
 mod passed;
+mod paths;
 pub mod plain;
 pub mod reach;
 mod recent;

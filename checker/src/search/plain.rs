@@ -176,10 +176,11 @@ impl<'s, 'a> Search<'s, 'a> {
         self.store.load(*discrete, &mut words);
         let zone = zone.clone();
         let mut moves = Moves::default();
-        self.symbolic.moves(&mut words, &mut moves)?;
+        self.symbolic
+            .moves_within(&mut words, zone.bounds(), &mut moves)?;
         let mut target = words.clone();
         let mut zones = Vec::new();
-        for (step, one) in moves.iter().enumerate() {
+        for one in moves.iter() {
             if !self.symbolic.is_enabled(one, zone.bounds())? {
                 continue;
             }
@@ -190,7 +191,7 @@ impl<'s, 'a> Search<'s, 'a> {
             effect.entry_zones(zone.bounds(), self.symbolic.dimension(), &mut zones);
             self.symbolic
                 .let_time_pass(&mut target, &effect.invariant, &mut zones)?;
-            self.enter(&mut target, &mut zones, node, step as Step)?;
+            self.enter(&mut target, &mut zones, node, one.rank)?;
         }
         Ok(())
     }
@@ -325,7 +326,7 @@ impl<'s, 'a> Search<'s, 'a> {
                     self.symbolic.moves(&mut source, &mut moves)?;
                     moves_of = node.parent;
                 }
-                let taken = moves.iter().nth(node.step as usize);
+                let taken = moves.with_rank(node.step);
                 from = taken.map(|one| (parent, one.parts.to_vec()));
             }
             met.push(Met {

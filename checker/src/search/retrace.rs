@@ -6,8 +6,8 @@ use crate::zones::Zone;
 use super::goal::Goal;
 use super::reach::Trace;
 
-/// A move of a state: its index.
-pub(super) type Step = u32;
+/// A move of a state: its rank.
+pub(super) type Step = u64;
 
 /// The words of a state that was entered, and its zones.
 type Entered = (Vec<i32>, Vec<Zone>);
@@ -71,8 +71,11 @@ fn take(
     zone: &Zone,
 ) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
     let mut moves = Moves::default();
-    symbolic.moves(&mut words, &mut moves)?;
-    let one = moves.get(step as usize);
+    symbolic.moves_within(&mut words, zone.bounds(), &mut moves)?;
+    // The zone is within the one of the search, where extrapolation let moves look possible that are not.
+    let Some(one) = moves.with_rank(step) else {
+        return Ok(None);
+    };
     let Some(effect) = symbolic.fire(one, &mut words)? else {
         return Ok(None);
     };

@@ -310,7 +310,7 @@ impl<'s, 'a> Plan<'s, 'a> {
 
     fn take(&mut self, event: usize, parts: &[Part]) -> Result<(), Unscheduled> {
         let mut moves = Moves::default();
-        self.symbolic.moves(&mut self.words, &mut moves)?;
+        self.symbolic.moves_of(&mut self.words, parts, &mut moves)?;
         let one = moves.iter().find(|one| one.parts == parts);
         let one = one.ok_or(Unscheduled::Impossible)?;
         let mut words = self.words.clone();

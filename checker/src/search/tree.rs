@@ -9,6 +9,7 @@ use crate::ir::Network;
 use crate::zones::Bound;
 
 use super::passed::{PassedList, Stored};
+use super::paths;
 use super::retrace::Step;
 
 /// Where the shard of the parent begins in a word, above a single move or the length of a way.
@@ -42,7 +43,7 @@ impl Origin {
 struct Node {
     parent: u32,
     /// The only move from the parent with the parent's shard; or, with [`MANY_STEPS`], where in `paths` the number of moves stands
-    /// with the shard, and then they.
+    /// with the shard, and then they, packed (see [`paths`]): the number is that of their words.
     path: u32,
 }
 
@@ -51,7 +52,7 @@ struct Node {
 pub(super) struct Tree {
     pub(super) passed: PassedList,
     nodes: Vec<Node>,
-    paths: Vec<Step>,
+    paths: Vec<u32>,
 }
 
 impl Tree {
@@ -66,7 +67,7 @@ impl Tree {
 
     /// The bytes that the tree takes.
     pub(super) fn bytes(&self) -> usize {
-        let ways = self.nodes.len() * size_of::<Node>() + self.paths.len() * size_of::<Step>();
+        let ways = self.nodes.len() * size_of::<Node>() + size_of_val(&*self.paths);
         self.passed.bytes() + ways
     }
 
@@ -88,12 +89,14 @@ impl Tree {
         let path = if let [step] = *path
             && step < 1 << SHARD_SHIFT
         {
-            step | shard
+            step as u32 | shard
         } else {
-            let first = self.paths.len() as u32;
-            self.paths.push(path.len() as u32 | shard);
-            self.paths.extend_from_slice(path);
-            first | MANY_STEPS
+            let first = self.paths.len();
+            self.paths.push(0);
+            paths::pack(path, &mut self.paths);
+            let words = self.paths.len() - first - 1;
+            self.paths[first] = words as u32 | shard;
+            first as u32 | MANY_STEPS
         };
         self.nodes.push(Node {
             parent: origin.node,
@@ -110,12 +113,12 @@ pub(super) fn way(trees: &[&Tree], mut origin: Origin, last: &[Step]) -> Vec<Ste
         let Tree { nodes, paths, .. } = trees[origin.shard as usize];
         let Node { parent, path } = nodes[origin.node as usize];
         let shard = if path < MANY_STEPS {
-            steps.push(path & LENGTH);
+            steps.push(Step::from(path & LENGTH));
             path >> SHARD_SHIFT
         } else {
             let first = (path - MANY_STEPS) as usize;
             let length = (paths[first] & LENGTH) as usize;
-            steps.extend(paths[first + 1..=first + length].iter().rev());
+            paths::unpack_reversed(&paths[first + 1..=first + length], &mut steps);
             paths[first] >> SHARD_SHIFT
         };
         origin = Origin {

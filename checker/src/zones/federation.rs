@@ -18,7 +18,7 @@
 use super::clocks::{self, Assignment};
 use super::dbm::{self, Constraint, Relation};
 use super::rows::rows;
-use super::{Bound, ClockSet, minimal};
+use super::{Bound, ClockSet, Zone, minimal};
 
 /// A finite union of zones of the same dimension.
 #[derive(Clone, Debug)]
@@ -143,6 +143,49 @@ impl Federation {
             });
         }
         *self = result;
+    }
+
+    /// Removes the valuations that satisfy all constraints: [`Federation::subtract_zone`] of their zone, without making it where each
+    /// constraint bounds one clock.
+    pub fn subtract_conjunction(&mut self, constraints: &[Constraint]) {
+        if constraints
+            .iter()
+            .any(|one| one.left != 0 && one.right != 0)
+        {
+            let zone = Zone::of_constraints(self.dimension, constraints);
+            self.subtract_zone(zone.bounds());
+            return;
+        }
+        if is_contradiction(constraints) {
+            return;
+        }
+        let (dimension, size) = (self.dimension, self.size());
+        let end = self.bounds.len();
+        for start in (0..end).step_by(size) {
+            let minuend = &self.bounds[start..start + size];
+            let meets = |one: &Constraint| dbm::satisfies(minuend, dimension, one);
+            if !constraints.iter().all(meets) {
+                self.bounds.extend_from_within(start..start + size);
+                continue;
+            }
+            loop {
+                let rest = &self.bounds[start..start + size];
+                let Some(cut) = deepest_cut(rest, dimension, constraints) else {
+                    break;
+                };
+                let part = self.bounds.len();
+                self.bounds.extend_from_within(start..start + size);
+                let outside = cut.negated();
+                if !dbm::constrain_all(&mut self.bounds[part..], dimension, &[outside]) {
+                    self.bounds.truncate(part);
+                }
+                let rest = &mut self.bounds[start..start + size];
+                if !dbm::constrain_all(rest, dimension, &[cut]) {
+                    break;
+                }
+            }
+        }
+        self.bounds.drain(..end);
     }
 
     /// Removes the valuations of another federation.
@@ -368,7 +411,7 @@ impl<'a> Subtrahend<'a> {
         }
         let mut rest = minuend.to_vec();
         let mut part = minuend.to_vec();
-        while let Some(cut) = self.deepest_cut(&rest) {
+        while let Some(cut) = deepest_cut(&rest, dimension, &self.constraints) {
             let outside = cut.negated();
             part.copy_from_slice(&rest);
             let has_part = dbm::constrain(
@@ -387,23 +430,31 @@ impl<'a> Subtrahend<'a> {
         }
         true
     }
+}
 
-    /// The constraint that the zone exceeds most; none if it satisfies all.
-    fn deepest_cut(&self, rest: &[Bound]) -> Option<Constraint> {
-        let excess = |constraint: &Constraint| {
-            let entry = rest[constraint.left * self.dimension + constraint.right];
-            i64::from(entry.raw()) - i64::from(constraint.bound.raw())
-        };
-        let cutting = self
-            .constraints
-            .iter()
-            .filter(|constraint| excess(constraint) > 0);
-        // Of equally deep cuts the first one, so that results do not depend on how a maximum is found.
-        cutting
-            .rev()
-            .max_by_key(|constraint| excess(constraint))
-            .copied()
-    }
+/// The constraint that the zone exceeds most; none if it satisfies all.
+fn deepest_cut(zone: &[Bound], dimension: usize, constraints: &[Constraint]) -> Option<Constraint> {
+    let excess = |constraint: &Constraint| {
+        let entry = zone[constraint.left * dimension + constraint.right];
+        i64::from(entry.raw()) - i64::from(constraint.bound.raw())
+    };
+    let cutting = constraints
+        .iter()
+        .filter(|constraint| excess(constraint) > 0);
+    // Of equally deep cuts the first one, so that results do not depend on how a maximum is found.
+    cutting
+        .rev()
+        .max_by_key(|constraint| excess(constraint))
+        .copied()
+}
+
+/// Whether constraints that bound one clock each have no solution.
+fn is_contradiction(constraints: &[Constraint]) -> bool {
+    constraints.iter().any(|upper| {
+        let opposite = |lower: &&Constraint| lower.left == upper.right && lower.right == upper.left;
+        let mut lowers = constraints.iter().filter(opposite);
+        lowers.any(|lower| upper.bound + lower.bound < Bound::LE_ZERO)
+    })
 }
 
 /// Whether the zones, one after the other in `cover`, contain the whole zone.

@@ -1,0 +1,75 @@
+//! The edges of a network, sorted by what is asked of them in each state.
+
+use crate::ir::{Edge, Location, Network, Process, Urgency};
+
+use super::selects::select_count;
+
+/// An edge with what is asked of it most.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EdgeEntry<'a> {
+    pub(super) index: u32,
+    /// How many combinations of select values it has.
+    pub(super) instances: u32,
+    pub(super) edge: &'a Edge,
+}
+
+/// The edges that leave a location, sorted by what they wait for.
+#[derive(Debug)]
+pub(super) struct LocationTable<'a> {
+    pub(super) internal: Vec<EdgeEntry<'a>>,
+    pub(super) sends: Vec<EdgeEntry<'a>>,
+    pub(super) receives: Vec<EdgeEntry<'a>>,
+    pub(super) urgency: Urgency,
+}
+
+impl<'a> LocationTable<'a> {
+    pub(super) fn new(process: &'a Process, location: &Location) -> LocationTable<'a> {
+        let urgency = location.urgency;
+        let (internal, sends, receives) = (Vec::new(), Vec::new(), Vec::new());
+        let mut table = LocationTable {
+            internal,
+            sends,
+            receives,
+            urgency,
+        };
+        for index in &location.edges {
+            let edge = &process.edges[index.0 as usize];
+            let entry = EdgeEntry {
+                index: index.0,
+                instances: select_count(edge),
+                edge,
+            };
+            match edge.sync {
+                None => table.internal.push(entry),
+                Some(sync) if sync.send => table.sends.push(entry),
+                Some(_) => table.receives.push(entry),
+            }
+        }
+        table
+    }
+
+    pub(super) fn is_committed(&self) -> bool {
+        self.urgency == Urgency::Committed
+    }
+}
+
+/// By channel: the processes with an edge that may receive on it, ascending.
+pub(super) fn receivers(network: &Network) -> Vec<Vec<u32>> {
+    let mut receivers = vec![Vec::new(); network.channels.len()];
+    for (index, process) in network.processes.iter().enumerate() {
+        for sync in process
+            .edges
+            .iter()
+            .filter_map(|edge| edge.sync)
+            .filter(|sync| !sync.send)
+        {
+            for channel in sync.channel.0..sync.channel.0 + sync.count {
+                let list: &mut Vec<u32> = &mut receivers[channel as usize];
+                if list.last() != Some(&(index as u32)) {
+                    list.push(index as u32);
+                }
+            }
+        }
+    }
+    receivers
+}
