@@ -5,6 +5,7 @@
 
 pub mod closed_loop;
 mod evasion;
+mod gains;
 pub mod graph;
 pub mod plans;
 pub mod programs;

@@ -32,15 +32,21 @@
 //! in the order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial Search Through Randomization",
 //! AAAI 1998). The random numbers are the same in every run.
 //!
-//! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are.
+//! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are. What
+//! takes zones is put off until the graph has grown by a part of itself, and goes round in turns: so a node meets what several of
+//! its successors have gained at once.
 //!
 //! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis of Timed
 //! Games", CONCUR 2005; the forced moves are those of G. Behrmann et al., "UPPAAL-TIGA: Time for Playing Games!", CAV 2007,
 //! and the tool's manual, section 3.1.
 
+use std::collections::VecDeque;
+
+use rustc_hash::FxHashMap;
+
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
-use crate::zones::{ClockSet, Federation, past};
+use crate::zones::{Bound, ClockSet, Federation, past};
 
 use super::graph::{Edge, Graph, NONE, Standing};
 use super::{Forced, Player};
@@ -48,8 +54,15 @@ use super::{Forced, Player};
 /// Expanded nodes between two looks at the limits.
 const LOOK_EVERY: u64 = 64;
 
-/// Updates between two looks at the limits, where no node is expanded.
+/// Nodes whose winning valuations hang on clocks are computed when the explored states have grown by this part of them. Each time
+/// costs more than looking at words, and the more is known by then, the fewer are computed twice.
+const BETWEEN_COMPUTATIONS: u64 = 4;
+
+/// Updates by words between two looks at the limits, where no node is expanded.
 const UPDATES_BETWEEN_LOOKS: u32 = 1024;
+
+/// Computations with zones between two looks at the limits.
+const COMPUTATIONS_BETWEEN_LOOKS: u32 = 16;
 
 /// The valuations of a node from which the seeker wins.
 #[derive(Clone, Debug)]
@@ -105,18 +118,38 @@ pub struct Solver<'g, 's, 'a> {
     pub(super) is_cooperative: bool,
     /// By node: the valuations from which the seeker wins.
     pub win: Vec<Win>,
+    /// How many zones the gains, the winning valuations and the rests have.
+    pub(super) gained_zones: u64,
+    /// The rest of each node of which a part is won.
+    pub(super) rest: FxHashMap<u32, Federation>,
     /// By node: the gains, by ascending stamp. What is sought has stamp 0.
     pub gains: Vec<Vec<Gain>>,
     pub(super) forced: Forced,
-    stamp: u32,
+    pub(super) stamp: u32,
     /// Nodes to be expanded; those to dive into stand last.
     waiting: Vec<u32>,
     is_waiting: Vec<bool>,
     random: Random,
     /// Whether the last expansion made no node to go on with.
     is_dive_over: bool,
-    updates: Vec<u32>,
-    is_updated: Vec<bool>,
+    /// Nodes to be looked at again, first those that were put in first.
+    updates: VecDeque<u32>,
+    /// Nodes whose winning valuations are to be computed with zones; some may be settled meanwhile.
+    deferred: VecDeque<u32>,
+    pending: Vec<Pending>,
+    /// How many states may be explored before the deferred nodes are computed.
+    next_computation: u64,
+}
+
+/// Whether a node is to be updated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Pending {
+    /// No.
+    No,
+    /// It waits to be looked at.
+    Look,
+    /// Words do not decide it; it waits to be computed.
+    Computation,
 }
 
 /// Random numbers: G. L. Steele, D. Lea, C. H. Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014.
@@ -143,6 +176,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             goes_on: false,
             is_cooperative: false,
             win: Vec::new(),
+            gained_zones: 0,
+            rest: FxHashMap::default(),
             gains: Vec::new(),
             forced,
             stamp: 0,
@@ -150,8 +185,10 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             random: Random(0),
             is_dive_over: false,
             is_waiting: Vec::new(),
-            updates: Vec::new(),
-            is_updated: Vec::new(),
+            updates: VecDeque::new(),
+            deferred: VecDeque::new(),
+            pending: Vec::new(),
+            next_computation: 0,
         };
         solver.adopt_new_nodes();
         solver
@@ -164,7 +201,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             stored: self.graph.nodes.len() as u64,
             waiting: self.waiting.len() as u64,
             bytes: self.graph.bytes()
-                + (self.win.capacity() * (size_of::<Win>() + size_of::<Vec<Gain>>() + 2)) as u64,
+                + (self.win.capacity() * (size_of::<Win>() + size_of::<Vec<Gain>>() + 2)) as u64
+                + self.gained_zones * (self.graph.dimension().pow(2) * size_of::<Bound>()) as u64,
         }
     }
 
@@ -172,7 +210,14 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     pub fn solve(&mut self, extent: Extent, watch: &mut dyn Watch) -> Result<Answer, Failure> {
         let mut next_look = LOOK_EVERY;
         loop {
-            if let Some(reason) = self.propagate(watch)? {
+            let explored = self.graph.explored;
+            let reason = if self.waiting.is_empty() || explored >= self.next_computation {
+                self.next_computation = explored + explored / BETWEEN_COMPUTATIONS;
+                self.propagate(watch)?
+            } else {
+                self.propagate_words(watch)
+            };
+            if let Some(reason) = reason {
                 return Ok(Answer::Stopped(reason));
             }
             if extent == Extent::Verdict && self.is_won() {
@@ -208,20 +253,58 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         &mut self,
         watch: &mut dyn Watch,
     ) -> Result<Option<StopReason>, Failure> {
-        let mut until_look = UPDATES_BETWEEN_LOOKS;
-        while let Some(node) = self.updates.pop() {
-            self.is_updated[node as usize] = false;
-            self.update(node)?;
+        let mut until_look = COMPUTATIONS_BETWEEN_LOOKS;
+        loop {
+            if let Some(reason) = self.propagate_words(watch) {
+                return Ok(Some(reason));
+            }
+            let Some(node) = self.deferred.pop_front() else {
+                return Ok(None);
+            };
+            if self.pending[node as usize] != Pending::Computation {
+                continue;
+            }
+            self.pending[node as usize] = Pending::No;
+            self.compute(node)?;
             until_look -= 1;
             if until_look == 0 {
-                until_look = UPDATES_BETWEEN_LOOKS;
+                until_look = COMPUTATIONS_BETWEEN_LOOKS;
                 let reason = watch.look(&self.counters());
                 if reason.is_some() {
                     return Ok(reason);
                 }
             }
         }
-        Ok(None)
+    }
+
+    /// Updates nodes until nothing grows as far as words decide, and puts the other nodes off.
+    fn propagate_words(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
+        let mut until_look = UPDATES_BETWEEN_LOOKS;
+        while let Some(node) = self.updates.pop_front() {
+            self.pending[node as usize] = Pending::No;
+            let is_settled =
+                self.is_decided(node) || matches!(self.win[node as usize], Win::Everything);
+            if is_settled || !self.graph.nodes[node as usize].is_expanded {
+                continue;
+            }
+            match self.quick(node) {
+                Some(true) => self.gain_everything(node),
+                Some(false) => {}
+                None => {
+                    self.pending[node as usize] = Pending::Computation;
+                    self.deferred.push_back(node);
+                }
+            }
+            until_look -= 1;
+            if until_look == 0 {
+                until_look = UPDATES_BETWEEN_LOOKS;
+                let reason = watch.look(&self.counters());
+                if reason.is_some() {
+                    return reason;
+                }
+            }
+        }
+        None
     }
 
     /// Forgets what was won, and seeks these parts of the nodes, in all of which play goes on.
@@ -229,10 +312,13 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         self.targets = Some(targets);
         self.stamp = 0;
         self.win.clear();
+        self.rest.clear();
+        self.gained_zones = 0;
         self.gains.clear();
         self.is_waiting.clear();
-        self.is_updated.clear();
+        self.pending.clear();
         self.updates.clear();
+        self.deferred.clear();
         self.adopt_new_nodes();
         for node in 0..self.graph.nodes.len() as u32 {
             self.mark(node);
@@ -329,6 +415,12 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     fn adopt_new_nodes(&mut self) {
         for node in self.win.len()..self.graph.nodes.len() {
             let win = self.sought(node as u32);
+            if let Win::Part(part) = &win {
+                let mut rest = self.whole(node as u32);
+                rest.subtract(part);
+                self.gained_zones += (2 * part.zone_count() + rest.zone_count()) as u64;
+                self.rest.insert(node as u32, rest);
+            }
             let gains = match &win {
                 Win::Nothing => Vec::new(),
                 Win::Everything => vec![Gain {
@@ -343,7 +435,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             self.win.push(win);
             self.gains.push(gains);
             self.is_waiting.push(false);
-            self.is_updated.push(false);
+            self.pending.push(Pending::No);
             if node == 0 {
                 self.wait_for(0);
             }
@@ -417,58 +509,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    fn mark(&mut self, node: u32) {
-        if !std::mem::replace(&mut self.is_updated[node as usize], true) {
-            self.updates.push(node);
+    pub(super) fn mark(&mut self, node: u32) {
+        let pending = &mut self.pending[node as usize];
+        if std::mem::replace(pending, Pending::Look) != Pending::Look {
+            self.updates.push_back(node);
         }
-    }
-
-    /// Computes the winning valuations of a node anew; if they grew, its predecessors are to be updated.
-    fn update(&mut self, node: u32) -> Result<(), Failure> {
-        let state = self.graph.nodes[node as usize];
-        let is_settled =
-            self.is_decided(node) || matches!(self.win[node as usize], Win::Everything);
-        if !state.is_expanded || is_settled {
-            return Ok(());
-        }
-        let grown = match self.quick(node) {
-            Some(true) => Some(Win::Everything),
-            Some(false) => None,
-            None => self.grown(node)?,
-        };
-        let Some(grown) = grown else { return Ok(()) };
-        self.stamp += 1;
-        let part = match &grown {
-            Win::Part(part) => Some(self.without_old(node, part.clone())),
-            _ => match &self.win[node as usize] {
-                Win::Part(_) => {
-                    let whole = Federation::of_zone(self.graph.dimension(), self.graph.zone(node));
-                    Some(self.without_old(node, whole))
-                }
-                _ => None,
-            },
-        };
-        self.gains[node as usize].push(Gain {
-            stamp: self.stamp,
-            part,
-        });
-        self.win[node as usize] = grown;
-        let mut edge = state.first_in;
-        while edge != NONE {
-            let Edge {
-                source, next_in, ..
-            } = self.graph.edges[edge as usize];
-            self.mark(source);
-            edge = next_in;
-        }
-        Ok(())
-    }
-
-    fn without_old(&self, node: u32, mut part: Federation) -> Federation {
-        if let Win::Part(old) = &self.win[node as usize] {
-            part.subtract(old);
-        }
-        part
     }
 
     /// Decides without zones whether the node is won as a whole (`true`) or nothing new is won (`false`); `None` if zones
@@ -516,26 +561,15 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         None
     }
 
-    /// The won valuations of a node; `None` if they did not grow.
-    fn grown(&mut self, node: u32) -> Result<Option<Win>, Failure> {
+    /// Computes the winning valuations of a node anew.
+    fn compute(&mut self, node: u32) -> Result<(), Failure> {
         let mut won = match self.seeker {
             Player::Controller => self.controllers_gain(node)?,
             Player::Environment => self.environments_gain(node)?,
         };
-        let whole = self.graph.zone(node);
-        won.intersect_zone(whole);
-        if won.is_empty() {
-            return Ok(None);
-        }
-        if won.includes_zone(whole) {
-            return Ok(Some(Win::Everything));
-        }
-        let is_new = match &self.win[node as usize] {
-            Win::Part(old) => !won.is_subset(old),
-            _ => true,
-        };
-        won.reduce();
-        Ok(is_new.then_some(Win::Part(won)))
+        won.intersect_zone(self.graph.zone(node));
+        self.gain(node, won);
+        Ok(())
     }
 
     /// What the controller wins as the seeker, as far as known.
@@ -610,65 +644,5 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let mut words = self.graph.symbolic.stepper.network().initial.clone();
         self.graph.load(node, &mut words);
         self.graph.symbolic.stopped(&words)
-    }
-
-    /// The valuations of an edge's source from which it leads into the given valuations of its target.
-    pub fn before(&self, edge: &Edge, target: &Win) -> Federation {
-        let dimension = self.graph.dimension();
-        let mut part = match target {
-            Win::Nothing => return Federation::empty(dimension),
-            Win::Everything if edge.is_total => {
-                return Federation::of_zone(dimension, self.graph.zone(edge.source));
-            }
-            Win::Everything => Federation::of_zone(dimension, self.graph.zone(edge.target)),
-            Win::Part(part) => part.clone(),
-        };
-        self.graph.programs.preimage(edge.program, &mut part);
-        part.intersect_zone(self.graph.zone(edge.source));
-        part
-    }
-
-    /// The valuations of an edge's source in which its first move is possible.
-    pub(super) fn enabled(&self, edge: &Edge) -> Federation {
-        self.graph.programs.enabled(
-            edge.program,
-            self.graph.zone(edge.source),
-            self.graph.dimension(),
-        )
-    }
-
-    /// The valuations from which a move of the evader is not known to lead into won ones.
-    pub(super) fn spoiling(&self, edge: &Edge) -> Federation {
-        self.missing(edge, &self.win[edge.target as usize])
-    }
-
-    /// The valuations from which an edge is possible and does not lead into the given valuations of its target. In a chain somebody
-    /// may still wait or get stuck, so there it is what is not led into them; other edges may be pieces of a move, and lead into
-    /// the rest of their own target.
-    pub(super) fn missing(&self, edge: &Edge, hit: &Win) -> Federation {
-        if edge.length == 1 {
-            return self.before(edge, &self.complement(edge.target, hit));
-        }
-        let mut missing = self.enabled(edge);
-        missing.subtract(&self.before(edge, hit));
-        missing
-    }
-
-    /// The valuations of a node that are not known to be won.
-    pub(super) fn lost(&self, node: u32) -> Win {
-        self.complement(node, &self.win[node as usize])
-    }
-
-    /// The other valuations of a node.
-    fn complement(&self, node: u32, part: &Win) -> Win {
-        match part {
-            Win::Nothing => Win::Everything,
-            Win::Everything => Win::Nothing,
-            Win::Part(part) => {
-                let mut rest = Federation::of_zone(self.graph.dimension(), self.graph.zone(node));
-                rest.subtract(part);
-                Win::Part(rest)
-            }
-        }
     }
 }

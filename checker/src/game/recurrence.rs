@@ -132,7 +132,7 @@ fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Wi
         if edge.controllable {
             back.unite(&solver.before(&edge, kept));
         } else {
-            out.unite(&solver.missing(&edge, kept));
+            out.unite(&solver.missing(&edge, kept, None));
         }
     }
     back.subtract(&out);

@@ -53,21 +53,25 @@ impl Bound {
     }
 
     /// The constant; meaningless for infinity.
+    #[inline]
     pub const fn value(self) -> i32 {
         self.0 >> 1
     }
 
     /// Whether the constant itself is excluded. Infinity counts as weak.
+    #[inline]
     pub const fn is_strict(self) -> bool {
         self.0 & 1 == 0
     }
 
     /// Whether this is no bound at all.
+    #[inline]
     pub const fn is_infinite(self) -> bool {
         self.0 == i32::MAX
     }
 
     /// Whether this is a bound.
+    #[inline]
     pub const fn is_finite(self) -> bool {
         self.0 != i32::MAX
     }
@@ -76,6 +80,7 @@ impl Bound {
     ///
     /// Infinity has no complement; the result for it is meaningless.
     #[must_use]
+    #[inline]
     pub const fn negated(self) -> Bound {
         Bound(1_i32.saturating_sub(self.0))
     }

@@ -288,6 +288,7 @@ pub fn intersect(zone: &mut [Bound], other: &[Bound], dimension: usize) -> bool 
 /// Whether two zones certainly have no valuation in common: some difference is bounded apart.
 ///
 /// Cheap and one-sided: disjoint zones can pass.
+#[inline]
 pub fn are_apart(zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
     (0..dimension).any(|left| {
         let row = &zone[left * dimension..(left + 1) * dimension];

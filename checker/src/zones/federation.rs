@@ -130,19 +130,35 @@ impl Federation {
     }
 
     /// Removes the valuations of a zone.
+    ///
+    /// A zone that is cut had no other one within it, so only its parts are looked for in the others.
     pub fn subtract_zone(&mut self, zone: &[Bound]) {
-        if dbm::is_empty(zone) || self.is_empty() {
+        let dimension = self.dimension;
+        let is_apart = |minuend: &[Bound]| dbm::are_apart(minuend, zone, dimension);
+        if dbm::is_empty(zone) || self.zones().all(is_apart) {
             return;
         }
-        let mut result = Federation::empty(self.dimension);
-        let subtrahend = Subtrahend::new(zone, self.dimension);
-        for minuend in self.zones() {
+        let mut cut = Vec::new();
+        self.retain(|minuend| {
+            let is_kept = is_apart(minuend);
+            if !is_kept {
+                cut.extend_from_slice(minuend);
+            }
+            is_kept
+        });
+        let subtrahend = Subtrahend::new(zone, dimension);
+        let size = self.size();
+        for minuend in cut.chunks_exact(size) {
+            // The parts of one zone are disjoint.
+            let others = self.bounds.len();
             subtrahend.subtract_from(minuend, &mut |part| {
-                result.push(part);
+                let mut others = self.bounds[..others].chunks_exact(size);
+                if !others.any(|other| dbm::is_subset(part, other)) {
+                    self.push(part);
+                }
                 true
             });
         }
-        *self = result;
     }
 
     /// Removes the valuations that satisfy all constraints: [`Federation::subtract_zone`] of their zone, without making it where each
@@ -192,7 +208,6 @@ impl Federation {
     pub fn subtract(&mut self, other: &Federation) {
         for zone in other.zones() {
             self.subtract_zone(zone);
-            self.remove_included();
         }
     }
 
@@ -276,9 +291,14 @@ impl Federation {
     /// Makes the description shorter: joins pairs of zones whose union is a zone, and removes zones that the rest
     /// covers. The set stays the same.
     pub fn reduce(&mut self) {
+        self.merge();
+        self.remove_covered();
+    }
+
+    /// Makes the description shorter as [`Federation::reduce`] does, but leaves zones that only several others cover. Cheaper.
+    pub fn merge(&mut self) {
         self.remove_included();
         self.join_pairs();
-        self.remove_covered();
     }
 
     /// Replaces pairs of zones by their hull where that adds no valuation, until there is no such pair.
@@ -367,7 +387,7 @@ impl Federation {
     }
 
     /// Keeps the zones for which the predicate holds, in their order.
-    fn retain(&mut self, is_kept: impl Fn(&[Bound]) -> bool) {
+    fn retain(&mut self, mut is_kept: impl FnMut(&[Bound]) -> bool) {
         self.update(|zone| is_kept(zone));
     }
 
@@ -474,13 +494,39 @@ fn is_covered(zone: &[Bound], cover: &[Bound], dimension: usize) -> bool {
 }
 
 /// Writes the hull of two zones; returns whether it contains nothing but them.
+///
+/// A valuation of the hull outside of both exceeds some bound of each. Such a pair of bounds leaves valuations of the hull, which
+/// is closed as a hull of closed zones, unless the cycle through both negated bounds is negative.
 fn join(hull: &mut [Bound], zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
     if has_gap(zone, other, dimension) {
         return false;
     }
     hull.copy_from_slice(zone);
     dbm::hull(hull, other);
-    Subtrahend::new(zone, dimension).subtract_from(hull, &mut |part| dbm::is_subset(part, other))
+    let hull = &*hull;
+    let is_covered_beyond = |left: usize, right: usize| {
+        let beyond = zone[left * dimension + right].negated();
+        let row = &hull[left * dimension..(left + 1) * dimension];
+        exceeded(hull, other, dimension).all(|(other_left, other_right)| {
+            let other_beyond = other[other_left * dimension + other_right].negated();
+            let there = row[other_right].plus(other_beyond);
+            let back = hull[other_left * dimension + right].plus(beyond);
+            there.plus(back) < Bound::LE_ZERO
+        })
+    };
+    exceeded(hull, zone, dimension).all(|(left, right)| is_covered_beyond(left, right))
+}
+
+/// The entries of a zone that those of a larger one exceed.
+fn exceeded(
+    larger: &[Bound],
+    zone: &[Bound],
+    dimension: usize,
+) -> impl Iterator<Item = (usize, usize)> {
+    let entries = larger.iter().zip(zone).enumerate();
+    entries
+        .filter(|(_, (larger, bound))| larger > bound)
+        .map(move |(index, _)| (index / dimension, index % dimension))
 }
 
 /// Whether there is room between two zones: some difference has values that lie beyond the one and before the other.

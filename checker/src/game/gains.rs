@@ -1,0 +1,137 @@
+//! The valuations that nodes win, the rest of them, and where edges lead into either.
+
+use crate::zones::Federation;
+
+use super::graph::{Edge, NONE};
+use super::reach::{Gain, Solver, Win};
+
+impl Solver<'_, '_, '_> {
+    /// Records that these valuations of a node are won; if they are more than before, its predecessors are to be updated.
+    pub(super) fn gain(&mut self, node: u32, mut won: Federation) {
+        let (mut rest, old_count) = match &self.win[node as usize] {
+            Win::Everything => return,
+            Win::Part(old) => {
+                let rest = &self.rest[&node];
+                (rest.clone(), old.zone_count() + rest.zone_count())
+            }
+            Win::Nothing => (self.whole(node), 0),
+        };
+        if !rest.intersects(&won) {
+            return;
+        }
+        won.reduce();
+        let is_first = old_count == 0;
+        let part = if is_first {
+            won.clone()
+        } else {
+            rest.intersection(&won)
+        };
+        rest.subtract(&won);
+        if rest.is_empty() {
+            self.rest.remove(&node);
+            self.record(node, Win::Everything, (!is_first).then_some(part));
+            return;
+        }
+        rest.merge();
+        let new_count = won.zone_count() + part.zone_count() + rest.zone_count();
+        self.gained_zones += new_count as u64;
+        self.gained_zones -= old_count as u64;
+        self.rest.insert(node, rest);
+        self.record(node, Win::Part(won), Some(part));
+    }
+
+    /// Records that all of a node is won.
+    pub(super) fn gain_everything(&mut self, node: u32) {
+        let rest = self.rest.remove(&node);
+        self.record(node, Win::Everything, rest);
+    }
+
+    /// Records what a node gains.
+    fn record(&mut self, node: u32, win: Win, part: Option<Federation>) {
+        self.stamp += 1;
+        self.gains[node as usize].push(Gain {
+            stamp: self.stamp,
+            part,
+        });
+        self.win[node as usize] = win;
+        let mut edge = self.graph.nodes[node as usize].first_in;
+        while edge != NONE {
+            let Edge {
+                source, next_in, ..
+            } = self.graph.edges[edge as usize];
+            self.mark(source);
+            edge = next_in;
+        }
+    }
+
+    /// The valuations of an edge's source from which it leads into the given valuations of its target.
+    pub fn before(&self, edge: &Edge, target: &Win) -> Federation {
+        let dimension = self.graph.dimension();
+        let mut part = match target {
+            Win::Nothing => return Federation::empty(dimension),
+            Win::Everything if edge.is_total => {
+                return Federation::of_zone(dimension, self.graph.zone(edge.source));
+            }
+            Win::Everything => Federation::of_zone(dimension, self.graph.zone(edge.target)),
+            Win::Part(part) => part.clone(),
+        };
+        self.graph.programs.preimage(edge.program, &mut part);
+        part.intersect_zone(self.graph.zone(edge.source));
+        part
+    }
+
+    /// The valuations of an edge's source in which its first move is possible.
+    pub(super) fn enabled(&self, edge: &Edge) -> Federation {
+        self.graph.programs.enabled(
+            edge.program,
+            self.graph.zone(edge.source),
+            self.graph.dimension(),
+        )
+    }
+
+    /// The valuations from which a move of the evader is not known to lead into won ones.
+    pub(super) fn spoiling(&self, edge: &Edge) -> Federation {
+        let is_missed = (edge.length == 1).then(|| self.lost(edge.target));
+        self.missing(edge, &self.win[edge.target as usize], is_missed)
+    }
+
+    /// The valuations from which an edge is possible and does not lead into the given valuations of its target, whose others are
+    /// computed unless they are given too. In a chain somebody may still wait or get stuck, so there it is what is not led into
+    /// them; other edges may be pieces of a move, and lead into the rest of their own target.
+    pub(super) fn missing(&self, edge: &Edge, hit: &Win, missed: Option<Win>) -> Federation {
+        if edge.length == 1 {
+            let missed = missed.unwrap_or_else(|| self.complement(edge.target, hit));
+            return self.before(edge, &missed);
+        }
+        let mut missing = self.enabled(edge);
+        missing.subtract(&self.before(edge, hit));
+        missing
+    }
+
+    /// The valuations of a node that are not known to be won.
+    pub(super) fn lost(&self, node: u32) -> Win {
+        match &self.win[node as usize] {
+            Win::Nothing => Win::Everything,
+            Win::Everything => Win::Nothing,
+            Win::Part(_) => Win::Part(self.rest[&node].clone()),
+        }
+    }
+
+    /// The other valuations of a node.
+    fn complement(&self, node: u32, part: &Win) -> Win {
+        match part {
+            Win::Nothing => Win::Everything,
+            Win::Everything => Win::Nothing,
+            Win::Part(part) => {
+                let mut rest = self.whole(node);
+                rest.subtract(part);
+                Win::Part(rest)
+            }
+        }
+    }
+
+    /// All valuations of a node.
+    pub(super) fn whole(&self, node: u32) -> Federation {
+        Federation::of_zone(self.graph.dimension(), self.graph.zone(node))
+    }
+}
