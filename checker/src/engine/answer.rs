@@ -20,7 +20,7 @@ use crate::search::leads_to::{self, Unanswered};
 use crate::search::limits::{Counters, StopReason};
 use crate::search::liveness::{self, Ending, Liveness};
 use crate::search::plain;
-use crate::search::reach::{self, Outcome, Trace};
+use crate::search::reach::{self, Outcome, Report, Trace};
 use crate::search::schedule::Stays;
 use crate::search::taking::Taking;
 use crate::verify::replay::Shown;
@@ -287,6 +287,27 @@ pub(super) fn symbolic<'a>(
     }
 }
 
+/// Zones that may be too large for what is asked, where those of [`symbolic`] would be many more: nothing that these zones do not
+/// have is there, but what they have may not be. `None` if there are none but those of [`symbolic`].
+fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Option<Symbolic<'a>> {
+    if predicate::depends_on_negations(subject.network) {
+        return None;
+    }
+    let atoms: Vec<ClockAtom> = predicates
+        .iter()
+        .flat_map(|one| predicate::atoms(one))
+        .collect();
+    let all: Vec<ClockAtom> = [&atoms, subject.atoms()]
+        .into_iter()
+        .flatten()
+        .cloned()
+        .collect();
+    if has_differences(subject.network, &all) {
+        return None;
+    }
+    Some(symbolic(subject, &[], &atoms, Abstraction::LowerUpper))
+}
+
 /// The verdict on something that was found, in zones that may be too large.
 fn found(is_approximate: bool) -> Verdict {
     if is_approximate {
@@ -297,15 +318,22 @@ fn found(is_approximate: bool) -> Verdict {
 }
 
 /// Is there a run inside the predicate that never leaves it?
-fn always(
-    subject: Subject<'_>,
+fn always<'a>(
+    subject: Subject<'a>,
     keep: &Predicate,
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let mut symbolic = symbolic(subject, &[keep], &[], Abstraction::Maximum);
-    let mut search = Liveness::new(&symbolic, keep);
-    let outcome = search.from_start(&mut symbolic, watch);
+    let mut run = |mut symbolic: Symbolic<'a>| {
+        let mut search = Liveness::new(&symbolic, keep);
+        let outcome = search.from_start(&mut symbolic, watch);
+        (symbolic, search, outcome)
+    };
+    let coarse = coarser(subject, &[keep]).map(&mut run);
+    let settled =
+        coarse.filter(|(.., outcome)| !matches!(outcome, Ok(liveness::Outcome::Found(_))));
+    let (mut symbolic, search, outcome) =
+        settled.unwrap_or_else(|| run(symbolic(subject, &[keep], &[], Abstraction::Maximum)));
     let mut witnesses = Witnesses::new(&mut symbolic, options);
     let verdict = match outcome {
         Ok(liveness::Outcome::Found(run)) => {
@@ -377,15 +405,21 @@ impl<'w, 'a> Witnesses<'w, 'a> {
 }
 
 /// Does every state of `open` lead out of `keep`?
-fn leads_to(
-    subject: Subject<'_>,
+fn leads_to<'a>(
+    subject: Subject<'a>,
     (open, keep): (&Predicate, &Predicate),
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let mut symbolic = symbolic(subject, &[open, keep], &[], Abstraction::Maximum);
-    let mut goal = Unanswered::new(&symbolic, open, keep);
-    let report = reach::search(&mut symbolic, &mut goal, options.order, watch);
+    let mut run = |mut symbolic: Symbolic<'a>| {
+        let mut goal = Unanswered::new(&symbolic, open, keep);
+        let report = reach::search(&mut symbolic, &mut goal, options.order, watch);
+        (symbolic, goal, report)
+    };
+    let coarse = coarser(subject, &[open, keep]).map(&mut run);
+    let settled = coarse.filter(|(.., report)| !matches!(report.outcome, Ok(Outcome::Found(_))));
+    let (mut symbolic, mut goal, report) =
+        settled.unwrap_or_else(|| run(symbolic(subject, &[open, keep], &[], Abstraction::Maximum)));
     let mut witnesses = Witnesses::new(&mut symbolic, options);
     let verdict = match report.outcome {
         Ok(Outcome::Found(way)) => {
@@ -538,11 +572,61 @@ fn reachable(
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
+    if let Some((mut symbolic, report)) = reach_coarsely(subject, goal, options, watch) {
+        return conclude(subject, &mut symbolic, goal, report, options, watch);
+    }
     let mut symbolic = symbolic(subject, &[goal], &[], Abstraction::LowerUpper);
     let mut look = goal;
     let report = reach::search(&mut symbolic, &mut look, options.order, watch);
+    conclude(subject, &mut symbolic, goal, report, options, watch)
+}
+
+/// Looks for a deadlock in zones that are too large for it. One that is found counts if it remains in the exact zones of its trace.
+/// `None` if this settles nothing, or does not apply.
+fn reach_coarsely<'a>(
+    subject: Subject<'a>,
+    goal: &Predicate,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Option<(Symbolic<'a>, Report)> {
+    // The zones of a certificate must be free of deadlocks themselves, and the best trace is found in them.
+    let is_exact = options.certificate || options.trace != TraceWanted::Any;
+    if is_exact || !predicate::has_deadlock(goal) {
+        return None;
+    }
+    let mut coarse = coarser(subject, &[goal])?;
+    let mut look = goal;
+    let report = reach::search(&mut coarse, &mut look, options.order, watch);
+    let is_settled = match &report.outcome {
+        Ok(Outcome::Found(trace)) => ends_in(&mut coarse, goal, trace),
+        _ => true,
+    };
+    is_settled.then_some((coarse, report))
+}
+
+/// Whether the last state of a trace, whose zones are exact, satisfies the predicate somewhere.
+fn ends_in(symbolic: &mut Symbolic<'_>, goal: &Predicate, trace: &Trace) -> bool {
+    let Some((words, zone)) = trace.states.last() else {
+        return false;
+    };
+    let is_whole = trace.states.len() == trace.moves.len() + 1;
+    is_whole
+        && symbolic
+            .extent(goal, &mut words.clone(), zone.bounds())
+            .is_ok_and(|extent| extent.is_somewhere())
+}
+
+/// The answer that the report of a search for the goal amounts to.
+fn conclude(
+    subject: Subject<'_>,
+    symbolic: &mut Symbolic<'_>,
+    goal: &Predicate,
+    report: Report,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
     let counters = report.counters;
-    let mut witnesses = Witnesses::new(&mut symbolic, options);
+    let mut witnesses = Witnesses::new(symbolic, options);
     let mut certificate = None;
     let mut message = None;
     let verdict = match report.outcome {

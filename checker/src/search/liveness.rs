@@ -11,7 +11,8 @@
 //! such a node (every valuation of that has a predecessor in itself, around and around, and the regions are finitely many). A
 //! node that was left without success starts no such run, nor does any that it contains.
 //!
-//! Extrapolation must keep all that comparisons can tell (Extra-M+), with those of the predicate among them.
+//! For a run that is found, extrapolation must have kept all that comparisons can tell (Extra-M+), with those of the predicate
+//! among them. That there is none holds with any larger zones too.
 //!
 //! Source: S. Tripakis, "Checking Timed Büchi Automata Emptiness on Simulation Graphs", ACM TOCL 10, 2009 (cycles of zones are
 //! cycles of runs); A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G. Larsen, J. van de Pol, "Multi-Core Emptiness Checking of Timed Büchi
