@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::exec::Executor;
+use crate::game::denial;
 use crate::game::graph::{Graph, Objective as GameObjective};
 use crate::game::plans::{NoPlans, Plan, Plans};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
@@ -157,8 +158,11 @@ fn played(
         PlansWanted::All(_) if is_planned => Extent::Everything,
         _ => Extent::Verdict,
     };
+    let is_strategy_wanted = (options.strategy || options.verify) && !is_cooperative;
+    let mut rounds = Vec::new();
     let result = if is_recurring {
-        recurrence::solve(&mut solver, is_cooperative, watch)
+        let wanted = is_strategy_wanted.then_some(&mut rounds);
+        recurrence::solve(&mut solver, is_cooperative, wanted, watch)
     } else if is_cooperative {
         solver.solve_cooperative(watch)
     } else {
@@ -190,12 +194,12 @@ fn played(
     if is_planned {
         add_plans(&mut answer, &mut solver, options);
     }
-    let has_strategy = match winner {
-        Player::Controller => !is_cooperative,
-        Player::Environment => !is_cooperative && !is_recurring,
-    };
-    if has_strategy && (options.strategy || options.verify) {
-        match strategy::extract(&mut solver) {
+    if is_strategy_wanted {
+        let strategy = match winner {
+            Player::Environment if is_recurring => denial::extract(&mut solver, &rounds),
+            _ => strategy::extract(&mut solver),
+        };
+        match strategy {
             Ok(strategy) => {
                 if options.verify {
                     let verification = verified(network, objective, &strategy, options);

@@ -153,6 +153,7 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
         Defect::Broken => "what must be kept does not hold here",
         Defect::GoalReached => "the goal of the controller holds here",
         Defect::Stuck => "it waits where time cannot pass and it may not",
+        Defect::Recurring => "the goal of the controller comes again and again",
         Defect::Endless => "the run goes on for ever without what the strategy is for",
     };
     let mut lines = vec![format!("strategy violated: {defect}")];

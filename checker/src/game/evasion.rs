@@ -55,7 +55,7 @@ pub(super) fn decisions(
     Ok((decisions, taken))
 }
 
-fn new_decision(zones: Federation, action: Option<Vec<Part>>) -> Decision {
+pub(super) fn new_decision(zones: Federation, action: Option<Vec<Part>>) -> Decision {
     Decision {
         zones,
         action,
@@ -166,14 +166,14 @@ pub(super) fn inner_states(
 }
 
 /// Where the move of a state inside a chain is possible, and leads to none of the valuations that are won.
-fn spoiling(inner: &Inner, won: &Federation) -> Federation {
+pub(super) fn spoiling(inner: &Inner, won: &Federation) -> Federation {
     let zone = Zone::of_constraints(won.dimension(), &inner.invariant);
     let mut acting = inner.effect.enabled_part(zone.bounds(), won.dimension());
     acting.subtract(won);
     acting
 }
 
-fn within_invariant(inner: &Inner, dimension: usize) -> Federation {
+pub(super) fn within_invariant(inner: &Inner, dimension: usize) -> Federation {
     let zone = Zone::of_constraints(dimension, &inner.invariant);
     Federation::of_zone(dimension, zone.bounds())
 }

@@ -11,7 +11,8 @@
 //! ```
 //!
 //! X begins with everything and shrinks until it stays; the graph is explored before. With the goals that are met at the start of
-//! each round, the strategy of the last one is a strategy for the whole: see [`super::strategy`].
+//! each round, the strategy of the last one is a strategy for the whole: see [`super::strategy`]. What each round takes away shows how
+//! the environment wins there: see [`super::denial`].
 //!
 //! Source: L. de Alfaro, M. Faella, T. Henzinger, R. Majumdar, M. Stoelinga, "The Element of Surprise in Timed Games", CONCUR 2003
 //! (nested fixpoints over timed predecessors).
@@ -26,9 +27,11 @@ use super::reach::{Answer, Extent, Solver, Win};
 
 /// Solves the game of a new solver with the controller as its seeker. The goal of its graph must be p ∩ q, and p what is kept.
 /// On a win, the strategy can be read from it. If the players work together, it is enough that it can be won from somewhere.
+/// `rounds`, if wanted, becomes the sets X by node, the first one first.
 pub fn solve(
     solver: &mut Solver<'_, '_, '_>,
     is_cooperative: bool,
+    mut rounds: Option<&mut Vec<Vec<Win>>>,
     watch: &mut dyn Watch,
 ) -> Result<Answer, Failure> {
     solver.go_on(is_cooperative);
@@ -43,11 +46,17 @@ pub fn solve(
         for node in 0..kept.len() as u32 {
             targets.push(target(solver, node, &kept)?);
         }
+        if let Some(rounds) = &mut rounds {
+            rounds.push(kept.clone());
+        }
         solver.restart(targets);
         if let Some(reason) = solver.propagate(watch)? {
             return Ok(Answer::Stopped(reason));
         }
         if !is_cooperative && !solver.is_won() {
+            if let Some(rounds) = rounds {
+                rounds.push(solver.win.clone());
+            }
             return Ok(Answer::Won(Player::Environment));
         }
         let mut has_shrunk = false;
@@ -94,7 +103,7 @@ fn as_win(part: Federation) -> Win {
     }
 }
 
-fn to_federation(solver: &Solver<'_, '_, '_>, node: u32, win: &Win) -> Federation {
+pub(super) fn to_federation(solver: &Solver<'_, '_, '_>, node: u32, win: &Win) -> Federation {
     match win {
         Win::Nothing => Federation::empty(solver.graph.dimension()),
         Win::Everything => Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node)),
@@ -123,6 +132,19 @@ fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Wi
             )
         }
     };
+    goal.subtract(&leave(solver, node, kept)?);
+    if goal.includes_zone(solver.graph.zone(node)) {
+        return Ok(Win::Everything);
+    }
+    Ok(as_win(goal))
+}
+
+/// The part of a node from which the controller cannot keep play from leaving what is kept.
+pub(super) fn leave(
+    solver: &mut Solver<'_, '_, '_>,
+    node: u32,
+    kept: &[Win],
+) -> Result<Federation, Failure> {
     let mut out = Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node));
     out.subtract(&to_federation(solver, node, &kept[node as usize]));
     let mut back = Federation::empty(solver.graph.dimension());
@@ -139,9 +161,5 @@ fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Wi
     let mut held = solver.forced_controller(node)?;
     held.subtract(&back);
     out.unite(&held);
-    goal.subtract(&solver.safe_past(node, out, &back)?);
-    if goal.includes_zone(solver.graph.zone(node)) {
-        return Ok(Win::Everything);
-    }
-    Ok(as_win(goal))
+    solver.safe_past(node, out, &back)
 }

@@ -5,7 +5,7 @@
 //! moves are listed too, so that a strategy can be followed, and checked, move by move. Where play has ended there is nothing to
 //! decide.
 //!
-//! There are five kinds, by who wins and how:
+//! There are six kinds, by who wins and how:
 //! * The controller of a reachability game, and the environment of a safety game, follow the stamps of the gains: from valuations
 //!   of stamp k they move only into valuations of smaller stamps, or wait for them; so they make progress and get there.
 //! * The controller of a game with a goal that is to come again and again does the same, and from the goal goes on into anything
@@ -13,6 +13,8 @@
 //! * The controller of a safety game may do whatever keeps it safe: its strategy allows all such moves and all such waiting. It is
 //!   the most permissive one, with one choice made: where what is safe has no last moment, and a move must be made before, it is
 //!   made in the last stretch of time in which it is possible.
+//! * The environment of a game with a goal that is to come again and again keeps it from coming, or leads play to where the
+//!   goal comes less often: see [`super::denial`].
 //! * The environment of a reachability game that it wins moves where that leads to what the controller does not win, and else
 //!   waits: it never gets under pressure there.
 //!

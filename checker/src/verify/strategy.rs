@@ -14,11 +14,12 @@
 //! One of the environment is right if no play meets the goal before what must be kept is broken, every decision is there and
 //! possible, and
 //! * against a controller that has to reach the goal, it never waits where it must move;
-//! * against one that has to keep something, every play ends in a region in which that is broken.
+//! * against one that has to keep something, every play ends in a region in which that is broken;
+//! * against one whose goal is to recur, no cycle of the graph has a goal in it, and no play stops at one.
 //!
 //! Cost: one look at each region and move of the closed loop; memory for each region.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::ir::{Network, Predicate};
 
@@ -163,6 +164,8 @@ pub enum Defect {
     Stuck,
     /// The play goes on for ever without what the owner wants.
     Endless,
+    /// The goal comes again and again, against the environment.
+    Recurring,
 }
 
 /// A step of a run.
@@ -216,6 +219,7 @@ pub fn verify(
         regions: Regions::new(network, constant, has_differences)?,
         seen: HashMap::new(),
         path: Vec::new(),
+        followed: HashSet::new(),
         goals: Vec::new(),
         is_from_goal: false,
         coverage: Coverage::default(),
@@ -264,6 +268,8 @@ struct Play<'a> {
     regions: Regions,
     seen: HashMap<State, Mark>,
     path: Vec<Frame>,
+    /// The regions that the searches back from goals which must not recur have met.
+    followed: HashSet<State>,
     /// Goals that are to recur and were met, with their successors.
     goals: Vec<(State, Vec<(Step, State)>)>,
     /// Whether the path begins in a goal and not in the initial state.
@@ -289,6 +295,9 @@ impl Play<'_> {
                 continue;
             };
             let Some((step, target)) = frame.successors.pop() else {
+                if let Some(outcome) = self.leave()? {
+                    return Ok(outcome);
+                }
                 let frame = self.path.pop().expect("the path has an end");
                 self.seen.insert(frame.state, Mark::Done);
                 continue;
@@ -310,6 +319,51 @@ impl Play<'_> {
                 return self.violated(defect);
             }
         }
+    }
+
+    /// Looks for a way back from the last region of the path to itself or one before it, if it is a goal that the environment
+    /// is to keep from recurring. All regions behind it were looked at. Source: C. Courcoubetis, M. Vardi, P. Wolper,
+    /// M. Yannakakis, "Memory-Efficient Algorithms for the Verification of Temporal Properties", FMSD 1, 1992 (nested search).
+    fn leave(&mut self) -> Result<Option<Outcome>, Error> {
+        let claim = self.rules.claim;
+        if claim.aim != Aim::Recur || claim.owner == Owner::Controller {
+            return Ok(None);
+        }
+        let Some(last) = self.path.last() else {
+            return Ok(None);
+        };
+        let goal = last.state.clone();
+        if self.rules.winner(&goal)?.is_some() || !self.rules.is_goal(&goal)? {
+            return Ok(None);
+        }
+        let coverage = self.coverage;
+        let outer = self.path.len();
+        // The frame of the goal stands for the first steps of the second search.
+        self.path[outer - 1].successors = self.successors(&goal)?.unwrap_or_default();
+        let mut found = None;
+        while found.is_none() && self.path.len() >= outer {
+            let frame = self.path.last_mut().expect("the path is long enough");
+            let Some((step, target)) = frame.successors.pop() else {
+                if self.path.len() == outer {
+                    break;
+                }
+                self.path.pop();
+                continue;
+            };
+            frame.taken = Some(step);
+            if self.seen.get(&target) == Some(&Mark::Open) {
+                self.push(target, Vec::new());
+                found = Some(self.violated(Defect::Recurring)?);
+            } else if self.followed.insert(target.clone()) {
+                let successors = match self.rules.winner(&target)? {
+                    Some(_) => Vec::new(),
+                    None => self.successors(&target)?.unwrap_or_default(),
+                };
+                self.push(target, successors);
+            }
+        }
+        self.coverage = coverage;
+        Ok(found)
     }
 
     fn push(&mut self, state: State, successors: Vec<(Step, State)>) {
@@ -386,7 +440,9 @@ impl Play<'_> {
         match self.successors(state)? {
             Err(defect) => Ok(Some(defect)),
             Ok(successors)
-                if self.rules.claim.aim == Aim::Recur && self.rules.is_goal(state)? =>
+                if self.rules.claim.aim == Aim::Recur
+                    && self.rules.claim.owner == Owner::Controller
+                    && self.rules.is_goal(state)? =>
             {
                 self.coverage.goals += 1;
                 self.goals.push((state.clone(), successors));

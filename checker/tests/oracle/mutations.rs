@@ -237,3 +237,25 @@ fn counter_strategy_with_a_move_of_the_controller_is_caught() {
         assert_eq!(defect_of(solved, 0, steal), Some(Defect::ImpossibleAction));
     }
 }
+
+/// The environment leads play out of the goal for ever, as soon as it can.
+const LEAVING: &str = "
+process P() {
+  clock x;
+  state G, Trap;
+  init G;
+  trans G -> G { guard x >= 3; assign x = 0; },
+        G -u-> Trap { guard x >= 2; };
+}
+system P;
+";
+
+#[test]
+fn counter_strategy_that_lets_a_goal_recur_is_caught() {
+    let game = || solved(LEAVING, "control: A[] (true && A<> P.G)");
+    assert_eq!(defect_of(game(), 0, |_| {}), None);
+    let wait = |decisions: &mut Vec<Decision>| acts(decisions).action = None;
+    assert_eq!(defect_of(game(), 0, wait), Some(Defect::Recurring));
+    let widen = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
+    assert_eq!(defect_of(game(), 0, widen), Some(Defect::Recurring));
+}

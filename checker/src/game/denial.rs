@@ -1,0 +1,171 @@
+//! How the environment keeps a goal from coming again and again.
+//!
+//! Each round of [`super::recurrence`] takes away valuations from which the controller cannot get to the goal within p and go
+//! on from there inside what was kept before. Let X be what was kept before a round and Y what is kept after it. The valuations
+//! of *rank* k are those that round k took away. The environment plays by the rank:
+//! * Where it can make play leave X, it does: it waits until it has a move that leaves X, and takes it. What is outside X has a
+//!   smaller rank, or p does not hold there.
+//! * Elsewhere in X without Y it evades: it takes moves that stay outside Y wherever there are any, and else waits. So play never
+//!   gets to a goal from which the controller could go on inside X.
+//!
+//! Along a play the rank never grows. A goal that is met is one from which play leaves X, so that the rank falls: there are no more
+//! goals than ranks, and after the last one the goal does not come again.
+
+use crate::network::Failure;
+use crate::zones::{ClockSet, Federation};
+
+use super::Player;
+use super::evasion::{new_decision, spoiling, within_invariant};
+use super::graph::{Edge, Standing};
+use super::reach::{Solver, Win};
+use super::recurrence::{leave, to_federation};
+use super::strategy::{
+    Decision, Selection, Strategy, StrategyState, moves_of, walk, whole_or_part,
+};
+
+/// Reads the strategy of the environment, which wins, from the rounds of the solution.
+pub fn extract(solver: &mut Solver<'_, '_, '_>, rounds: &[Vec<Win>]) -> Result<Strategy, Failure> {
+    let mut strategy = Strategy {
+        owner: Player::Environment,
+        selection: Selection::First,
+        states: Vec::new(),
+    };
+    let mut seen = vec![false; solver.graph.nodes.len()];
+    let mut waiting = vec![0_u32];
+    seen[0] = true;
+    while let Some(node) = waiting.pop() {
+        let mut words = solver.graph.symbolic.stepper.network().initial.clone();
+        solver.graph.load(node, &mut words);
+        let (decisions, taken) = decisions(solver, node, rounds)?;
+        strategy.states.push(StrategyState {
+            words: words.clone(),
+            decisions,
+            is_goal: solver.graph.nodes[node as usize].standing == Standing::Broken,
+        });
+        for edge in taken {
+            let edge = solver.graph.edges[edge];
+            inner_states(solver, &edge, &words, rounds, &mut strategy)?;
+            if !std::mem::replace(&mut seen[edge.target as usize], true) {
+                waiting.push(edge.target);
+            }
+        }
+    }
+    Ok(strategy)
+}
+
+/// The decisions in a node, and the edges that play may take from it.
+fn decisions(
+    solver: &mut Solver<'_, '_, '_>,
+    node: u32,
+    rounds: &[Vec<Win>],
+) -> Result<(Vec<Decision>, Vec<usize>), Failure> {
+    let mut decisions = Vec::new();
+    let mut taken = Vec::new();
+    let moves = moves_of(solver, node)?;
+    for (after, before) in (1..rounds.len()).zip(rounds) {
+        let mut lost = to_federation(solver, node, &before[node as usize]);
+        lost.subtract(&to_federation(solver, node, &rounds[after][node as usize]));
+        if lost.is_empty() {
+            continue;
+        }
+        let leaving = leave(solver, node, before)?.intersection(&lost);
+        let mut evading = lost.clone();
+        evading.subtract(&leaving);
+        for (part, kept) in [(leaving, before), (evading, &rounds[after])] {
+            let mut waiting = part.clone();
+            for index in solver.graph.edges_of(node) {
+                let edge = solver.graph.edges[index];
+                if edge.controllable {
+                    continue;
+                }
+                let acting = solver
+                    .missing(&edge, &kept[edge.target as usize], None)
+                    .intersection(&part);
+                if !acting.is_empty() {
+                    waiting.subtract(&acting);
+                    let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
+                    push(&mut decisions, acting, action, after);
+                    taken.push(index);
+                }
+            }
+            push(&mut decisions, waiting, None, after);
+        }
+        for index in solver.graph.edges_of(node) {
+            let edge = solver.graph.edges[index];
+            if edge.controllable && solver.enabled(&edge).intersects(&lost) {
+                taken.push(index);
+            }
+        }
+    }
+    taken.sort_unstable();
+    taken.dedup();
+    Ok((decisions, taken))
+}
+
+fn push(
+    decisions: &mut Vec<Decision>,
+    mut zones: Federation,
+    action: Option<Vec<crate::network::Part>>,
+    rank: usize,
+) {
+    if !zones.is_empty() {
+        zones.reduce();
+        decisions.push(Decision {
+            rank: rank as u32,
+            ..new_decision(zones, action)
+        });
+    }
+}
+
+/// Adds the states inside a chain, where the goal holds nowhere. Each has one move, which the environment takes, if it owns it,
+/// where the rest of the chain does not lead into what is kept.
+fn inner_states(
+    solver: &mut Solver<'_, '_, '_>,
+    edge: &Edge,
+    source: &[i32],
+    rounds: &[Vec<Win>],
+    strategy: &mut Strategy,
+) -> Result<(), Failure> {
+    let inside = walk(solver, edge, source)?;
+    let dimension = solver.graph.dimension();
+    let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
+    // What the rounds so far have taken away.
+    let mut taken: Vec<Federation> = vec![Federation::empty(dimension); inside.len()];
+    for (rank, kept) in rounds.iter().enumerate().skip(1) {
+        let mut kept = match &kept[edge.target as usize] {
+            Win::Nothing => Federation::empty(dimension),
+            Win::Everything => whole_or_part(solver, edge.target, None),
+            Win::Part(part) => part.clone(),
+        };
+        for (index, inner) in inside.iter().enumerate().rev() {
+            inner.effect.preimage(&mut kept);
+            kept.constrain_all(&inner.invariant);
+            let acting = if inner.controllable {
+                Federation::empty(dimension)
+            } else {
+                spoiling(inner, &kept)
+            };
+            if inner.delays {
+                kept.down(&ClockSet::EMPTY);
+                kept.constrain_all(&inner.invariant);
+            }
+            let mut lost = within_invariant(inner, dimension);
+            lost.subtract(&kept);
+            lost.subtract(&taken[index]);
+            taken[index].unite(&lost);
+            let acting = acting.intersection(&lost);
+            lost.subtract(&acting);
+            let action = Some(inner.parts.clone());
+            push(&mut decisions[index], acting, action, rank);
+            push(&mut decisions[index], lost, None, rank);
+        }
+    }
+    for (inner, decisions) in inside.into_iter().zip(decisions) {
+        strategy.states.push(StrategyState {
+            words: inner.words,
+            decisions,
+            is_goal: false,
+        });
+    }
+    Ok(())
+}
