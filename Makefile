@@ -70,6 +70,7 @@ bench: $(INSTALLED) ## Measure the engine: all plans, a thousand syntheses, whol
 	$(BIN)/python tests/benchmarks/needle.py
 	$(BIN)/python tests/benchmarks/syntheses.py
 	$(BIN)/python tests/benchmarks/race.py
+	$(BIN)/python tests/benchmarks/race.py --threads 2 "fischer 10" "csmacd 11" peterson
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
 .PHONY: bench-games

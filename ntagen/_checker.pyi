@@ -53,6 +53,7 @@ class Model:
         query: str,
         *,
         search: str,
+        threads: int,
         seed: int,
         forced: str,
         priorities: str,

@@ -371,6 +371,7 @@ class Model:
         query: str,
         *,
         search: SearchOrder = "bfs",
+        threads: int | Literal["all"] = 1,
         seed: int = 0,
         forced: ForcedRule = "tiga",
         priorities: PriorityRule = "ignore",
@@ -396,6 +397,11 @@ class Model:
         Args:
             query: The query in UPPAAL's language.
             search: The order of the search; verdicts do not depend on it.
+            threads: How many threads share the search for a reachable state (``E<>``, ``A[]``) or
+                for values, breadth first; ``"all"`` (or 0) is one for each core. Other searches
+                take one. With the same number everything is the same again, counts and traces
+                included; verdicts do not depend on the number, unless the model has a run-time
+                error, which may be met before or after what is looked for.
             seed: For ``search="random"``.
             forced: What happens where time cannot pass and only the environment can move.
             priorities: Whether priorities of channels and processes count in games and under
@@ -425,13 +431,17 @@ class Model:
 
         Raises:
             RejectedError: The query is wrong or of a kind that is not supported.
+            ValueError: There are to be more than 2048 threads, or fewer than none.
             KeyboardInterrupt: The user interrupted.
         """
+        if threads != "all" and threads < 0:
+            raise ValueError(f"{threads} threads: there must be at least one, or all")
         wanted = {"none": None, "first": 1, "all": max(max_plans, 2)}[plans]
         try:
             raw = self._raw.check(
                 query,
                 search=search,
+                threads=0 if threads == "all" else threads,
                 seed=seed,
                 forced=forced,
                 priorities=priorities,

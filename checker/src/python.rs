@@ -5,6 +5,7 @@
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::Duration;
 
 use pyo3::IntoPyObjectExt;
@@ -17,8 +18,8 @@ use crate::engine::limits::Observer;
 use crate::engine::simulation::{Point, SIMULATED_TICKS_PER_UNIT};
 use crate::engine::verification;
 use crate::engine::{
-    self, CodeEngine, Limits, LoadedModel, Options, PlansWanted, Rejection, TraceWanted, Verdict,
-    describe, explain, facts, json, strategy_file,
+    self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
+    TraceWanted, Verdict, describe, explain, facts, json, strategy_file,
 };
 use crate::game::{Forced, Priorities};
 use crate::network::Failure;
@@ -59,6 +60,17 @@ fn code_engine(name: &str) -> PyResult<CodeEngine> {
 fn time_limit(seconds: Option<f64>) -> PyResult<Option<Duration>> {
     let limit = seconds.map(Duration::try_from_secs_f64).transpose();
     limit.map_err(|_| unknown("time limit", &format!("{seconds:?}")))
+}
+
+/// The number of threads that is meant; 0 is one for each core that this process may use.
+fn thread_count(threads: usize) -> PyResult<usize> {
+    match threads {
+        0 => Ok(thread::available_parallelism().map_or(1, |cores| cores.get().min(MOST_THREADS))),
+        1..=MOST_THREADS => Ok(threads),
+        _ => Err(PyValueError::new_err(format!(
+            "{threads} threads: there can be at most {MOST_THREADS}"
+        ))),
+    }
 }
 
 fn stop_name(reason: StopReason) -> Option<&'static str> {
@@ -287,7 +299,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, folder, progress))]
+    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, folder, progress))]
     #[expect(
         clippy::too_many_arguments,
         clippy::fn_params_excessive_bools,
@@ -297,6 +309,7 @@ impl Model {
         slf: &Bound<'_, Self>,
         query: &str,
         search: &str,
+        threads: usize,
         seed: u64,
         forced: &str,
         priorities: &str,
@@ -321,6 +334,7 @@ impl Model {
                 "random" => Order::Random(seed),
                 other => return Err(unknown("search order", other)),
             },
+            threads: thread_count(threads)?,
             forced: match forced {
                 "tiga" => Forced::Tiga,
                 "product" => Forced::Product,

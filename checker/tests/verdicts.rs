@@ -3,8 +3,8 @@
 //! A file begins with lines `// query: …`, each followed by `// verdict: …` (`// verdict neutral: …` and `// verdict product: …`
 //! where the rule for forced moves matters, `// verdict priorities: …` where priorities are to count) and `// origin: …`, which says how the verdict is known. A line `// given: …` is a query that
 //! is answered before those below it, for the strategy that it defines. Other comment lines are
-//! prose. The verdict of a query for values is the values. Every trace must pass its replay. Every query is answered with every search order and with the interpreter and compiled code, and must come out
-//! the same.
+//! prose. The verdict of a query for values is the values. Every trace must pass its replay. Every query is answered with every search order, by several threads,
+//! and with the interpreter and compiled code, and must come out the same.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -139,9 +139,17 @@ fn value_text(values: &Values) -> String {
 fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>) {
     for (rules, expected) in &case.verdicts {
         for code in engines() {
-            for order in [Order::BreadthFirst, Order::DepthFirst, Order::Random(7)] {
+            let manners = [
+                (Order::BreadthFirst, 1),
+                (Order::DepthFirst, 1),
+                (Order::Random(7), 1),
+                (Order::BreadthFirst, 2),
+                (Order::BreadthFirst, 4),
+            ];
+            for (order, threads) in manners {
                 let options = Options {
                     order,
+                    threads,
                     code,
                     forced: rules.0,
                     priorities: rules.1,
@@ -153,7 +161,7 @@ fn check_case(path: &Path, bytes: &[u8], case: &Case, failures: &mut Vec<String>
                 let found = verdict_of(path, bytes, case, &options);
                 if &found != expected {
                     failures.push(format!(
-                        "{}: {}\n  expected {expected} ({}), found {found} with {order:?}, {code:?}, {rules:?}",
+                        "{}: {}\n  expected {expected} ({}), found {found} with {order:?}, {threads} threads, {code:?}, {rules:?}",
                         path.display(),
                         case.query,
                         case.origin

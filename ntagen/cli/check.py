@@ -67,6 +67,23 @@ class _Quantity(click.ParamType[float]):
         return float(match[1]) * units[match[2].lower()]
 
 
+class _Threads(click.ParamType[int]):
+    """A number of threads; ``all`` is 0, one for each core."""
+
+    name = "threads"
+    most = 2048
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
+        text = str(value).strip().lower()
+        if text == "all":
+            return 0
+        if not re.fullmatch(r"[0-9]{1,6}", text) or int(text) > self.most:
+            self.fail(f"{value!r} is no number of threads up to {self.most}, or all", param, ctx)
+        return int(text)
+
+
 @dataclass(frozen=True, slots=True)
 class _Asked:
     """A query to be answered."""
@@ -161,6 +178,14 @@ class _Outputs:
     "--max-plans", type=click.IntRange(2), default=1_000_000, help="List at most so many."
 )
 @click.option("--search", type=click.Choice(["bfs", "dfs", "random"]), default="bfs")
+@click.option(
+    "--threads",
+    metavar="N",
+    type=_Threads(),
+    default="1",
+    help="Share the work among so many threads, or `all` cores: of E<>, A[], sup, inf and bounds, "
+    "breadth first. Liveness, games, --shortest, --fastest and --certificate take one. Default 1.",
+)
 @click.option("--seed", type=int, default=0, help="For --search random.")
 @click.option(
     "--forced",
@@ -195,6 +220,7 @@ def command(
     ranking: str,
     max_plans: int,
     search: Any,  # noqa: ANN401
+    threads: int,
     seed: int,
     forced: Any,  # noqa: ANN401
     priorities: Any,  # noqa: ANN401
@@ -240,6 +266,7 @@ def command(
                 answer = loaded.model.check(
                     query.text,
                     search=search,
+                    threads=threads,
                     seed=seed,
                     forced=forced,
                     priorities=priorities,

@@ -1,6 +1,7 @@
 """How fast the engine explores whole state spaces, against TChecker and against published figures.
 
     python tests/benchmarks/race.py [--tchecker tck-reach] [--models FOLDER] [--runs 3] [NAME]...
+    python tests/benchmarks/race.py --threads 2 [--models FOLDER] [--runs 3] [NAME]...
 
 With ``--tchecker`` the same automata, made by the example generators of TChecker's sources (found
 beside the program, or by ``--examples``), are explored in the same run by ``tck-reach -a
@@ -11,6 +12,10 @@ brackets. ``--models`` names a folder with the public models whose counts by UPP
 Every exploration has a process of its own. Seconds are user CPU seconds, of the engine those of
 the check alone, its code's compilation included; memory is the growth of the resident set from
 the loaded model to its peak, of TChecker the whole. The median of the runs is printed.
+
+``--threads`` compares the engine with itself instead: one thread and so many, in turn. The times
+are of the clock on the wall, so the machine must have as many cores that nobody else uses:
+``waited`` is the share of the time in which the first thread could have run and had no core.
 """
 
 from __future__ import annotations
@@ -22,8 +27,10 @@ import resource
 import statistics
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import astuple, dataclass
+from itertools import chain
 from pathlib import Path
 
 import models
@@ -79,6 +86,8 @@ class Measured:
     seconds: float
     mb: float
     accounted_mb: float = 0.0
+    wall_seconds: float = 0.0
+    waited_seconds: float = 0.0
 
 
 def _resident_mb(key: str) -> float:
@@ -88,21 +97,28 @@ def _resident_mb(key: str) -> float:
     return int(line.split()[1]) / 1024
 
 
-def _explore(path: Path) -> None:
+def _waited_seconds() -> float:
+    """How long the first thread of this process was kept waiting for a core."""
+    return int(Path("/proc/self/schedstat").read_text(encoding="ascii").split()[1]) / 1e9
+
+
+def _explore(path: Path, threads: int) -> None:
     """Explores a model in this process and prints what it took as JSON."""
     model = checker.load_file(path)
     before = _resident_mb("VmRSS")
     start = resource.getrusage(resource.RUSAGE_SELF).ru_utime
-    answer = model.check(QUERY)
+    wall, waited = time.perf_counter(), _waited_seconds()
+    answer = model.check(QUERY, threads=threads)
+    wall, waited = time.perf_counter() - wall, _waited_seconds() - waited
     seconds = resource.getrusage(resource.RUSAGE_SELF).ru_utime - start
     if answer.verdict != "not satisfied":
         raise SystemExit(f"{path}: {answer.verdict}")
     mb = _resident_mb("VmHWM") - before
-    print(json.dumps([answer.stored, seconds, mb, answer.peak_bytes / 2**20]))
+    print(json.dumps([answer.stored, seconds, mb, answer.peak_bytes / 2**20, wall, waited]))
 
 
-def _run_engine(path: Path) -> Measured:
-    command = [sys.executable, __file__, "--explore", str(path)]
+def _run_engine(path: Path, threads: int = 1) -> Measured:
+    command = [sys.executable, __file__, "--explore", str(path), "--threads", str(threads)]
     output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     return Measured(*json.loads(output))
 
@@ -120,7 +136,8 @@ def _run_tchecker(program: Path, path: Path) -> Measured:
 
 
 def _median(runs: list[Measured]) -> Measured:
-    columns = zip(*((run.seconds, run.mb, run.accounted_mb) for run in runs), strict=True)
+    rows = (astuple(run)[1:] for run in runs)
+    columns = zip(*rows, strict=True)
     return Measured(runs[0].stored, *(statistics.median(column) for column in columns))
 
 
@@ -176,6 +193,48 @@ def _count(name: str, path: Path, runs: int, published: int | None) -> Measured:
     return mine
 
 
+def _untimed(folder: Path) -> Path:
+    """The model without clocks, written into the folder."""
+    path = folder / "peterson.xta"
+    path.write_text(models.peterson(UNTIMED_PROCESSES), encoding="utf-8")
+    return path
+
+
+def _made(folder: Path) -> Iterator[tuple[str, Path]]:
+    """All models that are made here, written into the folder, by their names."""
+    for race in RACES:
+        path = folder / f"{race.generator}-{race.size}.xta"
+        path.write_text(race.model(race.size), encoding="utf-8")
+        yield race.name, path
+    yield "peterson", _untimed(folder)
+
+
+def _published(folder: Path | None) -> Iterator[tuple[str, Path, int]]:
+    """The public models in the folder with their names and published counts."""
+    for name, published in PUBLISHED.items():
+        found = sorted(folder.rglob(f"{name}.xml")) if folder else []
+        if found:
+            yield name, found[0], published
+
+
+def _share(name: str, path: Path, arguments: argparse.Namespace) -> None:
+    """Explores a model by one thread and by several in turn, and prints how much faster that is."""
+    runs: dict[int, list[Measured]] = {1: [], arguments.threads: []}
+    for _ in range(arguments.runs):
+        for threads, measured in runs.items():
+            measured.append(_run_engine(path, threads))
+    one, several = (_median(measured) for measured in runs.values())
+    print(
+        f"{name:<22} stored {one.stored:>9} {several.stored:>9}"
+        f"   wall s {one.wall_seconds:7.2f} {several.wall_seconds:7.2f}"
+        f"   faster {one.wall_seconds / several.wall_seconds:5.2f}"
+        f"   user s {one.seconds:7.2f} {several.seconds:7.2f}   MB {one.mb:6.1f} {several.mb:6.1f}"
+        f"   waited {one.waited_seconds / one.wall_seconds:4.0%}"
+        f" {several.waited_seconds / several.wall_seconds:4.0%}",
+        flush=True,
+    )
+
+
 def main() -> None:
     """Runs all races that were asked for."""
     summary = (__doc__ or "").splitlines()[0]
@@ -186,10 +245,11 @@ def main() -> None:
     parser.add_argument("--models", type=Path, help="folder of the public models with counts")
     parser.add_argument("--runs", type=int, default=3, help="the median is of so many runs")
     parser.add_argument("--folder", type=Path, default=Path("build/race"), help="for made models")
+    parser.add_argument("--threads", type=int, default=1, help="compare one thread and so many")
     parser.add_argument("--explore", type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.explore:
-        _explore(arguments.explore)
+        _explore(arguments.explore, arguments.threads)
         return
     folder: Path = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)
@@ -197,22 +257,25 @@ def main() -> None:
     def is_wanted(name: str) -> bool:
         return not arguments.names or name in arguments.names
 
+    if arguments.threads > 1:
+        print(f"One thread and {arguments.threads}:")
+        public = ((name, path) for name, path, _ in _published(arguments.models))
+        for name, path in filter(lambda one: is_wanted(one[0]), chain(_made(folder), public)):
+            _share(name, path, arguments)
+        return
     print("Against TChecker (ours first; in brackets figures of a run elsewhere):")
     for race in RACES:
         if is_wanted(race.name):
             _race(race, arguments, folder)
     if is_wanted("peterson"):
         print("Without clocks:")
-        path = folder / "peterson.xta"
-        path.write_text(models.peterson(UNTIMED_PROCESSES), encoding="utf-8")
-        mine = _count(f"peterson {UNTIMED_PROCESSES}", path, 1, None)
+        mine = _count(f"peterson {UNTIMED_PROCESSES}", _untimed(folder), 1, None)
         print(f"{'':<22} transitions/s {UNTIMED_PROCESSES * mine.stored / mine.seconds:9.0f}")
     if arguments.models:
         print("Against published counts of UPPAAL (ours first):")
-        for name, published in PUBLISHED.items():
-            found = sorted(arguments.models.rglob(f"{name}.xml"))
-            if is_wanted(name) and found:
-                _count(name, found[0], arguments.runs, published)
+        for name, path, published in _published(arguments.models):
+            if is_wanted(name):
+                _count(name, path, arguments.runs, published)
 
 
 if __name__ == "__main__":

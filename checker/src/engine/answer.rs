@@ -461,7 +461,13 @@ fn extremum(
         let predicates = [question.predicate];
         symbolic(subject, &predicates, further, Abstraction::LowerUpper)
     };
-    let report = extremum::search(question, subject.network, &mut zones, options.order, watch);
+    let report = extremum::search(
+        question,
+        subject.network,
+        &mut zones,
+        options.manner(),
+        watch,
+    );
     let mut evidence = Evidence::default();
     let mut values = None;
     let verdict = match report.outcome {
@@ -517,7 +523,7 @@ fn value_witnesses<'a>(
                 is_reached,
             };
             let mut symbolic = zones(&taking.atoms());
-            let report = reach::search(&mut symbolic, &mut taking, options.order, watch);
+            let report = reach::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
             let Ok(Outcome::Found(trace)) = report.outcome else {
                 return found;
             };
@@ -577,7 +583,7 @@ fn reachable(
     }
     let mut symbolic = symbolic(subject, &[goal], &[], Abstraction::LowerUpper);
     let mut look = goal;
-    let report = reach::search(&mut symbolic, &mut look, options.order, watch);
+    let report = reach::search_shared(&mut symbolic, &mut look, options.manner(), watch);
     conclude(subject, &mut symbolic, goal, report, options, watch)
 }
 
@@ -596,7 +602,7 @@ fn reach_coarsely<'a>(
     }
     let mut coarse = coarser(subject, &[goal])?;
     let mut look = goal;
-    let report = reach::search(&mut coarse, &mut look, options.order, watch);
+    let report = reach::search_shared(&mut coarse, &mut look, options.manner(), watch);
     let is_settled = match &report.outcome {
         Ok(Outcome::Found(trace)) => ends_in(&mut coarse, goal, trace),
         _ => true,

@@ -42,7 +42,8 @@ pub use verification::Verification;
 
 use crate::game::strategy::Selection;
 use crate::game::{Forced, Player, Priorities};
-use crate::search::reach::Order;
+pub use crate::search::reach::MOST_THREADS;
+use crate::search::reach::{Manner, Order};
 
 /// Codes of what the engine refuses to answer although the model is right.
 pub mod codes {
@@ -100,6 +101,9 @@ pub enum TraceWanted {
 pub struct Options {
     /// In which order states are explored.
     pub order: Order,
+    /// How many threads share a search, from 1 to [`MOST_THREADS`]. More than one share searches for a reachable state and for values, breadth
+    /// first; other searches take one.
+    pub threads: usize,
     /// The rule for forced moves of the environment.
     pub forced: Forced,
     /// Whether priorities count in games and under strategies.
@@ -124,10 +128,21 @@ pub struct Options {
     pub certificate: bool,
 }
 
+impl Options {
+    /// How searches are done that threads can share.
+    fn manner(&self) -> Manner {
+        Manner {
+            order: self.order,
+            threads: self.threads.clamp(1, MOST_THREADS),
+        }
+    }
+}
+
 impl Default for Options {
     fn default() -> Options {
         Options {
             order: Order::BreadthFirst,
+            threads: 1,
             forced: Forced::default(),
             priorities: Priorities::default(),
             code: CodeEngine::default(),

@@ -25,8 +25,8 @@ pub struct Allowed {
     pub others: Federation,
 }
 
-/// Restricts one player.
-pub trait Restriction {
+/// Restricts one player. Threads share it.
+pub trait Restriction: Sync {
     /// What is allowed in a state with these words; `None` is everything.
     fn allowed(&self, words: &[i32]) -> Option<&Allowed>;
 

@@ -92,6 +92,12 @@ impl<'a> Stepper<'a> {
         }
     }
 
+    /// One for another thread.
+    #[must_use]
+    pub fn another(&self) -> Stepper<'a> {
+        Stepper::new(self.network, self.executor)
+    }
+
     /// The network.
     pub fn network(&self) -> &'a Network {
         self.network

@@ -76,6 +76,21 @@ impl<'a> Symbolic<'a> {
         }
     }
 
+    /// The same for another thread.
+    #[must_use]
+    pub fn another(&self) -> Symbolic<'a> {
+        Symbolic {
+            has_priorities: self.has_priorities,
+            restriction: self.restriction,
+            ..Symbolic::new(self.stepper.another(), self.bounds.clone())
+        }
+    }
+
+    /// Takes over what is known of the zones that another thread has made.
+    pub fn join(&mut self, other: &Symbolic<'_>) {
+        self.is_approximate |= other.is_approximate;
+    }
+
     /// The same under a restriction, whose atoms `bounds` must have been made with.
     #[must_use]
     pub fn restricted(mut self, restriction: Option<&'a dyn Restriction>) -> Symbolic<'a> {

@@ -51,7 +51,7 @@ pub(super) struct Scene<'x, 'a, S> {
 
 impl<S> Scene<'_, '_, S> {
     /// Asks the goal about a state.
-    pub(super) fn look(&mut self, words: &mut [i32], zone: &Zone) -> Result<Look, Failure> {
+    fn look(&mut self, words: &mut [i32], zone: &Zone) -> Result<Look, Failure> {
         self.goal.look(Visited {
             symbolic: self.symbolic,
             words,
@@ -163,14 +163,14 @@ impl Explorer {
         open(symbolic, frame)
     }
 
-    /// Explores what has begun, for at most so many moves.
+    /// Explores what has begun, until so many moves are used up.
     pub(super) fn explore<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
-        most_moves: u64,
+        moves: &mut u64,
     ) -> Result<Visit, Failure> {
         let mut frames = std::mem::take(&mut self.frames);
-        let result = self.explore_frames(&mut frames, scene, most_moves);
+        let result = self.explore_frames(&mut frames, scene, moves);
         self.frames = frames;
         result
     }
@@ -179,10 +179,11 @@ impl Explorer {
         &mut self,
         frames: &mut Vec<Frame>,
         scene: &mut Scene<'_, '_, S>,
-        most_moves: u64,
+        moves: &mut u64,
     ) -> Result<Visit, Failure> {
         let mut depth = self.depth;
-        for _ in 0..most_moves {
+        while *moves > 0 {
+            *moves -= 1;
             if frames[depth].next == frames[depth].moves.len() {
                 if depth == 0 {
                     return Ok(Visit::Done);
@@ -341,6 +342,26 @@ impl Explorer {
         }
         Taken::Down
     }
+}
+
+/// Comes to the initial states.
+pub(super) fn start<S: Sink>(scene: &mut Scene<'_, '_, S>) -> Result<Look, Failure> {
+    let (mut words, zone, invariant) = scene.symbolic.start()?;
+    let mut zones = vec![zone];
+    scene
+        .symbolic
+        .let_time_pass(&mut words, &invariant, &mut zones)?;
+    for zone in &zones {
+        let look = scene.look(&mut words, zone)?;
+        if look != Look::Continue {
+            return Ok(look);
+        }
+    }
+    scene.symbolic.extrapolate_all(&words, &mut zones);
+    for zone in &zones {
+        scene.sink.add_waiting(&words, zone.bounds(), &[]);
+    }
+    Ok(Look::Continue)
 }
 
 fn new_frame(symbolic: &Symbolic<'_>) -> Frame {

@@ -19,9 +19,9 @@ use crate::network::{Failure, Moves, Part, Symbolic, differences, predicate};
 use crate::zones::clocks::Assignment;
 use crate::zones::{Bound, Federation, Zone, clocks, dbm};
 
-use super::goal::{Goal, Look, Visited};
+use super::goal::{Goal, Look, SharedGoal, Visited};
 use super::limits::{Counters, StopReason, Watch};
-use super::reach::{self, Order, Trace};
+use super::reach::{self, Manner, Trace};
 
 /// A least or greatest value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +86,7 @@ pub fn search<'a>(
     question: Question<'_>,
     network: &Network,
     symbolic: &mut dyn FnMut(&[ClockAtom]) -> Symbolic<'a>,
-    order: Order,
+    manner: Manner,
     watch: &mut dyn Watch,
 ) -> Report {
     let greatest_constant = greatest_constant(network, &question);
@@ -95,7 +95,7 @@ pub fn search<'a>(
     loop {
         measuring.forget();
         let mut zones = symbolic(&measuring.atoms(question.least));
-        let report = reach::search(&mut zones, &mut measuring, order, watch);
+        let report = reach::search_shared(&mut zones, &mut measuring, manner, watch);
         explored += report.counters.explored;
         let outcome = match report.outcome {
             Ok(reach::Outcome::Stopped(reason)) => Ok(Outcome::Stopped(reason)),
@@ -165,7 +165,7 @@ struct Measuring<'q> {
     greatest_constant: i32,
     items: Vec<Item>,
     /// The item that exceeded its ceiling.
-    exceeding: usize,
+    exceeding: Option<usize>,
 }
 
 impl<'q> Measuring<'q> {
@@ -182,12 +182,13 @@ impl<'q> Measuring<'q> {
             question,
             greatest_constant,
             items: vec![item; question.items.len()],
-            exceeding: 0,
+            exceeding: None,
         }
     }
 
     /// Forgets what was measured, but not what is known to be infinite.
     fn forget(&mut self) {
+        self.exceeding = None;
         for item in &mut self.items {
             (item.least, item.greatest) = (None, None);
         }
@@ -230,7 +231,7 @@ impl<'q> Measuring<'q> {
         let item = &mut self.items[index];
         if self.question.greatest && !item.is_infinite {
             if upper > Bound::weak(item.high_ceiling).unwrap_or(Bound::INFINITY) {
-                self.exceeding = index;
+                self.exceeding = Some(index);
                 return false;
             }
             item.admit_greatest((upper.value(), !upper.is_strict()));
@@ -263,10 +264,10 @@ impl<'q> Measuring<'q> {
     fn exceeded(&mut self, symbolic: &mut Symbolic<'_>, trace: &Trace) -> Result<(), Failure> {
         let (words, zone) = trace.states.last().expect("the search ended in a state");
         let mut words = words.clone();
-        let (Measure::Clock(choice), _) = &self.question.items[self.exceeding] else {
+        let Some((index, choice)) = self.exceeding() else {
             return Ok(());
         };
-        let clock = symbolic.chosen_clock(*choice, &mut words)?.0 as usize;
+        let clock = symbolic.chosen_clock(choice, &mut words)?.0 as usize;
         let dimension = symbolic.dimension();
         let counting = self.counting(symbolic, &mut words, zone)?;
         let is_unbounded =
@@ -278,13 +279,22 @@ impl<'q> Measuring<'q> {
             predicate: self.question.predicate,
         };
         let is_infinite = counting.zones().any(is_unbounded) || pump.is_on(symbolic, trace)?;
-        let item = &mut self.items[self.exceeding];
+        let item = &mut self.items[index];
         if is_infinite {
             item.is_infinite = true;
         } else {
             item.high_ceiling = doubled(item.high_ceiling)?;
         }
         Ok(())
+    }
+
+    /// The item that exceeded its ceiling, and its clock.
+    fn exceeding(&self) -> Option<(usize, ClockChoice)> {
+        let index = self.exceeding?;
+        match self.question.items[index].0 {
+            Measure::Clock(choice) => Some((index, choice)),
+            Measure::Integer(_) => None,
+        }
     }
 
     fn values(&self) -> Vec<Extremes> {
@@ -365,16 +375,41 @@ impl Goal for Measuring<'_> {
         words: &mut [i32],
         zone: &Zone,
     ) -> Result<bool, Failure> {
-        let (Measure::Clock(choice), _) = self.question.items[self.exceeding] else {
+        let Some((index, choice)) = self.exceeding() else {
             return Ok(true);
         };
         let clock = symbolic.chosen_clock(choice, words)?.0 as usize;
-        let ceiling = Bound::weak(self.items[self.exceeding].high_ceiling);
+        let ceiling = Bound::weak(self.items[index].high_ceiling);
         let exceeds = |part| {
             let upper = dbm::clock_bounds(part, zone.dimension(), clock).1;
             ceiling.is_some_and(|ceiling| upper > ceiling)
         };
         Ok(self.counting(symbolic, words, zone)?.zones().any(exceeds))
+    }
+}
+
+impl SharedGoal for Measuring<'_> {
+    fn fork(&self) -> Self {
+        let mut copy = Measuring {
+            question: self.question,
+            greatest_constant: self.greatest_constant,
+            items: self.items.clone(),
+            exceeding: None,
+        };
+        copy.forget();
+        copy
+    }
+
+    fn join(&mut self, other: Self) {
+        for (item, seen) in self.items.iter_mut().zip(other.items) {
+            if let Some(least) = seen.least {
+                item.admit_least(least);
+            }
+            if let Some(greatest) = seen.greatest {
+                item.admit_greatest(greatest);
+            }
+        }
+        self.exceeding = self.exceeding.or(other.exceeding);
     }
 }
 

@@ -59,6 +59,17 @@ pub trait Goal {
     }
 }
 
+/// A goal that several threads look for, each by its own copy. Looking at a state never takes so long that the limits must be
+/// looked at meanwhile.
+pub trait SharedGoal: Goal + Send + Sized {
+    /// A copy that has seen nothing.
+    #[must_use]
+    fn fork(&self) -> Self;
+
+    /// Takes over what a copy has seen.
+    fn join(&mut self, other: Self);
+}
+
 /// A predicate is looked for: some valuation of the zone satisfies it.
 impl Goal for &Predicate {
     fn confirms(
@@ -70,4 +81,12 @@ impl Goal for &Predicate {
         let extent = symbolic.extent(self, words, zone.bounds())?;
         Ok(!matches!(extent, Extent::Nowhere))
     }
+}
+
+impl SharedGoal for &Predicate {
+    fn fork(&self) -> Self {
+        self
+    }
+
+    fn join(&mut self, _: Self) {}
 }

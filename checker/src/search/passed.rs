@@ -109,7 +109,28 @@ impl PassedList {
 
     /// Stores a state, unless a stored one contains it.
     pub(super) fn add(&mut self, words: &[i32], zone: &[Bound]) -> Option<Stored> {
-        let (discrete, is_new) = self.store.intern(words);
+        let hash = self.store.propose(words);
+        self.add_proposed(hash, zone)
+    }
+
+    /// Packs the words of a state, to be stored by [`PassedList::add_proposed`] or sent to another list; returns their hash.
+    pub(super) fn propose(&mut self, words: &[i32]) -> u32 {
+        self.store.propose(words)
+    }
+
+    /// The packed words of the state that was proposed last.
+    pub(super) fn proposed(&self) -> &[u8] {
+        self.store.proposed()
+    }
+
+    /// Takes over words that another list for the same network has packed.
+    pub(super) fn propose_record(&mut self, record: &[u8]) {
+        self.store.propose_record(record);
+    }
+
+    /// As [`PassedList::add`], for the words that were proposed last, which have this hash.
+    pub(super) fn add_proposed(&mut self, hash: u32, zone: &[Bound]) -> Option<Stored> {
+        let (discrete, is_new) = self.store.intern_proposed(hash);
         if !self.has_clocks {
             return is_new.then(|| self.stored(discrete, ZoneId(0)));
         }

@@ -13,12 +13,13 @@ use std::collections::VecDeque;
 use crate::network::{Failure, Part, Symbolic};
 use crate::zones::{Bound, Zone};
 
-use super::explore::{Explorer, Scene, Sink, Visit};
-use super::goal::{Goal, Look};
+use super::explore::{self, Explorer, Scene, Sink, Visit};
+use super::goal::{Goal, Look, SharedGoal};
 use super::limits::{Counters, StopReason, Watch};
+use super::parallel;
 use super::passed::Stored;
 use super::retrace::{self, Step};
-use super::tree::{self, Origin, Tree};
+use super::tree::{self, MOST_SHARDS, Origin, Tree};
 
 /// States between two looks at the limits.
 const LOOK_EVERY: u64 = 256;
@@ -35,6 +36,18 @@ pub enum Order {
     /// Depth first among the successors of a state in random order, from this seed.
     Random(u64),
 }
+
+/// How to search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Manner {
+    /// In which order states are explored.
+    pub order: Order,
+    /// How many threads share the work, from 1 to [`MOST_THREADS`]. Only breadth first is there more than one.
+    pub threads: usize,
+}
+
+/// The most threads of a search.
+pub const MOST_THREADS: usize = MOST_SHARDS;
 
 /// What a search found.
 #[derive(Debug)]
@@ -81,6 +94,19 @@ pub fn search(
         outcome,
         counters: search.counters(),
     }
+}
+
+/// As [`search`], by several threads if they are wanted and the order is breadth first: see [`super::parallel`].
+pub fn search_shared<G: SharedGoal>(
+    symbolic: &mut Symbolic<'_>,
+    goal: &mut G,
+    manner: Manner,
+    watch: &mut dyn Watch,
+) -> Report {
+    if manner.threads > 1 && manner.order == Order::BreadthFirst {
+        return parallel::search(symbolic, goal, manner.threads, watch);
+    }
+    search(symbolic, goal, manner.order, watch)
 }
 
 struct Search<'s, 'a> {
@@ -167,20 +193,11 @@ impl<'s, 'a> Search<'s, 'a> {
     }
 
     fn run(&mut self) -> Result<Outcome, Failure> {
-        let (mut words, zone, invariant) = self.symbolic.start()?;
-        let mut zones = vec![zone];
-        self.symbolic
-            .let_time_pass(&mut words, &invariant, &mut zones)?;
-        for zone in &zones {
-            match self.scene().look(&mut words, zone)? {
-                Look::Continue => {}
-                Look::Found => return Ok(Outcome::Found(self.trace(true))),
-                Look::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
-            }
-        }
-        self.symbolic.extrapolate_all(&words, &mut zones);
-        for zone in &zones {
-            self.store.add_waiting(&words, zone.bounds(), &[]);
+        let counters = self.own_counters();
+        match explore::start(&mut self.scene(counters))? {
+            Look::Continue => {}
+            Look::Found => return Ok(Outcome::Found(self.trace(true))),
+            Look::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
         }
         let mut next_look = LOOK_EVERY;
         while let Some(stored) = self.next_waiting() {
@@ -234,9 +251,9 @@ impl<'s, 'a> Search<'s, 'a> {
         self.random >> 16
     }
 
-    fn scene(&mut self) -> Scene<'_, 'a, Store> {
+    fn scene(&mut self, counters: Counters) -> Scene<'_, 'a, Store> {
         Scene {
-            counters: self.own_counters(),
+            counters,
             symbolic: self.symbolic,
             goal: self.goal,
             watch: self.watch,
@@ -258,7 +275,8 @@ impl<'s, 'a> Search<'s, 'a> {
                 watch: self.watch,
                 sink: &mut self.store,
             };
-            match self.explorer.explore(&mut scene, LOOK_EVERY_MOVES)? {
+            let mut moves = LOOK_EVERY_MOVES;
+            match self.explorer.explore(&mut scene, &mut moves)? {
                 Visit::Paused => {
                     let counters = self.counters();
                     if let Some(reason) = self.watch.look(&counters) {

@@ -209,7 +209,28 @@ impl StateStore {
 
     /// The id of a state, and whether it is new.
     pub fn intern(&mut self, words: &[i32]) -> (DiscreteId, bool) {
-        let hash = hash_bytes(self.pack(words));
+        let hash = self.propose(words);
+        self.intern_proposed(hash)
+    }
+
+    /// Packs a state, to be interned by [`StateStore::intern_proposed`] or handed to another store of the same network; returns
+    /// its hash, which only its identity decides.
+    pub(super) fn propose(&mut self, words: &[i32]) -> u32 {
+        hash_bytes(self.pack(words))
+    }
+
+    /// The record of the state that was packed last.
+    pub(super) fn proposed(&self) -> &[u8] {
+        &self.scratch
+    }
+
+    /// Takes over a record that another store of the same network has packed.
+    pub(super) fn propose_record(&mut self, record: &[u8]) {
+        self.scratch.copy_from_slice(record);
+    }
+
+    /// The id of the state that was packed or taken over last, which has this hash, and whether it is new.
+    pub(super) fn intern_proposed(&mut self, hash: u32) -> (DiscreteId, bool) {
         let (blocks, stride, bits, identity) =
             (&self.blocks, self.stride, self.block_bits, self.identity);
         let key = &self.scratch[..identity];

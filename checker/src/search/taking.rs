@@ -5,7 +5,7 @@ use crate::network::{Failure, Symbolic};
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Zone};
 
-use super::goal::Goal;
+use super::goal::{Goal, SharedGoal};
 
 /// A value of a measure that some state has, or comes near to.
 #[derive(Clone, Copy, Debug)]
@@ -101,4 +101,12 @@ impl Goal for Taking<'_> {
         counting.constrain_all(&constraints);
         Ok(!counting.is_empty())
     }
+}
+
+impl SharedGoal for Taking<'_> {
+    fn fork(&self) -> Self {
+        *self
+    }
+
+    fn join(&mut self, _: Self) {}
 }

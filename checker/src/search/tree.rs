@@ -12,6 +12,9 @@ use super::passed::{PassedList, Stored};
 use super::paths;
 use super::retrace::Step;
 
+/// The most trees that make one.
+pub(super) const MOST_SHARDS: usize = 1 << (31 - SHARD_SHIFT);
+
 /// Where the shard of the parent begins in a word, above a single move or the length of a way.
 const SHARD_SHIFT: u32 = 20;
 
@@ -80,6 +83,19 @@ impl Tree {
         path: &[Step],
     ) -> Option<Stored> {
         let stored = self.passed.add(words, zone)?;
+        self.add_node(origin, path);
+        Some(stored)
+    }
+
+    /// As [`Tree::add`], for the words that were proposed last, which have this hash.
+    pub(super) fn add_proposed(
+        &mut self,
+        hash: u32,
+        zone: &[Bound],
+        origin: Origin,
+        path: &[Step],
+    ) -> Option<Stored> {
+        let stored = self.passed.add_proposed(hash, zone)?;
         self.add_node(origin, path);
         Some(stored)
     }

@@ -208,6 +208,23 @@ def test_answers_do_not_depend_on_engine_and_order(
     assert json.loads(out)["verdict"] == "not satisfied"
 
 
+@pytest.mark.parametrize("threads", ["1", "3", "all", "0"])
+def test_answers_do_not_depend_on_the_number_of_threads(
+    gate: Path, capsys: pytest.CaptureFixture[str], threads: str
+) -> None:
+    options = ("--threads", threads, "--json")
+    out, _ = check_run(capsys, 1, gate, "--query", "A[] Gate.x < 7", *options)
+    assert json.loads(out)["verdict"] == "not satisfied"
+
+
+@pytest.mark.parametrize("threads", ["-1", "2049", "many", "1.5", ""])
+def test_a_wrong_number_of_threads_is_refused(
+    gate: Path, capsys: pytest.CaptureFixture[str], threads: str
+) -> None:
+    _, err = check_run(capsys, 2, gate, "--query", "A[] Gate.x < 7", "--threads", threads)
+    assert f"{threads!r} is no number of threads up to 2048, or all" in " ".join(err.split())
+
+
 FAILING = """
 int[0,3] n; int a[3];
 process P() {
