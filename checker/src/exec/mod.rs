@@ -20,6 +20,7 @@ pub use interpreter::Interpreter;
 #[cfg(feature = "jit")]
 pub use jit::{Jit, JitError};
 pub use optimise::optimise;
+pub(crate) use optimise::target;
 pub use rounds::ROUND_LIMIT;
 pub use validate::{Flaw, validate};
 

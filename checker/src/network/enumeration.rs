@@ -17,8 +17,8 @@ use super::tables::EdgeEntry;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
     pub(super) process: u32,
-    edge: u32,
-    select: u32,
+    pub(super) edge: u32,
+    pub(super) select: u32,
     pub(super) is_controllable: bool,
     pub(super) constraints: (u32, u32),
 }
@@ -77,7 +77,10 @@ impl<'a> Stepper<'a> {
         self.candidates.clear();
         self.constraints.clear();
         self.channel = None;
-        self.enabled_instances(process, entry, words)?;
+        match self.set_of(process, entry, words) {
+            Some(set) => self.add_candidates(process, entry, set, None),
+            None => self.enabled_instances(process, entry, words)?,
+        }
         for index in 0..self.candidates.len() {
             self.chosen.clear();
             self.chosen.push(Choice::Takes(index as u32));
@@ -96,10 +99,21 @@ impl<'a> Stepper<'a> {
         scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
-        let (network, executor, definition) = (self.network, self.executor, entry.edge);
+        let (executor, definition) = (self.executor, entry.edge);
         let Some(sync) = definition.sync else {
             return Ok(());
         };
+        if let Some(set) = self.set_of(process, entry, words) {
+            return self.remembered_synchronisations(
+                process,
+                entry,
+                set,
+                needs_committed,
+                words,
+                scope,
+                out,
+            );
+        }
         for select in 0..entry.instances {
             self.candidates.clear();
             self.constraints.clear();
@@ -114,14 +128,27 @@ impl<'a> Stepper<'a> {
                 None => 0,
             };
             let channel = sync.channel.0 + offset;
-            self.channel = Some(ChannelId(channel));
-            if network.channels[channel as usize].broadcast {
-                self.broadcast(process, channel, needs_committed, words, scope, out)?;
-            } else {
-                self.handshakes(process, channel, needs_committed, words, out)?;
-            }
+            self.synchronisations_on(process, channel, needs_committed, words, scope, out)?;
         }
         Ok(())
+    }
+
+    /// The moves in which the candidate 0 sends on a channel.
+    pub(super) fn synchronisations_on(
+        &mut self,
+        process: u32,
+        channel: u32,
+        needs_committed: bool,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        self.channel = Some(ChannelId(channel));
+        if self.network.channels[channel as usize].broadcast {
+            self.broadcast(process, channel, needs_committed, words, scope, out)
+        } else {
+            Ok(self.handshakes(process, channel, needs_committed, words, out)?)
+        }
     }
 
     /// Pairs the candidate 0 with every enabled receiver on a binary channel.
@@ -170,6 +197,10 @@ impl<'a> Stepper<'a> {
                 (sync.channel.0..sync.channel.0 + sync.count).contains(&channel)
             });
             if !listens {
+                continue;
+            }
+            if let Some(set) = self.set_of(process, entry, words) {
+                self.add_candidates(process, entry, set, Some(channel));
                 continue;
             }
             if !self.hears(process, index, words)? {

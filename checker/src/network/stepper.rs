@@ -15,9 +15,11 @@ use crate::ir::{ChannelId, Edge, FunctionId, Network, Update, Urgency};
 use super::combinations::{Choice, Group};
 use super::enumeration::Candidate;
 use super::failure::Failure;
+use super::instances::Instances;
 use super::listening::Listening;
 use super::moves::{MoveRef, Moves, Part};
 use super::offers::{Next, OfferId, Offers, Record, VectorId};
+use super::pairing::{Pair, Partners, partners};
 use super::scope::{Scope, Sieve};
 use super::selects::select_values;
 use super::tables::{LocationTable, receivers};
@@ -44,6 +46,11 @@ pub struct Stepper<'a> {
     /// The rank of the next move; see [`super::combinations`].
     pub(super) rank: u64,
     pub(super) sieve: Sieve,
+    /// The enabled instances of edges that are remembered.
+    pub(super) instances: Instances,
+    pub(super) partners: Partners,
+    /// The pairs of the sending edge at hand.
+    pub(super) pairs: Vec<Pair<'a>>,
     /// By process: the channels of its receiving instances in the state at hand, whose number is `round`.
     pub(super) listening: Vec<Listening>,
     pub(super) round: u64,
@@ -64,11 +71,15 @@ impl<'a> Stepper<'a> {
                 .map(|location| LocationTable::new(process, location))
                 .collect()
         });
+        let receivers = receivers(network);
         Stepper {
+            instances: Instances::new(network),
+            partners: partners(network, &receivers),
+            pairs: Vec::new(),
             network,
             executor,
             tables: tables.collect(),
-            receivers: receivers(network),
+            receivers,
             has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
             constraints: Vec::new(),
             assignments: Vec::new(),
@@ -209,7 +220,7 @@ impl<'a> Stepper<'a> {
 
     /// The bytes that remembered moves take, about.
     pub fn bytes(&self) -> usize {
-        self.offers.bytes()
+        self.offers.bytes() + self.instances.bytes()
     }
 
     /// Takes the move: changes locations and variables. The clock assignments, in order, are in the result.

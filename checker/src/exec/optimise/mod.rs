@@ -16,7 +16,7 @@ mod numbering;
 mod operands;
 mod unroll;
 
-pub(super) use operands::target;
+pub(crate) use operands::target;
 
 use std::collections::BTreeMap;
 

@@ -28,7 +28,7 @@ pub(super) fn target_mut(instruction: &mut Instruction) -> Option<&mut Register>
 }
 
 /// The register that an instruction writes.
-pub(in crate::exec) fn target(instruction: &Instruction) -> Option<Register> {
+pub(crate) fn target(instruction: &Instruction) -> Option<Register> {
     match instruction {
         Instruction::Integer { target, .. }
         | Instruction::Double { target, .. }
