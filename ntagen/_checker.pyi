@@ -67,6 +67,7 @@ class Model:
         trace: bool,
         wanted_trace: str,
         certificate: bool,
+        symmetry: bool,
         folder: str | None,
         progress: Callable[[int, int, int, int], object] | None,
     ) -> Answer: ...

@@ -386,6 +386,7 @@ class Model:
         trace: bool = True,
         wanted_trace: TraceWanted = "any",
         certificate: bool = False,
+        symmetry: bool = True,
         folder: Path | None = None,
         progress: Progress | None = None,
     ) -> Answer:
@@ -421,6 +422,9 @@ class Model:
                 a second search.
             certificate: Whether the reached set is wanted if ``E<>`` is not satisfied or ``A[]``
                 is; it takes a second search.
+            symmetry: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may take states
+                that differ only by exchanged members of scalar sets for one; verdicts, values
+                and traces do not depend on it, counts do.
             folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
                 folder of the model.
             progress: Is called some twenty times a second with the numbers of explored,
@@ -455,6 +459,7 @@ class Model:
                 trace=trace,
                 wanted_trace=wanted_trace,
                 certificate=certificate,
+                symmetry=symmetry,
                 folder=None if folder is None else str(folder),
                 progress=progress,
             )

@@ -299,7 +299,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, folder, progress))]
+    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, folder, progress))]
     #[expect(
         clippy::too_many_arguments,
         clippy::fn_params_excessive_bools,
@@ -323,6 +323,7 @@ impl Model {
         trace: bool,
         wanted_trace: &str,
         certificate: bool,
+        symmetry: bool,
         folder: Option<PathBuf>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
@@ -368,6 +369,7 @@ impl Model {
                 other => return Err(unknown("trace", other)),
             },
             certificate,
+            symmetry,
             folder,
         };
         let model = slf.get();

@@ -188,6 +188,13 @@ class _Outputs:
 )
 @click.option("--seed", type=int, default=0, help="For --search random.")
 @click.option(
+    "--symmetry",
+    type=click.Choice(["on", "off"]),
+    default="on",
+    help="Whether states that differ only by exchanged members of scalar sets are one (E<>, A[], "
+    "sup, inf, bounds; where the model cannot tell them apart).",
+)
+@click.option(
     "--forced",
     type=click.Choice(["tiga", "product", "neutral"]),
     default="tiga",
@@ -221,6 +228,7 @@ def command(
     max_plans: int,
     search: Any,  # noqa: ANN401
     threads: int,
+    symmetry: str,
     seed: int,
     forced: Any,  # noqa: ANN401
     priorities: Any,  # noqa: ANN401
@@ -281,6 +289,7 @@ def command(
                     trace=verify or trace is not None or wanted_trace is not None,
                     wanted_trace=wanted_trace or "any",
                     certificate=certificate is not None,
+                    symmetry=symmetry == "on",
                     folder=query.folder,
                     progress=report,
                 )

@@ -13,7 +13,7 @@ use crate::ir::{
 };
 use crate::network::bounds::is_difference;
 use crate::network::{
-    Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, predicate,
+    Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, Symmetry, predicate,
 };
 use crate::search::extremum::{self, Extreme, Extremes, Question};
 use crate::search::leads_to::{self, Unanswered};
@@ -148,10 +148,14 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
     let start = Instant::now();
     let mut watch = LimitWatch::new(options.limits.clone());
     let mut answer = match &query.kind {
-        QueryKind::Reachable(goal) => reachable(subject, goal, options, &mut watch),
+        QueryKind::Reachable(goal) => reduced(subject, options, |symmetry| {
+            reachable(subject, goal, options, symmetry, &mut watch)
+        }),
         QueryKind::Invariantly(invariant) => {
             let broken = negation(invariant);
-            negated(reachable(subject, &broken, options, &mut watch))
+            negated(reduced(subject, options, |symmetry| {
+                reachable(subject, &broken, options, symmetry, &mut watch)
+            }))
         }
         QueryKind::PotentiallyAlways(keep) => always(subject, keep, options, &mut watch),
         QueryKind::Eventually(goal) => {
@@ -176,7 +180,9 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
                 greatest: *greatest,
                 further: subject.atoms(),
             };
-            extremum(subject, question, options, &mut watch)
+            reduced(subject, options, |symmetry| {
+                extremum(subject, question, options, symmetry, &mut watch)
+            })
         }
         QueryKind::Control {
             objective,
@@ -206,6 +212,25 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
     answer.seconds = start.elapsed().as_secs_f64();
     answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
     answer
+}
+
+/// Answers with a search that takes states that differ only by exchanged members of scalar sets for the same, if that is
+/// wanted and sound. Whether a failure is met can hang on the order in which a quantifier runs through members, so that one
+/// that is found so is looked for again among all states.
+fn reduced(
+    subject: Subject<'_>,
+    options: &Options,
+    mut answer: impl FnMut(Option<&Arc<Symmetry>>) -> Answer,
+) -> Answer {
+    let is_allowed = options.symmetry && subject.under.is_none();
+    let symmetry = is_allowed
+        .then(|| Symmetry::of_network(subject.network))
+        .flatten();
+    let first = answer(symmetry.as_ref());
+    match first.verdict {
+        Verdict::Error(_) if symmetry.is_some() => answer(None),
+        _ => first,
+    }
 }
 
 pub(super) fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counters) -> Answer {
@@ -455,11 +480,13 @@ fn extremum(
     subject: Subject<'_>,
     question: Question<'_>,
     options: &Options,
+    symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Answer {
     let mut zones = |further: &[ClockAtom]| {
         let predicates = [question.predicate];
         symbolic(subject, &predicates, further, Abstraction::LowerUpper)
+            .reduced_by(symmetry.cloned())
     };
     let report = extremum::search(
         question,
@@ -576,12 +603,14 @@ fn reachable(
     subject: Subject<'_>,
     goal: &Predicate,
     options: &Options,
+    symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Answer {
-    if let Some((mut symbolic, report)) = reach_coarsely(subject, goal, options, watch) {
+    if let Some((mut symbolic, report)) = reach_coarsely(subject, goal, options, symmetry, watch) {
         return conclude(subject, &mut symbolic, goal, report, options, watch);
     }
-    let mut symbolic = symbolic(subject, &[goal], &[], Abstraction::LowerUpper);
+    let mut symbolic =
+        symbolic(subject, &[goal], &[], Abstraction::LowerUpper).reduced_by(symmetry.cloned());
     let mut look = goal;
     let report = reach::search_shared(&mut symbolic, &mut look, options.manner(), watch);
     conclude(subject, &mut symbolic, goal, report, options, watch)
@@ -593,6 +622,7 @@ fn reach_coarsely<'a>(
     subject: Subject<'a>,
     goal: &Predicate,
     options: &Options,
+    symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Option<(Symbolic<'a>, Report)> {
     // The zones of a certificate must be free of deadlocks themselves, and the best trace is found in them.
@@ -600,7 +630,7 @@ fn reach_coarsely<'a>(
     if is_exact || !predicate::has_deadlock(goal) {
         return None;
     }
-    let mut coarse = coarser(subject, &[goal])?;
+    let mut coarse = coarser(subject, &[goal])?.reduced_by(symmetry.cloned());
     let mut look = goal;
     let report = reach::search_shared(&mut coarse, &mut look, options.manner(), watch);
     let is_settled = match &report.outcome {
@@ -727,6 +757,7 @@ fn with_time(network: &Network) -> (Network, usize) {
             name: "time".to_owned(),
             owner: None,
             hybrid: false,
+            coordinates: Vec::new(),
         });
     }
     timed.initial_clocks.resize(timed.clocks.len(), 0);

@@ -71,6 +71,7 @@ fn visit_shape<'n>(
             part,
             length,
             first,
+            ..
         } => {
             let size = part.words() as usize;
             for index in 0..*length {

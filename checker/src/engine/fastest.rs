@@ -118,6 +118,7 @@ fn with_clock(network: &Network) -> Network {
         name: "#time".to_owned(),
         owner: None,
         hybrid: false,
+        coordinates: Vec::new(),
     });
     timed.initial_clocks.push(0);
     timed

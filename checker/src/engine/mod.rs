@@ -126,6 +126,8 @@ pub struct Options {
     pub trace: TraceWanted,
     /// Whether a certificate is wanted for the verdict that no reachable state is such.
     pub certificate: bool,
+    /// Whether a search may take states that differ only in which member of a scalar set is which for the same.
+    pub symmetry: bool,
 }
 
 impl Options {
@@ -154,6 +156,7 @@ impl Default for Options {
             folder: None,
             trace: TraceWanted::default(),
             certificate: false,
+            symmetry: true,
         }
     }
 }

@@ -16,6 +16,7 @@
 //! Clocks are no part of the words. Clock 0 is the reference clock (always 0); the model's clocks count from 1, arrays of
 //! clocks flattened. Channels are flattened likewise and count from 0.
 
+mod accesses;
 mod code;
 mod print;
 
@@ -70,6 +71,8 @@ pub struct Network {
     pub after_update: Option<Update>,
     /// What the model uses, for choosing algorithms and for `ntagen info`.
     pub features: Features,
+    /// The scalar sets, by the number that shapes and coordinates give.
+    pub scalar_sets: Vec<ScalarSet>,
 }
 
 impl Network {
@@ -84,6 +87,27 @@ impl Network {
                 .flatten()
         })
     }
+}
+
+/// A scalar set: numbers that are only compared for equality and used as indices, so that they can be exchanged.
+#[derive(Clone, Debug)]
+pub struct ScalarSet {
+    /// How many members it has.
+    pub size: u32,
+    /// What tells its members apart nevertheless, so that exchanging them would change what the network does; `None` if
+    /// nothing does but, possibly, the order in which broadcast receivers run their updates.
+    pub told_apart_by: Option<Span>,
+}
+
+/// A coordinate of something of which there is one for each member of a scalar set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Coordinate {
+    /// The scalar set.
+    pub set: u32,
+    /// The member.
+    pub member: u32,
+    /// How far apart those of neighbouring members are.
+    pub stride: u32,
 }
 
 /// One process of the network.
@@ -101,6 +125,10 @@ pub struct Process {
     pub initial: LocationId,
     /// Its level in the system line; greater is more urgent; 0 without priorities.
     pub priority: u32,
+    /// The first process of the same name in the system line: all of them make a set.
+    pub group: ProcessId,
+    /// Its place in the set, for each parameter that is a scalar; the stride counts processes.
+    pub coordinates: Vec<Coordinate>,
 }
 
 /// Whether time may pass in a location.
@@ -169,6 +197,8 @@ pub struct Select {
     pub low: i32,
     /// The greatest value.
     pub high: i32,
+    /// The scalar set, if it ranges over one.
+    pub set: Option<u32>,
 }
 
 /// One way an edge can end.
@@ -225,6 +255,8 @@ pub struct Clock {
     pub owner: Option<ProcessId>,
     /// Hybrid clocks are abstracted away in symbolic and game queries.
     pub hybrid: bool,
+    /// Its place in arrays that are indexed by scalars; the stride counts clocks.
+    pub coordinates: Vec<Coordinate>,
 }
 
 /// A condition on words and clocks: a guard or an invariant. It holds if `function` returns 1, and then on the clock
@@ -378,6 +410,8 @@ pub enum Shape {
         length: u32,
         /// The least index (0 but for `T x[int[a,b]]`).
         first: i32,
+        /// The scalar set that it is indexed by.
+        set: Option<u32>,
     },
     /// Named parts.
     Struct(Vec<(String, Shape)>),

@@ -8,6 +8,8 @@
 //!
 //! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4.
 
+use std::sync::Arc;
+
 use crate::exec::{EmittedAssignment, EmittedConstraint};
 use crate::ir::ClockId;
 use crate::zones::clocks::{self, Assignment};
@@ -17,7 +19,7 @@ use crate::zones::{Bound, ClockSet, Federation, Zone};
 
 use super::bounds::ClockBounds;
 use super::scope::Scope;
-use super::{Failure, MoveRef, Moves, Part, Restriction, Stepper};
+use super::{Failure, MoveRef, Moves, Part, Restriction, Stepper, Symmetry};
 
 /// Zones on top of the moves of a network. One per thread.
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
@@ -31,6 +33,7 @@ pub struct Symbolic<'a> {
     pub(super) has_guarded_urgency: bool,
     pub(super) has_priorities: bool,
     pub(super) restriction: Option<&'a dyn Restriction>,
+    symmetry: Option<Arc<Symmetry>>,
     is_approximate: bool,
     ceilings: Ceilings,
     pub(super) inner_moves: Moves,
@@ -67,6 +70,7 @@ impl<'a> Symbolic<'a> {
             has_guarded_urgency: network.features.clock_guarded_urgent,
             has_priorities: network.features.priorities,
             restriction: None,
+            symmetry: None,
             is_approximate: false,
             ceilings: bounds.everywhere().clone(),
             bounds,
@@ -82,6 +86,7 @@ impl<'a> Symbolic<'a> {
         Symbolic {
             has_priorities: self.has_priorities,
             restriction: self.restriction,
+            symmetry: self.symmetry.clone(),
             ..Symbolic::new(self.stepper.another(), self.bounds.clone())
         }
     }
@@ -108,6 +113,18 @@ impl<'a> Symbolic<'a> {
     /// Whether the network has priorities that do not count here.
     pub fn ignores_priorities(&self) -> bool {
         self.stepper.network().features.priorities && !self.has_priorities
+    }
+
+    /// The same, of states that may be exchanged for others by this symmetry; a search need only see one of each orbit.
+    #[must_use]
+    pub fn reduced_by(mut self, symmetry: Option<Arc<Symmetry>>) -> Symbolic<'a> {
+        self.symmetry = symmetry;
+        self
+    }
+
+    /// What states may be exchanged by.
+    pub fn symmetry(&self) -> Option<&Arc<Symmetry>> {
+        self.symmetry.as_ref()
     }
 
     /// Whether it is under a restriction.

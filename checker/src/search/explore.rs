@@ -15,6 +15,7 @@ use crate::zones::{Bound, Zone};
 use super::goal::{Goal, Look, Visited};
 use super::limits::{Counters, StopReason, Watch};
 use super::recent::RecentStates;
+use super::representatives::Representative;
 use super::retrace::Step;
 
 /// Committed states that are explored one below the other without waiting.
@@ -106,6 +107,8 @@ pub(super) struct Explorer {
     /// The moves from the stored state to the state at hand.
     way: Vec<Step>,
     entries: Vec<Zone>,
+    /// What is stored instead of a state, where some states may be exchanged for others.
+    representative: Representative,
     /// Whether some location is committed.
     has_committed: bool,
     explored: u64,
@@ -121,6 +124,7 @@ impl Explorer {
             depth: 0,
             way: Vec::new(),
             entries: Vec::new(),
+            representative: Representative::default(),
             has_committed: network.processes.iter().any(|process| {
                 let mut locations = process.locations.iter();
                 locations.any(|location| location.urgency == Urgency::Committed)
@@ -221,8 +225,15 @@ impl Explorer {
         if frame.moves.len() < 2 {
             return true;
         }
-        let (words, zone) = (&frame.words, frame.zone.bounds());
-        let is_new = scene.sink.add_choice(words, zone, &self.way);
+        let (words, zone) = (&*frame.words, frame.zone.bounds());
+        let is_new = match scene.symbolic.symmetry() {
+            None => scene.sink.add_choice(words, zone, &self.way),
+            Some(symmetry) => {
+                let representative = &mut self.representative;
+                let (words, zone, way) = representative.of(symmetry, (words, zone), &self.way);
+                scene.sink.add_choice(words, zone, way)
+            }
+        };
         self.explored -= u64::from(!is_new);
         is_new
     }
@@ -283,7 +294,7 @@ impl Explorer {
                 if self.descends(scene.symbolic, words, depth) {
                     return Ok(self.descend(scene.sink, words, zone.bounds()));
                 }
-                scene.sink.add_waiting(words, zone.bounds(), &self.way);
+                self.add_waiting(scene, words, zone.bounds());
                 Taken::Nothing
             }
         };
@@ -318,11 +329,26 @@ impl Explorer {
             return Ok(self.descend(scene.sink, &target.words, entry.bounds()));
         }
         for entry in &*entries {
-            let zone = entry.bounds();
-            scene.sink.add_waiting(&target.words, zone, &self.way);
+            self.add_waiting(scene, &target.words, entry.bounds());
         }
         self.way.pop();
         Ok(Taken::Nothing)
+    }
+
+    /// Stores a state and lets it wait, unless a stored one contains it.
+    fn add_waiting<S: Sink>(
+        &mut self,
+        scene: &mut Scene<'_, '_, S>,
+        words: &[i32],
+        zone: &[Bound],
+    ) {
+        let Some(symmetry) = scene.symbolic.symmetry() else {
+            scene.sink.add_waiting(words, zone, &self.way);
+            return;
+        };
+        let representative = &mut self.representative;
+        let (words, zone, way) = representative.of(symmetry, (words, zone), &self.way);
+        scene.sink.add_waiting(words, zone, way);
     }
 
     /// Whether a state is to be explored at once and not stored.

@@ -13,6 +13,7 @@ mod paths;
 pub mod plain;
 pub mod reach;
 mod recent;
+mod representatives;
 mod retrace;
 pub mod schedule;
 mod shard;

@@ -161,7 +161,7 @@ pub struct StateStore {
 impl StateStore {
     /// An empty store for the states of a network.
     pub fn new(network: &Network) -> StateStore {
-        let written = written_words(network);
+        let written = network.written_words();
         let widths = widths(network);
         let identity_words = network.layout.identity_words as usize;
         let mut runs = runs_of(&written, &widths, 0, identity_words);
@@ -306,23 +306,6 @@ fn record(blocks: &[Vec<u8>], stride: usize, bits: u32, id: u32) -> &[u8] {
     &blocks[id as usize >> bits][within..within + stride]
 }
 
-/// By word: whether some update may write it. Locations always count as written.
-fn written_words(network: &Network) -> Vec<bool> {
-    let mut written = vec![false; network.layout.words as usize];
-    written[..network.processes.len()].fill(true);
-    let edges = network.processes.iter().flat_map(|process| &process.edges);
-    let updates = edges
-        .flat_map(|edge| {
-            std::iter::once(&edge.update).chain(edge.branches.iter().map(|branch| &branch.update))
-        })
-        .chain(&network.before_update)
-        .chain(&network.after_update);
-    for &(first, count) in updates.flat_map(|update| &update.writes) {
-        written[first as usize..(first + count) as usize].fill(true);
-    }
-    written
-}
-
 /// By word: what it is stored as.
 fn widths(network: &Network) -> Vec<Width> {
     let mut widths = vec![Width::Whole; network.layout.words as usize];
@@ -461,6 +444,7 @@ mod tests {
                 part,
                 length: 3,
                 first: 0,
+                set: None,
             }));
             assert_eq!(store.stride, 3 * bytes);
             for state in [[low, high, 0], [high, high, low]] {

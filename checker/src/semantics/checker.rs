@@ -12,8 +12,8 @@ use super::types::{Size, Type};
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
 use crate::exec::{Context, Interpreter};
 use crate::ir::{
-    Channel, Clock, Function, FunctionId, Instruction, Network, ProcessId, RunTimeErrorKind,
-    Variable,
+    Channel, Clock, Coordinate, Function, FunctionId, Instruction, Network, ProcessId,
+    RunTimeErrorKind, Variable,
 };
 
 /// The place of the system section's scope: behind the prelude's and the global one.
@@ -75,8 +75,6 @@ pub(super) struct World {
     pub(super) initial_meta: Vec<i32>,
     /// How many rounds of loops the constants have taken so far.
     pub(super) constant_rounds: u64,
-    /// How many scalar sets there are.
-    pub(super) scalar_sets: u32,
     /// The scopes that queries see: prelude, globals, system.
     pub(super) query_scopes: Vec<Scope>,
     /// The processes by the name in the system line.
@@ -201,6 +199,7 @@ impl<'a> Checker<'a> {
         self.locals.push(Local {
             ty,
             addressed: false,
+            reference: false,
         });
         LocalId(self.locals.len() as u32 - 1)
     }
@@ -262,7 +261,7 @@ impl<'a> Checker<'a> {
                 meta,
             });
         }
-        self.add_parts(&full_name, ty, owner);
+        self.add_parts(&full_name, ty, owner, &mut Vec::new());
         Place {
             root: Root::State,
             base,
@@ -271,13 +270,20 @@ impl<'a> Checker<'a> {
     }
 
     /// Adds the clocks and channels of a variable.
-    fn add_parts(&mut self, name: &str, ty: &Type, owner: Option<ProcessId>) {
+    fn add_parts(
+        &mut self,
+        name: &str,
+        ty: &Type,
+        owner: Option<ProcessId>,
+        coordinates: &mut Vec<Coordinate>,
+    ) {
         match ty {
             Type::Clock { hybrid } => {
                 self.world.network.clocks.push(Clock {
                     name: name.to_owned(),
                     owner,
                     hybrid: *hybrid,
+                    coordinates: coordinates.clone(),
                 });
                 self.world.network.initial_clocks.push(0);
             }
@@ -290,12 +296,21 @@ impl<'a> Checker<'a> {
             Type::Array(array) if ty.size().clocks + ty.size().channels > 0 => {
                 for i in 0..array.index.length {
                     let index = i64::from(array.index.first) + i64::from(i);
-                    self.add_parts(&format!("{name}[{index}]"), &array.part, owner);
+                    let name = format!("{name}[{index}]");
+                    coordinates.extend(array.index.set.map(|set| Coordinate {
+                        set,
+                        member: i,
+                        stride: array.part.size().clocks,
+                    }));
+                    self.add_parts(&name, &array.part, owner, coordinates);
+                    if array.index.set.is_some() {
+                        coordinates.pop();
+                    }
                 }
             }
             Type::Struct(record) => {
                 for (field, ty) in &record.fields {
-                    self.add_parts(&format!("{name}.{field}"), ty, owner);
+                    self.add_parts(&format!("{name}.{field}"), ty, owner, coordinates);
                 }
             }
             _ => {}

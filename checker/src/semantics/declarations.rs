@@ -10,7 +10,7 @@ use super::typed::{Expr, Kind, Place, Root};
 use super::types::{self, DEFAULT_INT, Index, SIZE_LIMIT, Size, StructType, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
-use crate::ir::CLOCK_LIMIT;
+use crate::ir::{CLOCK_LIMIT, ScalarSet};
 use crate::syntax::ast::{self, Declaration, Dimension, Initialiser, Name, TypeExpr, TypeKind};
 
 /// The value that one part of a variable starts with.
@@ -271,9 +271,14 @@ impl Checker<'_> {
         let Some(index) = self.size(size) else {
             return Type::Error;
         };
-        self.world.scalar_sets += 1;
+        let sets = &mut self.world.network.scalar_sets;
+        sets.push(ScalarSet {
+            size: index.length,
+            // The sets of a template are others in each process.
+            told_apart_by: self.process.is_some().then_some(size.span),
+        });
         Type::Scalar {
-            set: self.world.scalar_sets,
+            set: sets.len() as u32 - 1,
             size: index.length,
         }
     }
@@ -420,6 +425,7 @@ impl Checker<'_> {
         {
             return Entity::Broken;
         }
+        self.tell_parts_apart(ty, words, span);
         if ty.is_register() {
             let value = match ty {
                 Type::Double => {

@@ -496,6 +496,10 @@ impl Checker<'_> {
         let checked = self.expression(body);
         let members_differ = std::mem::replace(&mut self.needs_unrolling, outer);
         self.scopes.pop();
+        if quantifier == Quantifier::Sum && checked.ty == Type::Double {
+            // The order of additions decides how they are rounded.
+            self.tell_members_apart(&range_type, span);
+        }
         if members_differ || self.must_unroll(&checked) {
             return self.unrolled(quantifier, (name, &range_type, range), body, span);
         }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::checker::Checker;
 use super::codes;
+use super::scalars::is_order_irrelevant;
 use super::scope::{Entity, Scope};
 use super::typed::{Effects, Expr, Kind, LocalId, Parameter, Place, Root, Signature, Statement};
 use super::types::{Size, Type};
@@ -104,6 +105,7 @@ impl Checker<'_> {
         let ty = self.dimensioned(&parameter.ty, &parameter.dimensions);
         self.check_parameter_type(parameter, &ty);
         let local = self.new_local(ty.clone());
+        self.locals[local.0 as usize].reference = parameter.reference;
         let constant = parameter.ty.prefixes.constant;
         let place = Place {
             root: Root::Local(local),
@@ -232,6 +234,12 @@ impl Checker<'_> {
         ty: Type,
         parts: Vec<super::declarations::InitialPart>,
     ) -> Statement {
+        // Without a value, a scalar is the first member; in a list of values, the first comes first.
+        if parts.is_empty() {
+            self.tell_scalars_apart(&ty, variable.name.span);
+        } else {
+            self.tell_indices_apart(&ty, variable.name.span);
+        }
         let local = self.new_local(ty.clone());
         let root = Root::Local(local);
         let assignments = parts
@@ -337,8 +345,15 @@ impl Checker<'_> {
             self.declare(name, Entity::Broken);
             ((0, 0), LocalId(0))
         };
+        let span = ty.span;
         let body = Box::new(self.statement(body, result));
         self.scopes.pop();
+        if let Some(ty) = self.locals.get(local.0 as usize).map(|one| one.ty.clone())
+            && ty.scalar_set().is_some()
+            && !is_order_irrelevant(&body, local, &self.locals)
+        {
+            self.tell_members_apart(&ty, span);
+        }
         Statement::Iterate { local, range, body }
     }
 

@@ -14,7 +14,7 @@ use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{DEFAULT_INT, Memory, Size, Type};
 use crate::exec::arithmetic;
-use crate::ir::ProcessId;
+use crate::ir::{Coordinate, ProcessId};
 use crate::syntax::ast::{self, Document, Name, Parameter, SystemItem};
 
 /// The most processes of a network.
@@ -203,8 +203,31 @@ impl Checker<'_> {
             return;
         }
         self.world.processes.groups.insert(name.text.clone(), group);
+        let first = self.world.network.processes.len() as u32;
         for values in combinations(&types) {
             self.make_process(document, (name, target, formals), (&types, &values), level);
+        }
+        self.place_in_group(first, &types);
+    }
+
+    /// Notes of the processes of a set, the last of the network, which they are.
+    fn place_in_group(&mut self, first: u32, types: &[Type]) {
+        let mut stride: u32 = types.iter().map(parameter_count).product();
+        let processes = &mut self.world.network.processes[first as usize..];
+        for process in &mut *processes {
+            process.group = ProcessId(first);
+        }
+        for ty in types {
+            let count = parameter_count(ty);
+            stride /= count;
+            let Some(set) = ty.scalar_set() else { continue };
+            for (number, process) in (0..).zip(&mut *processes) {
+                process.coordinates.push(Coordinate {
+                    set,
+                    member: number / stride % count,
+                    stride,
+                });
+            }
         }
     }
 

@@ -115,6 +115,7 @@ pub(super) fn shape(ty: &Type) -> Shape {
             part: Box::new(shape(&array.part)),
             length: array.index.length,
             first: array.index.first,
+            set: array.index.set,
         },
         Type::Struct(record) => Shape::Struct(
             record

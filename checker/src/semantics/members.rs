@@ -124,10 +124,7 @@ impl Checker<'_> {
                 return Err(());
             }
             let (low, high) = ty.bounds();
-            let set = match ty {
-                Type::Scalar { set, .. } => Some(*set),
-                _ => None,
-            };
+            let set = ty.scalar_set();
             let index = super::types::Index {
                 first: low,
                 length: high.abs_diff(low) + 1,

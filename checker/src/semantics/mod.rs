@@ -40,6 +40,8 @@ mod constants;
 
 mod declarations;
 
+mod scalars;
+
 mod functions;
 
 mod lower;

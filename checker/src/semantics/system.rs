@@ -18,6 +18,7 @@ impl Checker<'_> {
             name: String::from("0"),
             owner: None,
             hybrid: false,
+            coordinates: Vec::new(),
         });
         self.world.network.initial_clocks.push(0);
         for construct in &document.unsupported {

@@ -78,6 +78,8 @@ impl Checker<'_> {
             edges,
             initial,
             priority,
+            group: ir::ProcessId(0),
+            coordinates: Vec::new(),
         }
     }
 
@@ -257,11 +259,13 @@ impl Checker<'_> {
                 base: Size::default(),
                 mutable: false,
             };
+            let set = ty.scalar_set();
             self.declare(name, Entity::Variable { place, ty });
             let range = ir::Select {
                 name: name.text.clone(),
                 low,
                 high,
+                set,
             };
             selects.push(Select { local, range });
         }
@@ -341,9 +345,12 @@ impl Checker<'_> {
         }
         let mut ranges = Vec::new();
         for (name, ty) in &leg.select {
+            let span = ty.span;
             let Some((ty, _)) = self.iterated(ty) else {
                 return Vec::new();
             };
+            // Each value is a branch of its own, which exchanging members would renumber.
+            self.tell_members_apart(&ty, span);
             ranges.push((name, ty));
         }
         let types: Vec<Type> = ranges.iter().map(|(_, ty)| ty.clone()).collect();

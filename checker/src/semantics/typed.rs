@@ -272,6 +272,8 @@ pub(super) struct Local {
     pub(super) ty: Type,
     /// Whether it must lie in memory because something refers to it.
     pub(super) addressed: bool,
+    /// Whether it is a parameter by reference: another name for something that other names may mean as well.
+    pub(super) reference: bool,
 }
 
 impl Expr {

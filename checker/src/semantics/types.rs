@@ -174,6 +174,14 @@ impl Type {
         }
     }
 
+    /// The set that it is a member of.
+    pub(super) fn scalar_set(&self) -> Option<u32> {
+        match self {
+            Type::Scalar { set, .. } => Some(*set),
+            _ => None,
+        }
+    }
+
     /// Whether it is an integer or a truth value.
     pub(super) fn is_integral(&self) -> bool {
         matches!(self, Type::Int { .. } | Type::Bool)
