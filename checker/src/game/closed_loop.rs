@@ -74,10 +74,11 @@ pub fn joined<'s>(
     for state in &strategy.states {
         let (id, is_new) = store.intern(&state.words);
         if is_new {
-            joined.push((&state.words, state.is_goal, Vec::new()));
+            joined.push((&state.words, true, Vec::new()));
         }
         let entry = &mut joined[id.0 as usize];
-        entry.1 |= state.is_goal;
+        // Where the goal depends on clocks, only some of the states with these words are in it.
+        entry.1 &= state.is_goal;
         entry.2.extend(&state.decisions);
     }
     for (_, _, decisions) in &mut joined {
