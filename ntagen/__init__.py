@@ -15,10 +15,22 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, RejectedError
-    from ntagen.errors import InputError, ModelError, NtagenError
-    from ntagen.loading import load
+    from ntagen.errors import InputError, ModelError, NtagenError, UndecidedError
+    from ntagen.loading import load, load_strategy
+    from ntagen.strategy import Strategy
 
-__all__ = ["Answer", "InputError", "Model", "ModelError", "NtagenError", "RejectedError", "load"]
+__all__ = [
+    "Answer",
+    "InputError",
+    "Model",
+    "ModelError",
+    "NtagenError",
+    "RejectedError",
+    "Strategy",
+    "UndecidedError",
+    "load",
+    "load_strategy",
+]
 
 _HOMES = {
     "Answer": "ntagen.checker",
@@ -27,7 +39,10 @@ _HOMES = {
     "ModelError": "ntagen.errors",
     "NtagenError": "ntagen.errors",
     "RejectedError": "ntagen.checker",
+    "Strategy": "ntagen.strategy",
+    "UndecidedError": "ntagen.errors",
     "load": "ntagen.loading",
+    "load_strategy": "ntagen.loading",
 }
 """Where the public names are from. They are imported on first use: the command line imports this
 package for every command, and `ntagen --help` does not wait for the engine."""

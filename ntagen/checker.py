@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from ntagen import _checker
-from ntagen.errors import InputError, LimitError, ModelError
+from ntagen.errors import InputError, LimitError, ModelError, NtagenError
 from ntagen.model.facts import (
     Channel,
     Clock,
@@ -26,11 +28,10 @@ from ntagen.model.facts import (
     queries_from,
 )
 from ntagen.runs import Choose, Run, runs_of, simulated
+from ntagen.strategy import ForcedRule, PriorityRule, Strategy, Verification
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 SearchOrder = Literal["bfs", "dfs", "random"]
-ForcedRule = Literal["tiga", "product", "neutral"]
-PriorityRule = Literal["ignore", "keep"]
 CodeEngine = Literal["jit", "interpreter"]
 PlansWanted = Literal["none", "first", "all"]
 TraceWanted = Literal["any", "shortest", "fastest"]
@@ -55,6 +56,9 @@ _ReachedEntry = tuple[
 
 MAX_PLANS = 1_000_000
 """Plans that are listed at most, unless the caller says otherwise."""
+
+_GAME = re.compile(r"\s*(strategy\s+\w+\s*=\s*)?(\{[^{}]*\}\s*)?control(_t\*|\b)")
+"""How a query begins that asks for a strategy."""
 
 _PROCESSES_SHOWN = 5
 """Processes that the short text of a model names."""
@@ -112,20 +116,6 @@ class _EdgeEntry:
     def taken(self, branch: int, values: list[int]) -> EngineEdge:
         select = dict(zip(self.selects, values, strict=True))
         return EngineEdge(self.process, self.source, self.targets[branch], self.sync, select)
-
-
-@dataclass(frozen=True, slots=True)
-class Verification:
-    """What an independent check came to.
-
-    Attributes:
-        holds: Whether the evidence shows what it is said to; ``None`` if the check does not cover
-            the model or the query.
-        lines: What was looked at, or what is wrong.
-    """
-
-    holds: bool | None
-    lines: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,8 +178,15 @@ class Answer:
         verification: What these checks covered, or what is wrong, line by line.
     """
 
-    def __init__(self, raw: _checker.Answer, query: str, edges: list[list[_EdgeEntry]]) -> None:
+    def __init__(
+        self,
+        raw: _checker.Answer,
+        query: str,
+        edges: list[list[_EdgeEntry]],
+        rules: tuple[ForcedRule, PriorityRule],
+    ) -> None:
         self._raw = raw
+        self._rules = rules
         self._edges = edges
         self.query = query
         self.verdict: Verdict = raw.verdict
@@ -252,6 +249,12 @@ class Answer:
         """The certificate as text of its file; ``None`` if none was asked for or there is none."""
         return self._raw.certificate_text()
 
+    @property
+    def strategy(self) -> Strategy | None:
+        """The strategy of the player who wins; ``None`` if none was asked for or found."""
+        raw = _checker.Strategy.of_answer(self._raw)
+        return None if raw is None else Strategy(raw, *self._rules)
+
     def strategy_json(self) -> str | None:
         """The strategy as JSON text; ``None`` if none was asked for or found."""
         return self._raw.strategy_json()
@@ -260,8 +263,9 @@ class Answer:
 class Model:
     """A model that the engine has accepted.
 
-    What is in it are its attributes; `check` answers queries, `simulate` makes random runs,
-    `states` lists the reachable symbolic states, and `walk` goes through them by hand.
+    What is in it are its attributes; `check` answers queries, `synthesize` solves games, `simulate`
+    makes random runs, `states` lists the reachable symbolic states, and `walk` goes through them by
+    hand.
     """
 
     def __init__(self, raw: _checker.Model) -> None:
@@ -465,7 +469,109 @@ class Model:
             )
         except _checker.RejectedError as error:
             raise RejectedError(error.args[0]) from None
-        return Answer(raw, query, self._edge_table())
+        return Answer(raw, query, self._edge_table(), (forced, priorities))
+
+    def synthesize(
+        self,
+        query: str,
+        *,
+        search: SearchOrder = "bfs",
+        seed: int = 0,
+        forced: ForcedRule = "tiga",
+        priorities: PriorityRule = "ignore",
+        engine: CodeEngine = "jit",
+        states: int | None = None,
+        memory_bytes: int | None = None,
+        timeout_s: float | None = None,
+        verify: bool = False,
+        progress: Progress | None = None,
+    ) -> Strategy:
+        """Solves a game and gives the strategy of the player who wins.
+
+        If the controller cannot win, that is the environment's: `Strategy.winning` says which.
+
+        Args:
+            query: A control query, such as ``control: A<> Gate.Open``.
+            search: As in `check`, like all that follow.
+            seed: For ``search="random"``.
+            forced: What happens where time cannot pass and only the environment can move.
+            priorities: Whether priorities of channels and processes count.
+            engine: What runs the code of the model.
+            states: The search stops after this many stored states.
+            memory_bytes: The search stops when its states take this much.
+            timeout_s: The search stops after this time.
+            verify: Whether the strategy is to be checked against every move of the opponent.
+            progress: Is called now and then.
+
+        Raises:
+            RejectedError: The query is wrong or of a kind that is not supported.
+            InputError: It is no game, or of a kind that has no strategy.
+            LimitError: A limit was reached before there was an answer, or there is none because
+                stopped clocks allow only an approximation.
+            ModelError: The model fails.
+            KeyboardInterrupt: The user interrupted.
+        """
+        if not _GAME.match(query):
+            raise InputError(
+                f"{query.strip()} asks for no strategy\n"
+                "hint: begin the query with control: — control: A<> p, control: A[] p, …"
+            )
+        answer = self.check(
+            query,
+            search=search,
+            seed=seed,
+            forced=forced,
+            priorities=priorities,
+            engine=engine,
+            states=states,
+            memory_bytes=memory_bytes,
+            timeout_s=timeout_s,
+            strategy=True,
+            verify=verify,
+            progress=progress,
+        )
+        if answer.verified is False:
+            raise NtagenError("\n".join(answer.verification))
+        if answer.verdict == "error":
+            raise ModelError(answer.message or "the model fails")
+        if answer.verdict == "unknown":
+            raise LimitError(f"the synthesis was stopped by the limit of {answer.stop}")
+        if answer.verdict == "maybe":
+            raise LimitError("the engine could not decide who wins, since the model stops clocks")
+        strategy = answer.strategy
+        if strategy is None:
+            remark = f": {answer.message}" if answer.message else ""
+            raise InputError(
+                f"{answer.query.strip()} is {answer.verdict}, but this kind of query gives no "
+                f"strategy then{remark}"
+            )
+        return strategy
+
+    def load_strategy(
+        self,
+        path: str | os.PathLike[str],
+        forced: ForcedRule = "tiga",
+        priorities: PriorityRule = "ignore",
+    ) -> Strategy:
+        """Reads a strategy that was saved for this model.
+
+        Whether it wins is not checked: `Strategy.verify` does that.
+
+        Args:
+            path: A file as `Strategy.save` and ``ntagen check --strategy`` write it.
+            forced: The rule for forced moves that the strategy was made by.
+            priorities: Whether priorities counted when it was made.
+
+        Raises:
+            RejectedError: It is no strategy, or does not fit the model.
+            OSError: The file cannot be read.
+        """
+        data = Path(path).read_bytes()
+        try:
+            raw = _checker.Strategy.read(self._raw, os.fspath(path), data)
+        except _checker.RejectedError as error:
+            raise RejectedError(error.args[0]) from None
+        return Strategy(raw, forced, priorities)
 
     def verify(self, text: str, path: str = "") -> Verification:
         """Checks a trace or a certificate, independently of the search that found it.
@@ -497,7 +603,7 @@ class Model:
                 delay or without (then a random one), or ``None`` to end the run.
 
         Raises:
-            ValueError: `choose` gives a delay that is no whole number of thousandths of the unit.
+            ValueError: `choose` gives a delay that is too fine a fraction of the unit.
             IndexError: `choose` gives what is not possible.
             ModelError: The model fails on the way.
         """

@@ -4,6 +4,7 @@
 
     NtagenError                exit code 70 unless a subclass says otherwise
     ├── InputError             2: what the user gave is wrong: a file, a model, a query, an option
+    │   └── UndecidedError     a strategy is asked about a state of which it says nothing
     ├── LimitError             3: a limit of time, memory or states was reached before an answer
     ├── ModelError             4: the model ran into a run-time error (range, index, overflow, …)
     └── DeviceError            5: a device or sensor failed or answered what it must not
@@ -26,6 +27,13 @@ class InputError(NtagenError):
     """What the user gave is wrong: a missing file, a mistake in it, an unknown query name."""
 
     exit_code: ClassVar[int] = 2
+
+
+class UndecidedError(InputError, LookupError):
+    """A strategy is asked about a state of which it says nothing.
+
+    Play under the strategy does not get there, or its owner does not win from there.
+    """
 
 
 class LimitError(NtagenError):

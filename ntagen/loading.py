@@ -11,6 +11,7 @@ from pathlib import Path
 from ntagen import checker
 from ntagen.checker import Model
 from ntagen.scene import Scene
+from ntagen.strategy import Strategy
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,16 @@ def load(source: str | Path) -> Model:
     if isinstance(source, str) and any(sign in source for sign in "\n;<"):
         return checker.load(source)
     return load_file(Path(source)).model
+
+
+def load_strategy(path: str | Path, model: Model) -> Strategy:
+    """Reads a strategy that was saved for this model: see `Model.load_strategy`.
+
+    Raises:
+        InputError: It is no strategy, or does not fit the model.
+        OSError: The file cannot be read.
+    """
+    return model.load_strategy(path)
 
 
 def load_file(path: Path) -> Loaded:

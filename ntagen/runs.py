@@ -13,7 +13,18 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal, Protocol
 
-__all__ = ["Choice", "Choose", "Edge", "Run", "State", "Step", "runs_of", "simulated"]
+__all__ = [
+    "Choice",
+    "Choose",
+    "Edge",
+    "Run",
+    "State",
+    "Step",
+    "edge_of",
+    "runs_of",
+    "simulated",
+    "state_of",
+]
 
 End = Literal["after", "loop", "waits", "stuck"]
 
@@ -148,9 +159,9 @@ def _run(raw: dict[str, Any], title: str | None) -> Run:
     steps = raw["steps"]
     end = raw["end"]
     return Run(
-        states=tuple(_state(state, unit) for state in raw["states"][: len(steps) + 1]),
+        states=tuple(state_of(state, unit) for state in raw["states"][: len(steps) + 1]),
         steps=tuple(
-            Step(Fraction(step["wait"], unit), tuple(_edge(edge) for edge in step["edges"]))
+            Step(Fraction(step["wait"], unit), tuple(edge_of(edge) for edge in step["edges"]))
             for step in steps
         ),
         end=end["kind"],
@@ -160,12 +171,14 @@ def _run(raw: dict[str, Any], title: str | None) -> Run:
     )
 
 
-def _state(raw: dict[str, Any], unit: int) -> State:
+def state_of(raw: dict[str, Any], unit: int) -> State:
+    """A state as the engine writes it, with so many ticks in a unit of time."""
     clocks = {name: Fraction(ticks, unit) for name, ticks in raw["clocks"].items()}
     return State(raw["locations"], raw["variables"], clocks)
 
 
-def _edge(raw: dict[str, Any]) -> Edge:
+def edge_of(raw: dict[str, Any]) -> Edge:
+    """An edge as the engine writes it."""
     names = ("process", "source", "target", "sync", "guard", "update", "select")
     return Edge(*(raw[name] for name in names))
 
@@ -174,12 +187,19 @@ OPEN_WINDOW_UNITS = 5
 """How far a random delay reaches into a window without end, in units of time."""
 
 
+_FINEST = 2**30
+"""The greatest denominator of a delay."""
+
+
 class Walk(Protocol):
     """A run in the engine, at a state; times are whole numbers of ticks."""
 
     @property
     def ticks_per_unit(self) -> int:
         """How many ticks make one unit of the model's time."""
+
+    def refine(self, denominator: int) -> bool:
+        """Makes ticks as short as this part of a unit needs; false if that is too short."""
 
     def state_json(self) -> str:
         """The state."""
@@ -194,8 +214,7 @@ class Walk(Protocol):
 def simulated(walk: Walk, steps: int, seed: int, choose: Choose | None) -> Run:
     """A run of at most so many steps; see `ntagen.checker.Model.simulate`."""
     chance = random.Random(seed)
-    unit = walk.ticks_per_unit
-    states = [_state(json.loads(walk.state_json()), unit)]
+    states = [state_of(json.loads(walk.state_json()), walk.ticks_per_unit)]
     taken: list[Step] = []
     while len(taken) < steps:
         text, longest = walk.choices_json()
@@ -203,15 +222,18 @@ def simulated(walk: Walk, steps: int, seed: int, choose: Choose | None) -> Run:
         if not raw:
             end: End = "waits" if longest is None else "stuck"
             return Run(tuple(states), tuple(taken), end)
-        choices = tuple(_choice(one, unit) for one in raw)
-        index, ticks = _decision(states[-1], choices, choose, unit, chance)
+        choices = tuple(_choice(one, walk.ticks_per_unit) for one in raw)
+        index, delay = _decision(states[-1], choices, choose, chance)
         if index is None:
             break
-        if ticks is None:
-            ticks = _random_wait(raw[index]["windows"], unit, chance)
-        walk.take(index, ticks)
-        taken.append(Step(Fraction(ticks, unit), choices[index].edges))
-        states.append(_state(json.loads(walk.state_json()), unit))
+        if delay is None:
+            ticks = _random_wait(raw[index]["windows"], walk.ticks_per_unit, chance)
+            delay = Fraction(ticks, walk.ticks_per_unit)
+        elif delay.denominator > _FINEST or not walk.refine(delay.denominator):
+            raise ValueError(f"the delay {delay} is too fine a fraction of the unit")
+        walk.take(index, int(delay * walk.ticks_per_unit))
+        taken.append(Step(delay, choices[index].edges))
+        states.append(state_of(json.loads(walk.state_json()), walk.ticks_per_unit))
     return Run(tuple(states), tuple(taken), "after")
 
 
@@ -220,29 +242,23 @@ def _choice(raw: dict[str, Any], unit: int) -> Choice:
         (Fraction(first, unit), None if last is None else Fraction(last, unit))
         for first, last in raw["windows"]
     )
-    return Choice(tuple(_edge(edge) for edge in raw["edges"]), windows)
+    return Choice(tuple(edge_of(edge) for edge in raw["edges"]), windows)
 
 
 def _decision(
     state: State,
     choices: tuple[Choice, ...],
     choose: Choose | None,
-    unit: int,
     chance: random.Random,
-) -> tuple[int | None, int | None]:
-    """Which choice is taken, and after how many ticks, as far as that is decided."""
+) -> tuple[int | None, Fraction | None]:
+    """Which choice is taken, and after which delay, as far as that is decided."""
     if choose is None:
         return chance.randrange(len(choices)), None
     chosen = choose(state, choices)
     index, delay = chosen if isinstance(chosen, tuple) else (chosen, None)
     if index is not None and not 0 <= index < len(choices):
         raise IndexError(f"there is no choice {index}; the state has {len(choices)}")
-    if delay is None:
-        return index, None
-    ticks = Fraction(delay) * unit
-    if ticks.denominator != 1:
-        raise ValueError(f"the delay {delay} is no whole number of 1/{unit}")
-    return index, int(ticks)
+    return index, None if delay is None else Fraction(delay)
 
 
 def _random_wait(windows: list[list[int | None]], unit: int, chance: random.Random) -> int:

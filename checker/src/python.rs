@@ -3,6 +3,8 @@
 //! A model is behind a lock, so that Python threads may share it; the interpreter is released while the engine works, and
 //! signals (Ctrl-C) are looked for now and then.
 
+mod play;
+
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -26,6 +28,7 @@ use crate::network::Failure;
 use crate::search::limits::StopReason;
 use crate::search::plain::Met;
 use crate::search::reach::Order;
+use crate::verify::timed::{Timed, least_multiple};
 
 pyo3::create_exception!(
     _checker,
@@ -79,6 +82,23 @@ fn stop_name(reason: StopReason) -> Option<&'static str> {
         StopReason::Memory => Some("memory"),
         StopReason::Time => Some("time"),
         StopReason::Interrupted => None,
+    }
+}
+
+fn forced_rule(name: &str) -> PyResult<Forced> {
+    match name {
+        "tiga" => Ok(Forced::Tiga),
+        "product" => Ok(Forced::Product),
+        "neutral" => Ok(Forced::Neutral),
+        other => Err(unknown("rule for forced moves", other)),
+    }
+}
+
+fn priority_rule(name: &str) -> PyResult<Priorities> {
+    match name {
+        "ignore" => Ok(Priorities::Ignored),
+        "keep" => Ok(Priorities::Kept),
+        other => Err(unknown("rule for priorities", other)),
     }
 }
 
@@ -288,13 +308,18 @@ impl Model {
 
     /// A run with exact times from the initial state.
     fn walk_exactly(slf: &Bound<'_, Self>) -> PyResult<ExactWalk> {
+        let ticks_per_unit = SIMULATED_TICKS_PER_UNIT;
         let state = slf.get().with(|model| {
-            let start = model.choices().and_then(|choices| choices.initial());
+            let choices = model.choices(ticks_per_unit);
+            let start = choices.and_then(|choices| choices.initial());
             start.map_err(|error| ExactWalk::failed(model, error))
         })?;
         Ok(ExactWalk {
             model: slf.clone().unbind(),
-            state,
+            timed: Timed {
+                state,
+                ticks_per_unit,
+            },
         })
     }
 
@@ -336,17 +361,8 @@ impl Model {
                 other => return Err(unknown("search order", other)),
             },
             threads: thread_count(threads)?,
-            forced: match forced {
-                "tiga" => Forced::Tiga,
-                "product" => Forced::Product,
-                "neutral" => Forced::Neutral,
-                other => return Err(unknown("rule for forced moves", other)),
-            },
-            priorities: match priorities {
-                "ignore" => Priorities::Ignored,
-                "keep" => Priorities::Kept,
-                other => return Err(unknown("rule for priorities", other)),
-            },
+            forced: forced_rule(forced)?,
+            priorities: priority_rule(priorities)?,
             code: code_engine(engine)?,
             limits: Limits {
                 states,
@@ -487,7 +503,7 @@ impl Simulation {
 #[pyclass(module = "ntagen._checker")]
 struct ExactWalk {
     model: Py<Model>,
-    state: crate::verify::State,
+    timed: Timed,
 }
 
 impl ExactWalk {
@@ -499,22 +515,39 @@ impl ExactWalk {
 #[pymethods]
 impl ExactWalk {
     /// How many ticks make one unit of the model's time.
-    #[classattr]
-    fn ticks_per_unit() -> i64 {
-        SIMULATED_TICKS_PER_UNIT
+    #[getter]
+    fn ticks_per_unit(&self) -> i64 {
+        self.timed.ticks_per_unit
+    }
+
+    /// Makes ticks as short as this part of a unit needs; returns false if that is too short.
+    fn refine(&mut self, denominator: i64) -> bool {
+        let unit = self.timed.ticks_per_unit;
+        let finer = (denominator > 0)
+            .then(|| least_multiple(unit, denominator))
+            .flatten()
+            .and_then(|unit| self.timed.at_multiple_of(unit));
+        match finer {
+            Some(finer) => {
+                self.timed = finer;
+                true
+            }
+            None => false,
+        }
     }
 
     /// The state as JSON, clock values in ticks.
     fn state_json(&self) -> String {
         self.model
             .get()
-            .with(|model| json::state(model.network(), &self.state).to_string())
+            .with(|model| json::state(model.network(), &self.timed.state).to_string())
     }
 
     /// What can happen as JSON, and for how many ticks time can pass; `None` for ever.
     fn choices_json(&self) -> PyResult<(String, Option<i64>)> {
         self.model.get().with(|model| {
-            let found = model.choices().and_then(|choices| choices.of(&self.state));
+            let choices = model.choices(self.timed.ticks_per_unit);
+            let found = choices.and_then(|choices| choices.of(&self.timed.state));
             let (choices, longest) = found.map_err(|error| ExactWalk::failed(model, error))?;
             Ok((
                 json::choices(model.network(), &choices).to_string(),
@@ -523,14 +556,14 @@ impl ExactWalk {
         })
     }
 
-    /// Waits for so many ticks and takes the choice with this index.
+    /// Waits for so many ticks and takes the choice with this index. The ticks are as long afterwards as the state allows.
     fn take(&mut self, index: usize, wait: i64) -> PyResult<()> {
         let next = self.model.get().with(|model| {
-            let choices = model.choices();
+            let choices = model.choices(self.timed.ticks_per_unit);
             let taken = choices.and_then(|choices| {
-                let (all, _) = choices.of(&self.state)?;
+                let (all, _) = choices.of(&self.timed.state)?;
                 match all.get(index) {
-                    Some(one) => choices.take(&self.state, wait, &one.parts),
+                    Some(one) => choices.take(&self.timed.state, wait, &one.parts),
                     None => Ok(None),
                 }
             });
@@ -538,7 +571,13 @@ impl ExactWalk {
         })?;
         let impossible =
             || PyIndexError::new_err(format!("choice {index} after {wait} ticks is not possible"));
-        self.state = next.ok_or_else(impossible)?;
+        let next = Timed {
+            state: next.ok_or_else(impossible)?,
+            ticks_per_unit: self.timed.ticks_per_unit,
+        };
+        self.timed = next
+            .at_multiple_of(SIMULATED_TICKS_PER_UNIT)
+            .unwrap_or(next);
         Ok(())
     }
 }
@@ -777,6 +816,8 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Answer>()?;
     module.add_class::<ExactWalk>()?;
     module.add_class::<Simulation>()?;
+    module.add_class::<play::Strategy>()?;
+    module.add_class::<play::Play>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;
     module.add("RejectedError", module.py().get_type::<RejectedError>())?;
     module.add_function(wrap_pyfunction!(load, module)?)?;

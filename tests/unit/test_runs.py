@@ -90,8 +90,14 @@ def test_simulation_can_be_guided() -> None:
         model.simulate(choose=lambda _state, _choices: (0, Fraction(1)))
     with pytest.raises(IndexError, match="there is no choice 7"):
         model.simulate(choose=lambda _state, _choices: 7)
-    with pytest.raises(ValueError, match="no whole number"):
-        model.simulate(choose=lambda _state, _choices: (0, Fraction(1, 3)))
+    with pytest.raises(ValueError, match="too fine"):
+        model.simulate(choose=lambda _state, _choices: (0, Fraction(1, 3**40)))
+
+
+def test_simulation_takes_any_fraction_of_time() -> None:
+    model = checker.load(LAMP)
+    run = model.simulate(steps=1, choose=lambda _state, _choices: (0, Fraction(10, 3)))
+    assert [step.delay for step in run.steps] == [Fraction(10, 3)]
 
 
 def test_simulation_ends_where_nothing_is_possible() -> None:

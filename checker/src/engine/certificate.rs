@@ -9,7 +9,7 @@
 
 use serde_json::{Value as Json, json};
 
-use crate::ir::{Network, Predicate, QueryKind};
+use crate::ir::{Network, Objective, Predicate, QueryKind};
 use crate::network::Symbolic;
 use crate::search::StopReason;
 use crate::search::limits::{Counters, Watch};
@@ -20,7 +20,7 @@ use crate::verify::strategy::Constraint;
 use crate::verify::{self, Part};
 
 use super::describe;
-use super::evidence::Proof;
+use super::evidence::{Missing, Proof};
 use super::{LoadedModel, Rejection, json, verification};
 
 /// What a file with a certificate says that it is.
@@ -137,7 +137,7 @@ pub struct Checked {
 type Unreadable = String;
 
 /// What a file of evidence is.
-const HINT: &str = "hint: it must come from `ntagen check` for this model: with --certificate FILE, or --trace FILE.json";
+const HINT: &str = "hint: it must come from `ntagen check` for this model: with --certificate FILE, or --trace FILE.json; or from `ntagen play` with --log FILE";
 
 impl LoadedModel {
     /// Checks a certificate or a trace that was written for this model, independently of how it was found.
@@ -355,12 +355,40 @@ fn replay_of(
             };
             Claim::Takes(predicate, measure, shown)
         }
-        _ => return Err("a control query has no trace".to_owned()),
+        QueryKind::Control { .. }
+            if trace["priorities"] == "ignore" && network.features.priorities =>
+        {
+            let what = verify::Error::Unsupported("plays that ignore the priorities of the model");
+            return Ok(Proof::Missing(Missing::NotCovered(what)));
+        }
+        QueryKind::Control { objective, .. } if trace["kind"] == "play" => {
+            match (trace["winner"].as_str(), objective) {
+                (None, _) => Claim::Possible,
+                (
+                    Some("controller"),
+                    Objective::Reach(goal)
+                    | Objective::Until(_, goal)
+                    | Objective::WeakUntil(_, goal),
+                ) => Claim::Reaches(goal),
+                (
+                    Some("environment"),
+                    Objective::Safe(keep)
+                    | Objective::Until(keep, _)
+                    | Objective::WeakUntil(keep, _)
+                    | Objective::Buchi(keep, _),
+                ) => {
+                    first = negation(keep);
+                    Claim::Reaches(&first)
+                }
+                _ => return Err("nobody can have won so".to_owned()),
+            }
+        }
+        _ => return Err("a control query has no trace but that of a play".to_owned()),
     };
     Ok(match replay::replay(network, &run, &claim) {
         Ok(replay::Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),
         Ok(replay::Outcome::Violated(violation)) => Proof::Violated(run, violation),
-        Err(error) => Proof::Missing(super::evidence::Missing::NotCovered(error)),
+        Err(error) => Proof::Missing(Missing::NotCovered(error)),
     })
 }
 

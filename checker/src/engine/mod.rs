@@ -14,6 +14,7 @@ mod fastest;
 mod games;
 pub mod json;
 pub mod limits;
+pub mod play;
 pub mod simulation;
 pub mod strategies;
 pub mod strategy_file;
@@ -340,11 +341,7 @@ impl LoadedModel {
         let is_won = answer.verdict == Verdict::Satisfied;
         self.keep_strategy(NamedStrategy {
             name: name.clone(),
-            query: text
-                .split_once('=')
-                .map_or(text, |parts| parts.1)
-                .trim()
-                .to_owned(),
+            query: strategies::unnamed(text).to_owned(),
             strategy: is_won.then(|| answer.evidence.strategy.clone()).flatten(),
         });
         if !options.strategy {

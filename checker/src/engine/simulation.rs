@@ -17,7 +17,7 @@ use super::answer::has_differences;
 use super::limits::{LimitWatch, Limits};
 use super::{CodeEngine, LoadedModel, Rejection};
 
-/// How finely the times of simulated runs are chosen.
+/// How finely the times of simulated runs are chosen, unless finer ones are asked for.
 pub const SIMULATED_TICKS_PER_UNIT: i64 = 1000;
 
 /// Moves that [`LoadedModel::settle`] takes at most.
@@ -37,8 +37,8 @@ pub type Successors = Vec<(Vec<Part>, Point)>;
 
 impl LoadedModel {
     /// What can happen next in states with exact clock values, for simulating runs.
-    pub fn choices(&self) -> Result<Choices<'_>, verify::Error> {
-        Choices::new(self.network(), SIMULATED_TICKS_PER_UNIT)
+    pub fn choices(&self, ticks_per_unit: i64) -> Result<Choices<'_>, verify::Error> {
+        Choices::new(self.network(), ticks_per_unit)
     }
 
     /// Makes the code ready to run; needed once before the other functions here.

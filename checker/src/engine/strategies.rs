@@ -25,6 +25,16 @@ pub struct NamedStrategy {
     pub strategy: Option<Arc<Strategy>>,
 }
 
+/// The text of a query without the `strategy S =` before it, if it has one.
+pub fn unnamed(query: &str) -> &str {
+    let query = query.trim();
+    let named = query
+        .strip_prefix("strategy")
+        .filter(|rest| rest.starts_with(char::is_whitespace));
+    let parts = named.and_then(|rest| rest.split_once('='));
+    parts.map_or(query, |parts| parts.1.trim())
+}
+
 impl LoadedModel {
     /// The names of the strategies so far.
     pub(super) fn strategy_names(&self) -> Vec<String> {

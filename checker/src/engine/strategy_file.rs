@@ -139,6 +139,22 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
     Ok((query, strategy))
 }
 
+/// The words of a state that is given as an object with `locations` and `variables`, as in a strategy.
+///
+/// # Errors
+/// It is none of the network.
+pub(super) fn read_words(network: &Network, state: &Json) -> Result<Vec<i32>, Mismatch> {
+    let reader = Reader {
+        network,
+        owner: Player::Controller,
+    };
+    let mut words = network.initial.clone();
+    let state = At(state, String::new());
+    reader.locations(&state, &mut words)?;
+    reader.variables(&state, &mut words)?;
+    Ok(words)
+}
+
 /// A part of the file with its place.
 struct At<'j>(&'j Json, String);
 

@@ -24,9 +24,19 @@ pub fn verify(
     network: &Network,
     objective: &Objective,
     (strategy, owner, selection): (&[Decisions], Player, Selection),
-    (forced, priorities): (Forced, Priorities),
+    rules: (Forced, Priorities),
     most_regions: u64,
 ) -> Verification {
+    let claim = claim(objective, (owner, selection), rules);
+    strategy::verify(network, strategy, &claim, most_regions)
+}
+
+/// What is claimed of a strategy for an objective.
+pub fn claim(
+    objective: &Objective,
+    (owner, selection): (Player, Selection),
+    (forced, priorities): (Forced, Priorities),
+) -> Claim<'_> {
     let (goal, keep, aim) = match objective {
         Objective::Reach(goal) => (Some(goal), None, Aim::Reach),
         Objective::Until(keep, goal) => (Some(goal), Some(keep), Aim::Reach),
@@ -35,7 +45,7 @@ pub fn verify(
         Objective::Buchi(keep, goal) => (Some(goal), Some(keep), Aim::Recur),
     };
     let (constant, has_differences) = constants(goal.into_iter().chain(keep));
-    let claim = Claim {
+    Claim {
         owner: match owner {
             Player::Controller => Owner::Controller,
             Player::Environment => Owner::Environment,
@@ -52,8 +62,7 @@ pub fn verify(
         has_priorities: priorities == Priorities::Kept,
         constant,
         has_differences,
-    };
-    strategy::verify(network, strategy, &claim, most_regions)
+    }
 }
 
 fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> (i64, bool) {

@@ -3,7 +3,7 @@
 //! While time passes, what is possible changes only at the moments of [`super::moments`]; so a move is possible in whole windows
 //! between them, which are found by looking once into each.
 
-use crate::ir::{ClockId, Network};
+use crate::ir::Network;
 
 use super::concrete::{Error, Part, Semantics, State};
 use super::moments::Moments;
@@ -41,29 +41,23 @@ impl<'a> Choices<'a> {
     /// What can happen in a state, in the order of the first moments; and how long time can pass, `None` for ever.
     pub fn of(&self, state: &State) -> Result<(Vec<Choice>, Option<i64>), Error> {
         let state = doubled(state);
-        let mut is_stopped = vec![false; state.clocks.len()];
-        for ClockId(clock) in self.semantics.stopped_clocks(&state)? {
-            is_stopped[clock as usize] = true;
-        }
+        let is_stopped = self.semantics.stopped(&state)?;
         let unit = self.semantics.ticks_per_unit();
-        let moments = self.moments.of(&state, &is_stopped, unit, None)?;
         let mut choices: Vec<Choice> = Vec::new();
         let mut longest = Some(0);
-        for (index, &moment) in moments.iter().enumerate() {
-            let window = if index + 1 == moments.len() {
-                (moments[index - 1] / 2 + 1, None)
-            } else if index % 2 == 0 {
-                (moment / 2, Some(moment / 2))
+        for stretch in self.moments.stretches(&state, &is_stopped, unit)? {
+            let window = if stretch.is_open() {
+                (stretch.first / 2 + 1, stretch.last.map(|last| last / 2 - 1))
             } else {
-                (moments[index - 1] / 2 + 1, Some(moments[index + 1] / 2 - 1))
+                (stretch.first / 2, Some(stretch.first / 2))
             };
-            let now = self.after(&state, moment)?;
+            let now = self.semantics.after(&state, stretch.moment)?;
             if !self.semantics.invariants_hold(&now)? {
                 break;
             }
             let moves = self.semantics.moves(&now)?;
             let is_time_stopped = self.semantics.is_time_stopped(&now, &moves);
-            if index % 2 == 1 && is_time_stopped {
+            if stretch.is_open() && is_time_stopped {
                 break;
             }
             if window.1.is_none_or(|last| window.0 <= last) {
@@ -90,19 +84,8 @@ impl<'a> Choices<'a> {
         if !is_possible {
             return Ok(None);
         }
-        let later = self.after(&doubled(state), 2 * wait)?;
+        let later = self.semantics.after(&doubled(state), 2 * wait)?;
         Ok(self.semantics.take(&later, parts)?.map(halved))
-    }
-
-    fn after(&self, state: &State, wait: i64) -> Result<State, Error> {
-        let stopped = self.semantics.stopped_clocks(state)?;
-        let mut later = state.clone();
-        for (clock, value) in later.clocks.iter_mut().enumerate().skip(1) {
-            if !stopped.contains(&ClockId(clock as u32)) {
-                *value += wait;
-            }
-        }
-        Ok(later)
     }
 }
 

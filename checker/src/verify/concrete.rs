@@ -159,6 +159,27 @@ impl<'a> Semantics<'a> {
         Ok(stopped)
     }
 
+    /// By clock: whether its rate is 0.
+    pub fn stopped(&self, state: &State) -> Result<Vec<bool>, Error> {
+        let mut is_stopped = vec![false; state.clocks.len()];
+        for ClockId(clock) in self.stopped_clocks(state)? {
+            is_stopped[clock as usize] = true;
+        }
+        Ok(is_stopped)
+    }
+
+    /// The state after so many ticks, whether or not so much time can pass.
+    pub fn after(&self, state: &State, wait: i64) -> Result<State, Error> {
+        let is_stopped = self.stopped(state)?;
+        let mut later = state.clone();
+        for (clock, is_stopped) in later.clocks.iter_mut().zip(is_stopped).skip(1) {
+            if !is_stopped {
+                *clock += wait;
+            }
+        }
+        Ok(later)
+    }
+
     /// All moves whose guards hold; whether the invariants of their targets do is not looked at, nor are priorities.
     pub fn moves(&self, state: &State) -> Result<Vec<Move>, Error> {
         let found = self.combinations(state)?;

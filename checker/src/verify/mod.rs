@@ -4,7 +4,7 @@
 //! values straight from the definitions, running code on the interpreter; [`regions`] makes the set of valuations finite;
 //! [`strategy`] closes the loop between a strategy and every move of the environment; [`replay`] follows a single run;
 //! [`certificate`] checks that a set of states is closed and avoids a predicate;
-//! [`choices`] says what can happen next in a state, for simulating runs.
+//! [`choices`] says what can happen next in a state, for simulating runs; [`play`] the same for playing against a strategy.
 //!
 //! A mistake in the front end or in the interpreter is shared with the engine and not found here; one in moves, zones,
 //! extrapolation, compiled code or the solver is.
@@ -14,9 +14,11 @@ pub mod choices;
 mod code;
 pub mod concrete;
 mod moments;
+pub mod play;
 pub mod regions;
 pub mod replay;
 pub mod strategy;
+pub mod timed;
 mod zone;
 
 pub use concrete::{Error, Move, Part, Semantics, State};

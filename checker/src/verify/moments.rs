@@ -27,7 +27,45 @@ pub(super) struct Moments {
     compares_stopped: bool,
 }
 
+/// A stretch of a wait in which nothing changes: one moment, or all moments strictly between two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Stretch {
+    /// The moment, or the one before, in ticks.
+    pub(super) first: i64,
+    /// The moment, or the one after; `None` for ever.
+    pub(super) last: Option<i64>,
+    /// A moment of it.
+    pub(super) moment: i64,
+}
+
+impl Stretch {
+    /// Whether it is more than a moment.
+    pub(super) fn is_open(&self) -> bool {
+        self.last != Some(self.first)
+    }
+}
+
 impl Moments {
+    /// Those of some constants alone; `has_differences` is whether two clocks are compared.
+    pub(super) fn of_constants(
+        network: &Network,
+        constants: BTreeSet<i64>,
+        has_differences: bool,
+    ) -> Moments {
+        Moments {
+            constants,
+            compares_stopped: has_differences && network.features.stopwatches,
+        }
+    }
+
+    /// The same with more constants.
+    pub(super) fn with(&self, other: &Moments) -> Moments {
+        Moments {
+            constants: self.constants.union(&other.constants).copied().collect(),
+            compares_stopped: self.compares_stopped || other.compares_stopped,
+        }
+    }
+
     /// Those of a network and of the comparisons of predicates; an error if a comparison has too many possible bounds.
     pub(super) fn new(network: &Network, predicates: &[&Predicate]) -> Result<Moments, Error> {
         let mut atoms = Vec::new();
@@ -70,6 +108,35 @@ impl Moments {
             constants,
             compares_stopped: has_differences && network.features.stopwatches,
         })
+    }
+
+    /// The stretches of a wait from a state, however long. Clock values must be even numbers of ticks; so are the ends then.
+    pub(super) fn stretches(
+        &self,
+        state: &State,
+        is_stopped: &[bool],
+        ticks_per_unit: i64,
+    ) -> Result<Vec<Stretch>, Error> {
+        let moments = self.of(state, is_stopped, ticks_per_unit, None)?;
+        // After the last change all is one stretch, and the last moment lies in it.
+        let last = moments.len() - 1;
+        let stretches = moments[..last].iter().enumerate().map(|(index, &moment)| {
+            if index % 2 == 0 {
+                Stretch {
+                    first: moment,
+                    last: Some(moment),
+                    moment,
+                }
+            } else {
+                let is_last = index + 1 == last;
+                Stretch {
+                    first: moments[index - 1],
+                    last: (!is_last).then(|| moments[index + 1]),
+                    moment: if is_last { moments[last] } else { moment },
+                }
+            }
+        });
+        Ok(stretches.collect())
     }
 
     /// The waits from a state to look at: 0, those at which something may change, one between each two, and the last. Without a

@@ -14,7 +14,7 @@
 
 use std::collections::HashMap;
 
-use crate::ir::{ClockChoice, ClockId, Measure, Network, Predicate};
+use crate::ir::{ClockChoice, Measure, Network, Predicate};
 
 use super::concrete::{Error, Move, Part, Semantics, State};
 use super::moments::{self, Moments};
@@ -260,27 +260,7 @@ impl Replay<'_> {
 
     /// The state after a wait in ticks of the run.
     fn later(&self, state: &State, wait: i64) -> Result<State, Error> {
-        self.after(state, 2 * wait)
-    }
-
-    /// The state after a wait in ticks of the semantics.
-    fn after(&self, state: &State, wait: i64) -> Result<State, Error> {
-        let mut later = state.clone();
-        let is_stopped = self.stopped(state)?;
-        for (clock, is_stopped) in later.clocks[1..].iter_mut().zip(&is_stopped[1..]) {
-            if !is_stopped {
-                *clock += wait;
-            }
-        }
-        Ok(later)
-    }
-
-    fn stopped(&self, state: &State) -> Result<Vec<bool>, Error> {
-        let mut is_stopped = vec![false; state.clocks.len()];
-        for ClockId(clock) in self.semantics.stopped_clocks(state)? {
-            is_stopped[clock as usize] = true;
-        }
-        Ok(is_stopped)
+        self.semantics.after(state, 2 * wait)
     }
 
     /// Whether time may pass in the state with this index so long, or for ever, and what must hold does meanwhile.
@@ -309,7 +289,7 @@ impl Replay<'_> {
         let limit = wait.map(|wait| 2 * wait);
         for moment in self.moments_of(&state, limit, kept_from)? {
             self.coverage.moments += 1;
-            let now = self.after(&state, moment)?;
+            let now = self.semantics.after(&state, moment)?;
             if !self.semantics.invariants_hold(&now)? {
                 return Ok(Err(Defect::NoTime));
             }
@@ -344,7 +324,7 @@ impl Replay<'_> {
             Some(0) => vec![0],
             Some(limit) if !features.clock_guarded_urgent && !is_kept => vec![0, limit],
             _ => {
-                let is_stopped = self.stopped(state)?;
+                let is_stopped = self.semantics.stopped(state)?;
                 let unit = self.semantics.ticks_per_unit();
                 self.moments.of(state, &is_stopped, unit, limit)?
             }
@@ -385,11 +365,11 @@ impl Replay<'_> {
 
     /// Whether, for as long as time may pass, no move is possible and the predicate stays.
     fn waits_in_vain(&self, state: &State, keep: Option<&Predicate>) -> Checked {
-        let is_stopped = self.stopped(state)?;
+        let is_stopped = self.semantics.stopped(state)?;
         let unit = self.semantics.ticks_per_unit();
         let moments = self.moments.of(state, &is_stopped, unit, None)?;
         for (index, moment) in moments.into_iter().enumerate() {
-            let now = self.after(state, moment)?;
+            let now = self.semantics.after(state, moment)?;
             if !self.semantics.invariants_hold(&now)? {
                 break;
             }

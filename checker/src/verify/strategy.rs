@@ -55,22 +55,24 @@ pub struct Decisions {
 }
 
 impl Decisions {
-    /// The decisions that apply at clock values in ticks; only the first of them unless the strategy is permissive.
-    pub(super) fn at(
+    /// The decisions that apply at clock values in ticks, by index; only the first of them unless the strategy is permissive.
+    pub(super) fn indices_at(
         &self,
         clocks: &[i64],
         ticks_per_unit: i64,
         is_permissive: bool,
-    ) -> Vec<&Decision> {
+    ) -> Vec<usize> {
         let holds = |one: &Constraint| {
             let difference = clocks[one.left] - clocks[one.right];
             let bound = i64::from(one.bound) * ticks_per_unit;
             difference < bound || (!one.strict && difference == bound)
         };
         let applies =
-            |decision: &&Decision| decision.zones.iter().any(|zone| zone.iter().all(holds));
+            |decision: &Decision| decision.zones.iter().any(|zone| zone.iter().all(holds));
+        let decisions = self.decisions.iter().enumerate();
+        let applying = decisions.filter(|(_, decision)| applies(decision));
         let most = if is_permissive { usize::MAX } else { 1 };
-        self.decisions.iter().filter(applies).take(most).collect()
+        applying.map(|(index, _)| index).take(most).collect()
     }
 }
 
@@ -611,12 +613,19 @@ impl<'a> Rules<'a> {
 
     /// The decisions that apply.
     pub(super) fn decisions(&self, state: &State) -> Vec<&'a Decision> {
-        let words = identity(self.semantics.network(), &state.words);
-        let Some(&decisions) = self.strategy.get(words) else {
+        let Some(decisions) = self.decisions_of(state) else {
             return Vec::new();
         };
         let unit = self.semantics.ticks_per_unit();
-        decisions.at(&state.clocks, unit, self.claim.is_permissive)
+        let indices = decisions.indices_at(&state.clocks, unit, self.claim.is_permissive);
+        let indices = indices.into_iter();
+        indices.map(|index| &decisions.decisions[index]).collect()
+    }
+
+    /// All decisions for the words of a state.
+    pub(super) fn decisions_of(&self, state: &State) -> Option<&'a Decisions> {
+        let words = identity(self.semantics.network(), &state.words);
+        self.strategy.get(words).copied()
     }
 
     /// Whether the environment must move in a state in which time cannot pass.

@@ -1,0 +1,276 @@
+//! Strategies that are followed and played against.
+
+use std::sync::Arc;
+
+use pyo3::exceptions::{PyIndexError, PyLookupError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use super::{Answer, FailedError, Model, forced_rule, priority_rule, rejected};
+use crate::diagnostics::Span;
+use crate::engine::play::{self as engine, Done, Follower, Refused, Unadvised, player_name};
+use crate::engine::strategies::{NamedStrategy, unnamed};
+use crate::engine::{LoadedModel, describe, strategy_file, verification};
+use crate::game::strategy::Selection;
+use crate::verify;
+
+/// A strategy of one of the players.
+#[pyclass(frozen, module = "ntagen._checker")]
+pub(super) struct Strategy {
+    model: Py<Model>,
+    inner: Arc<Follower>,
+}
+
+fn unadvised(model: &LoadedModel, why: Unadvised) -> PyErr {
+    match why {
+        Unadvised::Mismatch(mismatch) => {
+            PyValueError::new_err(format!("in the {}: {}", mismatch.place, mismatch.message))
+        }
+        Unadvised::TooFine => {
+            let most = verify::timed::MOST_TICKS_PER_UNIT;
+            PyValueError::new_err(format!(
+                "in the clocks: the values are no whole numbers of any part of the unit down to 1/{most}, or too large"
+            ))
+        }
+        Unadvised::UnknownState => PyLookupError::new_err("state"),
+        Unadvised::NoDecision => PyLookupError::new_err("decision"),
+        Unadvised::Failed(error) => failed(model, error),
+    }
+}
+
+fn object(text: &str) -> PyResult<serde_json::Value> {
+    serde_json::from_str(text).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+#[pymethods]
+impl Strategy {
+    /// The winner's strategy of an answer; `None` if it has none.
+    #[staticmethod]
+    fn of_answer(py: Python<'_>, answer: &Bound<'_, Answer>) -> Option<Strategy> {
+        let answer = answer.get();
+        let strategy = Arc::clone(answer.inner.evidence.strategy.as_ref()?);
+        let query = unnamed(&answer.query).to_owned();
+        let model = answer.model.get();
+        let follower = model.with(|model| Follower::new(model.network(), query, strategy));
+        Some(Strategy {
+            model: answer.model.clone_ref(py),
+            inner: Arc::new(follower),
+        })
+    }
+
+    /// Reads a strategy from the bytes of a file; `path` names it.
+    #[staticmethod]
+    fn read(model: &Bound<'_, Model>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Strategy> {
+        let follower = model.get().with(|model| {
+            let read = model.read_strategy(path, data.as_bytes(), Span::default());
+            let (query, strategy) = read.map_err(rejected)?;
+            let strategy = Arc::new(strategy);
+            Ok::<_, PyErr>(Follower::new(model.network(), query, strategy))
+        })?;
+        Ok(Strategy {
+            model: model.clone().unbind(),
+            inner: Arc::new(follower),
+        })
+    }
+
+    /// How many states it has.
+    fn __len__(&self) -> usize {
+        self.inner.len()
+    }
+
+    /// The names of the model's processes and clocks.
+    fn names(&self) -> (Vec<String>, Vec<String>) {
+        self.model.get().with(|model| {
+            let network = model.network();
+            let processes = network.processes.iter().map(|one| one.name.clone());
+            let clocks = network.clocks.iter().skip(1).map(|one| one.name.clone());
+            (processes.collect(), clocks.collect())
+        })
+    }
+
+    /// The query that it answers.
+    #[getter]
+    fn query(&self) -> &str {
+        &self.inner.query
+    }
+
+    /// "controller" or "environment".
+    #[getter]
+    fn owner(&self) -> &'static str {
+        player_name(self.inner.strategy.owner)
+    }
+
+    /// Whether each decision that applies is allowed, and not only the first.
+    #[getter]
+    fn is_permissive(&self) -> bool {
+        self.inner.strategy.selection == Selection::Any
+    }
+
+    /// The strategy as a file.
+    fn json(&self) -> String {
+        let (strategy, query) = (&self.inner.strategy, &self.inner.query);
+        self.model
+            .get()
+            .with(|model| strategy_file::write(model.network(), strategy, query).to_string())
+    }
+
+    /// The entry of its file for a state, given as JSON with `locations` and `variables`.
+    fn state_json(&self, state: &str) -> PyResult<String> {
+        let state = object(state)?;
+        self.model.get().with(|model| {
+            let entry = self.inner.state(model.network(), &state);
+            let entry = entry.map_err(|why| unadvised(model, why))?;
+            Ok(entry.to_string())
+        })
+    }
+
+    /// What it says in a state, given as JSON with `clocks` too; see `engine::play`.
+    fn advice_json(&self, state: &str) -> PyResult<String> {
+        let state = object(state)?;
+        self.model.get().with(|model| {
+            let advice = self.inner.advice(model.network(), &state);
+            let advice = advice.map_err(|why| unadvised(model, why))?;
+            Ok(advice.to_string())
+        })
+    }
+
+    /// Checks it in closed loop: whether its owner wins (`None` if the check does not cover it), and what was looked at.
+    fn verify(
+        &self,
+        py: Python<'_>,
+        forced: &str,
+        priorities: &str,
+        states: Option<u64>,
+    ) -> PyResult<(Option<bool>, Vec<String>)> {
+        let rules = (forced_rule(forced)?, priority_rule(priorities)?);
+        let most = states.unwrap_or(verification::MOST_REGIONS);
+        let model = self.model.get();
+        let inner = &self.inner;
+        let result = py.detach(|| model.with(|model| inner.verify(model, rules, most)));
+        result.map_err(rejected)
+    }
+
+    /// Lets queries of the model be asked under it by a name.
+    fn keep(&self, name: &str) {
+        let strategy = Some(Arc::clone(&self.inner.strategy));
+        let query = self.inner.query.clone();
+        self.model.get().with(|model| {
+            model.keep_strategy(NamedStrategy {
+                name: name.to_owned(),
+                query,
+                strategy,
+            });
+        });
+    }
+
+    /// Begins a play against it.
+    fn play(&self, py: Python<'_>, query: &str, forced: &str, priorities: &str) -> PyResult<Play> {
+        let rules = (forced_rule(forced)?, priority_rule(priorities)?);
+        let inner = self.model.get().with(|model| {
+            let play = model.play(Arc::clone(&self.inner), query, rules);
+            let play = play.map_err(rejected)?;
+            play.map_err(|error| failed(model, error))
+        })?;
+        Ok(Play {
+            model: self.model.clone_ref(py),
+            inner,
+        })
+    }
+}
+
+fn failed(model: &LoadedModel, error: verify::Error) -> PyErr {
+    FailedError::new_err(describe::error_text(model, error))
+}
+
+fn refused(model: &LoadedModel, why: Refused) -> PyErr {
+    match why {
+        Refused::Impossible => PyIndexError::new_err("this is not possible now"),
+        Refused::TooFine => {
+            let most = verify::timed::MOST_TICKS_PER_UNIT;
+            PyValueError::new_err(format!(
+                "times finer than 1/{most} of the unit, or so long, cannot be waited"
+            ))
+        }
+        Refused::Failed(error) => failed(model, error),
+    }
+}
+
+/// A play against a strategy.
+#[pyclass(module = "ntagen._checker")]
+pub(super) struct Play {
+    model: Py<Model>,
+    inner: engine::Play,
+}
+
+#[pymethods]
+impl Play {
+    /// How many steps were made.
+    #[getter]
+    fn length(&self) -> usize {
+        self.inner.length()
+    }
+
+    /// The state as JSON, and how many of its ticks make a unit of time.
+    fn state_json(&self) -> (String, i64) {
+        let model = self.model.get();
+        let (state, unit) = model.with(|model| self.inner.state(model.network()));
+        (state.to_string(), unit)
+    }
+
+    /// What can happen, as JSON; see `engine::play`.
+    fn situation_json(&self) -> PyResult<String> {
+        self.model.get().with(|model| {
+            let situation = self.inner.situation(model.network());
+            let situation = situation.map_err(|error| failed(model, error))?;
+            Ok(situation.to_string())
+        })
+    }
+
+    /// Lets a fraction of the unit pass, and then a move be made: the reply of the opponent with an index, or what a permissive
+    /// strategy allows, or none.
+    #[pyo3(signature = (numerator, denominator, *, reply, allowed))]
+    #[pyo3(name = "pass_time")]
+    fn pass(
+        &mut self,
+        numerator: i64,
+        denominator: i64,
+        reply: Option<usize>,
+        allowed: Option<usize>,
+    ) -> PyResult<()> {
+        if numerator < 0 || denominator < 1 {
+            return Err(PyIndexError::new_err("a wait is not negative"));
+        }
+        let done = match (reply, allowed) {
+            (Some(index), _) => Done::Reply(index),
+            (None, Some(index)) => Done::Allowed(index),
+            (None, None) => Done::Nothing,
+        };
+        self.model.get().with(|model| {
+            let wait = (numerator, denominator);
+            let made = self.inner.pass(model.network(), wait, done);
+            made.map_err(|why| refused(model, why))
+        })
+    }
+
+    /// Time passes until the strategy acts, and it does.
+    fn follow(&mut self) -> PyResult<()> {
+        self.model.get().with(|model| {
+            let made = self.inner.follow(model.network());
+            made.map_err(|why| refused(model, why))
+        })
+    }
+
+    /// Takes steps back until only so many are left.
+    fn undo(&mut self, length: usize) {
+        self.inner.undo(length);
+    }
+
+    /// The play as a trace; `None` if its times have no common resolution.
+    fn trace_json(&self) -> PyResult<Option<String>> {
+        self.model.get().with(|model| {
+            let trace = self.inner.trace(model.network());
+            let trace = trace.map_err(|error| failed(model, error))?;
+            Ok(trace.map(|trace| trace.to_string()))
+        })
+    }
+}

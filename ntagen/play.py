@@ -1,0 +1,308 @@
+"""Playing against a strategy: what can happen in a state, and the moves of both sides.
+
+The strategy acts by itself at the first moment at which it does not wait; its opponent may move
+before.
+At the same instant the environment is first. What is possible is computed by the engine's
+independent check, not by the solver that found the strategy.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+from ntagen import _checker
+from ntagen.errors import InputError, ModelError
+from ntagen.runs import Edge, State, edge_of, state_of
+
+__all__ = ["Chance", "Next", "Play", "Reply", "Situation", "Window"]
+
+_OPEN_UNITS = 5
+"""How far a random delay reaches into a window without end, in units of time."""
+
+_FINEST = 2**20
+"""The finest parts of a unit that random delays are multiples of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Delays after which something is possible.
+
+    Attributes:
+        first: Where it begins, in units of the model's time.
+        after_first: Whether it begins only after that.
+        last: Where it ends; ``None`` without an end.
+        before_last: Whether it ends before that.
+    """
+
+    first: Fraction
+    after_first: bool
+    last: Fraction | None
+    before_last: bool
+
+    def __contains__(self, delay: Fraction | int) -> bool:
+        is_in = delay > self.first if self.after_first else delay >= self.first
+        if self.last is None:
+            return is_in
+        return is_in and (delay < self.last if self.before_last else delay <= self.last)
+
+    def soon(self) -> Fraction:
+        """The first delay in it; if there is no first one, one that is soon."""
+        if not self.after_first:
+            return self.first
+        return self.first + (Fraction(1) if self.last is None else (self.last - self.first) / 2)
+
+    def chosen(self, chance: random.Random) -> Fraction:
+        """A random delay in it, in coarse parts of a unit; a short one if there is no end."""
+        end = self.first + _OPEN_UNITS if self.last is None else self.last
+        parts = chance.choice((1, 2, 4))
+        while parts <= _FINEST:
+            grid = range(math.ceil(self.first * parts), math.floor(end * parts) + 1)
+            delays = [delay for one in grid if (delay := Fraction(one, parts)) in self]
+            if delays:
+                return chance.choice(delays)
+            parts *= 2
+        return self.soon()
+
+    def __str__(self) -> str:
+        if self.first == self.last:
+            return f"after {self.first}" if self.first else "now"
+        if not self.first and not self.after_first:
+            if self.last is None:
+                return "at any time"
+            return f"{'before' if self.before_last else 'within'} {self.last}"
+        begin = f"after {'more than ' * self.after_first}{self.first}"
+        if self.last is None:
+            return begin if self.after_first else f"{begin} or later"
+        return f"{begin} {'and less than' if self.before_last else 'up to'} {self.last}"
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """A move of one of the players.
+
+    Attributes:
+        edges: The edges that are taken together, the sender's first.
+        windows: When it is possible, in ascending order.
+    """
+
+    edges: tuple[Edge, ...]
+    windows: tuple[Window, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Next:
+    """What happens next if the strategy's opponent does not move.
+
+    Attributes:
+        kind: ``acts``: the strategy takes `edges`. ``won``: play is over, and `winner` has won.
+            ``must``: the opponent has to move before. ``fails``: the strategy does not say how to
+            go on (`why`), so that nothing of what it promises holds.
+        delay: After how long; ``None`` if time passes for ever.
+        edges: What the strategy takes.
+        winner: Who has won.
+        why: Why play is over: ``goal`` (the goal holds), ``broken`` (what must be kept does not
+            hold), ``stopped`` (time cannot pass and nobody has to move) or ``endless`` (time passes
+            for ever); or what the strategy lacks.
+    """
+
+    kind: Literal["acts", "won", "must", "fails"]
+    delay: Fraction | None
+    edges: tuple[Edge, ...] = ()
+    winner: Literal["controller", "environment"] | None = None
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What can happen in a state of a play.
+
+    Attributes:
+        replies: The moves of the strategy's opponent.
+        allowed: The moves that a permissive strategy allows its owner.
+        waits: For how long it need not do anything.
+        next: What happens if it does not.
+        goal: Whether the goal of the query holds now.
+    """
+
+    replies: tuple[Reply, ...]
+    allowed: tuple[Reply, ...]
+    waits: Window
+    next: Next
+    goal: bool
+
+    @property
+    def winner(self) -> Literal["controller", "environment"] | None:
+        """Who has won, if play is over now: decided, or without any move left."""
+        if self.next.kind != "won":
+            return None
+        is_decided = self.next.why in ("goal", "broken") and self.next.delay == 0
+        is_at_end = self.next.delay in (0, None) and not self.replies and not self.allowed
+        return self.next.winner if is_decided or is_at_end else None
+
+
+class Chance:
+    """Plays the side of a strategy's opponent at random; the same seed plays the same."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+
+    def choose(self, situation: Situation) -> tuple[Reply, Fraction] | None:
+        """A move, also of those that a permissive strategy allows, and its delay.
+
+        Returns:
+            ``None`` for only waiting.
+        """
+        options = [
+            (one, window)
+            for one in (*situation.replies, *situation.allowed)
+            for window in one.windows
+        ]
+        # What would end play is the last resort.
+        must_move = situation.next.kind == "must" or situation.next.why in ("stopped", "endless")
+        if not options or not (must_move or self._random.randrange(len(options) + 1)):
+            return None
+        move, window = self._random.choice(options)
+        return move, window.chosen(self._random)
+
+
+class Play:
+    """A play against a strategy; it begins in the initial state.
+
+    The caller is the opponent of the strategy: `reply` and `wait` are its steps, `follow` lets the
+    strategy act. A permissive strategy waits as long as it may, unless `allow` lets it move.
+    """
+
+    def __init__(self, raw: _checker.Play) -> None:
+        self._raw = raw
+
+    def __len__(self) -> int:
+        """How many steps were made: moves, and waits without one."""
+        return self._raw.length
+
+    @property
+    def state(self) -> State:
+        """The state."""
+        text, unit = self._raw.state_json()
+        return state_of(json.loads(text), unit)
+
+    def situation(self) -> Situation:
+        """What can happen in the state.
+
+        Raises:
+            ModelError: The model fails in it.
+        """
+        with _refusing():
+            raw = json.loads(self._raw.situation_json())
+        unit = raw["ticks_per_unit"]
+        then = raw["next"]
+        return Situation(
+            replies=tuple(_reply(one, unit) for one in raw["replies"]),
+            allowed=tuple(_reply(one, unit) for one in raw["allowed"]),
+            waits=_window(raw["waits"], unit),
+            next=Next(
+                kind=then["kind"],
+                delay=None if raw["ticks"] is None else Fraction(raw["ticks"], unit),
+                edges=_edges(then.get("edges", ())),
+                winner=then.get("winner"),
+                why=then.get("by") or then.get("gap", ""),
+            ),
+            goal=raw["goal"],
+        )
+
+    def reply(self, index: int, delay: Fraction | int) -> None:
+        """Waits, and then makes the reply with this index.
+
+        Raises:
+            IndexError: It is not possible, or not then.
+            InputError: The delay is too fine a fraction.
+            ModelError: The model fails in it.
+        """
+        self._step(delay, reply=index)
+
+    def allow(self, index: int, delay: Fraction | int) -> None:
+        """Waits, and then lets a permissive strategy make the allowed move with this index.
+
+        Raises:
+            IndexError: It is not allowed, or not then.
+            InputError: The delay is too fine a fraction.
+            ModelError: The model fails in it.
+        """
+        self._step(delay, allowed=index)
+
+    def wait(self, delay: Fraction | int) -> None:
+        """Only waits.
+
+        Raises:
+            IndexError: Something happens before.
+            InputError: The delay is too fine a fraction.
+            ModelError: The model fails in it.
+        """
+        self._step(delay)
+
+    def follow(self) -> None:
+        """Lets time pass until the strategy acts, and lets it act.
+
+        Raises:
+            IndexError: It does not act next.
+            ModelError: The model fails in it.
+        """
+        with _refusing():
+            self._raw.follow()
+
+    def undo(self, length: int) -> None:
+        """Takes the last steps back, until only so many are left."""
+        self._raw.undo(max(length, 0))
+
+    def trace_json(self) -> str | None:
+        """The play so far as a trace that ``ntagen verify`` checks.
+
+        ``None`` if its times have no common resolution that is coarse enough.
+        """
+        with _refusing():
+            return self._raw.trace_json()
+
+    def _step(
+        self, delay: Fraction | int, *, reply: int | None = None, allowed: int | None = None
+    ) -> None:
+        exact = Fraction(delay)
+        if (reply or allowed or 0) < 0:
+            raise IndexError("a move has no negative index")
+        with _refusing():
+            try:
+                self._raw.pass_time(
+                    exact.numerator, exact.denominator, reply=reply, allowed=allowed
+                )
+            except OverflowError:
+                raise InputError(f"the delay {exact} is too long or too fine a fraction") from None
+
+
+@contextlib.contextmanager
+def _refusing() -> Iterator[None]:
+    """Turns the engine's errors into ours."""
+    try:
+        yield
+    except _checker.FailedError as error:
+        raise ModelError(error.args[0]) from None
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+def _edges(raw: list[dict[str, Any]]) -> tuple[Edge, ...]:
+    return tuple(edge_of(edge) for edge in raw)
+
+
+def _reply(raw: dict[str, Any], unit: int) -> Reply:
+    return Reply(_edges(raw["edges"]), tuple(_window(window, unit) for window in raw["windows"]))
+
+
+def _window(raw: list[Any], unit: int) -> Window:
+    first, after_first, last, before_last = raw
+    end = None if last is None else Fraction(last, unit)
+    return Window(Fraction(first, unit), after_first, end, before_last)

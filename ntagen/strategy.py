@@ -1,0 +1,381 @@
+"""Strategies of timed games as values: what to do in a state, state by state, and as files.
+
+A strategy is of the player who wins: of the controller, or of the environment, which shows why the
+controller cannot win. Clock values and waits are exact fractions of the model's unit of time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from ntagen import _checker
+from ntagen.errors import InputError, ModelError, UndecidedError
+from ntagen.play import Play
+from ntagen.runs import Edge, State, edge_of
+
+__all__ = ["Advice", "Decision", "Discrete", "Strategy", "StrategyState", "Verification"]
+
+Owner = Literal["controller", "environment"]
+
+ForcedRule = Literal["tiga", "product", "neutral"]
+
+PriorityRule = Literal["ignore", "keep"]
+
+_DECISIONS_SHOWN = 5
+"""Decisions that a message lists."""
+
+
+class Discrete(Protocol):
+    """What has locations and variables: a state of a run, a symbolic state, a walk."""
+
+    @property
+    def locations(self) -> dict[str, str]:
+        """The location of each process."""
+
+    @property
+    def variables(self) -> dict[str, int | float]:
+        """The value of each variable."""
+
+
+StateLike = State | Mapping[str, Any]
+"""A state of a run; or names with values, such as ``{"Gate": "Open", "n": 2, "x": "3/2"}``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What a strategy does, or allows, in a state with exact clock values.
+
+    Attributes:
+        kind: ``act``: it takes `edges` now. ``wait``: it lets time pass, and the opponent move.
+            ``done``: play has ended here, won.
+        edges: The edges that are taken together, the sender's first; empty unless it acts.
+        delay: Of waiting: after how long it acts, if the opponent has not moved before. Where
+            acting has no first moment (``x > 1``), one is chosen that is soon. ``None`` if it
+            waits as long as time passes.
+        then: What it takes after `delay`; of a permissive strategy the first of what is allowed.
+        rank: Along a play it never grows; 0 where what is sought is reached, and everywhere in
+            strategies that only avoid something.
+    """
+
+    kind: Literal["act", "wait", "done"]
+    edges: tuple[Edge, ...] = ()
+    delay: Fraction | None = None
+    then: tuple[Edge, ...] = ()
+    rank: int = 0
+
+    def __str__(self) -> str:
+        if self.kind != "wait":
+            return ", ".join(map(str, self.edges)) or "done"
+        if self.delay is None:
+            return "wait"
+        after = f", then {', '.join(map(str, self.then))}" if self.then else ""
+        return f"wait {self.delay}{after}"
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What a strategy does in some zones of a state.
+
+    Attributes:
+        zones: Where it applies: in one of these, each a list of constraints that all hold, such as
+            ``x <= 3``; the empty list always holds.
+        edges: The edges that are taken together, the sender's first; empty is to wait.
+        rank: As of `Advice`.
+    """
+
+    zones: tuple[tuple[str, ...], ...]
+    edges: tuple[Edge, ...]
+    rank: int
+
+    def __str__(self) -> str:
+        zones = " or ".join(" && ".join(zone) or "true" for zone in self.zones)
+        return f"{zones}: {', '.join(map(str, self.edges)) or 'wait'}"
+
+
+@dataclass(frozen=True, slots=True)
+class StrategyState:
+    """What a strategy says of some locations and variables.
+
+    Attributes:
+        locations: The location of each process.
+        variables: The value of each variable.
+        is_goal: Whether play has ended here, won, whatever the clocks say.
+        decisions: What to do. The first that applies counts; of a permissive strategy each is
+            allowed.
+    """
+
+    locations: dict[str, str] = field(hash=False)
+    variables: dict[str, int | float] = field(hash=False)
+    is_goal: bool
+    decisions: tuple[Decision, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What an independent check came to.
+
+    Attributes:
+        holds: Whether the evidence shows what it is said to; ``None`` if the check does not cover
+            the model or the query.
+        lines: What was looked at, or what is wrong.
+    """
+
+    holds: bool | None
+    lines: tuple[str, ...]
+
+
+class Strategy:
+    """A strategy of the player who wins a game. Iterating gives its states.
+
+    Attributes:
+        query: The query that it answers.
+        owner: Whose it is: the ``controller``'s, or the ``environment``'s against the query.
+        winning: Whether the controller wins: whether it is the controller's strategy.
+        is_permissive: Whether every decision that applies is allowed, and not only the first. Such
+            strategies keep something, and are the most permissive ones.
+        forced: The rule for forced moves of the game.
+        priorities: Whether priorities count in the game.
+    """
+
+    def __init__(
+        self, raw: _checker.Strategy, forced: ForcedRule, priorities: PriorityRule
+    ) -> None:
+        self._raw = raw
+        processes, clocks = raw.names()
+        self._processes = frozenset(processes)
+        self._clocks = frozenset(clocks)
+        self.forced: ForcedRule = forced
+        self.priorities: PriorityRule = priorities
+        self.query = raw.query
+        self.owner: Owner = raw.owner
+        self.winning = raw.owner == "controller"
+        self.is_permissive = raw.is_permissive
+
+    def __repr__(self) -> str:
+        states = "1 state" if len(self) == 1 else f"{len(self)} states"
+        return f"<Strategy of the {self.owner}, {states}: {self.query}>"
+
+    def __len__(self) -> int:
+        return len(self._raw)
+
+    def __iter__(self) -> Iterator[StrategyState]:
+        return map(_state, json.loads(self.json())["states"])
+
+    def at(self, state: StateLike | Discrete) -> StrategyState:
+        """What it says of the locations and variables of a state; clocks are not looked at.
+
+        Raises:
+            UndecidedError: It has no such state.
+            InputError: It is no state of the model.
+        """
+        return _state(json.loads(self._at(self._given(state))))
+
+    def action(self, state: StateLike) -> Advice:
+        """What it does in a state.
+
+        A permissive strategy waits as long as it may, and then takes the first of what it allows.
+
+        Raises:
+            UndecidedError: It says nothing of the state.
+            InputError: It is no state of the model.
+            ModelError: The model fails in it.
+        """
+        allowed = self.allowed(state)
+        return next((one for one in allowed if one.kind == "wait"), allowed[0])
+
+    def allowed(self, state: StateLike) -> tuple[Advice, ...]:
+        """All that it allows in a state: one thing, unless it is permissive.
+
+        Raises:
+            UndecidedError: It says nothing of the state.
+            InputError: It is no state of the model.
+            ModelError: The model fails in it.
+        """
+        if not isinstance(state, State | Mapping):
+            raise InputError(
+                "a symbolic state has no clock values\n"
+                "hint: ask `at`, which gives the decisions with their zones, or write the values"
+            )
+        given = self._given(state)
+        try:
+            raw = json.loads(self._raw.advice_json(json.dumps(given)))
+        except LookupError as error:
+            raise self._undecided(given, error) from None
+        except ValueError as error:
+            raise InputError(f"{error}\n{_STATE_HINT}") from None
+        except _checker.FailedError as error:
+            raise ModelError(error.args[0]) from None
+        if raw["over"]:
+            return (Advice("done"),)
+        return tuple(_advice(decision, raw["waiting"]) for decision in raw["now"])
+
+    def json(self) -> str:
+        """The strategy as JSON text, as ``ntagen check --strategy FILE`` writes it."""
+        return self._raw.json()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes it to a file, which `ntagen.load_strategy` and ``loadStrategy`` read.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        Path(path).write_text(self.json() + "\n", encoding="utf-8", newline="\n")
+
+    def keep(self, name: str) -> None:
+        """Lets later queries of the model be asked under it: ``A<> Gate.Open under S``.
+
+        Args:
+            name: What such queries call it.
+        """
+        self._raw.keep(name)
+
+    def verify(self, states: int | None = None) -> Verification:
+        """Checks that its owner wins, in closed loop, against every move of the opponent.
+
+        The check shares nothing with the solver.
+
+        Args:
+            states: It gives up after so many regions; by default two million.
+
+        Returns:
+            Whether it wins; the lines hold the run that shows what is wrong, if anything is.
+
+        Raises:
+            InputError: Its query is none of the model.
+        """
+        with _rejecting():
+            holds, lines = self._raw.verify(self.forced, self.priorities, states)
+        return Verification(holds, tuple(lines))
+
+    def play(self) -> Play:
+        """Begins a play against it: the opponent's moves are chosen by the caller.
+
+        Raises:
+            InputError: Its query is none of the model.
+            ModelError: The initial state cannot be computed.
+        """
+        with _rejecting():
+            return Play(self._raw.play(self.query, self.forced, self.priorities))
+
+    def _given(self, state: StateLike | Discrete) -> dict[str, Any]:
+        """The state as the engine reads it."""
+        clocks: Mapping[str, Any] = {}
+        if isinstance(state, Mapping):
+            if isinstance(state.get("locations"), Mapping):
+                locations, variables = state["locations"], state.get("variables", {})
+                clocks = state.get("clocks", {})
+            else:
+                locations = {name: state[name] for name in state if name in self._processes}
+                clocks = {name: state[name] for name in state if name in self._clocks}
+                rest = state.keys() - locations.keys() - clocks.keys()
+                variables = {name: state[name] for name in state if name in rest}
+        else:
+            locations, variables = state.locations, state.variables
+            clocks = getattr(state, "clocks", {})
+        return {
+            "locations": dict(locations),
+            "variables": {name: _number(name, value) for name, value in variables.items()},
+            "clocks": {name: _pair(name, value) for name, value in clocks.items()},
+        }
+
+    def _at(self, given: dict[str, Any]) -> str:
+        try:
+            return self._raw.state_json(json.dumps(given))
+        except LookupError as error:
+            raise self._undecided(given, error) from None
+        except ValueError as error:
+            raise InputError(f"{error}\n{_STATE_HINT}") from None
+
+    def _undecided(self, given: dict[str, Any], error: LookupError) -> UndecidedError:
+        places = " ".join(f"{process}.{place}" for process, place in given["locations"].items())
+        values = "".join(f" {name}={value}" for name, value in given["variables"].items())
+        what = f"( {places} ){values}"
+        if error.args[0] == "state":
+            return UndecidedError(
+                f"the {self.owner}'s strategy has no state {what}\n"
+                "hint: play under it does not get there, or it does not win from there"
+            )
+        clocks = " ".join(f"{name}={Fraction(*value)}" for name, value in given["clocks"].items())
+        decisions = _state(json.loads(self._at(given))).decisions
+        lines = [f"  {decision}" for decision in decisions[:_DECISIONS_SHOWN]] or ["  none"]
+        if len(decisions) > _DECISIONS_SHOWN:
+            lines.append(f"  … and {len(decisions) - _DECISIONS_SHOWN} more")
+        return UndecidedError(
+            "\n".join(
+                [
+                    f"the {self.owner}'s strategy has no decision for {clocks} in {what}; it has",
+                    *lines,
+                ]
+            )
+        )
+
+
+@contextlib.contextmanager
+def _rejecting() -> Iterator[None]:
+    """Turns the engine's errors about a query or model into ours."""
+    try:
+        yield
+    except _checker.RejectedError as error:
+        raise InputError("\n".join(text.rstrip() for text in error.args[0])) from None
+    except _checker.FailedError as error:
+        raise ModelError(error.args[0]) from None
+
+
+_STATE_HINT = (
+    "hint: give a state of a run of this model, or the location of each process and the value of "
+    "each variable and clock by their names"
+)
+
+
+def _number(name: str, value: object) -> int | float:
+    if isinstance(value, int | float):
+        # Truth values are 0 and 1.
+        return float(value) if isinstance(value, float) else int(value)
+    raise InputError(f"the value {value!r} of {name} is no number\n{_STATE_HINT}")
+
+
+def _pair(name: str, value: object) -> tuple[int, int]:
+    """A clock value as numerator and denominator."""
+    if isinstance(value, int | Fraction | Decimal | str):
+        try:
+            exact = Fraction(value)
+        except (ValueError, ZeroDivisionError, OverflowError):
+            pass
+        else:
+            return exact.numerator, exact.denominator
+    hint = "write an integer, a Fraction, or a text such as '3/2' or '1.5'"
+    raise InputError(f"the value {value!r} of clock {name} is no exact number\nhint: {hint}")
+
+
+def _edges(raw: list[dict[str, Any]] | None) -> tuple[Edge, ...]:
+    return tuple(edge_of(edge) for edge in raw or ())
+
+
+def _advice(decision: dict[str, Any], waiting: dict[str, Any] | None) -> Advice:
+    if decision["edges"] is not None or waiting is None:
+        return Advice("act", edges=_edges(decision["edges"]), rank=decision["rank"])
+    ticks, unit = waiting["ticks"], waiting["ticks_per_unit"]
+    return Advice(
+        "wait",
+        delay=None if ticks is None else Fraction(ticks, unit),
+        then=_edges(waiting["then"][0]["edges"]) if waiting["then"] else (),
+        rank=decision["rank"],
+    )
+
+
+def _state(raw: dict[str, Any]) -> StrategyState:
+    decisions = (
+        Decision(
+            zones=tuple(map(tuple, one["zones"])), edges=_edges(one["action"]), rank=one["rank"]
+        )
+        for one in raw["decisions"]
+    )
+    return StrategyState(raw["locations"], raw["variables"], raw["goal"], tuple(decisions))

@@ -1,0 +1,232 @@
+"""Strategies as values: what to do in a state, as files, and what is said of wrong states."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+import ntagen
+from ntagen.runs import Choice, State
+
+FEEDER = """
+clock x;
+int[0,1] fed;
+process M() {
+  state Hungry, Full { x <= 3 }, Dead;
+  init Hungry;
+  trans Hungry -> Full { select k : int[1,2]; guard x >= 2 && x <= 4; assign x = 0, fed = 1; },
+        Hungry -u-> Dead { guard x > 4; };
+}
+system M;
+"""
+
+RACE = """
+process P() { clock x; state L, G, Bad; init L; trans L -> G { }, L -u-> Bad { }; }
+system P;
+"""
+
+LATE = """
+clock x;
+process P() { state L, G; init L; trans L -> G { guard x > 1 && x < 2; }; }
+system P;
+"""
+
+ROUNDS = """
+clock x, y;
+process P() {
+  state L { x <= 1 }, Idle;
+  init L;
+  trans L -> L { guard x >= 1; assign x = 0; }, L -> Idle { };
+}
+system P;
+"""
+
+COUNTER = """
+int n;
+process P() { state L; init L; trans L -> L { guard n < 30000; assign n++; }, L -u-> L { }; }
+system P;
+"""
+
+DOOR = """
+clock x;
+process Door() {
+  state Shut { x <= 5 }, Open { x <= 2 }, Broken;
+  init Shut;
+  trans Shut -> Open { guard x >= 3; assign x = 0; },
+        Open -> Shut { assign x = 0; },
+        Open -u-> Broken { guard x > 1; };
+}
+system Door;
+"""
+
+
+def test_strategy_says_what_to_do_and_until_when() -> None:
+    model = ntagen.load(FEEDER)
+    strategy = model.synthesize("control: A<> M.Full", verify=True)
+    assert (strategy.owner, strategy.winning, strategy.is_permissive) == ("controller", True, False)
+    waiting = strategy.action(model.simulate(steps=0).states[0])
+    assert (waiting.kind, waiting.delay, waiting.edges) == ("wait", 2, ())
+    assert str(waiting) == "wait 2, then M.Hungry -> M.Full"
+    later = strategy.action({"M": "Hungry", "fed": 0, "x": "1/3"})
+    assert later.delay == Fraction(5, 3)
+    acting = strategy.action({"M": "Hungry", "fed": False, "x": Fraction(5, 2)})
+    assert acting.kind == "act"
+    assert acting.edges[0].select["k"] in (1, 2)
+    assert acting.edges == waiting.then
+    nested = {"locations": {"M": "Full"}, "variables": {"fed": 1}, "clocks": {"x": 0}}
+    assert strategy.action(nested).kind == "done"
+    assert str(strategy.action(nested)) == "done"
+
+
+def test_moment_is_chosen_where_acting_has_no_first_one() -> None:
+    strategy = ntagen.load(LATE).synthesize("control: A<> P.G")
+    advice = strategy.action({"P": "L", "x": Fraction(1, 2)})
+    assert (advice.kind, advice.delay) == ("wait", Fraction(3, 4))
+    assert strategy.action({"P": "L", "x": Fraction(5, 4)}).edges == advice.then
+
+
+def test_permissive_strategy_gives_all_that_is_allowed() -> None:
+    strategy = ntagen.load(DOOR).synthesize("control: A[] not Door.Broken")
+    assert strategy.is_permissive
+    state = {"Door": "Shut", "x": 4}
+    allowed = strategy.allowed(state)
+    assert sorted(one.kind for one in allowed) == ["act", "wait"]
+    assert strategy.action(state).kind == "wait"
+    assert strategy.action(state).delay == 1
+    assert [one.kind for one in strategy.allowed({"Door": "Shut", "x": 5})] == ["act"]
+    # After 1 the environment may break the open door, so it is shut before.
+    opened = strategy.action({"Door": "Open", "x": 0})
+    assert (opened.kind, opened.delay) == ("wait", 1)
+    assert str(opened) == "wait 1, then Door.Open -> Door.Shut"
+
+
+def test_lost_game_gives_the_strategy_of_the_environment() -> None:
+    model = ntagen.load(RACE)
+    strategy = model.synthesize("control: A<> P.G")
+    assert (strategy.owner, strategy.winning) == ("environment", False)
+    assert str(strategy.action({"P": "L", "P.x": 7})) == "P.L -> P.Bad"
+    assert strategy.verify().holds
+    assert repr(strategy) == "<Strategy of the environment, 3 states: control: A<> P.G>"
+
+
+def test_states_are_listed_with_zones_and_decisions() -> None:
+    model = ntagen.load(FEEDER)
+    strategy = model.synthesize("strategy Feed = control: A<> M.Full")
+    assert strategy.query == "control: A<> M.Full"
+    states = list(strategy)
+    assert len(states) == len(strategy)
+    first = states[0]
+    assert first.locations == {"M": "Hungry"}
+    assert first.variables == {"fed": 0}
+    assert [decision.zones for decision in first.decisions] == [
+        (("x >= 2", "x <= 4"),),
+        (("x < 2",),),
+    ]
+    assert str(first.decisions[1]) == "x < 2: wait"
+    assert strategy.at(model.walk()) == first
+    assert strategy.at(next(model.states())) == first
+    assert any(state.is_goal for state in states)
+
+
+def test_goal_that_depends_on_clocks_does_not_end_play_elsewhere() -> None:
+    strategy = ntagen.load(ROUNDS).synthesize("control: A<> y >= 3")
+    (state,) = (one for one in strategy if one.locations == {"P": "L"})
+    assert not state.is_goal
+    assert strategy.action({"P": "L", "x": 0, "y": 0}).delay == 1
+
+
+def test_saved_strategy_is_read_again(tmp_path: Path) -> None:
+    model = ntagen.load(FEEDER)
+    strategy = model.synthesize("control: A<> M.Full")
+    path = tmp_path / "feed.json"
+    strategy.save(path)
+    again = ntagen.load_strategy(path, model)
+    assert again.json() == strategy.json() == path.read_text().rstrip("\n")
+    assert again.verify().holds
+    again.keep("Feed")
+    assert model.check("A<> M.Full under Feed").verdict == "satisfied"
+    assert model.check("A<> M.Full").verdict == "not satisfied"
+    path.write_text(strategy.json().replace('"x >= 2"', '"x >= 3"'))
+    changed = ntagen.load_strategy(path, model)
+    assert not changed.verify().holds
+    with pytest.raises(ntagen.RejectedError, match="the model's process P is missing"):
+        ntagen.load_strategy(path, ntagen.load(RACE))
+    with pytest.raises(OSError, match="nowhere"):
+        ntagen.load_strategy(tmp_path / "nowhere.json", model)
+
+
+@pytest.mark.parametrize(
+    ("state", "message"),
+    [
+        ({"fed": 0, "x": 0}, "the model's process M is missing"),
+        ({"M": "Hungry", "fed": 0}, "the value of clock x is missing"),
+        ({"M": "Hungry", "x": 0}, "the model's variable fed is missing"),
+        ({"M": "Hungry", "fed": 2, "x": 0}, "variable fed cannot be 2"),
+        ({"M": "Angry", "fed": 0, "x": 0}, 'process M has no location "Angry"'),
+        ({"M": "Hungry", "fed": 0, "x": 0, "n": 1}, "the model has no variable n"),
+        ({"M": "Hungry", "fed": 0, "x": 0.5}, "the value 0.5 of clock x is no exact number"),
+        ({"M": "Hungry", "fed": 0, "x": "soon"}, "the value 'soon' of clock x is no exact number"),
+        ({"M": "Hungry", "fed": 0, "x": -1}, "the value of clock x is negative"),
+        ({"M": "Hungry", "fed": 0, "x": Fraction(1, 2**50)}, "no whole numbers of any part"),
+        ({"M": "Hungry", "fed": 0, "x": Fraction(1, 2**90)}, "no whole numbers of any part"),
+        ({"M": "Hungry", "fed": "no", "x": 0}, "the value 'no' of fed is no number"),
+    ],
+)
+def test_what_is_no_state_is_refused(state: dict[str, object], message: str) -> None:
+    strategy = ntagen.load(FEEDER).synthesize("control: A<> M.Full")
+    with pytest.raises(ntagen.InputError, match=re.escape(message)) as caught:
+        strategy.action(state)
+    assert not isinstance(caught.value, ntagen.UndecidedError)
+    assert "\nhint: " in str(caught.value)
+
+
+def test_states_outside_the_strategy_are_named() -> None:
+    model = ntagen.load(FEEDER)
+    strategy = model.synthesize("control: A<> M.Full")
+    with pytest.raises(ntagen.UndecidedError, match=r"no state \( M.Hungry \) fed=1"):
+        strategy.action({"M": "Hungry", "fed": 1, "x": 0})
+    with pytest.raises(ntagen.UndecidedError) as caught:
+        strategy.action({"M": "Hungry", "fed": 0, "x": "9/2"})
+    assert str(caught.value) == (
+        "the controller's strategy has no decision for x=9/2 in ( M.Hungry ) fed=0; it has\n"
+        "  x >= 2 && x <= 4: M.Hungry -> M.Full\n"
+        "  x < 2: wait"
+    )
+    with pytest.raises(ntagen.InputError, match="a symbolic state has no clock values"):
+        strategy.action(model.walk())  # type: ignore[arg-type]
+
+
+def test_what_gives_no_strategy_says_so() -> None:
+    model = ntagen.load(FEEDER)
+    with pytest.raises(ntagen.InputError, match="asks for no strategy"):
+        model.synthesize("A<> M.Full")
+    with pytest.raises(ntagen.InputError, match="asks for no strategy"):
+        model.synthesize("E<> control: A<> M.Full")
+    with pytest.raises(ntagen.InputError, match=r"control_t\* gives no strategy"):
+        model.synthesize("control_t*(5, 0): A<> M.Full")
+    with pytest.raises(ntagen.NtagenError, match="stopped by the limit of states"):
+        ntagen.load(COUNTER).synthesize("control: A<> n == 30000", states=100)
+    with pytest.raises(ntagen.RejectedError):
+        model.synthesize("control: A<> M.Nowhere")
+
+
+def test_simulation_follows_a_strategy() -> None:
+    model = ntagen.load(FEEDER)
+    strategy = model.synthesize("control: A<> M.Full")
+
+    def choose(state: State, choices: tuple[Choice, ...]) -> tuple[int, Fraction] | None:
+        advice = strategy.action(state)
+        if advice.kind == "done":
+            return None
+        edges, delay = (
+            (advice.then, advice.delay) if advice.kind == "wait" else (advice.edges, Fraction(0))
+        )
+        assert delay is not None
+        return next(i for i, one in enumerate(choices) if one.edges == edges), delay
+
+    run = model.simulate(choose=choose)
+    assert run.states[-1].locations == {"M": "Full"}
+    assert run.duration == 2
