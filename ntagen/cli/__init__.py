@@ -31,6 +31,7 @@ COMMANDS: Final = {
     "compile": "Turn an environment into a UPPAAL model and its queries.",
     "check": "Answer the queries of a model or an environment.",
     "verify": "Check a trace or a certificate independently.",
+    "play": "Play a timed game against a strategy.",
     "info": "Show what is in a model or an environment.",
     "explain": "Explain a diagnostic: what it means and how to mend it.",
     "plot": "Draw a scene, its plans or a run.",

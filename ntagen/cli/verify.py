@@ -27,10 +27,11 @@ NOT_COVERED: Final = 3
 def command(model_path: Path, file: Path) -> int:
     """Check a trace or a certificate, independently of the search that found it.
 
-    FILE is what `ntagen check` wrote for MODEL with --certificate FILE or --trace FILE.json. A
-    trace is replayed with its exact times, and must show what its query asks about. A certificate
-    is a set of states for E<> (not satisfied) or A[] (satisfied): it must contain the initial
-    state, no move and no delay may lead out of it, and it must not meet what is to be avoided.
+    FILE is what `ntagen check` wrote for MODEL with --certificate FILE or --trace FILE.json, or
+    `ntagen play` with --log FILE. A trace is replayed with its exact times, and must show what its
+    query asks about; a play must end as it says. A certificate is a set of states for E<> (not
+    satisfied) or A[] (satisfied): it must contain the initial state, no move and no delay may lead
+    out of it, and it must not meet what is to be avoided.
 
     \b
     Examples:

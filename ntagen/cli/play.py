@@ -1,0 +1,532 @@
+"""`ntagen play`: one side of a game is played by a strategy, the other by the user."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, ParamSpec
+
+import click
+
+from ntagen.cli.files import write_files
+from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.cli.progress import shown_progress
+from ntagen.errors import InputError, NtagenError
+
+if TYPE_CHECKING:
+    from ntagen.checker import Model
+    from ntagen.play import Chance, Play, Reply, Situation
+    from ntagen.runs import Edge, State
+    from ntagen.strategy import Strategy
+
+DEFEATED: Final = 1
+"""Exit code where the strategy did not keep its promise."""
+
+VALUES_SHOWN: Final = 24
+"""Variables that are shown without being asked for; of more only those that changed."""
+
+CHOICES_SHOWN: Final = 40
+"""Moves that are listed without being asked for."""
+
+SILENT_MOVES: Final = 100
+"""Moves of the strategy in a row, without a choice for the user, after which the user is asked."""
+
+HELP: Final = """\
+  2          make move 2, as soon as it is possible
+  2 3/2      make move 2 after a delay of 3/2
+  Enter, w   only wait, until the strategy acts or something is decided;
+             where you have to make a move and there is only one, make it
+  w 1/2      only wait for 1/2
+  +1, +1 2   let the strategy make its allowed move 1 (after 2)
+  u          undo: back to your last choice
+  r          restart
+  s          show the whole state
+  m          show all moves
+  log FILE   write the play as a trace that `ntagen verify` checks
+  q          quit"""
+
+
+@click.command(
+    "play",
+    epilog="Exit codes: 0 done, 1 the strategy lost or did not say how to go on, 2 the input is "
+    "rejected, 3 stopped by a limit, 4 run-time error in the model.",
+)
+@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
+@click.option(
+    "--strategy",
+    "strategy_path",
+    metavar="FILE.json",
+    type=click.Path(path_type=Path),
+    help="The strategy to play against, as `ntagen check --strategy` writes it.",
+)
+@click.option(
+    "--query",
+    "asked",
+    metavar="TEXT|NAME",
+    help="A control query, or the name of one of the model's; the winner's strategy is synthesised "
+    "first.  [default: the model's only control query]",
+)
+@click.option("--auto", "steps", type=click.IntRange(1), help="Let chance play so many steps.")
+@click.option("--seed", type=int, default=0, help="For --auto: the same seed gives the same play.")
+@click.option(
+    "--log",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write the play at the end as a trace, which `ntagen verify MODEL FILE` checks.",
+)
+@click.option(
+    "--forced",
+    type=click.Choice(["tiga", "product", "neutral"]),
+    default="tiga",
+    help="When the environment must move because time cannot pass.",
+)
+@click.option(
+    "--priorities",
+    type=click.Choice(["ignore", "keep"]),
+    default="ignore",
+    help="Whether priorities of channels and processes count.",
+)
+def command(
+    model_path: Path,
+    strategy_path: Path | None,
+    asked: str | None,
+    steps: int | None,
+    seed: int,
+    log: Path | None,
+    forced: Any,  # noqa: ANN401  click gives a str where the engine wants literals
+    priorities: Any,  # noqa: ANN401
+) -> int:
+    """Play a timed game against a strategy.
+
+    MODEL is an environment (.nsl) or a UPPAAL model (.xml, .xta). The strategy plays the side of
+    its owner, you play the other one: against a winning strategy of the controller you are the
+    environment, and where the controller cannot win you are the controller.
+
+    \b
+    Examples:
+      ntagen play game.xta --query "control: A<> Gate.Open"
+      ntagen check game.xta --query "control: A<> Gate.Open" --strategy open.json
+      ntagen play game.xta --strategy open.json --log play.json
+      ntagen play game.xta --strategy open.json --auto 1000 --seed 7
+
+    \b
+    In each state the moves are listed with the delays after which they are possible. The strategy
+    acts by itself, at the first moment at which it does not wait; at the same instant the
+    environment is first. Type:
+      2          make move 2, as soon as it is possible
+      2 3/2      make move 2 after a delay of 3/2
+      Enter, w   only wait, until the strategy acts or something is decided
+      w 1/2      only wait for 1/2
+      +1, +1 2   let a strategy that allows several moves make its move 1 (after 2)
+      u  r       undo, restart
+      s  m       show the whole state, all moves
+      ?  q       help, quit
+    """  # noqa: D301  click wants the control character
+    if strategy_path and asked:
+        raise InputError("give either --strategy or --query: the file says which query it answers")
+    with pointing_to_explanations(True):
+        model = load_model(model_path).model
+        if strategy_path:
+            strategy = model.load_strategy(strategy_path, forced, priorities)
+        else:
+            query = _query(model, asked)
+            with shown_progress(query, quiet=steps is not None) as report:
+                strategy = model.synthesize(
+                    query, forced=forced, priorities=priorities, progress=report
+                )
+        session = _Session(strategy)
+    try:
+        if steps is None:
+            session.converse(_reader())
+        else:
+            from ntagen.play import Chance
+
+            session.play_at_random(steps, Chance(seed))
+    finally:
+        if log is not None:
+            session.write(log)
+    return DEFEATED if session.is_defeated else 0
+
+
+def _query(model: Model, asked: str | None) -> str:
+    """The query that is meant."""
+    games = [query for query in model.queries if re.search(r"\bcontrol\b", query.text)]
+    if asked is None:
+        if len(games) == 1:
+            return games[0].text
+        shown = "".join(f"\n  {query.text}" for query in games)
+        raise InputError(
+            f"the model has {len(games) or 'no'} control queries{':' if games else ''}{shown}\n"
+            "hint: choose a game with --query, or a file with --strategy"
+        )
+    for query in games:
+        name = query.comment.strip().partition("\n")[0].strip()
+        named = re.match(r"strategy\s+(\w+)\s*=", query.text)
+        if asked.strip() in (name, named[1] if named else None):
+            return query.text
+    return asked
+
+
+def _reader() -> Callable[[], str | None]:
+    """Gives the lines that the user types, and ``None`` at their end."""
+
+    def typed() -> str | None:
+        try:
+            return input("> ")
+        except EOFError:
+            click.echo()
+            return None
+
+    def piped() -> str | None:
+        line = sys.stdin.readline()
+        if line:
+            # Shown, so that the output can be read on its own.
+            click.echo(f"> {line.rstrip()}")
+        return line.rstrip() if line else None
+
+    return typed if sys.stdin.isatty() else piped
+
+
+@dataclass(frozen=True, slots=True)
+class _Mark:
+    """A place that can be gone back to."""
+
+    length: int
+    time: Fraction
+
+
+class _Session:
+    """A play with its user."""
+
+    def __init__(self, strategy: Strategy) -> None:
+        self._strategy = strategy
+        self._play: Play = strategy.play()
+        self._rival = "environment" if strategy.winning else "controller"
+        self._time = Fraction(0)
+        self._shown: State | None = None
+        self._marks: list[_Mark] = []
+        self._ending: str | None = None
+        self._silent = 0
+        self.is_defeated = False
+        click.echo(strategy.query)
+        click.echo(
+            f"The strategy is the {strategy.owner}'s; you are the {self._rival}."
+            + ("" if strategy.winning else " The controller cannot win: see why.")
+        )
+
+    def converse(self, read: Callable[[], str | None]) -> None:
+        """Plays with the user until the end of the input or of their patience."""
+        click.echo("Type ? for help.")
+        while True:
+            situation = self._play.situation()
+            if self._is_over(situation):
+                click.echo(f"{self._ending} (u undo, r restart, q quit)")
+            elif self._goes_on_silently(situation):
+                self._follow(situation)
+                continue
+            else:
+                self._show(situation)
+            if not self._obey(read, situation):
+                return
+
+    def play_at_random(self, steps: int, chance: Chance) -> None:
+        """Lets chance play the side of the user."""
+        for _ in range(steps):
+            situation = self._play.situation()
+            if self._is_over(situation):
+                break
+            self._show_state()
+            chosen = chance.choose(situation)
+            if chosen is None:
+                self._wait(situation)
+            else:
+                self._make(situation, *chosen)
+            if self._ending is not None:
+                break
+        self._is_over(self._play.situation())
+        self._show_state()
+        click.echo(self._ending or f"{steps} steps are played; nothing is decided.")
+
+    def write(self, path: Path) -> None:
+        """Writes the play as a trace."""
+        text = self._play.trace_json()
+        if text is None:
+            raise InputError("the times of this play are too fine for a trace")
+        write_files({path: f"{text}\n"})
+        click.echo(f"play written to {path}")
+
+    def _is_over(self, situation: Situation) -> bool:
+        """Whether play has ended; notes how."""
+        if self._ending is None:
+            then = situation.next
+            if situation.winner is not None:
+                self._end(then.why, situation.winner)
+            elif then.kind == "fails" and then.delay == 0 and not situation.replies:
+                self._fail(then.why)
+        return self._ending is not None
+
+    def _end(self, why: str, winner: str) -> None:
+        reason = {
+            "goal": "The goal holds",
+            "broken": "What the controller must keep does not hold any more",
+            "stopped": "Time cannot pass, and nobody moves",
+            "endless": "Time passes for ever, and nobody moves",
+        }[why]
+        self.is_defeated = winner != self._strategy.owner
+        whose = "you have won against the strategy" if self.is_defeated else "the strategy has won"
+        self._ending = f"{reason}: the {winner} has won after {self._time}; {whose}."
+
+    def _fail(self, why: str) -> None:
+        self.is_defeated = True
+        self._ending = f"The strategy does not say how to go on: {why}."
+
+    def _goes_on_silently(self, situation: Situation) -> bool:
+        """Whether the strategy acts at once and the user has no choice."""
+        then = situation.next
+        is_silent = then.kind == "acts" and then.delay == 0 and not situation.replies
+        return is_silent and self._silent < SILENT_MOVES
+
+    def _show(self, situation: Situation) -> None:
+        self._silent = 0
+        self._show_state()
+        if situation.goal:
+            click.echo("  the goal holds now")
+        click.echo(f"  {self._forecast(situation)}")
+        self._show_moves(situation, CHOICES_SHOWN)
+
+    def _show_state(self, whole: bool = False) -> None:
+        state, before = self._play.state, None if whole else self._shown
+        places = {f"{name}.{place}" for name, place in before.locations.items()} if before else ()
+        locations = [f"{name}.{place}" for name, place in state.locations.items()]
+        if len(locations) > VALUES_SHOWN:
+            locations = _changed(locations, [one for one in locations if one not in places], before)
+        variables = [f"{name}={value}" for name, value in state.variables.items()]
+        if len(variables) > VALUES_SHOWN:
+            changed = [
+                f"{name}={value}"
+                for name, value in state.variables.items()
+                if before and before.variables[name] != value
+            ]
+            variables = variables if whole else _changed(variables, changed, before)
+        clocks = [f"{name}={value}" for name, value in state.clocks.items()]
+        click.secho(f"[{len(self._play)}] time {self._time}", bold=True)
+        for line in (locations, variables, clocks):
+            if line:
+                click.echo(f"  {' '.join(line)}")
+        self._shown = state
+
+    def _forecast(self, situation: Situation) -> str:
+        """What happens if the user only waits."""
+        then, owner = situation.next, self._strategy.owner
+        when = "at once" if then.delay == 0 else f"after {then.delay}"
+        if then.kind == "acts":
+            waits = "" if then.delay == 0 else "waits, and "
+            return f"the {owner} {waits}{when} takes {_move(then.edges)}"
+        if then.kind == "must":
+            return f"the {owner} waits; time cannot pass on, and you must move"
+        if then.kind == "fails":
+            return f"{when} the strategy does not say how to go on: {then.why}"
+        outcome = {
+            "goal": f"{when} the goal holds, and the {then.winner} wins",
+            "broken": f"{when} what must be kept does not hold, and the {then.winner} wins",
+            "stopped": f"{when} time cannot pass; if nobody moves the {then.winner} wins",
+            "endless": f"if nobody ever moves the {then.winner} wins",
+        }[then.why]
+        return f"the {owner} waits; {outcome}"
+
+    def _show_moves(self, situation: Situation, most: int | None) -> None:
+        self._list(situation.replies, "", most)
+        if not situation.replies:
+            click.echo("  you have no move; Enter goes on")
+        if situation.allowed:
+            click.echo(f"  the {self._strategy.owner} may also")
+            self._list(situation.allowed, "+", most)
+
+    def _list(self, moves: Sequence[Reply], sign: str, most: int | None) -> None:
+        names = [_move(one.edges) for one in moves]
+        for index, one in enumerate(moves[:most]):
+            name = names[index]
+            if names.count(name) > 1:
+                name += _labels(one.edges)
+            number = click.style(f"{sign}{index + 1}".rjust(3), bold=True)
+            click.echo(f"  {number}  {name}   {', or '.join(map(str, one.windows))}")
+        if most is not None and len(moves) > most:
+            click.echo(f"  … {len(moves) - most} more: m shows all")
+
+    def _obey(self, read: Callable[[], str | None], situation: Situation) -> bool:
+        """Reads commands until one changes the play; false at the end."""
+        while True:
+            line = read()
+            if line is None:
+                return False
+            words = _words(line)
+            name = words[0] if words else "w"
+            match name:
+                case "q" | "quit" | "exit":
+                    return False
+                case "?" | "h" | "help":
+                    click.echo(HELP)
+                case "s":
+                    self._show_state(whole=True)
+                case "m":
+                    self._show_moves(situation, None)
+                case "log":
+                    _said(self.write, Path(" ".join(words[1:]) or "play.json"))
+                case "u" | "r":
+                    self._back(everything=name == "r")
+                    return True
+                case _ if self._ending is not None:
+                    click.echo("play is over: u undo, r restart, q quit")
+                case _:
+                    if _said(self._step, situation, words):
+                        return True
+
+    def _step(self, situation: Situation, words: Sequence[str]) -> None:
+        """Makes the move, or the wait, that was typed."""
+        if len(words) > 2:
+            raise InputError(f"{' '.join(words)} is no command; type ? for help")
+        delay = _delay(words[1]) if len(words) == 2 else None
+        mark = _Mark(len(self._play), self._time)
+        if not words or words[0] == "w":
+            if delay is None:
+                self._wait(situation)
+            elif delay not in situation.waits:
+                raise InputError(f"something happens before: {self._forecast(situation)}")
+            else:
+                self._pass(delay)
+        else:
+            move = _meant(situation, words[0])
+            if delay is None:
+                delay = move.windows[0].soon()
+            elif not any(delay in window for window in move.windows):
+                windows = ", or ".join(map(str, move.windows))
+                raise InputError(f"this move is possible {windows}")
+            self._make(situation, move, delay)
+        self._marks.append(mark)
+
+    def _make(self, situation: Situation, move: Reply, delay: Fraction) -> None:
+        if move in situation.replies:
+            self._play.reply(situation.replies.index(move), delay)
+            who = "you take"
+        else:
+            self._play.allow(situation.allowed.index(move), delay)
+            who = f"the {self._strategy.owner} takes"
+        self._time += delay
+        click.echo(f"  · {_after(delay)}{who} {_move(move.edges)}")
+
+    def _pass(self, delay: Fraction) -> None:
+        self._play.wait(delay)
+        self._time += delay
+        if delay:
+            click.echo(f"  · {delay} passes")
+
+    def _wait(self, situation: Situation) -> None:
+        """Waits until something happens."""
+        then = situation.next
+        if then.kind == "acts":
+            self._follow(situation)
+        elif then.kind == "must" and len(situation.replies) == 1:
+            only = situation.replies[0]
+            self._make(situation, only, only.windows[-1].soon())
+        elif then.kind == "must":
+            raise InputError("time cannot pass on, and you must move")
+        else:
+            self._pass(then.delay or Fraction(0))
+            if then.kind == "fails":
+                self._fail(then.why)
+            elif then.winner is not None:
+                self._end(then.why, then.winner)
+
+    def _follow(self, situation: Situation) -> None:
+        """Lets the strategy act."""
+        then = situation.next
+        self._play.follow()
+        delay = then.delay or Fraction(0)
+        self._time += delay
+        self._silent += 1
+        click.echo(f"  · {_after(delay)}the {self._strategy.owner} takes {_move(then.edges)}")
+
+    def _back(self, everything: bool) -> None:
+        if everything:
+            self._marks.clear()
+        mark = self._marks.pop() if self._marks else _Mark(0, Fraction(0))
+        self._play.undo(mark.length)
+        self._time = mark.time
+        self._ending, self._shown, self.is_defeated = None, None, False
+        self._silent = 0
+
+
+_P = ParamSpec("_P")
+
+
+def _said(action: Callable[_P, None], *given: _P.args, **named: _P.kwargs) -> bool:
+    """Whether something could be done; what was wrong is said."""
+    try:
+        action(*given, **named)
+    except NtagenError as error:
+        click.echo(str(error))
+        return False
+    return True
+
+
+def _meant(situation: Situation, word: str) -> Reply:
+    """The move that a number means."""
+    moves = situation.allowed if word.startswith("+") else situation.replies
+    number = word.removeprefix("+")
+    if not number.isdecimal():
+        raise InputError(f"{word} is no command; type ? for help")
+    if not 1 <= int(number) <= len(moves):
+        raise InputError(f"there is no move {word}")
+    return moves[int(number) - 1]
+
+
+def _words(line: str) -> list[str]:
+    try:
+        return shlex.split(line)
+    except ValueError:
+        return line.split()
+
+
+def _delay(text: str) -> Fraction:
+    try:
+        delay = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f"{text} is no delay: write a number such as 2, 3/2 or 1.5") from None
+    if delay < 0:
+        raise InputError("a delay is not negative")
+    return delay
+
+
+def _changed(every: list[str], changed: list[str], before: State | None) -> list[str]:
+    """What is shown of a long list."""
+    if before is None:
+        return [f"{len(every)} values (s shows them)"]
+    rest = len(changed) - VALUES_SHOWN
+    more = [f"… and {rest} more changes (s shows all)"] if rest > 0 else []
+    return changed[:VALUES_SHOWN] + more
+
+
+def _after(delay: Fraction) -> str:
+    return f"after {delay} " if delay else ""
+
+
+def _move(edges: Sequence[Edge]) -> str:
+    """A move on one line: the edges that are taken together."""
+    return " | ".join(map(_edge, edges))
+
+
+def _edge(edge: Edge) -> str:
+    select = "".join(f" {name}={value}" for name, value in edge.select.items())
+    sync = f" {edge.sync}" if edge.sync else ""
+    return f"{edge.process}.{edge.source} -> {edge.target}{sync}{select}"
+
+
+def _labels(edges: Sequence[Edge]) -> str:
+    """What tells moves apart that look the same otherwise."""
+    labels = "; ".join(label for edge in edges for label in (edge.guard, edge.update) if label)
+    return f" {{ {labels} }}" if labels else ""
