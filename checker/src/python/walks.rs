@@ -1,0 +1,217 @@
+//! Walks through a model, symbolic and with exact times.
+
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+
+use super::{FailedError, Model, StepEntry, rejected, step_entry};
+use crate::engine::simulation::{Point, SIMULATED_TICKS_PER_UNIT};
+use crate::engine::{CodeEngine, LoadedModel, describe, json};
+use crate::network::Failure;
+use crate::verify::timed::{Timed, least_multiple};
+
+/// A walk through a model.
+#[pyclass(module = "ntagen._checker")]
+pub(super) struct Simulation {
+    model: Py<Model>,
+    point: Point,
+}
+
+impl Simulation {
+    /// A walk from the initial state.
+    pub(super) fn start(model: &Bound<'_, Model>, code: CodeEngine) -> PyResult<Simulation> {
+        let point = model.get().with(|model| {
+            model.prepare_simulation(code).map_err(rejected)?;
+            model
+                .start()
+                .map_err(|failure| Simulation::failed(model, failure))
+        })?;
+        Ok(Simulation {
+            model: model.clone().unbind(),
+            point,
+        })
+    }
+
+    pub(super) fn failed(model: &LoadedModel, failure: Failure) -> PyErr {
+        FailedError::new_err(describe::failure_text(model, failure))
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    /// The location of each process, by its name.
+    fn locations(&self) -> Vec<(String, String)> {
+        self.model.get().with(|model| {
+            let network = model.network();
+            let name = |index: usize| {
+                describe::location_name(network, index, &self.point.words).to_owned()
+            };
+            let processes = network.processes.iter().enumerate();
+            processes
+                .map(|(index, process)| (process.name.clone(), name(index)))
+                .collect()
+        })
+    }
+
+    /// The value of each scalar part of each variable, by its name.
+    fn variables(&self, py: Python<'_>) -> PyResult<Vec<(String, Py<PyAny>)>> {
+        self.model.get().with(|model| {
+            let mut values: Vec<PyResult<(String, Py<PyAny>)>> = Vec::new();
+            describe::for_each_value(model.network(), &self.point.words, |name, value| {
+                let value = match value {
+                    describe::Value::Integer(value) => value.into_py_any(py),
+                    describe::Value::Double(value) => value.into_py_any(py),
+                };
+                values.push(value.map(|value| (name.to_owned(), value)));
+            });
+            values.into_iter().collect()
+        })
+    }
+
+    /// The constraints on clock values that the moves so far leave.
+    fn zone(&self) -> Vec<String> {
+        self.model
+            .get()
+            .with(|model| describe::zone_constraints(model.network(), &self.point.zone))
+    }
+
+    /// The moves: of each, process, edge, branch and select values of the edges that are taken.
+    fn moves(&self) -> PyResult<Vec<StepEntry>> {
+        self.model.get().with(|model| {
+            let successors = model
+                .successors(&self.point)
+                .map_err(|failure| Simulation::failed(model, failure))?;
+            let entries = successors
+                .iter()
+                .map(|(parts, _)| step_entry(model.network(), parts));
+            Ok(entries.collect())
+        })
+    }
+
+    /// Takes the move with this index.
+    fn take(&mut self, index: usize) -> PyResult<()> {
+        let point = self.model.get().with(|model| {
+            let successors = model
+                .successors(&self.point)
+                .map_err(|failure| Simulation::failed(model, failure))?;
+            let count = successors.len();
+            let chosen = successors.into_iter().nth(index);
+            chosen.map(|(_, point)| point).ok_or_else(|| {
+                PyIndexError::new_err(format!("there is no move {index}; the state has {count}"))
+            })
+        })?;
+        self.point = point;
+        Ok(())
+    }
+
+    /// Follows moves as long as time cannot pass and there is exactly one.
+    fn settle(&mut self) -> PyResult<()> {
+        let point = self.model.get().with(|model| {
+            model
+                .settle(self.point.clone())
+                .map_err(|failure| Simulation::failed(model, failure))
+        })?;
+        self.point = point;
+        Ok(())
+    }
+}
+
+/// A run that is simulated with exact times.
+#[pyclass(module = "ntagen._checker")]
+pub(super) struct ExactWalk {
+    model: Py<Model>,
+    timed: Timed,
+}
+
+impl ExactWalk {
+    /// A run from the initial state.
+    pub(super) fn start(model: &Bound<'_, Model>) -> PyResult<ExactWalk> {
+        let ticks_per_unit = SIMULATED_TICKS_PER_UNIT;
+        let state = model.get().with(|model| {
+            let choices = model.choices(ticks_per_unit);
+            let start = choices.and_then(|choices| choices.initial());
+            start.map_err(|error| ExactWalk::failed(model, error))
+        })?;
+        Ok(ExactWalk {
+            model: model.clone().unbind(),
+            timed: Timed {
+                state,
+                ticks_per_unit,
+            },
+        })
+    }
+
+    fn failed(model: &LoadedModel, error: crate::verify::Error) -> PyErr {
+        FailedError::new_err(describe::error_text(model, error))
+    }
+}
+
+#[pymethods]
+impl ExactWalk {
+    /// How many ticks make one unit of the model's time.
+    #[getter]
+    fn ticks_per_unit(&self) -> i64 {
+        self.timed.ticks_per_unit
+    }
+
+    /// Makes ticks as short as this part of a unit needs; returns false if that is too short.
+    fn refine(&mut self, denominator: i64) -> bool {
+        let unit = self.timed.ticks_per_unit;
+        let finer = (denominator > 0)
+            .then(|| least_multiple(unit, denominator))
+            .flatten()
+            .and_then(|unit| self.timed.at_multiple_of(unit));
+        match finer {
+            Some(finer) => {
+                self.timed = finer;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// The state as JSON, clock values in ticks.
+    fn state_json(&self) -> String {
+        self.model
+            .get()
+            .with(|model| json::state(model.network(), &self.timed.state).to_string())
+    }
+
+    /// What can happen as JSON, and for how many ticks time can pass; `None` for ever.
+    fn choices_json(&self) -> PyResult<(String, Option<i64>)> {
+        self.model.get().with(|model| {
+            let choices = model.choices(self.timed.ticks_per_unit);
+            let found = choices.and_then(|choices| choices.of(&self.timed.state));
+            let (choices, longest) = found.map_err(|error| ExactWalk::failed(model, error))?;
+            Ok((
+                json::choices(model.network(), &choices).to_string(),
+                longest,
+            ))
+        })
+    }
+
+    /// Waits for so many ticks and takes the choice with this index. The ticks are as long afterwards as the state allows.
+    fn take(&mut self, index: usize, wait: i64) -> PyResult<()> {
+        let next = self.model.get().with(|model| {
+            let choices = model.choices(self.timed.ticks_per_unit);
+            let taken = choices.and_then(|choices| {
+                let (all, _) = choices.of(&self.timed.state)?;
+                match all.get(index) {
+                    Some(one) => choices.take(&self.timed.state, wait, &one.parts),
+                    None => Ok(None),
+                }
+            });
+            taken.map_err(|error| ExactWalk::failed(model, error))
+        })?;
+        let impossible =
+            || PyIndexError::new_err(format!("choice {index} after {wait} ticks is not possible"));
+        let next = Timed {
+            state: next.ok_or_else(impossible)?,
+            ticks_per_unit: self.timed.ticks_per_unit,
+        };
+        self.timed = next
+            .at_multiple_of(SIMULATED_TICKS_PER_UNIT)
+            .unwrap_or(next);
+        Ok(())
+    }
+}
