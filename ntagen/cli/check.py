@@ -15,6 +15,7 @@ from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.files import write_files
 from ntagen.cli.models import load_model, pointing_to_explanations, show_warnings
 from ntagen.cli.progress import shown_progress
+from ntagen.cli.quantities import SIZE, TIME
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,18 +29,6 @@ STOPPED: Final = 3
 MODEL_ERROR: Final = 4
 """Exit code after a run-time error in the model."""
 
-_BYTES_PER: Final = {
-    "": 1,
-    "B": 1,
-    "KB": 10**3,
-    "MB": 10**6,
-    "GB": 10**9,
-    "KIB": 2**10,
-    "MIB": 2**20,
-    "GIB": 2**30,
-    "TIB": 2**40,
-}
-_SECONDS_PER: Final = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
 _MARK: Final = {
     "satisfied": ("yes", "green"),
     "not satisfied": ("no", "red"),
@@ -47,24 +36,6 @@ _MARK: Final = {
     "unknown": ("stopped", "yellow"),
     "error": ("error", "red"),
 }
-
-
-class _Quantity(click.ParamType[float]):
-    """A number with a unit, such as ``4GiB`` or ``60s``."""
-
-    def __init__(self, name: str, units: dict[str, float] | dict[str, int]) -> None:
-        self.name = name
-        self._units = units
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([A-Za-z]*)\s*", str(value))
-        units = {unit.lower(): size for unit, size in self._units.items()}
-        if not match or match[2].lower() not in units:
-            known = ", ".join(unit for unit in self._units if unit)
-            self.fail(f"{value!r} is no {self.name}; write a number and one of {known}", param, ctx)
-        return float(match[1]) * units[match[2].lower()]
 
 
 class _Threads(click.ParamType[int]):
@@ -209,10 +180,8 @@ class _Outputs:
 )
 @click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
 @click.option("--states", type=click.IntRange(1), help="Stop after so many stored states.")
-@click.option("--memory", metavar="SIZE", type=_Quantity("size", _BYTES_PER), help="Such as 4GiB.")
-@click.option(
-    "--timeout", metavar="TIME", type=_Quantity("time", _SECONDS_PER), help="Such as 60s."
-)
+@click.option("--memory", metavar="SIZE", type=SIZE, help="Such as 4GiB.")
+@click.option("--timeout", metavar="TIME", type=TIME, help="Such as 60s.")
 def command(
     model_path: Path,
     asked: tuple[str, ...],

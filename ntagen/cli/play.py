@@ -16,6 +16,7 @@ import click
 from ntagen.cli.files import write_files
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
+from ntagen.cli.quantities import SIZE, TIME
 from ntagen.errors import InputError, NtagenError
 
 if TYPE_CHECKING:
@@ -91,6 +92,9 @@ HELP: Final = """\
     default="ignore",
     help="Whether priorities of channels and processes count.",
 )
+@click.option("--states", type=click.IntRange(1), help="Of --query: stop after so many states.")
+@click.option("--memory", metavar="SIZE", type=SIZE, help="Of --query: such as 4GiB.")
+@click.option("--timeout", metavar="TIME", type=TIME, help="Of --query: such as 60s.")
 def command(
     model_path: Path,
     strategy_path: Path | None,
@@ -100,6 +104,9 @@ def command(
     log: Path | None,
     forced: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     priorities: Any,  # noqa: ANN401
+    states: int | None,
+    memory: float | None,
+    timeout: float | None,
 ) -> int:
     """Play a timed game against a strategy.
 
@@ -137,7 +144,13 @@ def command(
             query = _query(model, asked)
             with shown_progress(query, quiet=steps is not None) as report:
                 strategy = model.synthesize(
-                    query, forced=forced, priorities=priorities, progress=report
+                    query,
+                    forced=forced,
+                    priorities=priorities,
+                    states=states,
+                    memory_bytes=None if memory is None else int(memory),
+                    timeout_s=timeout,
+                    progress=report,
                 )
         session = _Session(strategy)
     try:

@@ -176,6 +176,15 @@ def test_wrong_strategy_is_defeated(machine: Path, tmp_path: Path, player: Playe
     assert "The strategy does not say how to go on: it has no decision here." in out
 
 
+def test_synthesis_has_limits(tmp_path: Path, player: Player) -> None:
+    model = tmp_path / "counter.xta"
+    model.write_text(
+        "int n; process P() { state L; init L;"
+        "trans L -> L { guard n < 30000; assign n++; }, L -u-> L { }; } system P;"
+    )
+    player(model, "--query", "control: A<> n == 30000", "--states", "100", code=3)
+
+
 def test_game_is_found_by_name_or_alone(tmp_path: Path, player: Player) -> None:
     model = tmp_path / "race.xml"
     query = "<query><formula>{}</formula><comment>{}</comment></query>"

@@ -1,0 +1,46 @@
+"""Numbers with a unit on the command line: sizes and times."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+import click
+
+_BYTES_PER: Final = {
+    "": 1,
+    "B": 1,
+    "KB": 10**3,
+    "MB": 10**6,
+    "GB": 10**9,
+    "KIB": 2**10,
+    "MIB": 2**20,
+    "GIB": 2**30,
+    "TIB": 2**40,
+}
+_SECONDS_PER: Final = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
+
+
+class _Quantity(click.ParamType[float]):
+    """A number with a unit, such as ``4GiB`` or ``60s``."""
+
+    def __init__(self, name: str, units: dict[str, float] | dict[str, int]) -> None:
+        self.name = name
+        self._units = units
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([A-Za-z]*)\s*", str(value))
+        units = {unit.lower(): size for unit, size in self._units.items()}
+        if not match or match[2].lower() not in units:
+            known = ", ".join(unit for unit in self._units if unit)
+            self.fail(f"{value!r} is no {self.name}; write a number and one of {known}", param, ctx)
+        return float(match[1]) * units[match[2].lower()]
+
+
+SIZE: Final = _Quantity("size", _BYTES_PER)
+"""Such as ``4GiB``; in bytes."""
+
+TIME: Final = _Quantity("time", _SECONDS_PER)
+"""Such as ``60s``; in seconds."""
