@@ -225,6 +225,31 @@ def test_a_wrong_number_of_threads_is_refused(
     assert f"{threads!r} is no number of threads up to 2048, or all" in " ".join(err.split())
 
 
+TAKING_TURNS = """
+typedef scalar[4] member;
+member last;
+process P(const member me) {
+  state Idle, Done;
+  init Idle;
+  trans Idle -> Done { assign last = me; };
+}
+system P;
+"""
+
+
+@pytest.mark.parametrize(("symmetry", "stored"), [("on", 5), ("off", 33)])
+def test_members_of_scalar_sets_are_told_apart_only_if_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], symmetry: str, stored: int
+) -> None:
+    model = tmp_path / "turns.xta"
+    model.write_text(TAKING_TURNS)
+    options = ("--symmetry", symmetry, "--json")
+    query = "E<> forall (i : member) P(i).Idle && last == i"
+    out, _ = check_run(capsys, 1, model, "--query", query, *options)
+    answer = json.loads(out)
+    assert (answer["verdict"], answer["stored"]) == ("not satisfied", stored)
+
+
 FAILING = """
 int[0,3] n; int a[3];
 process P() {
