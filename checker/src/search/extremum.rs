@@ -458,7 +458,7 @@ impl Pump<'_> {
         if !zone.constrain(0, self.clock, above) {
             return Ok(Attempt::Nothing);
         }
-        let shifted = self.shifted(symbolic, first_words, &zone);
+        let mut shifted = self.shifted(symbolic, first_words, &zone);
         let mut words = first_words.clone();
         let mut is_pump = false;
         for parts in &trace.moves[start..] {
@@ -472,6 +472,8 @@ impl Pump<'_> {
                 symbolic.extrapolate_all(&words, &mut later);
                 let is_contained = |one: &Zone| later.iter().any(|later| one.is_subset(later));
                 is_pump |= shifted.iter().all(is_contained);
+                // What the start was cut to may take a round to wear off, so that each round is compared with the one before.
+                shifted = self.shifted(symbolic, first_words, &zone);
             }
         }
         let extent = symbolic.extent(self.predicate, &mut words, zone.bounds())?;
@@ -510,9 +512,13 @@ impl Pump<'_> {
             return Ok(Taken::Nothing);
         };
         let sets = |assignment: &Assignment| match *assignment {
-            Assignment::Value { clock, .. }
-            | Assignment::Copy { clock, .. }
-            | Assignment::Free { clock } => clock == self.clock,
+            // A clock that is set to itself or to more goes on as it was.
+            Assignment::Copy {
+                clock,
+                source,
+                increment,
+            } => clock == self.clock && (source != clock || increment < 0),
+            Assignment::Value { clock, .. } | Assignment::Free { clock } => clock == self.clock,
         };
         if effect.assignments.iter().any(sets) {
             return Ok(Taken::Set);
