@@ -33,6 +33,18 @@ pub(crate) struct Tally {
     unverified: Cell<u32>,
 }
 
+impl Tally {
+    /// Counts a query without a verdict whose answer was right.
+    pub(crate) fn count_compared(&self) {
+        count(&self.compared);
+    }
+
+    /// Counts a query that the engine gave up.
+    pub(crate) fn count_stopped(&self) {
+        count(&self.stopped);
+    }
+}
+
 fn count(cell: &Cell<u32>) {
     cell.set(cell.get() + 1);
 }
@@ -171,6 +183,22 @@ pub(crate) fn check(
         Err(Error::RunTime(_)) => matches!(answer.verdict, Verdict::Error(_)),
         Err(Error::Unsupported(what)) => panic!("{what} is not generated"),
     };
+    check_witnesses(answer, &describe)?;
+    if is_right {
+        return Ok(());
+    }
+    Err(TestCaseError::fail(format!(
+        "{}\nbrute force says {expected:?}, the engine {:?}",
+        describe(),
+        answer.verdict
+    )))
+}
+
+/// The runs of all witnesses must have been replayed.
+pub(crate) fn check_witnesses(
+    answer: &Answer,
+    describe: impl Fn() -> String,
+) -> Result<(), TestCaseError> {
     for witness in &answer.evidence.witnesses {
         match &witness.run {
             Some(Proof::Replayed(..)) | None => {}
@@ -183,14 +211,7 @@ pub(crate) fn check(
             }
         }
     }
-    if is_right {
-        return Ok(());
-    }
-    Err(TestCaseError::fail(format!(
-        "{}\nbrute force says {expected:?}, the engine {:?}",
-        describe(),
-        answer.verdict
-    )))
+    Ok(())
 }
 
 /// A strategy must pass the closed loop.

@@ -518,7 +518,7 @@ impl Network {
         labels.join(" ")
     }
 
-    fn clock(&self, clock: usize) -> String {
+    pub(crate) fn clock(&self, clock: usize) -> String {
         format!("x{}", clock % self.clocks)
     }
 
