@@ -22,7 +22,7 @@ use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
     TraceWanted, Verdict, describe, explain, facts, json, strategy_file,
 };
-use crate::game::{Forced, Priorities};
+use crate::game::{Forced, Nodes, Priorities};
 use crate::search::limits::StopReason;
 use crate::search::plain::Met;
 use crate::search::reach::Order;
@@ -338,6 +338,7 @@ impl Model {
                 other => return Err(unknown("search order", other)),
             },
             threads: thread_count(threads)?,
+            nodes: Nodes::Automatic,
             forced: forced_rule(forced)?,
             priorities: priority_rule(priorities)?,
             code: code_engine(engine)?,

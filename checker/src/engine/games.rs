@@ -9,7 +9,7 @@ use crate::game::plans::{NoPlans, Plan, Plans};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
 use crate::game::recurrence;
 use crate::game::strategy::{self, Strategy};
-use crate::game::{Player, Priorities};
+use crate::game::{Nodes, Player, Priorities};
 use crate::ir::{ClockAtom, Network, Objective, Predicate};
 use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic, predicate};
 use crate::search::limits::{Counters, StopReason, Watch};
@@ -39,17 +39,29 @@ pub(super) fn unsupported_game(
 /// smaller than with zones that are cut along the comparisons.
 const MOST_EXACT_STATES: u64 = 4096;
 
-/// Stops a search after a number of states, if nothing else does before.
+/// States that a game is explored for before it is looked whether there are many zones for each discrete state.
+const STATES_BEFORE_CROWD: u64 = 2048;
+
+/// Discrete states that are explored instead, at most. More of them are rather such that no run reaches.
+const MOST_DISCRETE_STATES: u64 = 64 * STATES_BEFORE_CROWD;
+
+/// Bytes that a discrete state may take, on average, before zones that are reached are looked at again: winning sets of all that
+/// invariants allow can fall into many more pieces than those of what is reached.
+const MOST_BYTES_OF_DISCRETE_STATE: u64 = 64 << 10;
+
+/// Stops a search after a number of states, or when the average one takes too much memory, if nothing else does before.
 struct Attempt<'w> {
     watch: &'w mut dyn Watch,
     most: u64,
+    most_bytes_each: u64,
     is_given_up: bool,
 }
 
 impl Watch for Attempt<'_> {
     fn look(&mut self, counters: &Counters) -> Option<StopReason> {
         let reason = self.watch.look(counters);
-        if reason.is_none() && counters.explored > self.most {
+        let most_bytes = (counters.stored + 256).saturating_mul(self.most_bytes_each);
+        if reason.is_none() && (counters.explored > self.most || counters.bytes > most_bytes) {
             self.is_given_up = true;
             return Some(StopReason::States);
         }
@@ -71,18 +83,62 @@ pub(super) fn game(
         zones_of(network, executor, bounds, options)
     };
     if !has_differences(network, &atoms) {
-        return played(zones(Abstraction::Maximum), asked, options, watch);
+        let in_discrete_states = |watch: &mut LimitWatch| {
+            let mut attempt = Attempt {
+                watch,
+                most: MOST_DISCRETE_STATES,
+                most_bytes_each: MOST_BYTES_OF_DISCRETE_STATE,
+                is_given_up: false,
+            };
+            let zones = zones(Abstraction::Exact);
+            let (answer, _) = played(zones, asked, options, Nodes::Discrete, &mut attempt);
+            // A run-time error may lie in a state that no run reaches.
+            let is_of_use = !attempt.is_given_up && !matches!(answer.verdict, Verdict::Error(_));
+            (answer, is_of_use)
+        };
+        let in_symbolic_states = |nodes, watch: &mut LimitWatch| {
+            played(zones(Abstraction::Maximum), asked, options, nodes, watch)
+        };
+        let nodes = if can_be_discrete(network, asked, options) {
+            options.nodes
+        } else {
+            Nodes::Symbolic
+        };
+        let mut before = Counters::default();
+        if nodes == Nodes::Automatic {
+            let (answer, has_given_up) = in_symbolic_states(nodes, watch);
+            if !has_given_up {
+                return answer;
+            }
+            before = answer.counters;
+        }
+        let mut answer = if nodes == Nodes::Symbolic {
+            in_symbolic_states(nodes, watch).0
+        } else {
+            let (answer, is_of_use) = in_discrete_states(watch);
+            if is_of_use {
+                answer
+            } else {
+                before.explored += answer.counters.explored;
+                in_symbolic_states(Nodes::Symbolic, watch).0
+            }
+        };
+        answer.counters.explored += before.explored;
+        return answer;
     }
     let mut attempt = Attempt {
         watch,
         most: MOST_EXACT_STATES,
+        most_bytes_each: u64::MAX,
         is_given_up: false,
     };
-    let first = played(zones(Abstraction::Exact), asked, options, &mut attempt);
+    let exact = zones(Abstraction::Exact);
+    let (first, _) = played(exact, asked, options, Nodes::Symbolic, &mut attempt);
     if !attempt.is_given_up {
         return first;
     }
-    let mut second = played(zones(Abstraction::Differences), asked, options, watch);
+    let cut = zones(Abstraction::Differences);
+    let (mut second, _) = played(cut, asked, options, Nodes::Symbolic, watch);
     second.counters.explored += first.counters.explored;
     second
 }
@@ -101,6 +157,21 @@ pub(super) fn zones_of<'a>(
     }
 }
 
+/// Whether the game may be played in discrete states with all that invariants allow: if it does not matter what is reached, and if
+/// neither clocks that stop nor priorities make it hang on more than the state.
+fn can_be_discrete(
+    network: &Network,
+    (objective, is_cooperative): (&Objective, bool),
+    options: &Options,
+) -> bool {
+    let has_priorities = network.features.priorities && options.priorities == Priorities::Kept;
+    let hangs_on_more = network.features.stopwatches || has_priorities;
+    options.plans == PlansWanted::No
+        && !is_cooperative
+        && !matches!(objective, Objective::Buchi(..))
+        && !hangs_on_more
+}
+
 /// The clock comparisons of an objective.
 pub(super) fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
     let (one, other) = match objective {
@@ -114,13 +185,14 @@ pub(super) fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
     both.flat_map(predicate::atoms).collect()
 }
 
-/// Plays the game of a query in these zones.
+/// Plays the game of a query in these zones; also says whether it was given up for having many zones for each discrete state.
 fn played(
     mut symbolic: Symbolic<'_>,
     (objective, is_cooperative): (&Objective, bool),
     options: &Options,
+    nodes: Nodes,
     watch: &mut dyn Watch,
-) -> Answer {
+) -> (Answer, bool) {
     let network = symbolic.stepper.network();
     let recurring;
     let (goal, keep, seeker) = match objective {
@@ -140,17 +212,19 @@ fn played(
         must_progress: seeker == Player::Controller,
         deadline: None,
     };
-    let mut graph = match Graph::new(&mut symbolic, wanted) {
+    let plain = |verdict, counters| (new_answer(verdict, Evidence::default(), counters), false);
+    let graph = match nodes {
+        Nodes::Automatic | Nodes::Symbolic => Graph::new(&mut symbolic, wanted),
+        Nodes::Discrete => Graph::of_discrete_states(&mut symbolic, wanted),
+    };
+    let mut graph = match graph {
         Ok(graph) => graph,
-        Err(failure) => {
-            return new_answer(
-                Verdict::Error(failure),
-                Evidence::default(),
-                Counters::default(),
-            );
-        }
+        Err(failure) => return plain(Verdict::Error(failure), Counters::default()),
     };
     let mut solver = Solver::new(&mut graph, seeker, options.forced);
+    if nodes == Nodes::Automatic {
+        solver.give_up_if_crowded(STATES_BEFORE_CROWD);
+    }
     let is_planned = options.plans != PlansWanted::No
         && matches!(objective, Objective::Reach(_) | Objective::Until(..))
         && !is_cooperative;
@@ -172,15 +246,16 @@ fn played(
     let winner = match result {
         Ok(GameAnswer::Won(winner)) => winner,
         Ok(GameAnswer::Stopped(reason)) => {
-            return new_answer(Verdict::Unknown(reason), Evidence::default(), counters);
+            let has_given_up = solver.has_given_up;
+            return (plain(Verdict::Unknown(reason), counters).0, has_given_up);
         }
         Err(failure) => {
-            return new_answer(Verdict::Error(failure), Evidence::default(), counters);
+            return plain(Verdict::Error(failure), counters);
         }
     };
     // Beside stopped clocks the past of a zone may be too large, so that nobody is known to win.
     if solver.graph.symbolic.is_approximate() {
-        return new_answer(Verdict::Maybe, Evidence::default(), counters);
+        return plain(Verdict::Maybe, counters);
     }
     let verdict = match winner {
         Player::Controller => Verdict::Satisfied,
@@ -210,7 +285,7 @@ fn played(
             Err(failure) => answer.verdict = Verdict::Error(failure),
         }
     }
-    answer
+    (answer, false)
 }
 
 /// Checks a strategy in closed loop.

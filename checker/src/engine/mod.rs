@@ -42,7 +42,7 @@ pub use strategies::NamedStrategy;
 pub use verification::Verification;
 
 use crate::game::strategy::Selection;
-use crate::game::{Forced, Player, Priorities};
+use crate::game::{Forced, Nodes, Player, Priorities};
 pub use crate::search::reach::MOST_THREADS;
 use crate::search::reach::{Manner, Order};
 
@@ -109,6 +109,8 @@ pub struct Options {
     pub forced: Forced,
     /// Whether priorities count in games and under strategies.
     pub priorities: Priorities,
+    /// What the nodes of game graphs are.
+    pub nodes: Nodes,
     /// What runs the code of the model.
     pub code: CodeEngine,
     /// When to give up.
@@ -148,6 +150,7 @@ impl Default for Options {
             threads: 1,
             forced: Forced::default(),
             priorities: Priorities::default(),
+            nodes: Nodes::default(),
             code: CodeEngine::default(),
             limits: Limits::default(),
             plans: PlansWanted::default(),

@@ -8,6 +8,9 @@
 //!   controller's. Nothing of the inside is stored. The winning valuations of the inside follow from those of the end,
 //!   since nobody has a choice.
 //! * An edge leads to a node whose zone contains the zone that the moves reach.
+//! * In a graph of discrete states ([`Graph::of_discrete_states`]) there is one node for each discrete state, whose zone is all that its
+//!   invariants allow. Who wins from a valuation does not hang on how it is reached, so the answer is the same. There may be far
+//!   fewer nodes, but also ones that no run reaches, so a run-time error in such a graph means nothing.
 //!
 //! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly. Where two clocks are compared,
 //! zones are cut along the comparisons, and a move has an edge for each piece; there are no chains then.
@@ -146,6 +149,8 @@ pub struct Graph<'s, 'a> {
     entries: Vec<Zone>,
     pub(super) chains_delays: bool,
     pub(super) trails: Trails,
+    /// Whether there is one node for each discrete state.
+    has_discrete_nodes: bool,
 }
 
 /// Where an edge starts.
@@ -163,8 +168,33 @@ impl<'s, 'a> Graph<'s, 'a> {
         symbolic: &'s mut Symbolic<'a>,
         objective: Objective<'s>,
     ) -> Result<Graph<'s, 'a>, Failure> {
+        let mut graph = Graph::without_nodes(symbolic, objective);
+        let (mut words, mut zone) = graph.initial()?;
+        graph.symbolic.extrapolate(&words, zone.bounds_mut());
+        graph.node(&mut words, &zone)?;
+        Ok(graph)
+    }
+
+    /// A graph of discrete states that holds the initial node only. No clock may be stopped, and there must be no deadline.
+    ///
+    /// Source: N. Jensen, K. G. Larsen, D. Lime, J. Srba, "On-the-Fly Symbolic Algorithm for Timed ATL with Abstractions", CONCUR 2025
+    /// (expansion abstraction).
+    pub fn of_discrete_states(
+        symbolic: &'s mut Symbolic<'a>,
+        objective: Objective<'s>,
+    ) -> Result<Graph<'s, 'a>, Failure> {
+        let mut graph = Graph::without_nodes(symbolic, objective);
+        graph.has_discrete_nodes = true;
+        graph.trails = Trails::new(false, &graph.objective);
+        let (mut words, _, invariant) = graph.symbolic.start()?;
+        let zone = Zone::of_constraints(graph.dimension(), &invariant);
+        graph.node(&mut words, &zone)?;
+        Ok(graph)
+    }
+
+    fn without_nodes(symbolic: &'s mut Symbolic<'a>, objective: Objective<'s>) -> Graph<'s, 'a> {
         let network = symbolic.stepper.network();
-        let mut graph = Graph {
+        Graph {
             store: StateStore::new(network),
             zones: ZoneTable::new(symbolic.dimension()),
             programs: Programs::default(),
@@ -183,13 +213,10 @@ impl<'s, 'a> Graph<'s, 'a> {
             entries: Vec::new(),
             chains_delays: objective.must_progress && !network.features.stopwatches,
             trails: Trails::new(symbolic.is_fixed(), &objective),
+            has_discrete_nodes: false,
             objective,
             symbolic,
-        };
-        let (mut words, mut zone) = graph.initial()?;
-        graph.symbolic.extrapolate(&words, zone.bounds_mut());
-        graph.node(&mut words, &zone)?;
-        Ok(graph)
+        }
     }
 
     /// The initial words and zone.
@@ -209,6 +236,11 @@ impl<'s, 'a> Graph<'s, 'a> {
     /// The number of clocks, the reference clock included.
     pub fn dimension(&self) -> usize {
         self.symbolic.dimension()
+    }
+
+    /// The number of discrete states among the nodes.
+    pub fn discrete_count(&self) -> usize {
+        self.heads.len()
     }
 
     /// The zone of a node.
@@ -487,7 +519,10 @@ impl<'s, 'a> Graph<'s, 'a> {
         for zone in &mut zones {
             delay_after(self.symbolic, target, &self.steps, zone)?;
         }
-        if self.symbolic.splits() {
+        if self.has_discrete_nodes {
+            // All pieces end in the same node, and the steps say from where.
+            zones.truncate(1);
+        } else if self.symbolic.splits() {
             self.symbolic.extrapolate_all(target, &mut zones);
         }
         for zone in zones {
@@ -504,7 +539,11 @@ impl<'s, 'a> Graph<'s, 'a> {
         origin: Origin,
         length: u32,
     ) -> Result<(), Failure> {
-        self.symbolic.extrapolate(target, zone.bounds_mut());
+        if self.has_discrete_nodes {
+            zone = Zone::of_constraints(self.dimension(), invariant_after(&self.steps));
+        } else {
+            self.symbolic.extrapolate(target, zone.bounds_mut());
+        }
         let mut ending = Ending {
             id: self.zones.intern(zone.bounds()),
             zone,
@@ -565,10 +604,13 @@ pub(super) fn delay_after(
     zone: &mut Zone,
 ) -> Result<bool, Failure> {
     let may_delay = symbolic.may_delay(words)?;
-    // The invariant of the state is that of the last step, since steps that are left out have none.
-    let invariant = steps.last().map_or(&[][..], |last| &last.effect.invariant);
-    symbolic.delay(words, may_delay, invariant, zone.bounds_mut())?;
+    symbolic.delay(words, may_delay, invariant_after(steps), zone.bounds_mut())?;
     Ok(may_delay)
+}
+
+/// The invariant of the state that the steps lead to: that of the last step, since steps that are left out have none.
+fn invariant_after(steps: &[ProgramStep]) -> &[Constraint] {
+    steps.last().map_or(&[][..], |last| &last.effect.invariant)
 }
 
 /// Adds a step to a program. One that changes nothing is left out, unless it is the first or ends an invariant.

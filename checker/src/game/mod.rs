@@ -8,6 +8,7 @@ pub mod denial;
 mod evasion;
 mod gains;
 pub mod graph;
+mod hopes;
 pub mod plans;
 pub mod programs;
 pub mod reach;
@@ -62,4 +63,16 @@ pub enum Forced {
     Product,
     /// The environment must move; the controller may always decline.
     Neutral,
+}
+
+/// What the nodes of a game graph are. The answer is the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Nodes {
+    /// Symbolic states first; discrete states if there turn out to be many symbolic ones for each, and if that is possible.
+    #[default]
+    Automatic,
+    /// Symbolic states: what is reached, and no more.
+    Symbolic,
+    /// Discrete states with all that their invariants allow, where that is possible.
+    Discrete,
 }

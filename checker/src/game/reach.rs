@@ -27,10 +27,13 @@
 //! valuations of one stamp into those of smaller ones makes progress. Where the seeker wins nowhere any more, the evader has only
 //! to stay outside of what is won.
 //!
-//! Forward, the solver dives: it follows a random move of each newly made node as far as this goes, then takes up one of
-//! the nodes that wait, at random, and dives from there. Dives from everywhere meet wins that lie close together sooner than dives
-//! in the order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial Search Through Randomization",
+//! Forward, the solver dives: it follows a random move of each newly made node as far as this goes, in every other dive one of the
+//! seeker where there is one, then takes up one of the nodes that wait, at random, and dives from there. Dives from everywhere meet
+//! wins that lie close together sooner than dives in the order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial Search Through Randomization",
 //! AAAI 1998). The random numbers are the same in every run.
+//!
+//! Nodes that the evader may move to from where the seeker has won something come before: the win hangs on them. From time to time
+//! it is looked whether the seeker may still win at all ([`super::hopes`]), so that both answers can come early.
 //!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are. What
 //! takes zones is put off until the graph has grown by a part of itself, and goes round in turns: so a node meets what several of
@@ -50,6 +53,9 @@ use crate::zones::{Bound, ClockSet, Federation, past};
 
 use super::graph::{Edge, Graph, NONE, Standing};
 use super::{Forced, Player};
+
+/// So many nodes for each discrete state are many.
+const CROWD: usize = 4;
 
 /// Expanded nodes between two looks at the limits.
 const LOOK_EVERY: u64 = 64;
@@ -126,12 +132,19 @@ pub struct Solver<'g, 's, 'a> {
     pub gains: Vec<Vec<Gain>>,
     pub(super) forced: Forced,
     pub(super) stamp: u32,
+    /// After how many explored states it is looked whether there are many nodes for each discrete state.
+    crowded_from: u64,
+    /// Whether the solver has given up for having many nodes for each discrete state.
+    pub has_given_up: bool,
     /// Nodes to be expanded; those to dive into stand last.
     waiting: Vec<u32>,
     is_waiting: Vec<bool>,
+    /// Nodes that moves of the evader lead to, and of which it hangs whether more of a node is won; those met last stand last.
+    spoilers: Vec<u32>,
+    /// By node, as far as it was looked at: whether the seeker may still win; see [`super::hopes`].
+    pub(super) has_hope: Vec<bool>,
     random: Random,
-    /// Whether the last expansion made no node to go on with.
-    is_dive_over: bool,
+    dive: Dive,
     /// Nodes to be looked at again, first those that were put in first.
     updates: VecDeque<u32>,
     /// Nodes whose winning valuations are to be computed with zones; some may be settled meanwhile.
@@ -139,6 +152,15 @@ pub struct Solver<'g, 's, 'a> {
     pending: Vec<Pending>,
     /// How many states may be explored before the deferred nodes are computed.
     next_computation: u64,
+}
+
+/// How the graph is dived into.
+#[derive(Clone, Copy, Debug)]
+struct Dive {
+    /// Whether moves of the seeker are followed first.
+    prefers_own: bool,
+    /// Whether the last expansion made no node to go on with.
+    is_over: bool,
 }
 
 /// Whether a node is to be updated.
@@ -181,9 +203,16 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             gains: Vec::new(),
             forced,
             stamp: 0,
+            crowded_from: u64::MAX,
+            has_given_up: false,
             waiting: Vec::new(),
+            spoilers: Vec::new(),
+            has_hope: Vec::new(),
             random: Random(0),
-            is_dive_over: false,
+            dive: Dive {
+                prefers_own: true,
+                is_over: false,
+            },
             is_waiting: Vec::new(),
             updates: VecDeque::new(),
             deferred: VecDeque::new(),
@@ -192,6 +221,17 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         };
         solver.adopt_new_nodes();
         solver
+    }
+
+    /// Lets the solver give up, when it has explored so many states for a verdict, if it has many nodes for each discrete state. It
+    /// stops then for their number, and [`Solver::has_given_up`] is set.
+    pub fn give_up_if_crowded(&mut self, explored: u64) {
+        self.crowded_from = explored;
+    }
+
+    fn is_crowded(&self) -> bool {
+        self.graph.explored >= self.crowded_from
+            && self.graph.nodes.len() >= CROWD * self.graph.discrete_count()
     }
 
     /// What was done so far.
@@ -209,6 +249,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// Solves the game.
     pub fn solve(&mut self, extent: Extent, watch: &mut dyn Watch) -> Result<Answer, Failure> {
         let mut next_look = LOOK_EVERY;
+        let mut next_hope = 1;
         loop {
             let explored = self.graph.explored;
             let reason = if self.waiting.is_empty() || explored >= self.next_computation {
@@ -220,8 +261,20 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             if let Some(reason) = reason {
                 return Ok(Answer::Stopped(reason));
             }
-            if extent == Extent::Verdict && self.is_won() {
-                break;
+            if extent == Extent::Verdict {
+                if self.is_won() {
+                    break;
+                }
+                if explored >= next_hope {
+                    next_hope = 2 * explored;
+                    if !self.has_hope() {
+                        break;
+                    }
+                    if self.is_crowded() {
+                        self.has_given_up = true;
+                        return Ok(Answer::Stopped(StopReason::States));
+                    }
+                }
             }
             let Some(node) = self.next_waiting() else {
                 break;
@@ -240,12 +293,13 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 }
             }
         }
-        let winner = if self.is_won() {
-            self.seeker
-        } else {
-            self.seeker.opponent()
-        };
-        Ok(Answer::Won(winner))
+        if self.is_won() {
+            return Ok(Answer::Won(self.seeker));
+        }
+        if extent == Extent::Verdict {
+            self.keep_out_of_unexpanded();
+        }
+        Ok(Answer::Won(self.seeker.opponent()))
     }
 
     /// Updates nodes until nothing grows.
@@ -356,7 +410,14 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     }
 
     fn next_waiting(&mut self) -> Option<u32> {
-        if self.is_dive_over && !self.waiting.is_empty() {
+        while self.dive.is_over
+            && let Some(node) = self.spoilers.pop()
+        {
+            if !self.graph.nodes[node as usize].is_expanded {
+                return Some(node);
+            }
+        }
+        if self.dive.is_over && !self.waiting.is_empty() {
             let index = self.random.below(self.waiting.len());
             Some(self.waiting.swap_remove(index))
         } else {
@@ -378,7 +439,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    /// Whether the winning valuations of some predecessor may still grow by those of the node.
+    /// Whether the winning valuations of some predecessor with hope may still grow by those of the node.
     fn is_relevant(&self, node: u32) -> bool {
         if node == 0 {
             return true;
@@ -388,7 +449,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             let Edge {
                 source, next_in, ..
             } = self.graph.edges[edge as usize];
-            if !matches!(self.win[source as usize], Win::Everything) {
+            let has_hope = self.has_hope.get(source as usize).is_none_or(|&it| it);
+            if has_hope && !matches!(self.win[source as usize], Win::Everything) {
                 return true;
             }
             edge = next_in;
@@ -402,11 +464,27 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let waiting = self.waiting.len();
         let edges = self.graph.edges_of(node);
         let first = edges.start + self.random.below(edges.len().max(1));
-        for edge in (first..edges.end).chain(edges.start..first) {
-            let target = self.graph.edges[edge].target;
-            self.wait_for(target);
+        // Every other dive follows moves of the seeker where there are some: those of the evader rather lead away from what is sought,
+        // but sometimes they are the way.
+        let turns: &[Option<bool>] = if self.dive.prefers_own {
+            &[Some(false), Some(true)]
+        } else {
+            &[None]
+        };
+        for turn in turns {
+            for edge in (first..edges.end).chain(edges.start..first) {
+                let Edge {
+                    target,
+                    controllable,
+                    ..
+                } = self.graph.edges[edge];
+                if turn.is_none_or(|is_own| self.seeker.owns(controllable) == is_own) {
+                    self.wait_for(target);
+                }
+            }
         }
-        self.is_dive_over = self.waiting.len() == waiting;
+        self.dive.is_over = self.waiting.len() == waiting;
+        self.dive.prefers_own ^= self.dive.is_over;
         self.mark(node);
         Ok(())
     }
@@ -463,7 +541,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     }
 
     /// Whether the words decide who has won in a node.
-    fn is_decided(&self, node: u32) -> bool {
+    pub(super) fn is_decided(&self, node: u32) -> bool {
         match self.graph.nodes[node as usize].standing {
             Standing::Broken => true,
             Standing::Goal => self.targets.is_none(),
@@ -569,7 +647,28 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         };
         won.intersect_zone(self.graph.zone(node));
         self.gain(node, won);
+        if !matches!(self.win[node as usize], Win::Everything) {
+            self.note_spoilers(node);
+        }
         Ok(())
+    }
+
+    /// Lets the nodes be expanded soon to which the evader may move from a node of which more may be won.
+    fn note_spoilers(&mut self, node: u32) {
+        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        if edges.all(|edge| matches!(self.win[edge.target as usize], Win::Nothing)) {
+            return;
+        }
+        for index in self.graph.edges_of(node) {
+            let edge = &self.graph.edges[index];
+            let target = edge.target as usize;
+            if !self.seeker.owns(edge.controllable)
+                && self.is_waiting[target]
+                && !self.graph.nodes[target].is_expanded
+            {
+                self.spoilers.push(edge.target);
+            }
+        }
     }
 
     /// What the controller wins as the seeker, as far as known.

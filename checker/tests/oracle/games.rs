@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict};
 use checker::game::strategy::Strategy;
-use checker::game::{Forced, Player, Priorities};
+use checker::game::{Forced, Nodes, Player, Priorities};
 use checker::search::extremum::Extreme;
 use proptest::test_runner::TestCaseError;
 
@@ -62,7 +62,11 @@ fn compare(
                 Ok(graph) => Ok(wins(network, (goal, keep), graph, kind, rule)),
                 Err(error) => Err(*error),
             };
-            for is_cooperative in [false, true] {
+            for (is_cooperative, nodes) in [
+                (false, Nodes::Symbolic),
+                (false, Nodes::Discrete),
+                (true, Nodes::Automatic),
+            ] {
                 let query = if is_cooperative {
                     format!("E<> {query}")
                 } else {
@@ -75,6 +79,7 @@ fn compare(
                 };
                 let options = Options {
                     forced,
+                    nodes,
                     priorities: Priorities::Kept,
                     verify: true,
                     ..compare::options()
@@ -82,10 +87,10 @@ fn compare(
                 let query_text = model.add_query(&query);
                 let answer = model.check(&query_text, &options);
                 compare::check(&answer, expected, tally, || {
-                    format!("{text}{query}\n{forced:?}")
+                    format!("{text}{query}\n{forced:?} {nodes:?}")
                 })?;
                 compare::check_strategy(&model, &answer, tally, || {
-                    format!("{text}{query}\n{forced:?}")
+                    format!("{text}{query}\n{forced:?} {nodes:?}")
                 })?;
                 let strategy = answer.ok().and_then(|answer| answer.evidence.strategy);
                 if let Some(strategy) = strategy {
@@ -93,7 +98,9 @@ fn compare(
                         let strategy = Arc::clone(&strategy);
                         let result = check_under(&mut model, strategy, &enforced, tally);
                         result.map_err(|error| {
-                            TestCaseError::fail(format!("{text}{query} {forced:?}: {error}"))
+                            TestCaseError::fail(format!(
+                                "{text}{query} {forced:?} {nodes:?}: {error}"
+                            ))
                         })?;
                     }
                 }

@@ -1,0 +1,83 @@
+//! Where the seeker may still win, as far as the graph is explored.
+//!
+//! A node has *hope* if the seeker has won some of it, or if it is not expanded, or if a move of the seeker leads to a node with
+//! hope; a move of the evader only if time may stop in the node, since it need not move before. Nodes without hope are lost: the
+//! evader stays among them whatever the seeker does. So if the initial node has none, the game is over, however much of the graph
+//! waits; and what only nodes without hope lead to need not be explored. Clocks are not looked at, so a node with hope may be lost.
+//!
+//! Nodes lose hope as the graph grows and never gain it again.
+
+use crate::zones::{ClockSet, dbm};
+
+use super::graph::{Edge, NONE};
+use super::reach::{Solver, Win};
+
+impl Solver<'_, '_, '_> {
+    /// Finds the nodes with hope anew, and returns whether the initial one is among them. If it is not, all nodes with hope count as
+    /// won afterwards, so that the strategy of the evader keeps out of them.
+    pub(super) fn has_hope(&mut self) -> bool {
+        let count = self.graph.nodes.len() as u32;
+        let mut has_hope = vec![false; count as usize];
+        let mut waiting: Vec<u32> = (0..count)
+            .filter(|&node| self.is_source_of_hope(node))
+            .collect();
+        for &node in &waiting {
+            has_hope[node as usize] = true;
+        }
+        while let Some(node) = waiting.pop() {
+            let mut edge = self.graph.nodes[node as usize].first_in;
+            while edge != NONE {
+                let Edge {
+                    source,
+                    next_in,
+                    controllable,
+                    ..
+                } = self.graph.edges[edge as usize];
+                edge = next_in;
+                let is_useful = self.seeker.owns(controllable) || self.may_stop(source);
+                if is_useful
+                    && !self.is_decided(source)
+                    && !std::mem::replace(&mut has_hope[source as usize], true)
+                {
+                    waiting.push(source);
+                }
+            }
+        }
+        let is_open = has_hope[0];
+        if !is_open {
+            for (win, has_hope) in self.win.iter_mut().zip(&has_hope) {
+                *win = if *has_hope {
+                    Win::Everything
+                } else {
+                    Win::Nothing
+                };
+            }
+        }
+        self.has_hope = has_hope;
+        is_open
+    }
+
+    /// Counts the nodes that were left unexpanded as won, once the evader has won: it has no need of them, and nobody knows more.
+    pub(super) fn keep_out_of_unexpanded(&mut self) {
+        for node in 0..self.win.len() {
+            if !self.graph.nodes[node].is_expanded && !self.is_decided(node as u32) {
+                self.win[node] = Win::Everything;
+            }
+        }
+    }
+
+    fn is_source_of_hope(&self, node: u32) -> bool {
+        !matches!(self.win[node as usize], Win::Nothing)
+            || !self.graph.nodes[node as usize].is_expanded && !self.is_decided(node)
+    }
+
+    /// Whether time may come to a stop in an expanded node.
+    fn may_stop(&self, node: u32) -> bool {
+        !self.graph.nodes[node as usize].delays
+            || dbm::is_delay_bounded(
+                self.graph.zone(node),
+                self.graph.dimension(),
+                &ClockSet::EMPTY,
+            )
+    }
+}
