@@ -106,3 +106,13 @@ def test_simulation_ends_where_nothing_is_possible() -> None:
     )
     run = model.simulate()
     assert (len(run.steps), run.end) == (1, "stuck")
+
+
+def test_threads_share_a_check_and_a_wrong_number_of_them_is_refused() -> None:
+    model, query = checker.load(LAMP), "E<> Lamp.Off and y < 1 and x > 1"
+    expected = str(model.check(query).trace)
+    assert str(model.check(query, threads=2).trace) == expected
+    assert str(model.check(query, threads="all").trace) == expected
+    for threads in (-1, 4000):
+        with pytest.raises(ValueError, match=f"^{threads} threads: "):
+            model.check(query, threads=threads)

@@ -42,7 +42,7 @@ const PULSE: Duration = Duration::from_millis(20);
 /// Moves of a worker in a round: at first so many, and
 const FEWEST_MOVES: u64 = 1 << 10;
 /// at most so many.
-const MOST_MOVES: u64 = 1 << 14;
+const MOST_MOVES: u64 = 1 << 15;
 /// A worker that has collected so many bytes for others ends its round.
 const MOST_MAIL_BYTES: usize = 1 << 20;
 
