@@ -259,6 +259,10 @@ class Answer:
         """The strategy as JSON text; ``None`` if none was asked for or found."""
         return self._raw.strategy_json()
 
+    def strategy_text(self) -> str | None:
+        """The strategy as text in the form of TIGA; ``None`` if none was asked for or found."""
+        return self._raw.strategy_text()
+
 
 class Model:
     """A model that the engine has accepted.

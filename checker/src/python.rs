@@ -20,7 +20,7 @@ use crate::engine::limits::Observer;
 use crate::engine::verification;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
-    TraceWanted, Verdict, describe, explain, facts, json, strategy_file,
+    TraceWanted, Verdict, describe, explain, facts, json, strategy_file, strategy_text,
 };
 use crate::game::{Forced, Nodes, Priorities};
 use crate::search::limits::StopReason;
@@ -584,6 +584,13 @@ impl Answer {
                 strategy_file::write(model.network(), strategy, &self.query).to_string()
             }),
         )
+    }
+
+    /// The strategy as text in TIGA's form; `None` without a strategy.
+    fn strategy_text(&self) -> Option<String> {
+        let strategy = self.inner.evidence.strategy.as_ref()?;
+        let write = |model: &mut LoadedModel| strategy_text::write(model.network(), strategy);
+        Some(self.model.get().with(write))
     }
 }
 

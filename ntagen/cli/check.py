@@ -71,7 +71,7 @@ class _Outputs:
 
     trace: str | None
     certificate: Path | None
-    strategy: Path | None
+    strategy: str | None
     plans: Path | None
     ranking: str
 
@@ -120,10 +120,9 @@ class _Outputs:
 )
 @click.option(
     "--strategy",
-    metavar="FILE.json",
-    type=click.Path(path_type=Path),
+    metavar="FILE|-",
     help="Write the winner's strategy of the (last) control query: the controller's, or how the "
-    "environment prevents it.",
+    "environment prevents it. A FILE.json is for tools, any other gets TIGA's text; - is stdout.",
 )
 @click.option(
     "--verify",
@@ -190,7 +189,7 @@ def command(
     trace: str | None,
     wanted_trace: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     certificate: Path | None,
-    strategy: Path | None,
+    strategy: str | None,
     verify: bool,
     plans: Path | None,
     ranking: str,
@@ -215,7 +214,7 @@ def command(
       ntagen check examples/paper.nsl --plans plans.json
       ntagen check model.xml --query "E<> Gate.Open" --trace -
       ntagen check model.xml --queries model.q --json --timeout 60s
-      ntagen check game.xml --query "control: A<> Main.Won" --verify
+      ntagen check game.xml --query "control: A<> Main.Won" --verify --strategy -
       ntagen check model.xml --query "bounds{Gate.Open}: x"
       ntagen check model.xml --query "E<> Gate.Open" --fastest --trace open.json
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
@@ -229,6 +228,8 @@ def command(
     pair of both; of several items the list of their values. It is null if no state counts. The
     message says where a clock comes near the value without reaching it.
     """  # noqa: D301  click wants the control character
+    if as_json and strategy == "-":
+        raise click.UsageError("--json and --strategy - both write on standard output")
     outputs = _Outputs(trace, certificate, strategy, plans, ranking)
     worst = 0
     with pointing_to_explanations(not as_json):
@@ -416,11 +417,8 @@ def _write_evidence(
         write_files({outputs.certificate: certificate})
         states = certificate.count("\n") - 1
         notes.append(f"certificate of {states} states written to {outputs.certificate}")
-    strategy = answer.strategy_json() if outputs.strategy else None
-    if outputs.strategy and strategy is not None:
-        write_files({outputs.strategy: strategy + "\n"})
-        whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
-        notes.append(f"{whose} written to {outputs.strategy}")
+    if outputs.strategy:
+        notes += _write_strategy(answer, query, outputs.strategy)
     if outputs.plans and answer.plan_count is not None:
         notes += _write_plans(answer, outputs.plans, outputs.ranking, scene)
     return notes
@@ -437,6 +435,20 @@ def _write_trace(answer: Answer, query: _Asked, target: str) -> list[str]:
     as_json = answer.trace_json() if path.suffix == ".json" else None
     write_files({path: f"{as_json}\n" if as_json else f"{query.text}\n\n{text}"})
     return [f"trace written to {path}"]
+
+
+def _write_strategy(answer: Answer, query: _Asked, target: str) -> list[str]:
+    text = answer.strategy_text()
+    if text is None:
+        return []
+    if target == "-":
+        click.echo(text, nl=False)
+        return []
+    path = Path(target)
+    as_json = answer.strategy_json() if path.suffix == ".json" else None
+    write_files({path: f"{as_json}\n" if as_json else f"{query.text}\n\n{text}"})
+    whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
+    return [f"{whose} written to {target}"]
 
 
 def _write_plans(answer: Answer, path: Path, ranking: str, scene: Scene | None) -> list[str]:

@@ -137,33 +137,41 @@ pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
     constraints
 }
 
-/// The fewest constraints that make a zone: first the equalities, as `x == 3` and `x-y == 2`, then the others, as `x <= 3`.
+/// The fewest constraints that make a zone: first the equalities, as `x == 3` and `x-y == 2`, then the others, as `x <= 3` and `x-y >= 1`.
 pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
     let ties = |left: usize, right: usize| {
         zone.bound(left, right) + zone.bound(right, left) == Bound::LE_ZERO
     };
     let name = |clock: usize| network.clocks[clock].name.as_str();
-    let difference = |left: usize, right: usize| match right {
-        0 => name(left).to_owned(),
-        _ => format!("{}-{}", name(left), name(right)),
+    let compared = |left: usize, right: usize, relation: &str, value: i32| {
+        // Differences are written so that they are not negative.
+        let is_swapped = left == 0 || (right != 0 && value < 0);
+        let (left, right, value) = if is_swapped {
+            (right, left, -value)
+        } else {
+            (left, right, value)
+        };
+        let relation = match relation {
+            "<=" if is_swapped => ">=",
+            "<" if is_swapped => ">",
+            same => same,
+        };
+        match right {
+            0 => format!("{} {relation} {value}", name(left)),
+            _ => format!("{}-{} {relation} {value}", name(left), name(right)),
+        }
     };
     let mut texts = Vec::new();
     for left in 1..zone.dimension() {
         if let Some(right) = (0..left).find(|&right| ties(left, right)) {
-            let value = zone.bound(left, right).value();
-            texts.push(format!("{} == {value}", difference(left, right)));
+            texts.push(compared(left, right, "==", zone.bound(left, right).value()));
         }
     }
     minimal::for_each_minimal(zone.bounds(), zone.dimension(), |one| {
-        if ties(one.left, one.right) {
-            return;
+        if !ties(one.left, one.right) {
+            let relation = if one.bound.is_strict() { "<" } else { "<=" };
+            texts.push(compared(one.left, one.right, relation, one.bound.value()));
         }
-        let equal = if one.bound.is_strict() { "" } else { "=" };
-        let value = one.bound.value();
-        texts.push(match one.left {
-            0 => format!("{} >{equal} {}", name(one.right), -value),
-            left => format!("{} <{equal} {value}", difference(left, one.right)),
-        });
     });
     texts
 }

@@ -5,6 +5,7 @@
 
 pub mod answer;
 pub mod certificate;
+pub mod decision_table;
 pub mod describe;
 pub mod evidence;
 pub mod explain;
@@ -18,6 +19,7 @@ pub mod play;
 pub mod simulation;
 pub mod strategies;
 pub mod strategy_file;
+pub mod strategy_text;
 pub mod verification;
 
 use std::path::{Path, PathBuf};

@@ -88,7 +88,7 @@ pub fn joined<'s>(
 }
 
 /// The parts of the decisions in which they count.
-fn counting<'d>(
+pub fn counting<'d>(
     decisions: &[&'d Decision],
     selection: Selection,
     dimension: usize,

@@ -129,6 +129,22 @@ def test_traces_and_strategies_and_plans_are_written(
     assert decisions[0]["action"][0]["sync"] == "go!"
 
 
+def test_strategies_are_written_as_text(
+    gate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    query = "control: A<> Gate.Open"
+    out, _ = check_run(capsys, 0, gate, "--query", query, "--strategy", "-")
+    assert "\nStrategy to win:\n\nState: ( Driver.Here Gate.Closed ) Gate.n=0\nWhen" in out
+    assert "take transition Driver.Here->Driver.There { 1, go!, 1 } Gate.Closed->Gate.Open" in out
+    path = tmp_path / "strategy.txt"
+    check_run(capsys, 0, gate, "--query", query, "--strategy", path)
+    text = path.read_text()
+    assert text.startswith(f"{query}\n\nInitial state:\n")
+    assert text.partition("\n\n")[2] in out
+    _, err = check_run(capsys, 2, gate, "--query", query, "--strategy", "-", "--json")
+    assert "standard output" in err
+
+
 def test_plans_of_an_environment_are_ranked_and_certified(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

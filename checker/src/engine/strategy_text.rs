@@ -1,0 +1,76 @@
+//! Strategies as text, in the form that TIGA's command-line checker prints: for each discrete state, where to wait and where to act.
+
+use std::fmt::Write as _;
+
+use crate::game::Player;
+use crate::game::strategy::{Selection, Strategy};
+use crate::ir::Network;
+use crate::zones::{Federation, Zone};
+
+use super::decision_table::{self, Rule};
+use super::describe;
+
+/// A strategy as text: the initial state, whose strategy it is, and a paragraph for each discrete state about which it says
+/// something. Each line stands on its own; of a strategy that leaves a choice, several may apply.
+pub fn write(network: &Network, strategy: &Strategy) -> String {
+    let mut text = format!(
+        "Initial state:\n{}\n{}\n\n",
+        describe::words_line(network, &network.initial),
+        initial_clocks(network)
+    );
+    text.push_str(match (strategy.owner, strategy.selection) {
+        (Player::Environment, _) => "Strategy of the environment:\n",
+        (Player::Controller, Selection::First) => "Strategy to win:\n",
+        (Player::Controller, Selection::Any) => "Strategy to avoid losing:\n",
+    });
+    for entry in decision_table::entries(network, strategy) {
+        let state = describe::words_line(network, entry.words);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "\nState: {state}");
+        if entry.is_goal {
+            text.push_str("Play has ended here.\n");
+        }
+        for rule in &entry.rules {
+            text.push_str(&line(network, rule));
+        }
+    }
+    text
+}
+
+/// What a rule says, as a line.
+fn line(network: &Network, rule: &Rule) -> String {
+    let zones = zones(network, &rule.zones);
+    let Some(parts) = &rule.action else {
+        return format!("While you are in\t{zones}, wait.\n");
+    };
+    let parts = parts.iter().map(|&one| describe::part_text(network, one));
+    let parts: Vec<String> = parts.collect();
+    format!(
+        "When you are in {zones}, take transition {}\n",
+        parts.join(" ")
+    )
+}
+
+/// The zones, joined by "or"; one without constraints is "true".
+fn zones(network: &Network, federation: &Federation) -> String {
+    let zones = federation.zones().map(|bounds| {
+        let zone = Zone::from_bounds(federation.dimension(), bounds);
+        conjunction(&describe::minimal_constraints(network, &zone))
+    });
+    zones.collect::<Vec<_>>().join(" || ")
+}
+
+fn conjunction(constraints: &[String]) -> String {
+    if constraints.is_empty() {
+        return "true".to_owned();
+    }
+    let constraints: Vec<String> = constraints.iter().map(|one| one.replace(' ', "")).collect();
+    format!("({})", constraints.join(" && "))
+}
+
+/// The initial clock values.
+fn initial_clocks(network: &Network) -> String {
+    let clocks = network.clocks.iter().zip(&network.initial_clocks).skip(1);
+    let clocks = clocks.map(|(clock, value)| format!("{}=={value}", clock.name));
+    conjunction(&clocks.collect::<Vec<_>>())
+}
