@@ -420,7 +420,8 @@ class Model:
             memory_bytes: The search stops when its states take this much.
             timeout_s: The search stops after this time.
             plans: Which winning sequences to list.
-            max_plans: At most this many plans are listed.
+            max_plans: At most this many plans are listed; 1 is the quick search of
+                ``plans="first"``.
             strategy: Whether the strategy of the player who wins is wanted.
             verify: Whether the strategy is to be checked against every move of the opponent.
             trace: Whether witnesses and counterexamples get exact times, which an independent
@@ -442,13 +443,16 @@ class Model:
             The answer; a limit that was reached is an answer too.
 
         Raises:
+            ValueError: `max_plans` is less than 1.
             RejectedError: The query is wrong or of a kind that is not supported.
             ValueError: There are to be more than 2048 threads, or fewer than none.
             KeyboardInterrupt: The user interrupted.
         """
         if threads != "all" and threads < 0:
             raise ValueError(f"{threads} threads: there must be at least one, or all")
-        wanted = {"none": None, "first": 1, "all": max(max_plans, 2)}[plans]
+        if max_plans < 1:
+            raise ValueError("max_plans is the number of plans to list, at least 1")
+        wanted = {"none": None, "first": 1, "all": max_plans}[plans]
         try:
             raw = self._raw.check(
                 query,

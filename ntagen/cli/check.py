@@ -55,6 +55,20 @@ class _Threads(click.ParamType[int]):
         return int(text)
 
 
+class _PlanCount(click.ParamType[int]):
+    """A number of plans, at least 1; ``first`` is 1."""
+
+    name = "number of plans"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
+        text = "1" if value == "first" else str(value)
+        if not text.isdecimal() or int(text) < 1:
+            self.fail(f"{value!r} is no {self.name}; write 1, 2, … or first", param, ctx)
+        return int(text)
+
+
 @dataclass(frozen=True, slots=True)
 class _Asked:
     """A query to be answered."""
@@ -145,7 +159,12 @@ class _Outputs:
     help="How plans of an environment are ranked.",
 )
 @click.option(
-    "--max-plans", type=click.IntRange(2), default=1_000_000, help="List at most so many."
+    "--max-plans",
+    metavar="N|first",
+    type=_PlanCount(),
+    default=1_000_000,
+    show_default=True,
+    help="List at most so many. 1 or `first` is any one, found without looking for the others.",
 )
 @click.option("--search", type=click.Choice(["bfs", "dfs", "random"]), default="bfs")
 @click.option(
@@ -465,7 +484,8 @@ def _write_plans(answer: Answer, path: Path, ranking: str, scene: Scene | None) 
     ranked = rank(found, criteria)
     write_files({path: json.dumps(document(scene, ranked, criteria), indent=1) + "\n"})
     holding = [candidate for candidate in ranked if candidate.certificate.holds()]
-    notes = [f"{len(ranked)} plans written to {path}; {len(holding)} hold on the exact arc, best:"]
+    written = "1 plan" if len(ranked) == 1 else f"{len(ranked)} plans"
+    notes = [f"{written} written to {path}; {len(holding)} hold on the exact arc, best:"]
     for place, candidate in enumerate(holding[:BEST_SHOWN], start=1):
         clearance = candidate.certificate.critical_clearance_mm
         shown = (

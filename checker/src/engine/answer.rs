@@ -62,7 +62,7 @@ pub struct Evidence {
     pub verification: Option<Verification>,
     /// Plans, if they were wanted.
     pub plans: Option<Vec<Plan>>,
-    /// Whether there are more plans than were wanted.
+    /// Whether there are more plans than were wanted, or may be: after the first, no other is looked for.
     pub has_more_plans: bool,
 }
 

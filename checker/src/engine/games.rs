@@ -316,7 +316,7 @@ fn add_plans(answer: &mut Answer, solver: &mut Solver<'_, '_, '_>, options: &Opt
     match plans(solver, most) {
         Ok(Ok((plans, has_more))) => {
             answer.evidence.plans = Some(plans);
-            answer.evidence.has_more_plans = has_more && most > 1;
+            answer.evidence.has_more_plans = has_more;
         }
         Ok(Err(NoPlans::EnvironmentChooses)) => {
             let message = "the environment has choices, so the strategy is no list of plans";
@@ -326,7 +326,7 @@ fn add_plans(answer: &mut Answer, solver: &mut Solver<'_, '_, '_>, options: &Opt
     }
 }
 
-/// At most this many plans, and whether there are more.
+/// At most this many plans, and whether there are more. After a single one nobody looks for another, so there may be.
 fn plans(
     solver: &mut Solver<'_, '_, '_>,
     most: usize,
@@ -342,6 +342,9 @@ fn plans(
         }
         let path = path.to_vec();
         plans.push(paths.spell(&path)?);
+        if most == 1 {
+            return Ok(Ok((plans, true)));
+        }
     }
     Ok(Ok((plans, false)))
 }
