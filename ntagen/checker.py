@@ -581,18 +581,29 @@ class Model:
             raise RejectedError(error.args[0]) from None
         return Strategy(raw, forced, priorities)
 
-    def verify(self, text: str, path: str = "") -> Verification:
-        """Checks a trace or a certificate, independently of the search that found it.
+    def verify(
+        self,
+        text: str,
+        path: str = "",
+        *,
+        forced: ForcedRule = "tiga",
+        priorities: PriorityRule = "ignore",
+    ) -> Verification:
+        """Checks a trace, certificate or strategy, independently of the search that found it.
 
         Args:
-            text: The file, as `Answer.trace_json` and `Answer.certificate_text` give it.
+            text: The file, as `Answer.trace_json`, `Answer.certificate_text` and
+                `Answer.strategy_json` give it.
             path: What to call it in messages.
+            forced: For strategies: what happens where time cannot pass and only the environment
+                can move.
+            priorities: For strategies: whether priorities of channels and processes count.
 
         Raises:
-            RejectedError: It is neither, or does not belong to this model.
+            RejectedError: It is none of them, or does not belong to this model.
         """
         try:
-            holds, lines = self._raw.verify(path or "evidence", text)
+            holds, lines = self._raw.verify(path or "evidence", text, forced, priorities)
         except _checker.RejectedError as error:
             raise RejectedError(error.args[0]) from None
         return Verification(holds, tuple(lines))

@@ -59,6 +59,23 @@ fn code_engine(name: &str) -> PyResult<CodeEngine> {
     }
 }
 
+fn forced_rule(name: &str) -> PyResult<Forced> {
+    match name {
+        "tiga" => Ok(Forced::Tiga),
+        "product" => Ok(Forced::Product),
+        "neutral" => Ok(Forced::Neutral),
+        other => Err(unknown("rule for forced moves", other)),
+    }
+}
+
+fn priority_rule(name: &str) -> PyResult<Priorities> {
+    match name {
+        "ignore" => Ok(Priorities::Ignored),
+        "keep" => Ok(Priorities::Kept),
+        other => Err(unknown("rule for priorities", other)),
+    }
+}
+
 fn time_limit(seconds: Option<f64>) -> PyResult<Option<Duration>> {
     let limit = seconds.map(Duration::try_from_secs_f64).transpose();
     limit.map_err(|_| unknown("time limit", &format!("{seconds:?}")))
@@ -281,16 +298,20 @@ impl Model {
         Ok(json_list(facts::queries(&queries)))
     }
 
-    /// Checks a file with a certificate or a trace: whether it holds (`None` if the check does not cover it), and what was looked at.
+    /// Checks a file with a certificate, a trace or a strategy: whether it holds (`None` if the check does not cover it), and what was
+    /// looked at.
     fn verify(
         slf: &Bound<'_, Self>,
         path: &str,
         text: &str,
+        forced: &str,
+        priorities: &str,
     ) -> PyResult<(Option<bool>, Vec<String>)> {
+        let rules = (forced_rule(forced)?, priority_rule(priorities)?);
         let model = slf.get();
         let checked = slf
             .py()
-            .detach(|| model.with(|model| model.verify_evidence(path, text)));
+            .detach(|| model.with(|model| model.verify_evidence(path, text, rules)));
         let checked = checked.map_err(rejected)?;
         Ok((checked.holds, checked.lines))
     }

@@ -163,17 +163,25 @@ fn file_is_checked() {
     let certificate = answer.evidence.certificate.expect("it is satisfied");
     let text = certificate.text(model.network(), QUERY);
     let checked = model
-        .verify_evidence("safe.jsonl", &text)
+        .verify_evidence("safe.jsonl", &text, Default::default())
         .expect("it is one");
     assert_eq!(checked.holds, Some(true), "{:?}", checked.lines);
     let shorter: Vec<&str> = text.lines().take(3).collect();
     assert!(
         model
-            .verify_evidence("safe.jsonl", &shorter.join("\n"))
+            .verify_evidence("safe.jsonl", &shorter.join("\n"), Default::default())
             .is_err()
     );
-    assert!(model.verify_evidence("safe.jsonl", "{}").is_err());
-    assert!(model.verify_evidence("safe.jsonl", "no json").is_err());
+    assert!(
+        model
+            .verify_evidence("safe.jsonl", "{}", Default::default())
+            .is_err()
+    );
+    assert!(
+        model
+            .verify_evidence("safe.jsonl", "no json", Default::default())
+            .is_err()
+    );
 }
 
 /// Deadlocks, urgent channels with clock guards, priorities and receivers that abstain have rules of their own in the check.

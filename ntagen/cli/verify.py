@@ -1,9 +1,9 @@
-"""`ntagen verify`: does a trace or a certificate show what it is said to?"""
+"""`ntagen verify`: does a trace, a certificate or a strategy do what it is said to?"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import click
 
@@ -24,23 +24,43 @@ NOT_COVERED: Final = 3
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
-def command(model_path: Path, file: Path) -> int:
-    """Check a trace or a certificate, independently of the search that found it.
+@click.option(
+    "--forced",
+    type=click.Choice(["tiga", "product", "neutral"]),
+    default="tiga",
+    help="For strategies: when the environment must move because time cannot pass.",
+)
+@click.option(
+    "--priorities",
+    type=click.Choice(["ignore", "keep"]),
+    default="ignore",
+    help="For strategies: whether priorities of channels and processes count.",
+)
+def command(
+    model_path: Path,
+    file: Path,
+    forced: Any,  # noqa: ANN401  click gives a str where the engine wants literals
+    priorities: Any,  # noqa: ANN401
+) -> int:
+    """Check a trace, certificate or strategy, independently of the search that found it.
 
-    FILE is what `ntagen check` wrote for MODEL with --certificate FILE or --trace FILE.json, or
-    `ntagen play` with --log FILE. A trace is replayed with its exact times, and must show what its
-    query asks about; a play must end as it says. A certificate is a set of states for E<> (not
-    satisfied) or A[] (satisfied): it must contain the initial state, no move and no delay may lead
-    out of it, and it must not meet what is to be avoided.
+    FILE is what `ntagen check` wrote for MODEL with --certificate FILE, --trace FILE.json or
+    --strategy FILE.json, or `ntagen play` with --log FILE. A trace is replayed with its exact
+    times, and must show what its query asks about; a play must end as it says. A certificate is a
+    set of states for E<> (not satisfied) or A[] (satisfied): it must contain the initial state, no
+    move and no delay may lead out of it, and it must not meet what is to be avoided. A strategy is
+    played against every move of its opponent, at every moment, and its owner must win.
 
     \b
     Examples:
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
       ntagen verify model.xml safe.jsonl
+      ntagen check game.xml --query "control: A<> Main.Won" --strategy win.json
+      ntagen verify game.xml win.json
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(True):
         loaded = load_model(model_path)
-        checked = loaded.model.verify(_read(file), str(file))
+        checked = loaded.model.verify(_read(file), str(file), forced=forced, priorities=priorities)
     for line in checked.lines:
         click.echo(line)
     return {True: 0, False: VIOLATED, None: NOT_COVERED}[checked.holds]

@@ -9,6 +9,8 @@
 
 use serde_json::{Value as Json, json};
 
+use crate::game::strategy::Strategy;
+use crate::game::{Forced, Priorities};
 use crate::ir::{Network, Objective, Predicate, QueryKind};
 use crate::network::Symbolic;
 use crate::search::StopReason;
@@ -16,12 +18,12 @@ use crate::search::limits::{Counters, Watch};
 use crate::search::plain::{Measure, Outcome, Search};
 use crate::verify::certificate::{self, Defect, States};
 use crate::verify::replay::{self, Claim, End, Moment, Run, Shown, Step};
-use crate::verify::strategy::Constraint;
+use crate::verify::strategy::{Constraint, Outcome as StrategyOutcome};
 use crate::verify::{self, Part};
 
 use super::describe;
 use super::evidence::{Missing, Proof};
-use super::{LoadedModel, Rejection, json, verification};
+use super::{LoadedModel, Rejection, json, strategy_file, verification};
 
 /// What a file with a certificate says that it is.
 pub const FORMAT: &str = "ntagen-certificate";
@@ -137,11 +139,17 @@ pub struct Checked {
 type Unreadable = String;
 
 /// What a file of evidence is.
-const HINT: &str = "hint: it must come from `ntagen check` for this model: with --certificate FILE, or --trace FILE.json; or from `ntagen play` with --log FILE";
+const HINT: &str = "hint: it must come from `ntagen check` for this model: with --certificate FILE, --trace FILE.json or --strategy FILE.json; or from `ntagen play` with --log FILE";
 
 impl LoadedModel {
-    /// Checks a certificate or a trace that was written for this model, independently of how it was found.
-    pub fn verify_evidence(&mut self, path: &str, text: &str) -> Result<Checked, Rejection> {
+    /// Checks a certificate, a trace or a strategy that was written for this model, independently of how it was found. `rules` are
+    /// those for forced moves and priorities that a strategy was made for.
+    pub fn verify_evidence(
+        &mut self,
+        path: &str,
+        text: &str,
+        rules: (Forced, Priorities),
+    ) -> Result<Checked, Rejection> {
         let unreadable = |why: Unreadable| Rejection {
             diagnostics: Vec::new(),
             rendered: vec![format!("error: {path}: {why}\n{HINT}")],
@@ -151,19 +159,25 @@ impl LoadedModel {
             .or_else(|_| serde_json::from_str(text))
             .map_err(|error| unreadable(format!("it is no JSON: {error}")))?;
         let kind = header["format"].as_str().unwrap_or_default().to_owned();
-        if header["version"] != 1 || ![FORMAT, json::TRACE_FORMAT].contains(&kind.as_str()) {
+        if header["version"] != 1
+            || ![FORMAT, json::TRACE_FORMAT, strategy_file::FORMAT].contains(&kind.as_str())
+        {
             return Err(unreadable(
-                "it is neither a certificate nor a trace of version 1".to_owned(),
+                "it is neither a certificate nor a trace nor a strategy of version 1".to_owned(),
             ));
         }
         let query = header["query"].as_str().unwrap_or_default();
         let query_text = self.add_query(query);
         let (compiled, _) = self.compile(query_text.span)?;
         let network = self.network();
-        let checked = if kind == FORMAT {
-            check_certificate(network, &compiled.kind, &header, text)
-        } else {
-            check_traces(network, &compiled.kind, &header)
+        let checked = match kind.as_str() {
+            FORMAT => check_certificate(network, &compiled.kind, &header, text),
+            json::TRACE_FORMAT => check_traces(network, &compiled.kind, &header),
+            _ => strategy_file::read(network, text.as_bytes())
+                .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))
+                .and_then(|(_, strategy)| {
+                    check_strategy(network, &compiled.kind, &strategy, rules)
+                }),
         };
         checked.map_err(unreadable)
     }
@@ -171,6 +185,31 @@ impl LoadedModel {
 
 fn negation(predicate: &Predicate) -> Predicate {
     Predicate::Not(Box::new(predicate.clone()))
+}
+
+/// Checks in closed loop that the owner of a strategy wins.
+fn check_strategy(
+    network: &Network,
+    query: &QueryKind,
+    strategy: &Strategy,
+    rules: (Forced, Priorities),
+) -> Result<Checked, Unreadable> {
+    let QueryKind::Control { objective, .. } = query else {
+        return Err("the query of a strategy begins with control:".to_owned());
+    };
+    let decisions = verification::decisions(network, strategy);
+    let played = (&decisions[..], strategy.owner, strategy.selection);
+    let most = verification::MOST_REGIONS;
+    let result = verification::verify(network, objective, played, rules, most);
+    let holds = match &result {
+        Ok(StrategyOutcome::Verified(_)) => Some(true),
+        Ok(StrategyOutcome::Violated(..)) => Some(false),
+        Ok(StrategyOutcome::TooLarge(_)) | Err(_) => None,
+    };
+    Ok(Checked {
+        holds,
+        lines: verification::describe(network, &result),
+    })
 }
 
 /// Checks a certificate as read from its file.

@@ -74,12 +74,17 @@ fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> (i64, bool)
     (constant.unwrap_or(0), has_differences)
 }
 
-/// The decisions of a strategy by words, in the order of their ranks.
+/// The decisions of a strategy by words, in the order of their ranks. There are none where play is said to have ended, so that a state
+/// in which it has not is found.
 pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
     let states = closed_loop::joined(network, strategy).into_iter();
-    let states = states.map(|(words, _, decisions)| Decisions {
+    let states = states.map(|(words, is_goal, decisions)| Decisions {
         words: words.to_vec(),
-        decisions: decisions.into_iter().map(decision).collect(),
+        decisions: if is_goal {
+            Vec::new()
+        } else {
+            decisions.into_iter().map(decision).collect()
+        },
     });
     states.collect()
 }

@@ -128,3 +128,80 @@ def test_certificate_of_another_model_is_rejected(
     lamp.write_text(LAMP.replace("clock x;", "clock x; int n;"))
     check_exit(2, "verify", lamp, certificate)
     assert "a model with other processes, variables or clocks" in capsys.readouterr().err
+
+
+RACE = """
+process P() {
+  clock x;
+  state L { x <= 2 }, G, Bad;
+  init L;
+  trans L -> G { guard x >= 1; },
+        L -u-> Bad { guard x > 1; };
+}
+system P;
+"""
+
+
+@pytest.mark.parametrize(
+    ("query", "code", "owner", "changed", "said"),
+    [
+        ("control: A<> P.G", 0, "controller", ('["P.x < 1"]', '["P.x < 0"]'), "has no decision"),
+        ("control: A[] not P.Bad", 0, "controller", ('["P.x < 1"]', '["P.x <= 2"]'), "not hold"),
+        ("control: A<> P.Bad", 1, "environment", ('"goal": false', '"goal": true'), "no decision"),
+    ],
+)
+def test_strategy_holds_until_a_decision_is_changed(
+    query: str,
+    code: int,
+    owner: str,
+    changed: tuple[str, str],
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    model = tmp_path / "race.xta"
+    model.write_text(RACE)
+    path = tmp_path / "strategy.json"
+    check_exit(code, "check", model, "--query", query, "--strategy", path)
+    check_exit(0, "verify", model, path)
+    assert "strategy verified: " in capsys.readouterr().out
+    file = json.loads(path.read_text())
+    assert (file["format"], file["owner"]) == ("ntagen-strategy", owner)
+    text = json.dumps(file)
+    assert changed[0] in text, text
+    path.write_text(text.replace(*changed))
+    check_exit(1, "verify", model, path)
+    assert said in capsys.readouterr().out
+
+
+def test_strategy_depends_on_the_rule_for_forced_moves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "forced.xta"
+    model.write_text(
+        "process P() { clock x; state I { x <= 5 }, G, S; init I; "
+        "trans I -u-> G { }, I -> S { }; }\nsystem P;\n"
+    )
+    path = tmp_path / "strategy.json"
+    query = ("--query", "control: A<> P.G", "--strategy", path)
+    check_exit(0, "check", model, *query, "--forced", "neutral")
+    check_exit(0, "verify", model, path, "--forced", "neutral")
+    check_exit(1, "verify", model, path)
+    assert "time cannot pass" in capsys.readouterr().out
+
+
+def test_strategy_of_another_query_or_model_is_rejected(
+    lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "race.xta"
+    model.write_text(RACE)
+    path = tmp_path / "strategy.json"
+    check_exit(0, "check", model, "--query", "control: A<> P.G", "--strategy", path)
+    text = path.read_text()
+    path.write_text(text.replace("control: A<> P.G", "E<> P.G"))
+    check_exit(2, "verify", model, path)
+    assert "begins with control:" in capsys.readouterr().err
+    path.write_text(text.replace("control: A<> P.G", "control: A<> Lamp.On"))
+    check_exit(2, "verify", lamp, path)
+    said = capsys.readouterr().err
+    assert "strategy.json: at states[0].locations: the model's process Lamp" in said
