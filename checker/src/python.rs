@@ -59,23 +59,6 @@ fn code_engine(name: &str) -> PyResult<CodeEngine> {
     }
 }
 
-fn forced_rule(name: &str) -> PyResult<Forced> {
-    match name {
-        "tiga" => Ok(Forced::Tiga),
-        "product" => Ok(Forced::Product),
-        "neutral" => Ok(Forced::Neutral),
-        other => Err(unknown("rule for forced moves", other)),
-    }
-}
-
-fn priority_rule(name: &str) -> PyResult<Priorities> {
-    match name {
-        "ignore" => Ok(Priorities::Ignored),
-        "keep" => Ok(Priorities::Kept),
-        other => Err(unknown("rule for priorities", other)),
-    }
-}
-
 fn time_limit(seconds: Option<f64>) -> PyResult<Option<Duration>> {
     let limit = seconds.map(Duration::try_from_secs_f64).transpose();
     limit.map_err(|_| unknown("time limit", &format!("{seconds:?}")))

@@ -270,10 +270,11 @@ fn played(
         add_plans(&mut answer, &mut solver, options);
     }
     if is_strategy_wanted {
-        let strategy = match winner {
+        let layered = solver.put_into_layers(watch);
+        let strategy = layered.and_then(|()| match winner {
             Player::Environment if is_recurring => denial::extract(&mut solver, &rounds),
             _ => strategy::extract(&mut solver),
-        };
+        });
         match strategy {
             Ok(strategy) => {
                 if options.verify {

@@ -9,6 +9,7 @@ mod evasion;
 mod gains;
 pub mod graph;
 mod hopes;
+mod layers;
 pub mod plans;
 pub mod programs;
 pub mod reach;

@@ -364,6 +364,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// Forgets what was won, and seeks these parts of the nodes, in all of which play goes on.
     pub(super) fn restart(&mut self, targets: Vec<Win>) {
         self.targets = Some(targets);
+        self.begin_anew();
+    }
+
+    /// Forgets what was won. All nodes are to be updated.
+    pub(super) fn begin_anew(&mut self) {
         self.stamp = 0;
         self.win.clear();
         self.rest.clear();
@@ -587,6 +592,15 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
+    /// The nodes that are to be updated, in order; none is any more.
+    pub(super) fn take_updates(&mut self) -> VecDeque<u32> {
+        let nodes = std::mem::take(&mut self.updates);
+        for &node in &nodes {
+            self.pending[node as usize] = Pending::No;
+        }
+        nodes
+    }
+
     pub(super) fn mark(&mut self, node: u32) {
         let pending = &mut self.pending[node as usize];
         if std::mem::replace(pending, Pending::Look) != Pending::Look {
@@ -596,7 +610,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
 
     /// Decides without zones whether the node is won as a whole (`true`) or nothing new is won (`false`); `None` if zones
     /// are needed.
-    fn quick(&self, node: u32) -> Option<bool> {
+    pub(super) fn quick(&self, node: u32) -> Option<bool> {
         let mut can_move = false;
         let mut is_spoiled = false;
         let mut has_evader = false;
@@ -641,16 +655,22 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
 
     /// Computes the winning valuations of a node anew.
     fn compute(&mut self, node: u32) -> Result<(), Failure> {
-        let mut won = match self.seeker {
-            Player::Controller => self.controllers_gain(node)?,
-            Player::Environment => self.environments_gain(node)?,
-        };
-        won.intersect_zone(self.graph.zone(node));
+        let won = self.winnable(node)?;
         self.gain(node, won);
         if !matches!(self.win[node as usize], Win::Everything) {
             self.note_spoilers(node);
         }
         Ok(())
+    }
+
+    /// The valuations of a node that are won by what is known of its successors.
+    pub(super) fn winnable(&mut self, node: u32) -> Result<Federation, Failure> {
+        let mut won = match self.seeker {
+            Player::Controller => self.controllers_gain(node)?,
+            Player::Environment => self.environments_gain(node)?,
+        };
+        won.intersect_zone(self.graph.zone(node));
+        Ok(won)
     }
 
     /// Lets the nodes be expanded soon to which the evader may move from a node of which more may be won.
