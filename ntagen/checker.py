@@ -263,6 +263,20 @@ class Answer:
         """The strategy as text in the form of TIGA; ``None`` if none was asked for or found."""
         return self._raw.strategy_text()
 
+    def controller_c(self) -> str | None:
+        """The strategy as a controller in C99; ``None`` if none was asked for or found.
+
+        The file depends on nothing but two standard headers; the comment at its start says how to
+        call it.
+
+        Raises:
+            RejectedError: The model has stopwatches.
+        """
+        try:
+            return self._raw.controller_c()
+        except _checker.RejectedError as error:
+            raise RejectedError(error.args[0]) from None
+
 
 class Model:
     """A model that the engine has accepted.

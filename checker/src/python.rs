@@ -20,7 +20,7 @@ use crate::engine::limits::Observer;
 use crate::engine::verification;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
-    TraceWanted, Verdict, describe, explain, facts, json, strategy_file, strategy_text,
+    TraceWanted, Verdict, controller, describe, explain, facts, json, strategy_file, strategy_text,
 };
 use crate::game::{Forced, Nodes, Priorities};
 use crate::search::limits::StopReason;
@@ -588,6 +588,19 @@ impl Answer {
                 strategy_file::write(model.network(), strategy, &self.query).to_string()
             }),
         )
+    }
+
+    /// The strategy as a controller in C; `None` without a strategy.
+    fn controller_c(&self) -> PyResult<Option<String>> {
+        let Some(strategy) = self.inner.evidence.strategy.as_ref() else {
+            return Ok(None);
+        };
+        let text = self
+            .model
+            .get()
+            .with(|model| controller::write(model.network(), strategy, &self.query));
+        text.map(Some)
+            .map_err(|reason| RejectedError::new_err((vec![format!("error: {reason}")],)))
     }
 
     /// The strategy as text in TIGA's form; `None` without a strategy.

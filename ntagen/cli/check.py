@@ -86,6 +86,7 @@ class _Outputs:
     trace: str | None
     certificate: Path | None
     strategy: str | None
+    controller: Path | None
     plans: Path | None
     ranking: str
 
@@ -137,6 +138,12 @@ class _Outputs:
     metavar="FILE|-",
     help="Write the winner's strategy of the (last) control query: the controller's, or how the "
     "environment prevents it. A FILE.json is for tools, any other gets TIGA's text; - is stdout.",
+)
+@click.option(
+    "--controller",
+    metavar="FILE.c",
+    type=click.Path(path_type=Path),
+    help="Write the same strategy as a compact controller in C99, which depends on nothing.",
 )
 @click.option(
     "--verify",
@@ -209,6 +216,7 @@ def command(
     wanted_trace: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     certificate: Path | None,
     strategy: str | None,
+    controller: Path | None,
     verify: bool,
     plans: Path | None,
     ranking: str,
@@ -234,6 +242,7 @@ def command(
       ntagen check model.xml --query "E<> Gate.Open" --trace -
       ntagen check model.xml --queries model.q --json --timeout 60s
       ntagen check game.xml --query "control: A<> Main.Won" --verify --strategy -
+      ntagen check game.xml --query "control: A[] not Main.Lost" --controller safe.c
       ntagen check model.xml --query "bounds{Gate.Open}: x"
       ntagen check model.xml --query "E<> Gate.Open" --fastest --trace open.json
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
@@ -249,7 +258,7 @@ def command(
     """  # noqa: D301  click wants the control character
     if as_json and strategy == "-":
         raise click.UsageError("--json and --strategy - both write on standard output")
-    outputs = _Outputs(trace, certificate, strategy, plans, ranking)
+    outputs = _Outputs(trace, certificate, strategy, controller, plans, ranking)
     worst = 0
     with pointing_to_explanations(not as_json):
         loaded = load_model(model_path)
@@ -273,7 +282,7 @@ def command(
                     timeout_s=timeout,
                     plans="all" if plans else "none",
                     max_plans=max_plans,
-                    strategy=strategy is not None,
+                    strategy=strategy is not None or controller is not None,
                     verify=verify,
                     trace=verify or trace is not None or wanted_trace is not None,
                     wanted_trace=wanted_trace or "any",
@@ -438,6 +447,10 @@ def _write_evidence(
         notes.append(f"certificate of {states} states written to {outputs.certificate}")
     if outputs.strategy:
         notes += _write_strategy(answer, query, outputs.strategy)
+    controller = answer.controller_c() if outputs.controller else None
+    if outputs.controller and controller is not None:
+        write_files({outputs.controller: controller})
+        notes.append(f"controller written to {outputs.controller}")
     if outputs.plans and answer.plan_count is not None:
         notes += _write_plans(answer, outputs.plans, outputs.ranking, scene)
     return notes

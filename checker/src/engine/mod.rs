@@ -5,6 +5,7 @@
 
 pub mod answer;
 pub mod certificate;
+pub mod controller;
 pub mod decision_table;
 pub mod describe;
 pub mod evidence;

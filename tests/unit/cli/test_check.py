@@ -145,6 +145,20 @@ def test_strategies_are_written_as_text(
     assert "standard output" in err
 
 
+def test_strategy_is_written_as_a_controller(
+    gate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "controller.c"
+    query = ("--query", "control: A<> Gate.Open", "--controller", path)
+    out, _ = check_run(capsys, 0, gate, *query)
+    assert f"controller written to {path}" in out
+    assert "control: A<> Gate.Open" in path.read_text()
+    assert "\ncontroller_decision controller_decide(" in path.read_text()
+    gate.write_text(GATE.replace("x <= 5", "x <= 5 && x' == 0"))
+    _, err = check_run(capsys, 2, gate, *query)
+    assert "stopwatches" in err
+
+
 @pytest.mark.parametrize("most", ["1", "first"])
 def test_a_single_plan_is_found_without_the_others(
     most: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

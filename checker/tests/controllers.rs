@@ -1,0 +1,325 @@
+//! Controllers in C: compiled, they decide as the strategy does that they were made of.
+//!
+//! Each is asked in all discrete states of its strategy and in some beside them, at all clock values of a grid and at random ones. What
+//! is expected is looked up in the strategy itself, decision by decision.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use checker::engine::{CodeEngine, LoadedModel, Options, controller};
+use checker::game::closed_loop;
+use checker::game::strategy::{Decision, Selection, Strategy};
+use checker::network::Part;
+
+/// Ticks of a unit of time. Clock values are whole numbers of two of them, so that every bound and the middle between is met.
+const TICKS_PER_UNIT: i64 = 4;
+
+/// The greatest clock value that is asked about, in ticks.
+const GREATEST: i64 = 7 * TICKS_PER_UNIT;
+
+/// Reads states with clock values, and writes of each the decision, the wait, and what is allowed.
+const DRIVER: &str = r#"
+#include <stdio.h>
+int main(void)
+{
+    int32_t state[CONTROLLER_STATE_WORDS + 1];
+    controller_time clocks[CONTROLLER_CLOCKS + 1];
+    for (;;) {
+        int i, value;
+        controller_decision decision;
+        for (i = 0; i < CONTROLLER_STATE_WORDS; i++) {
+            if (scanf("%d", &value) != 1)
+                return 0;
+            state[i] = value;
+        }
+        for (i = 0; i < CONTROLLER_CLOCKS; i++) {
+            if (scanf("%d", &value) != 1)
+                return 1;
+            clocks[i] = (controller_time)value;
+        }
+        decision = controller_decide(state, clocks);
+        printf("%d %ld %d", decision.action, (long)decision.wait, decision.is_open);
+        for (i = -1; i < CONTROLLER_ACTIONS; i++)
+            printf(" %d", controller_allows(state, clocks, i));
+        printf("\n");
+    }
+}
+"#;
+
+struct Case {
+    name: String,
+    text: String,
+    strategy: Strategy,
+    words: usize,
+    clocks: usize,
+    /// By number of the controller, the text of its edges.
+    actions: Vec<String>,
+    network: checker::ir::Network,
+}
+
+fn solve(path: &Path, query: &str) -> Option<Case> {
+    let bytes = fs::read(path).expect("the model is there");
+    let mut model = LoadedModel::load("model.xta", &bytes).expect("the model is right");
+    let text = model.add_query(query);
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        strategy: true,
+        ..Options::default()
+    };
+    let strategy = model.check(&text, &options).ok()?.evidence.strategy?;
+    let network = model.network();
+    let text = controller::write(network, &strategy, query).ok()?;
+    let again = controller::write(network, &strategy, query);
+    assert_eq!(again.as_ref(), Ok(&text), "the text is always the same");
+    let (_, after) = text.split_once("controller_texts[] = {\n")?;
+    let (list, _) = after.split_once("};")?;
+    let actions = list.lines().filter_map(|line| {
+        let line = line.trim().strip_prefix('"')?.strip_suffix("\",")?;
+        Some(line.replace("\\\"", "\"").replace("\\?", "?"))
+    });
+    Some(Case {
+        name: format!("{}: {query}", path.display()),
+        actions: actions.collect(),
+        text,
+        strategy: (*strategy).clone(),
+        words: network.layout.identity_words as usize,
+        clocks: network.clocks.len().saturating_sub(1),
+        network: network.clone(),
+    })
+}
+
+/// What the strategy says at a point.
+struct Expected<'s> {
+    is_known: bool,
+    is_goal: bool,
+    /// The decisions that apply.
+    decisions: Vec<&'s Decision>,
+}
+
+impl Case {
+    fn at(&self, words: &[i32], clocks: &[i64]) -> Expected<'_> {
+        let joined = closed_loop::joined(&self.network, &self.strategy);
+        let known = joined
+            .into_iter()
+            .find(|(other, _, _)| other[..self.words] == words[..self.words]);
+        let Some((_, is_goal, decisions)) = known else {
+            return Expected {
+                is_known: false,
+                is_goal: false,
+                decisions: Vec::new(),
+            };
+        };
+        let most = match self.strategy.selection {
+            Selection::First => 1,
+            Selection::Any => usize::MAX,
+        };
+        let mut values = vec![0];
+        values.extend_from_slice(clocks);
+        let applies = decisions
+            .into_iter()
+            .filter(|one| one.zones.contains(&values, TICKS_PER_UNIT));
+        Expected {
+            is_known: true,
+            is_goal,
+            decisions: applies.take(most).collect(),
+        }
+    }
+
+    fn waits_at(&self, words: &[i32], clocks: &[i64], ticks: i64) -> bool {
+        let later: Vec<i64> = clocks.iter().map(|value| value + ticks).collect();
+        let expected = self.at(words, &later);
+        expected.decisions.iter().any(|one| one.action.is_none())
+    }
+
+    fn number(&self, parts: &[Part]) -> i64 {
+        let edges = parts
+            .iter()
+            .map(|&part| checker::engine::describe::part_text(&self.network, part));
+        let text = edges.collect::<Vec<_>>().join(" ");
+        let number = self.actions.iter().position(|one| *one == text);
+        number.unwrap_or_else(|| panic!("{}: no {text}", self.name)) as i64
+    }
+
+    /// Compares a line of the driver with the strategy.
+    fn check(&self, words: &[i32], clocks: &[i64], line: &str) {
+        let got: Vec<i64> = line
+            .split(' ')
+            .map(|number| number.parse().expect("the driver writes numbers"))
+            .collect();
+        let place = format!("{}: {words:?} at {clocks:?}: {line}", self.name);
+        let expected = self.at(words, clocks);
+        let (action, wait, is_open, allowed) = (got[0], got[1], got[2] == 1, &got[3..]);
+        if !expected.is_known || (expected.decisions.is_empty() && !expected.is_goal) {
+            assert_eq!(action, -3, "{place}");
+        } else if expected.is_goal {
+            assert_eq!(action, -2, "{place}");
+        } else {
+            let one_of = expected.decisions.iter().any(|one| match &one.action {
+                None => action == -1,
+                Some(parts) => action == self.number(parts),
+            });
+            assert!(one_of, "{place}");
+        }
+        for (index, &is_allowed) in allowed.iter().enumerate() {
+            let action = index as i64 - 1;
+            let mut decisions = expected.decisions.iter().filter(|_| !expected.is_goal);
+            let wanted = decisions.any(|one| match &one.action {
+                None => action == -1,
+                Some(parts) => action == self.number(parts),
+            });
+            assert_eq!(is_allowed == 1, wanted, "{place}: {action}");
+        }
+        if action == -1 {
+            // Every bound is a whole number of ticks, so looking at each tick and between is enough.
+            let end = if wait < 0 { 3 * GREATEST } else { wait };
+            for ticks in 0..end {
+                assert!(
+                    self.waits_at(words, clocks, ticks),
+                    "{place}: after {ticks}"
+                );
+            }
+            if wait >= 0 {
+                assert_eq!(
+                    self.waits_at(words, clocks, wait),
+                    !is_open,
+                    "{place}: at the end"
+                );
+                assert!(
+                    is_open || !self.waits_at(words, clocks, wait + 1),
+                    "{place}: after the end"
+                );
+            }
+        }
+    }
+
+    /// The points that are asked about.
+    fn points(&self) -> Vec<(Vec<i32>, Vec<i64>)> {
+        let mut random = 0x9e37_79b9_u64;
+        let mut below = |limit: i64| {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            (random % limit as u64) as i64
+        };
+        let mut points = Vec::new();
+        for (words, _, _) in closed_loop::joined(&self.network, &self.strategy) {
+            let mut beside = words.to_vec();
+            let word = below(self.words as i64) as usize;
+            beside[word] = beside[word].wrapping_add(below(5) as i32 - 2);
+            for words in [words.to_vec(), beside] {
+                let mut clocks = vec![0; self.clocks];
+                loop {
+                    points.push((words.clone(), clocks.clone()));
+                    let step = if self.clocks > 2 { TICKS_PER_UNIT } else { 2 };
+                    let Some(index) = clocks.iter().position(|&value| value + step <= GREATEST)
+                    else {
+                        break;
+                    };
+                    clocks[..index].fill(0);
+                    clocks[index] += step;
+                }
+                for _ in 0..20 {
+                    let clocks = (0..self.clocks).map(|_| 2 * below(GREATEST / 2));
+                    points.push((words.clone(), clocks.collect()));
+                }
+            }
+        }
+        points
+    }
+
+    fn run(&self, folder: &Path) -> usize {
+        let source = folder.join("controller.c");
+        let program = folder.join("controller");
+        // Clock values are asked in ticks, as integers.
+        let settings =
+            format!("#define CONTROLLER_TIME long\n#define CONTROLLER_UNIT {TICKS_PER_UNIT}\n");
+        fs::write(&source, settings + &self.text + DRIVER).expect("the folder can be written");
+        let flags = [
+            "-std=c99",
+            "-pedantic",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-O1",
+            "-o",
+        ];
+        let compiled = Command::new("cc")
+            .args(flags)
+            .arg(&program)
+            .arg(&source)
+            .output();
+        let compiled = compiled.expect("there is a C compiler");
+        let said = String::from_utf8_lossy(&compiled.stderr);
+        assert!(
+            compiled.status.success(),
+            "{}:\n{said}\n{}",
+            self.name,
+            self.text
+        );
+
+        let points = self.points();
+        let mut input = String::new();
+        for (words, clocks) in &points {
+            for word in &words[..self.words] {
+                let _ = write!(input, "{word} ");
+            }
+            for value in clocks {
+                let _ = write!(input, "{value} ");
+            }
+            input.push('\n');
+        }
+        let mut child = Command::new(&program)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the controller runs");
+        let mut stdin = child.stdin.take().expect("its input is a pipe");
+        let writer = std::thread::spawn(move || stdin.write_all(input.as_bytes()));
+        let output = child.wait_with_output().expect("the controller ends");
+        writer.join().expect("writing ends").expect("all is read");
+        let output = String::from_utf8(output.stdout).expect("it writes numbers");
+        assert_eq!(output.lines().count(), points.len(), "{}", self.name);
+        for ((words, clocks), line) in points.iter().zip(output.lines()) {
+            self.check(words, clocks, line);
+        }
+        points.len()
+    }
+}
+
+fn games() -> Vec<(PathBuf, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/games");
+    let files = fs::read_dir(folder).expect("the folder is there");
+    let mut files: Vec<PathBuf> = files
+        .map(|file| file.expect("the folder can be read").path())
+        .collect();
+    files.sort();
+    let mut games = Vec::new();
+    for path in files {
+        let text = fs::read_to_string(&path).expect("the model is there");
+        let queries = text
+            .lines()
+            .filter_map(|line| line.strip_prefix("// query: "));
+        let control = queries.filter(|query| query.starts_with("control: "));
+        games.extend(control.map(|query| (path.clone(), query.to_owned())));
+    }
+    games
+}
+
+#[test]
+fn controllers_decide_as_their_strategies() {
+    let folder = std::env::temp_dir().join(format!("controllers-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("the folder can be made");
+    let (mut controllers, mut points) = (0, 0);
+    for (path, query) in games() {
+        if let Some(case) = solve(&path, &query) {
+            points += case.run(&folder);
+            controllers += 1;
+        }
+    }
+    fs::remove_dir_all(&folder).expect("the folder can be removed");
+    assert!(controllers >= 40, "only {controllers} controllers");
+    assert!(points >= 15_000, "only {points} points");
+}
