@@ -228,11 +228,13 @@ fn played(
     let is_planned = options.plans != PlansWanted::No
         && matches!(objective, Objective::Reach(_) | Objective::Until(..))
         && !is_cooperative;
+    let is_strategy_wanted = (options.strategy || options.verify) && !is_cooperative;
     let extent = match options.plans {
         PlansWanted::All(_) if is_planned => Extent::Everything,
+        // A strategy that keeps out of what was not explored would not be the most permissive one.
+        _ if is_strategy_wanted && seeker == Player::Environment => Extent::Permissive,
         _ => Extent::Verdict,
     };
-    let is_strategy_wanted = (options.strategy || options.verify) && !is_cooperative;
     let mut rounds = Vec::new();
     let result = if is_recurring {
         let wanted = is_strategy_wanted.then_some(&mut rounds);

@@ -95,6 +95,8 @@ pub struct Gain {
 pub enum Extent {
     /// Until the verdict is known.
     Verdict,
+    /// Until the verdict is known, and if the seeker loses, until nothing is left out that the evader may do.
+    Permissive,
     /// The winning valuations of the initial node.
     Start,
     /// The winning valuations of all nodes that can be reached.
@@ -261,13 +263,13 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             if let Some(reason) = reason {
                 return Ok(Answer::Stopped(reason));
             }
-            if extent == Extent::Verdict {
+            if matches!(extent, Extent::Verdict | Extent::Permissive) {
                 if self.is_won() {
                     break;
                 }
                 if explored >= next_hope {
                     next_hope = 2 * explored;
-                    if !self.has_hope() {
+                    if extent == Extent::Verdict && !self.has_hope() {
                         break;
                     }
                     if self.is_crowded() {
