@@ -158,14 +158,15 @@ pub(super) fn zones_of<'a>(
 }
 
 /// Whether the game may be played in discrete states with all that invariants allow: if it does not matter what is reached, and if
-/// neither clocks that stop nor priorities make it hang on more than the state.
+/// neither clocks that stop, nor priorities, nor clock guards on urgent channels make it hang on more than the state.
 fn can_be_discrete(
     network: &Network,
     (objective, is_cooperative): (&Objective, bool),
     options: &Options,
 ) -> bool {
     let has_priorities = network.features.priorities && options.priorities == Priorities::Kept;
-    let hangs_on_more = network.features.stopwatches || has_priorities;
+    let is_urgent = network.features.clock_guarded_urgent;
+    let hangs_on_more = network.features.stopwatches || has_priorities || is_urgent;
     options.plans == PlansWanted::No
         && !is_cooperative
         && !matches!(objective, Objective::Buchi(..))

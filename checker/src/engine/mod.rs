@@ -471,8 +471,6 @@ impl LoadedModel {
             Some("stopwatches in a query under a strategy")
         } else if !features.clock_guarded_urgent {
             None
-        } else if is_game {
-            Some("clock guards on edges of urgent channels in a game")
         } else if features.stopwatches {
             Some("clock guards on edges of urgent channels together with stopwatches")
         } else {

@@ -99,12 +99,22 @@ fn allowed_waiting(
     let safe = rest_of(solver, node);
     let stopped = solver.stopped(node)?;
     let mut waiting = instants::before(&safe, &stopped).intersection(free);
+    // Where time can pass at all, and what it does not pass.
+    let mut passing = safe.clone();
+    let mut impassable = Federation::empty(safe.dimension());
+    if let Some(urgent) = solver.graph.urgent(node) {
+        let standstill = urgent.standstill();
+        waiting.subtract(&standstill);
+        passing.subtract(&standstill);
+        impassable.unite(&urgent.stops);
+    }
     // What is safe may end in a limit that is not itself safe. Before such an end, the last valuations with a move must use it.
     let mut unsafe_ones = whole_or_part(solver, node, None);
     unsafe_ones.subtract(&safe);
-    let ends = unsafe_ones.intersection(&instants::after(&safe, &stopped));
+    let ends = unsafe_ones.intersection(&instants::after(&passing, &stopped));
     if !ends.is_empty() {
         let mut others = unsafe_ones.clone();
+        others.unite(&impassable);
         others.subtract(&ends);
         let ending = past::predecessors(&ends, &others, &stopped).intersection(&safe);
         let mut last = ending.intersection(acting);

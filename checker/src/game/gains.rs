@@ -70,13 +70,16 @@ impl Solver<'_, '_, '_> {
         let mut part = match target {
             Win::Nothing => return Federation::empty(dimension),
             Win::Everything if edge.is_total => {
-                return Federation::of_zone(dimension, self.graph.zone(edge.source));
+                return self.whole(edge.source);
             }
-            Win::Everything => Federation::of_zone(dimension, self.graph.zone(edge.target)),
+            Win::Everything => self.whole(edge.target),
             Win::Part(part) => part.clone(),
         };
         self.graph.programs.preimage(edge.program, &mut part);
-        part.intersect_zone(self.graph.zone(edge.source));
+        match self.graph.urgent(edge.source) {
+            None => part.intersect_zone(self.graph.zone(edge.source)),
+            Some(urgent) => part = part.intersection(&urgent.reached),
+        }
         part
     }
 
@@ -132,6 +135,6 @@ impl Solver<'_, '_, '_> {
 
     /// All valuations of a node.
     pub(super) fn whole(&self, node: u32) -> Federation {
-        Federation::of_zone(self.graph.dimension(), self.graph.zone(node))
+        self.graph.whole(node)
     }
 }

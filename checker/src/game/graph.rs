@@ -12,6 +12,9 @@
 //!   invariants allow. Who wins from a valuation does not hang on how it is reached, so the answer is the same. There may be far
 //!   fewer nodes, but also ones that no run reaches, so a run-time error in such a graph means nothing.
 //!
+//! Where synchronisations on urgent channels have clock guards, time does not reach all of a node's zone: see
+//! [`super::urgency`].
+//!
 //! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly. Where two clocks are compared,
 //! zones are cut along the comparisons, and a move has an edge for each piece; there are no chains then.
 
@@ -24,6 +27,7 @@ use crate::zones::{Bound, Federation, Zone, clocks};
 
 use super::programs::{ProgramId, ProgramStep, Programs};
 use super::trails::{Ending, Root, Trails};
+use super::urgency::Urgent;
 
 /// Moves in one chain, at most; longer ones are cut by a node, so that loops end.
 pub(super) const LONGEST_CHAIN: usize = 64;
@@ -135,6 +139,7 @@ pub struct Graph<'s, 'a> {
     pub edges: Vec<Edge>,
     heads: Vec<u32>,
     parts: rustc_hash::FxHashMap<u32, Parts>,
+    pub(super) urgent: rustc_hash::FxHashMap<u32, Urgent>,
     /// How many states were expanded, those inside chains included.
     pub explored: u64,
     words: Vec<i32>,
@@ -145,8 +150,8 @@ pub struct Graph<'s, 'a> {
     chain_moves: Moves,
     pub(super) steps: Vec<ProgramStep>,
     /// What the move that was just taken does to clocks.
-    effect: ClockEffect,
-    entries: Vec<Zone>,
+    pub(super) effect: ClockEffect,
+    pub(super) entries: Vec<Zone>,
     pub(super) chains_delays: bool,
     pub(super) trails: Trails,
     /// Whether there is one node for each discrete state.
@@ -169,9 +174,14 @@ impl<'s, 'a> Graph<'s, 'a> {
         objective: Objective<'s>,
     ) -> Result<Graph<'s, 'a>, Failure> {
         let mut graph = Graph::without_nodes(symbolic, objective);
+        if graph.symbolic.has_guarded_urgency() {
+            graph.start_urgently()?;
+            return Ok(graph);
+        }
         let (mut words, mut zone) = graph.initial()?;
         graph.symbolic.extrapolate(&words, zone.bounds_mut());
-        graph.node(&mut words, &zone)?;
+        let id = graph.zones.intern(zone.bounds());
+        graph.node_of(&mut words, &zone, id, None)?;
         Ok(graph)
     }
 
@@ -188,7 +198,8 @@ impl<'s, 'a> Graph<'s, 'a> {
         graph.trails = Trails::new(false, &graph.objective);
         let (mut words, _, invariant) = graph.symbolic.start()?;
         let zone = Zone::of_constraints(graph.dimension(), &invariant);
-        graph.node(&mut words, &zone)?;
+        let id = graph.zones.intern(zone.bounds());
+        graph.node_of(&mut words, &zone, id, None)?;
         Ok(graph)
     }
 
@@ -202,6 +213,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             edges: Vec::new(),
             heads: Vec::new(),
             parts: rustc_hash::FxHashMap::default(),
+            urgent: rustc_hash::FxHashMap::default(),
             explored: 0,
             words: network.initial.clone(),
             target: network.initial.clone(),
@@ -221,16 +233,21 @@ impl<'s, 'a> Graph<'s, 'a> {
 
     /// The initial words and zone.
     fn initial(&mut self) -> Result<(Vec<i32>, Zone), Failure> {
-        let Some(deadline) = self.objective.deadline else {
-            return self.symbolic.initial();
-        };
-        let (mut words, mut zone, invariant) = self.symbolic.start()?;
-        clocks::free_clock(zone.bounds_mut(), self.dimension(), deadline.clock);
-        zone.constrain(deadline.clock, 0, weak(deadline.limit)?);
+        let (mut words, mut zone, invariant) = self.start()?;
         let may_delay = self.symbolic.may_delay(&mut words)?;
         self.symbolic
             .delay(&words, may_delay, &invariant, zone.bounds_mut())?;
         Ok((words, zone))
+    }
+
+    /// The initial words, the zone before time passes, and the invariants.
+    pub(super) fn start(&mut self) -> Result<(Vec<i32>, Zone, Vec<Constraint>), Failure> {
+        let (words, mut zone, invariant) = self.symbolic.start()?;
+        if let Some(deadline) = self.objective.deadline {
+            clocks::free_clock(zone.bounds_mut(), self.dimension(), deadline.clock);
+            zone.constrain(deadline.clock, 0, weak(deadline.limit)?);
+        }
+        Ok((words, zone, invariant))
     }
 
     /// The number of clocks, the reference clock included.
@@ -275,14 +292,14 @@ impl<'s, 'a> Graph<'s, 'a> {
         first as usize..last as usize
     }
 
-    /// The node of a state, made if no stored one contains it.
-    fn node(&mut self, words: &mut [i32], zone: &Zone) -> Result<u32, Failure> {
-        let id = self.zones.intern(zone.bounds());
-        self.node_of(words, zone, id)
-    }
-
-    /// As [`Graph::node`], with the id of the zone.
-    fn node_of(&mut self, words: &mut [i32], zone: &Zone, id: ZoneId) -> Result<u32, Failure> {
+    /// The node of a state, whose zone has this id, made if no stored one contains it.
+    pub(super) fn node_of(
+        &mut self,
+        words: &mut [i32],
+        zone: &Zone,
+        id: ZoneId,
+        urgent: Option<Urgent>,
+    ) -> Result<u32, Failure> {
         let (discrete, is_new) = self.store.intern(words);
         if is_new {
             self.heads.push(NONE);
@@ -292,13 +309,15 @@ impl<'s, 'a> Graph<'s, 'a> {
             let Node {
                 zone: other, next, ..
             } = self.nodes[node as usize];
-            if other == id || dbm::is_subset(zone.bounds(), self.zones.get(other)) {
+            if (other == id || dbm::is_subset(zone.bounds(), self.zones.get(other)))
+                && self.covers(node, zone, urgent.as_ref())
+            {
                 return Ok(node);
             }
             node = next;
         }
         let made = self.nodes.len() as u32;
-        let standing = self.standing(made, words, zone)?;
+        let standing = self.standing(made, words, zone, urgent.as_ref())?;
         self.nodes.push(Node {
             discrete,
             zone: id,
@@ -310,11 +329,20 @@ impl<'s, 'a> Graph<'s, 'a> {
             standing,
         });
         self.heads[discrete.0 as usize] = made;
+        if let Some(urgent) = urgent {
+            self.urgent.insert(made, urgent);
+        }
         Ok(made)
     }
 
     /// Evaluates the objective in a state that becomes the node `made`.
-    fn standing(&mut self, made: u32, words: &mut [i32], zone: &Zone) -> Result<Standing, Failure> {
+    fn standing(
+        &mut self,
+        made: u32,
+        words: &mut [i32],
+        zone: &Zone,
+        urgent: Option<&Urgent>,
+    ) -> Result<Standing, Failure> {
         let (goal, keep) = self.extents(words, zone)?;
         match (goal, keep) {
             (Extent::Everywhere, _) => Ok(Standing::Goal),
@@ -326,6 +354,20 @@ impl<'s, 'a> Graph<'s, 'a> {
                 let mut broken = Federation::of_zone(dimension, zone.bounds());
                 broken.subtract(&keep.to_federation(zone.bounds(), dimension));
                 broken.subtract(&goal);
+                let mut goal = goal;
+                if let Some(urgent) = urgent {
+                    goal = goal.intersection(&urgent.reached);
+                    broken = broken.intersection(&urgent.reached);
+                    if urgent.reached.is_subset(&goal) {
+                        return Ok(Standing::Goal);
+                    }
+                    if goal.is_empty() && broken.is_empty() {
+                        return Ok(Standing::Open);
+                    }
+                    if goal.is_empty() && urgent.reached.is_subset(&broken) {
+                        return Ok(Standing::Broken);
+                    }
+                }
                 self.parts.insert(made, Parts { goal, broken });
                 Ok(Standing::Mixed)
             }
@@ -433,6 +475,9 @@ impl<'s, 'a> Graph<'s, 'a> {
         moves: &Moves,
         target: &mut Vec<i32>,
     ) -> Result<(), Failure> {
+        if self.symbolic.has_guarded_urgency() {
+            return self.follow_urgently(origin, moves, target);
+        }
         if let Some(root) = root.filter(|_| !self.symbolic.splits())
             && self.follow_trail(root, moves, origin, target)?
         {
@@ -558,14 +603,11 @@ impl<'s, 'a> Graph<'s, 'a> {
         &mut self,
         words: &mut [i32],
         ending: &mut Ending,
-        Origin {
-            node: source,
-            ordinal,
-            controllable,
-        }: Origin,
+        origin: Origin,
         length: u32,
     ) -> Result<(), Failure> {
-        let target = self.node_of(words, &ending.zone, ending.id)?;
+        let source = origin.node;
+        let target = self.node_of(words, &ending.zone, ending.id, None)?;
         let program = ending.program;
         let (from, to) = (
             self.nodes[source as usize].zone,
@@ -580,6 +622,23 @@ impl<'s, 'a> Graph<'s, 'a> {
             }
         };
         ending.totality = Some((to, is_total));
+        self.link(origin, target, program, (length, is_total));
+        Ok(())
+    }
+
+    /// Adds an edge between two nodes that stands for `length` moves.
+    pub(super) fn link(
+        &mut self,
+        origin: Origin,
+        target: u32,
+        program: ProgramId,
+        (length, is_total): (u32, bool),
+    ) {
+        let Origin {
+            node: source,
+            ordinal,
+            controllable,
+        } = origin;
         let edge = self.edges.len() as u32;
         let next_in = std::mem::replace(&mut self.nodes[target as usize].first_in, edge);
         self.edges.push(Edge {
@@ -592,7 +651,6 @@ impl<'s, 'a> Graph<'s, 'a> {
             controllable,
             is_total,
         });
-        Ok(())
     }
 }
 

@@ -17,6 +17,7 @@ pub mod recurrence;
 mod stops;
 pub mod strategy;
 mod trails;
+mod urgency;
 
 /// Who plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -66,8 +66,9 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
             solver,
         };
         if !matches!(plans.solver.win[0], Win::Nothing) {
-            let zone = Zone::from_bounds(dimension, plans.solver.graph.zone(0));
-            plans.enter(0, vec![zone]);
+            let zones = plans.solver.graph.whole(0);
+            let zones = zones.zones().map(|zone| Zone::from_bounds(dimension, zone));
+            plans.enter(0, zones.collect());
         }
         Ok(plans)
     }
@@ -117,13 +118,17 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
         {
             return None;
         }
-        let delays = graph.nodes[edge.target as usize].delays;
+        let urgent = graph.urgent(edge.target);
+        let delays = graph.nodes[edge.target as usize].delays && urgent.is_none();
         let level = self.path.last()?;
         let images = level
             .zones
             .iter()
             .flat_map(|zone| graph.programs.image(edge.program, zone, delays));
-        let zones: Vec<Zone> = images.collect();
+        let mut zones: Vec<Zone> = images.collect();
+        if let Some(urgent) = urgent {
+            zones = urgent.later(&zones);
+        }
         (!zones.is_empty()).then_some(zones)
     }
 

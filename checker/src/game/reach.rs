@@ -562,7 +562,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         if let Some(targets) = &self.targets {
             return match &targets[node as usize] {
                 Win::Nothing => Federation::empty(dimension),
-                Win::Everything => Federation::of_zone(dimension, self.graph.zone(node)),
+                Win::Everything => self.whole(node),
                 Win::Part(part) => part.clone(),
             };
         }
@@ -671,7 +671,10 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             Player::Controller => self.controllers_gain(node)?,
             Player::Environment => self.environments_gain(node)?,
         };
-        won.intersect_zone(self.graph.zone(node));
+        match self.graph.urgent(node) {
+            None => won.intersect_zone(self.graph.zone(node)),
+            Some(urgent) => won = won.intersection(&urgent.reached),
+        }
         Ok(won)
     }
 
@@ -753,6 +756,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         bad: &Federation,
     ) -> Result<Federation, Failure> {
         if self.graph.nodes[node as usize].delays {
+            if let Some(urgent) = self.graph.urgent(node) {
+                return Ok(urgent.predecessors(&good, bad));
+            }
             let stopped = self.stopped(node)?;
             return Ok(past::predecessors(&good, bad, &stopped));
         }

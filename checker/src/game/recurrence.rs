@@ -88,7 +88,7 @@ fn unbroken(solver: &Solver<'_, '_, '_>, node: u32) -> Win {
         Standing::Broken => Win::Nothing,
         Standing::Open | Standing::Goal => Win::Everything,
         Standing::Mixed => {
-            let mut rest = Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node));
+            let mut rest = solver.whole(node);
             rest.subtract(&solver.broken(node));
             as_win(rest)
         }
@@ -106,7 +106,7 @@ fn as_win(part: Federation) -> Win {
 pub(super) fn to_federation(solver: &Solver<'_, '_, '_>, node: u32, win: &Win) -> Federation {
     match win {
         Win::Nothing => Federation::empty(solver.graph.dimension()),
-        Win::Everything => Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node)),
+        Win::Everything => solver.whole(node),
         Win::Part(part) => part.clone(),
     }
 }
@@ -123,7 +123,7 @@ fn is_within(solver: &Solver<'_, '_, '_>, node: u32, one: &Win, other: &Win) -> 
 fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Win, Failure> {
     let mut goal = match solver.graph.nodes[node as usize].standing {
         Standing::Open | Standing::Broken => return Ok(Win::Nothing),
-        Standing::Goal => Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node)),
+        Standing::Goal => solver.whole(node),
         Standing::Mixed => {
             let parts = solver.graph.parts(node);
             parts.map_or_else(
@@ -145,7 +145,7 @@ pub(super) fn leave(
     node: u32,
     kept: &[Win],
 ) -> Result<Federation, Failure> {
-    let mut out = Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node));
+    let mut out = solver.whole(node);
     out.subtract(&to_federation(solver, node, &kept[node as usize]));
     let mut back = Federation::empty(solver.graph.dimension());
     for index in solver.graph.edges_of(node) {

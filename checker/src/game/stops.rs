@@ -80,7 +80,7 @@ impl Solver<'_, '_, '_> {
         words: &mut [i32],
     ) -> Result<Vec<(Option<u32>, Federation)>, Failure> {
         let dimension = self.graph.dimension();
-        let whole = Federation::of_zone(dimension, self.graph.zone(node));
+        let whole = self.whole(node);
         let network = self.graph.symbolic.stepper.network();
         let mut stops = Vec::new();
         for (index, process) in network.processes.iter().enumerate() {
@@ -91,6 +91,9 @@ impl Solver<'_, '_, '_> {
         }
         if stops.is_empty() && !self.graph.nodes[node as usize].delays {
             stops.push((None, whole));
+        }
+        if let Some(urgent) = self.graph.urgent(node) {
+            stops.push((None, urgent.standstill()));
         }
         let stopped = self.graph.symbolic.stopped(words)?;
         for (process, bound) in self.graph.symbolic.upper_bounds(words)? {

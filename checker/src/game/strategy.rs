@@ -228,7 +228,7 @@ pub(super) fn whole_or_part(
 ) -> Federation {
     match part {
         Some(part) => part.clone(),
-        None => Federation::of_zone(solver.graph.dimension(), solver.graph.zone(node)),
+        None => solver.whole(node),
     }
 }
 

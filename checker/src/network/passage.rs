@@ -41,6 +41,11 @@ impl Symbolic<'_> {
         Ok(barriers)
     }
 
+    /// Whether a synchronisation on an urgent channel may have clock guards.
+    pub fn has_guarded_urgency(&self) -> bool {
+        self.has_guarded_urgency
+    }
+
     /// Whether there may be barriers.
     pub(super) fn has_barriers(&self) -> bool {
         self.has_guarded_urgency || self.restriction.is_some()
@@ -100,7 +105,7 @@ impl Symbolic<'_> {
     }
 
     /// What `entry` reaches in `whole`, its future within the invariant, without passing a barrier.
-    fn within(&self, entry: &Zone, whole: &Zone, barriers: &Barriers) -> Federation {
+    pub fn within(&self, entry: &Zone, whole: &Zone, barriers: &Barriers) -> Federation {
         let from = Federation::of_zone(self.dimension(), entry.bounds());
         let nothing = Federation::empty(self.dimension());
         let mut reached = future::successors(&from, &nothing, barriers);

@@ -112,10 +112,7 @@ impl Regions {
     /// Lets time pass to the next region; false if the region is its own successor.
     pub fn pass(&self, clocks: &mut [i64]) -> bool {
         let unit = self.ticks_per_unit;
-        let is_running = |clock: i64| match self.bounding {
-            Bounding::Values(constant) => clock <= constant * unit,
-            Bounding::Gaps(_) | Bounding::Nothing => true,
-        };
+        let is_running = |clock: i64| self.is_running(clock);
         let fractions = clocks[1..].iter().filter(|&&clock| is_running(clock));
         let fractions: Vec<i64> = fractions.map(|clock| clock % unit).collect();
         let Some(&greatest) = fractions.iter().max() else {
@@ -134,6 +131,20 @@ impl Regions {
         }
         self.represent(clocks);
         true
+    }
+
+    /// Whether the next region, unlike this one, lasts: some clock leaves an integer, and time passes within the next region.
+    pub fn opens(&self, clocks: &[i64]) -> bool {
+        let is_integer = |clock: &i64| *clock % self.ticks_per_unit == 0;
+        let mut running = clocks[1..].iter().filter(|&&clock| self.is_running(clock));
+        running.any(is_integer)
+    }
+
+    fn is_running(&self, clock: i64) -> bool {
+        match self.bounding {
+            Bounding::Values(constant) => clock <= constant * self.ticks_per_unit,
+            Bounding::Gaps(_) | Bounding::Nothing => true,
+        }
     }
 
     /// As [`Regions::represent`], for a whole state.

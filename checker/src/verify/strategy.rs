@@ -531,6 +531,7 @@ impl Play<'_> {
             let mut later = state.clone();
             self.regions.pass(&mut later.clocks);
             if !self.rules.semantics.is_time_stopped(state, &moves)
+                && !self.is_stopped_at_once(state, &later)?
                 && self.rules.semantics.invariants_hold(&later)?
             {
                 successors.push((Step::Time, later));
@@ -539,6 +540,17 @@ impl Play<'_> {
             }
         }
         Ok(Ok(successors))
+    }
+}
+
+impl Play<'_> {
+    /// Whether an urgent synchronisation is possible at all moments that follow a region: there is no first one to which time
+    /// could pass.
+    fn is_stopped_at_once(&self, state: &State, later: &State) -> Result<bool, Error> {
+        let semantics = &self.rules.semantics;
+        Ok(semantics.network().features.clock_guarded_urgent
+            && self.regions.opens(&state.clocks)
+            && semantics.moves(later)?.iter().any(|one| one.is_urgent))
     }
 }
 
@@ -642,7 +654,10 @@ impl<'a> Rules<'a> {
             Forcing::Network => return Ok(own.next().is_none()),
             Forcing::Component => {}
         }
-        if own.clone().next().is_none() && moves.iter().any(|one| one.is_urgent) {
+        // An urgent synchronisation with clock guards may stop time before it is possible.
+        let may_be_channel = self.semantics.network().features.clock_guarded_urgent
+            || moves.iter().any(|one| one.is_urgent);
+        if own.clone().next().is_none() && may_be_channel {
             return Ok(true);
         }
         for process in 0..self.semantics.network().processes.len() {

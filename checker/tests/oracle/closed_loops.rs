@@ -27,6 +27,7 @@ const SHAPE: Shape = Shape {
     uncontrollable: true,
     deadlock: true,
     priorities: false,
+    guarded_urgency: false,
 };
 
 /// Regions that brute force explores before it gives a case up.

@@ -22,6 +22,7 @@ const LIVENESS: Shape = Shape {
     uncontrollable: false,
     deadlock: false,
     priorities: true,
+    guarded_urgency: false,
 };
 
 /// Values are compared up to [`TOP`], which takes many regions.

@@ -128,7 +128,12 @@ fn successors(
             stoppers.push(Stopper::Process(process as u32));
         }
     }
-    if moves.iter().any(|one| one.is_urgent) {
+    let network = semantics.network();
+    // Of a synchronisation that is possible at all moments after the region there is no first one.
+    let is_stopped_at_once = network.features.clock_guarded_urgent
+        && regions.opens(&state.clocks)
+        && semantics.moves(&next)?.iter().any(|one| one.is_urgent);
+    if is_stopped_at_once || moves.iter().any(|one| one.is_urgent) {
         stoppers.push(Stopper::Channel);
     }
     let later = stoppers.is_empty().then(|| known.id(next));

@@ -19,6 +19,7 @@ const SHAPE: Shape = Shape {
     uncontrollable: true,
     deadlock: false,
     priorities: true,
+    guarded_urgency: true,
 };
 
 fn compare(

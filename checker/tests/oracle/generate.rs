@@ -19,6 +19,8 @@ pub(crate) struct Network {
     pub processes: Vec<Process>,
     /// An index into [`PRIORITIES`].
     priority: usize,
+    /// Whether edges on urgent channels keep their clock guards.
+    guards_urgency: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -94,7 +96,7 @@ enum Sync {
     },
 }
 
-/// The channels with their declarations. Edges on urgent ones have no clock guards.
+/// The channels with their declarations. Edges on urgent ones have no clock guards unless the network has them.
 const CHANNELS: [(&str, &str); 5] = [
     ("a", "chan"),
     ("b", "chan"),
@@ -223,6 +225,7 @@ pub(crate) struct Shape {
     pub uncontrollable: bool,
     pub deadlock: bool,
     pub priorities: bool,
+    pub guarded_urgency: bool,
 }
 
 fn any_index() -> impl Strategy<Value = usize> {
@@ -358,12 +361,15 @@ pub(crate) fn network(shape: Shape) -> impl Strategy<Value = Network> {
         Just(0).boxed()
     };
     let parts = (1..=shape.clocks, 1..=2_usize, vec(process(shape), 1..=3));
-    (parts, priority).prop_map(|((clocks, variables, processes), priority)| Network {
+    let guarded = prop::bool::weighted(if shape.guarded_urgency { 0.4 } else { 0.0 });
+    let network = |((clocks, variables, processes), priority, guards_urgency)| Network {
         clocks,
         variables,
         processes,
         priority,
-    })
+        guards_urgency,
+    };
+    (parts, priority, guarded).prop_map(network)
 }
 
 /// State formulas.
@@ -498,7 +504,9 @@ impl Network {
         let guards: Vec<String> = edge
             .guards
             .iter()
-            .filter(|atom| !is_urgent || matches!(atom, Atom::Variable { .. }))
+            .filter(|atom| {
+                !is_urgent || self.guards_urgency || matches!(atom, Atom::Variable { .. })
+            })
             .map(|atom| self.atom(atom))
             .collect();
         if !guards.is_empty() {

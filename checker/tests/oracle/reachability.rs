@@ -16,6 +16,7 @@ const SHAPE: Shape = Shape {
     uncontrollable: false,
     deadlock: true,
     priorities: false,
+    guarded_urgency: false,
 };
 
 fn compare(
