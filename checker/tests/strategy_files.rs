@@ -255,3 +255,22 @@ fn strategies_are_saved_and_loaded_beside_the_model() {
     );
     std::fs::remove_dir_all(&folder).expect("the folder is there");
 }
+
+#[test]
+fn questions_without_a_strategy_say_so() {
+    let text = "clock x; process P() { state A { x <= 2 }, B; init A; trans A -> B { guard x >= 1; }; } system P;";
+    let mut model = LoadedModel::load("model.xta", text.as_bytes()).expect("the model is right");
+    for query in [
+        "strategy S = E<> control: A<> P.B",
+        "strategy S = control_t*: A<> P.B",
+    ] {
+        let query = model.add_query(query);
+        let options = Options {
+            strategy: true,
+            ..Options::default()
+        };
+        let answer = model.check(&query, &options).expect("it is accepted");
+        let message = answer.message.unwrap_or_default();
+        assert!(message.contains("gives no strategy"), "{message}");
+    }
+}

@@ -269,6 +269,10 @@ fn played(
         let message = "games ignore the priorities of the model, unless they are told to keep them";
         answer.message = Some(message.to_owned());
     }
+    if is_cooperative && (options.strategy || options.verify) {
+        let message = "E<> control: gives no strategy, since both sides have to help on the way: ask control: of a model that starts where the controller wins";
+        answer.message = Some(message.to_owned());
+    }
     if is_planned {
         add_plans(&mut answer, &mut solver, options);
     }
