@@ -8,31 +8,27 @@ use crate::game::Priorities;
 use crate::game::closed_loop::ClosedLoop;
 use crate::game::plans::Plan;
 use crate::game::strategy::Strategy;
-use crate::ir::{
-    Clock, ClockAtom, ClockId, ClockRange, Measure, Network, Predicate, Query, QueryKind,
-};
+use crate::ir::{ClockAtom, Network, Predicate, Query, QueryKind};
 use crate::network::bounds::is_difference;
 use crate::network::{
     Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, Symmetry, predicate,
 };
-use crate::search::extremum::{self, Extreme, Extremes, Question};
+use crate::search::extremum::{Extremes, Question};
 use crate::search::leads_to::{self, Unanswered};
 use crate::search::limits::{Counters, StopReason};
 use crate::search::liveness::{self, Ending, Liveness};
-use crate::search::plain;
-use crate::search::reach::{self, Outcome, Report, Trace};
+use crate::search::reach::{self, Outcome, Trace};
 use crate::search::schedule::Stays;
-use crate::search::taking::Taking;
-use crate::verify::replay::Shown;
 use crate::verify::strategy::Outcome as StrategyCheck;
-use crate::zones::Bound;
 
-use super::certificate::{self, Certificate};
+use super::certificate::Certificate;
 use super::evidence::{self, Kind, Proof, Shows, Witness};
 use super::fastest::{Race, fastest};
 use super::limits::LimitWatch;
+use super::reachable::reachable;
+use super::values::extremum;
 use super::verification::Verification;
-use super::{Options, TraceWanted, games};
+use super::{Options, games};
 
 /// What a query came out as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -314,7 +310,7 @@ pub(super) fn symbolic<'a>(
 
 /// Zones that may be too large for what is asked, where those of [`symbolic`] would be many more: nothing that these zones do not
 /// have is there, but what they have may not be. `None` if there are none but those of [`symbolic`].
-fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Option<Symbolic<'a>> {
+pub(super) fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Option<Symbolic<'a>> {
     if predicate::depends_on_negations(subject.network) {
         return None;
     }
@@ -334,7 +330,7 @@ fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Option<Symbol
 }
 
 /// The verdict on something that was found, in zones that may be too large.
-fn found(is_approximate: bool) -> Verdict {
+pub(super) fn found(is_approximate: bool) -> Verdict {
     if is_approximate {
         Verdict::Maybe
     } else {
@@ -377,8 +373,8 @@ fn always<'a>(
 }
 
 /// Collects what backs an answer.
-struct Witnesses<'w, 'a> {
-    symbolic: &'w mut Symbolic<'a>,
+pub(super) struct Witnesses<'w, 'a> {
+    pub(super) symbolic: &'w mut Symbolic<'a>,
     has_runs: bool,
     /// Whether the runs follow a strategy.
     is_restricted: bool,
@@ -386,7 +382,7 @@ struct Witnesses<'w, 'a> {
 }
 
 impl<'w, 'a> Witnesses<'w, 'a> {
-    fn new(symbolic: &'w mut Symbolic<'a>, options: &Options) -> Witnesses<'w, 'a> {
+    pub(super) fn new(symbolic: &'w mut Symbolic<'a>, options: &Options) -> Witnesses<'w, 'a> {
         Witnesses {
             has_runs: options.runs,
             is_restricted: symbolic.is_restricted(),
@@ -396,7 +392,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
     }
 
     /// Adds a trace, with its run if runs are wanted.
-    fn add(&mut self, trace: Trace, ending: Option<Ending>, shows: Shows<'_>) {
+    pub(super) fn add(&mut self, trace: Trace, ending: Option<Ending>, shows: Shows<'_>) {
         let kind = match shows {
             Shows::Possible => Kind::Failure,
             Shows::Reaches(..) | Shows::Stays(_) => Kind::Predicate,
@@ -421,7 +417,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         self.found.push(witness);
     }
 
-    fn into_evidence(self) -> Evidence {
+    pub(super) fn into_evidence(self) -> Evidence {
         Evidence {
             witnesses: self.found,
             ..Evidence::default()
@@ -474,311 +470,3 @@ fn leads_to<'a>(
     let evidence = witnesses.into_evidence();
     negated(new_answer(verdict, evidence, report.counters))
 }
-
-/// The least and greatest values.
-fn extremum(
-    subject: Subject<'_>,
-    question: Question<'_>,
-    options: &Options,
-    symmetry: Option<&Arc<Symmetry>>,
-    watch: &mut LimitWatch,
-) -> Answer {
-    let mut zones = |further: &[ClockAtom]| {
-        let predicates = [question.predicate];
-        symbolic(subject, &predicates, further, Abstraction::LowerUpper)
-            .reduced_by(symmetry.cloned())
-    };
-    let report = extremum::search(
-        question,
-        subject.network,
-        &mut zones,
-        options.manner(),
-        watch,
-    );
-    let mut evidence = Evidence::default();
-    let mut values = None;
-    let verdict = match report.outcome {
-        Ok(extremum::Outcome::Found(items)) => {
-            values = Some(Values {
-                least: question.least,
-                greatest: question.greatest,
-                items,
-            });
-            found(report.is_approximate)
-        }
-        Ok(extremum::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
-        Err((failure, trace)) => {
-            evidence
-                .witnesses
-                .push(Witness::new(trace, None, Kind::Failure));
-            Verdict::Error(failure)
-        }
-    };
-    if let Some(values) = &values
-        && options.runs
-        && verdict == Verdict::Satisfied
-    {
-        evidence.witnesses = value_witnesses(question, values, &mut zones, options, watch);
-    }
-    let mut answer = new_answer(verdict, evidence, report.counters);
-    answer.message = values
-        .as_ref()
-        .and_then(|values| remark(values, question.items));
-    answer.value = values;
-    answer
-}
-
-/// A run to a state with each of the values; none for a clock without limit, and none beyond a limit of the search.
-fn value_witnesses<'a>(
-    question: Question<'_>,
-    values: &Values,
-    zones: &mut dyn FnMut(&[ClockAtom]) -> Symbolic<'a>,
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Vec<Witness> {
-    let mut found = Vec::new();
-    for (index, ((measure, text), item)) in question.items.iter().zip(&values.items).enumerate() {
-        for (extreme, is_greatest) in [(item.least, false), (item.greatest, true)] {
-            let Some(Extreme::Value { value, is_reached }) = extreme else {
-                continue;
-            };
-            let mut taking = Taking {
-                predicate: question.predicate,
-                measure,
-                value,
-                is_greatest,
-                is_reached,
-            };
-            let mut symbolic = zones(&taking.atoms());
-            let report = reach::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
-            let Ok(Outcome::Found(trace)) = report.outcome else {
-                return found;
-            };
-            let last = trace.states.last().map(|(words, _)| words.clone());
-            let mut words = last.unwrap_or_default();
-            let Ok(Some(constraints)) = taking.constraints(&mut symbolic, &mut words) else {
-                return found;
-            };
-            let shown = Shown {
-                value: value.into(),
-                is_greatest,
-                is_reached,
-            };
-            let shows = Shows::Takes(index, question.predicate, measure, shown, &constraints);
-            let mut witnesses = Witnesses::new(&mut symbolic, options);
-            witnesses.add(trace, None, shows);
-            let which = if is_greatest { "greatest" } else { "least" };
-            found.extend(witnesses.found.into_iter().map(|witness| Witness {
-                title: Some(format!("{which} {text}")),
-                ..witness
-            }));
-        }
-    }
-    found
-}
-
-/// What the numbers alone do not say: that no state counts, or that a value is not reached.
-fn remark(values: &Values, items: &[(Measure, String)]) -> Option<String> {
-    let mut remarks = Vec::new();
-    for (Extremes { least, greatest }, (_, text)) in values.items.iter().zip(items) {
-        if least.is_none() && greatest.is_none() {
-            return Some("no reachable state satisfies the condition".to_owned());
-        }
-        for (extreme, relation) in [(least, '>'), (greatest, '<')] {
-            if let Some(Extreme::Value {
-                value,
-                is_reached: false,
-            }) = extreme
-            {
-                remarks.push(format!(
-                    "{text} {relation} {value}: the value itself is not reached"
-                ));
-            }
-        }
-    }
-    (!remarks.is_empty()).then(|| remarks.join("; "))
-}
-
-fn reachable(
-    subject: Subject<'_>,
-    goal: &Predicate,
-    options: &Options,
-    symmetry: Option<&Arc<Symmetry>>,
-    watch: &mut LimitWatch,
-) -> Answer {
-    if let Some((mut symbolic, report)) = reach_coarsely(subject, goal, options, symmetry, watch) {
-        return conclude(subject, &mut symbolic, goal, report, options, watch);
-    }
-    let mut symbolic =
-        symbolic(subject, &[goal], &[], Abstraction::LowerUpper).reduced_by(symmetry.cloned());
-    let mut look = goal;
-    let report = reach::search_shared(&mut symbolic, &mut look, options.manner(), watch);
-    conclude(subject, &mut symbolic, goal, report, options, watch)
-}
-
-/// Looks for a deadlock in zones that are too large for it. One that is found counts if it remains in the exact zones of its trace.
-/// `None` if this settles nothing, or does not apply.
-fn reach_coarsely<'a>(
-    subject: Subject<'a>,
-    goal: &Predicate,
-    options: &Options,
-    symmetry: Option<&Arc<Symmetry>>,
-    watch: &mut LimitWatch,
-) -> Option<(Symbolic<'a>, Report)> {
-    // The zones of a certificate must be free of deadlocks themselves, and the best trace is found in them.
-    let is_exact = options.certificate || options.trace != TraceWanted::Any;
-    if is_exact || !predicate::has_deadlock(goal) {
-        return None;
-    }
-    let mut coarse = coarser(subject, &[goal])?.reduced_by(symmetry.cloned());
-    let mut look = goal;
-    let report = reach::search_shared(&mut coarse, &mut look, options.manner(), watch);
-    let is_settled = match &report.outcome {
-        Ok(Outcome::Found(trace)) => ends_in(&mut coarse, goal, trace),
-        _ => true,
-    };
-    is_settled.then_some((coarse, report))
-}
-
-/// Whether the last state of a trace, whose zones are exact, satisfies the predicate somewhere.
-fn ends_in(symbolic: &mut Symbolic<'_>, goal: &Predicate, trace: &Trace) -> bool {
-    let Some((words, zone)) = trace.states.last() else {
-        return false;
-    };
-    let is_whole = trace.states.len() == trace.moves.len() + 1;
-    is_whole
-        && symbolic
-            .extent(goal, &mut words.clone(), zone.bounds())
-            .is_ok_and(|extent| extent.is_somewhere())
-}
-
-/// The answer that the report of a search for the goal amounts to.
-fn conclude(
-    subject: Subject<'_>,
-    symbolic: &mut Symbolic<'_>,
-    goal: &Predicate,
-    report: Report,
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Answer {
-    let counters = report.counters;
-    let mut witnesses = Witnesses::new(symbolic, options);
-    let mut certificate = None;
-    let mut message = None;
-    let verdict = match report.outcome {
-        Ok(Outcome::Found(trace)) => {
-            let symbolic = &mut *witnesses.symbolic;
-            let (trace, deadline) = match best(subject, symbolic, goal, options, watch) {
-                Ok(None) => (trace, None),
-                Ok(Some((best, deadline))) => (best, deadline),
-                Err(reason) => {
-                    message = Some(format!("the trace is not the one wanted: {reason}"));
-                    (trace, None)
-                }
-            };
-            witnesses.add(trace, None, Shows::Reaches(goal, deadline));
-            found(witnesses.symbolic.is_approximate())
-        }
-        Ok(Outcome::Exhausted) => {
-            if options.certificate && subject.under.is_some() {
-                message = Some("no certificate: it would be about the model alone".to_owned());
-            } else if options.certificate {
-                match certificate::reached(witnesses.symbolic, goal, counters, watch) {
-                    Ok(reached) => certificate = Some(reached),
-                    Err(reason) => message = Some(format!("no certificate: {reason}")),
-                }
-            }
-            Verdict::NotSatisfied
-        }
-        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
-        Err((failure, trace)) => {
-            witnesses.add(trace, None, Shows::Possible);
-            Verdict::Error(failure)
-        }
-    };
-    let evidence = Evidence {
-        certificate,
-        ..witnesses.into_evidence()
-    };
-    let mut answer = new_answer(verdict, evidence, counters);
-    answer.message = message;
-    answer
-}
-
-/// The trace with the fewest moves or the least time, and its time; `None` if any trace will do.
-fn best(
-    subject: Subject<'_>,
-    symbolic: &mut Symbolic<'_>,
-    goal: &Predicate,
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Result<Option<(Trace, Option<plain::Cost>)>, String> {
-    let none = Counters::default();
-    let way = match options.trace {
-        TraceWanted::Any => return Ok(None),
-        TraceWanted::Shortest => {
-            plain::Search::new(symbolic, goal, plain::Measure::Moves, none).run(watch)
-        }
-        TraceWanted::Fastest if subject.under.is_some() => {
-            return Err("there is none for fastest traces under a strategy".to_owned());
-        }
-        TraceWanted::Fastest => {
-            let (timed, clock) = with_time(subject.network);
-            let subject = Subject {
-                network: &timed,
-                ..subject
-            };
-            let mut zones = self::symbolic(
-                subject,
-                &[goal],
-                &[time_atom(clock)],
-                Abstraction::LowerUpper,
-            );
-            plain::Search::new(&mut zones, goal, plain::Measure::Time(clock), none).run(watch)
-        }
-    };
-    match way {
-        Ok(plain::Outcome::Found(way)) => {
-            let deadline = (options.trace == TraceWanted::Fastest).then_some(way.cost);
-            Ok(Some((way.trace(symbolic, goal), deadline)))
-        }
-        Ok(plain::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
-        Ok(plain::Outcome::Stopped(reason)) => Err(certificate::stop_text(reason).to_owned()),
-        // The search for any trace did not come to the state that fails.
-        Err(_) => Err("the model fails in a state beside it".to_owned()),
-    }
-}
-
-/// The network with a clock that nothing sets or compares, and its index.
-fn with_time(network: &Network) -> (Network, usize) {
-    let mut timed = network.clone();
-    while timed.clocks.len() < network.clocks.len().max(1) + 1 {
-        timed.clocks.push(Clock {
-            name: "time".to_owned(),
-            owner: None,
-            hybrid: false,
-            coordinates: Vec::new(),
-        });
-    }
-    timed.initial_clocks.resize(timed.clocks.len(), 0);
-    let clock = timed.clocks.len() - 1;
-    (timed, clock)
-}
-
-/// A comparison that keeps the lower bounds of the clock apart.
-fn time_atom(clock: usize) -> ClockAtom {
-    let range = |clock: usize| ClockRange {
-        first: ClockId(clock as u32),
-        count: 1,
-    };
-    ClockAtom {
-        left: range(clock),
-        right: range(0),
-        low: LONGEST_TIME,
-        high: LONGEST_TIME,
-        strict: false,
-    }
-}
-
-/// Up to here times of traces are compared.
-const LONGEST_TIME: i32 = Bound::MAX_VALUE / 4;

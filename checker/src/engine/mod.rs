@@ -17,10 +17,12 @@ mod games;
 pub mod json;
 pub mod limits;
 pub mod play;
+mod reachable;
 pub mod simulation;
 pub mod strategies;
 pub mod strategy_file;
 pub mod strategy_text;
+mod values;
 pub mod verification;
 
 use std::path::{Path, PathBuf};
