@@ -259,3 +259,64 @@ fn counter_strategy_that_lets_a_goal_recur_is_caught() {
     let widen = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
     assert_eq!(defect_of(game(), 0, widen), Some(Defect::Recurring));
 }
+
+#[test]
+fn strategies_with_a_condition_on_the_way_are_checked_too() {
+    for query in [
+        "control: A[ not P.L4 U P.goal ]",
+        "control: A[ not P.L4 W P.goal ]",
+    ] {
+        let defect = |location, mutate: &dyn Fn(&mut Vec<Decision>)| {
+            defect_of(solved(GAME, query), location, mutate)
+        };
+        assert_eq!(defect(0, &|_| {}), None, "{query}");
+        let widen_waiting = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
+        assert_eq!(
+            defect(0, &widen_waiting),
+            Some(Defect::Broken),
+            "{query}: the environment leads to L4"
+        );
+        let widen_action = |decisions: &mut Vec<Decision>| {
+            let action = acts(decisions).action.clone();
+            everywhere(decisions, action);
+        };
+        assert_eq!(
+            defect(1, &widen_action),
+            Some(Defect::ImpossibleAction),
+            "{query}: nothing leads from L1 before 2"
+        );
+    }
+}
+
+/// The environment leads play away again and again, and into the trap if the controller does not come back at once.
+const RETURNING: &str = "
+process P() {
+  clock x;
+  state G, Away { x <= 2 }, Trap;
+  init G;
+  trans G -u-> Away { assign x = 0; },
+        Away -> G { guard x >= 1; },
+        Away -u-> Trap { guard x > 1; };
+}
+system P;
+";
+
+#[test]
+fn strategy_that_does_not_let_the_goal_recur_is_caught() {
+    let game = || solved(RETURNING, "control: A[] (true && A<> P.G)");
+    assert_eq!(game().owner, Player::Controller);
+    assert_eq!(defect_of(game(), 1, |_| {}), None);
+    let wait = |decisions: &mut Vec<Decision>| acts(decisions).action = None;
+    let widen_waiting = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
+    // Past the moment of the action nothing is decided; and where waiting is, the invariant ends it, out of the goal.
+    assert_eq!(defect_of(game(), 1, wait), Some(Defect::NoDecision));
+    assert_eq!(defect_of(game(), 1, widen_waiting), Some(Defect::Stuck));
+    let widen_action = |decisions: &mut Vec<Decision>| {
+        let action = acts(decisions).action.clone();
+        everywhere(decisions, action);
+    };
+    assert_eq!(
+        defect_of(game(), 1, widen_action),
+        Some(Defect::ImpossibleAction)
+    );
+}
