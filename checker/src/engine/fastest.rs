@@ -9,7 +9,7 @@ use crate::exec::Executor;
 use crate::game::Player;
 use crate::game::graph::{Deadline, Graph, Objective as GameObjective};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver, Win};
-use crate::ir::{Clock, ClockAtom, ClockId, ClockRange, FunctionId, Network, Objective, Predicate};
+use crate::ir::{ClockAtom, ClockId, ClockRange, FunctionId, Network, Objective, Predicate};
 use crate::network::{Abstraction, ClockBounds, Failure, Stepper};
 use crate::search::extremum::{Extreme, Extremes};
 use crate::search::limits::{Counters, StopReason, Watch};
@@ -19,6 +19,7 @@ use super::Options;
 use super::answer::{Answer, Evidence, Values, Verdict, has_differences, new_answer};
 use super::games::{self, objective_atoms};
 use super::limits::LimitWatch;
+use super::reachable::with_time;
 
 /// The limit to start from if the query has none.
 const FIRST_LIMIT: i32 = 16;
@@ -72,9 +73,17 @@ pub(super) fn fastest(
         counters = answer.counters;
         FIRST_LIMIT
     };
-    let timed = with_clock(network);
+    let (timed, clock) = with_time(network);
     loop {
-        let run = within(&timed, executor, race, limit, options, &mut counters, watch);
+        let run = within(
+            (&timed, clock),
+            executor,
+            race,
+            limit,
+            options,
+            &mut counters,
+            watch,
+        );
         let (verdict, time) = match run {
             Ok(Run::Time(None)) if race.limit.is_none() && limit <= Bound::MAX_VALUE / 2 => {
                 limit *= 2;
@@ -111,22 +120,9 @@ pub(super) fn fastest(
     }
 }
 
-/// The network with a clock more, which nothing sets.
-fn with_clock(network: &Network) -> Network {
-    let mut timed = network.clone();
-    timed.clocks.push(Clock {
-        name: "#time".to_owned(),
-        owner: None,
-        hybrid: false,
-        coordinates: Vec::new(),
-    });
-    timed.initial_clocks.push(0);
-    timed
-}
-
 /// Solves the game with a limit.
 fn within(
-    timed: &Network,
+    (timed, clock): (&Network, usize),
     executor: &dyn Executor,
     race: &Race<'_>,
     limit: i32,
@@ -137,7 +133,6 @@ fn within(
     if limit < 0 {
         return Ok(Run::Time(None));
     }
-    let clock = timed.clocks.len() - 1;
     let mut atoms = objective_atoms(race.objective);
     atoms.extend(limits_of(clock, limit));
     let abstraction = if has_differences(timed, &atoms) {

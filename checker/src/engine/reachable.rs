@@ -168,7 +168,7 @@ fn best(
 }
 
 /// The network with a clock that nothing sets or compares, and its index.
-fn with_time(network: &Network) -> (Network, usize) {
+pub(super) fn with_time(network: &Network) -> (Network, usize) {
     let mut timed = network.clone();
     while timed.clocks.len() < network.clocks.len().max(1) + 1 {
         timed.clocks.push(Clock {

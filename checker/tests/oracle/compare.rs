@@ -12,6 +12,7 @@ use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
 use crate::explicit::{Graph, NoGraph, explore};
+use crate::generate::{self, Formula};
 use checker::verify::strategy::Outcome;
 use checker::verify::{Error, Regions, Semantics};
 
@@ -135,6 +136,16 @@ pub(crate) fn regions(
         }
         Err(NoGraph::Failed(error)) => Err(error),
     }
+}
+
+/// The regions that tell formulas with constants up to this one apart, or why a query fails; `None`, counted, if they are too many.
+pub(crate) fn regions_for(
+    model: &LoadedModel,
+    (formulas, constant): (&[Formula], i32),
+    tally: &Tally,
+) -> Option<Result<Graph, Error>> {
+    let has_differences = formulas.iter().any(generate::has_differences);
+    regions(model, i64::from(constant), has_differences, tally).transpose()
 }
 
 /// Compares an answer of the engine with what brute force says.

@@ -107,12 +107,8 @@ fn compare_liveness(
 ) -> Result<(), TestCaseError> {
     let text = network.text();
     let mut model = compare::load(&text);
-    let has_differences = formulas.iter().any(generate::has_differences);
-    let constant = i64::from(LIVENESS.constant);
-    let graph = match compare::regions(&model, constant, has_differences, tally) {
-        Ok(Some(graph)) => Ok(graph),
-        Ok(None) => return Ok(()),
-        Err(error) => Err(error),
+    let Some(graph) = compare::regions_for(&model, (formulas, LIVENESS.constant), tally) else {
+        return Ok(());
     };
     let (p, q) = (network.formula(&formulas[0]), network.formula(&formulas[1]));
     let verdicts = graph.as_ref().map(|graph| {
@@ -155,9 +151,8 @@ fn compare_values(
 ) -> Result<(), TestCaseError> {
     let text = network.text();
     let mut model = compare::load(&text);
-    let has_differences = formulas.iter().any(generate::has_differences);
     // A network that fails has neither values nor traces that end.
-    let Ok(Some(graph)) = compare::regions(&model, TOP, has_differences, tally) else {
+    let Some(Ok(graph)) = compare::regions_for(&model, (formulas, TOP as i32), tally) else {
         return Ok(());
     };
     let wanted = labels(network, &graph, &formulas[0]);

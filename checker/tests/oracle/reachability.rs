@@ -25,12 +25,8 @@ fn compare(
 ) -> Result<(), TestCaseError> {
     let text = network.text();
     let mut model = compare::load(&text);
-    let has_differences = formulas.iter().any(generate::has_differences);
-    let constant = i64::from(SHAPE.constant);
-    let graph = match compare::regions(&model, constant, has_differences, tally) {
-        Ok(Some(graph)) => Ok(graph),
-        Ok(None) => return Ok(()),
-        Err(error) => Err(error),
+    let Some(graph) = compare::regions_for(&model, (formulas, SHAPE.constant), tally) else {
+        return Ok(());
     };
     for (index, formula) in formulas.iter().enumerate() {
         let is_invariant = index % 3 == 2;
