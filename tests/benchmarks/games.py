@@ -96,11 +96,15 @@ GAMES = [
 ]
 
 
+MOST_CLOCKS = 255
+"""More than so many the engine does not take; each plate and each train has one."""
+
+
 def rows(game: Game, timeout_s: float, memory_bytes: int) -> Iterator[tuple[int, checker.Answer]]:
-    """The answers by size, the last one stopped by a limit."""
+    """The answers by size, the last one stopped by a limit, or as large as the engine takes."""
     size = 0
-    while True:
-        size = max(size + 1, size * 5 // 4)
+    while size < MOST_CLOCKS:
+        size = min(max(size + 1, size * 5 // 4), MOST_CLOCKS)
         model = checker.load(game.at(size))
         answer = model.check(game.query, timeout_s=timeout_s, memory_bytes=memory_bytes)
         yield size, answer
