@@ -16,6 +16,7 @@ from ntagen.cli.files import write_files
 from ntagen.cli.models import load_model, pointing_to_explanations, show_warnings
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.quantities import SIZE, TIME
+from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
@@ -190,18 +191,10 @@ class _Outputs:
     help="Whether states that differ only by exchanged members of scalar sets are one (E<>, A[], "
     "sup, inf, bounds; where the model cannot tell them apart).",
 )
-@click.option(
-    "--forced",
-    type=click.Choice(["tiga", "product", "neutral"]),
-    default="tiga",
-    help="When the environment must move because time cannot pass.",
-)
-@click.option(
-    "--priorities",
-    type=click.Choice(["ignore", "keep"]),
-    default="ignore",
-    help="Whether priorities of channels and processes count in games and under strategies. TIGA "
-    "ignores them; in all other queries they count.",
+@forced_rule()
+@priority_rule(
+    "Whether priorities of channels and processes count in games and under strategies. TIGA "
+    "ignores them; in all other queries they count."
 )
 @click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
 @click.option("--states", type=click.IntRange(1), help="Stop after so many stored states.")

@@ -17,6 +17,7 @@ from ntagen.cli.files import write_files
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.quantities import SIZE, TIME
+from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError, NtagenError
 
 if TYPE_CHECKING:
@@ -80,18 +81,8 @@ HELP: Final = """\
     type=click.Path(path_type=Path),
     help="Write the play at the end as a trace, which `ntagen verify MODEL FILE` checks.",
 )
-@click.option(
-    "--forced",
-    type=click.Choice(["tiga", "product", "neutral"]),
-    default="tiga",
-    help="When the environment must move because time cannot pass.",
-)
-@click.option(
-    "--priorities",
-    type=click.Choice(["ignore", "keep"]),
-    default="ignore",
-    help="Whether priorities of channels and processes count.",
-)
+@forced_rule()
+@priority_rule("Whether priorities of channels and processes count.")
 @click.option("--states", type=click.IntRange(1), help="Of --query: stop after so many states.")
 @click.option("--memory", metavar="SIZE", type=SIZE, help="Of --query: such as 4GiB.")
 @click.option("--timeout", metavar="TIME", type=TIME, help="Of --query: such as 60s.")

@@ -8,6 +8,7 @@ from typing import Any, Final
 import click
 
 from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError
 
 VIOLATED: Final = 1
@@ -24,18 +25,8 @@ NOT_COVERED: Final = 3
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
-@click.option(
-    "--forced",
-    type=click.Choice(["tiga", "product", "neutral"]),
-    default="tiga",
-    help="For strategies: when the environment must move because time cannot pass.",
-)
-@click.option(
-    "--priorities",
-    type=click.Choice(["ignore", "keep"]),
-    default="ignore",
-    help="For strategies: whether priorities of channels and processes count.",
-)
+@forced_rule("For strategies: when the environment must move because time cannot pass.")
+@priority_rule("For strategies: whether priorities of channels and processes count.")
 def command(
     model_path: Path,
     file: Path,

@@ -1,0 +1,22 @@
+"""The rules by which a game is played, as options of the commands that solve, check or play one."""
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import click
+
+Decorator: TypeAlias = Callable[[Callable[..., int]], Callable[..., int]]
+
+
+def forced_rule(
+    about: str = "When the environment must move because time cannot pass.",
+) -> Decorator:
+    """The option ``--forced``; ``about`` is its line in ``--help``."""
+    rules = click.Choice(["tiga", "product", "neutral"])
+    return click.option("--forced", type=rules, default="tiga", help=about)
+
+
+def priority_rule(about: str) -> Decorator:
+    """The option ``--priorities``; ``about`` is its line in ``--help``."""
+    rules = click.Choice(["ignore", "keep"])
+    return click.option("--priorities", type=rules, default="ignore", help=about)
