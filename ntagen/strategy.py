@@ -282,9 +282,19 @@ class Strategy:
             clocks = getattr(state, "clocks", {})
         return {
             "locations": dict(locations),
-            "variables": {name: _number(name, value) for name, value in variables.items()},
+            "variables": {name: self._number(name, value) for name, value in variables.items()},
             "clocks": {name: _pair(name, value) for name, value in clocks.items()},
         }
+
+    def _number(self, name: str, value: object) -> int | float:
+        if isinstance(value, int | float):
+            # Truth values are 0 and 1.
+            return float(value) if isinstance(value, float) else int(value)
+        # Most likely a clock was meant, by a name that is not its own.
+        clocks = ", ".join(sorted(self._clocks)) or "none"
+        raise InputError(
+            f"the value {value!r} of {name} is no number\n{_STATE_HINT}; the clocks are {clocks}"
+        )
 
     def _at(self, given: dict[str, Any]) -> str:
         try:
@@ -333,13 +343,6 @@ _STATE_HINT = (
     "hint: give a state of a run of this model, or the location of each process and the value of "
     "each variable and clock by their names"
 )
-
-
-def _number(name: str, value: object) -> int | float:
-    if isinstance(value, int | float):
-        # Truth values are 0 and 1.
-        return float(value) if isinstance(value, float) else int(value)
-    raise InputError(f"the value {value!r} of {name} is no number\n{_STATE_HINT}")
 
 
 def _pair(name: str, value: object) -> tuple[int, int]:

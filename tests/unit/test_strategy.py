@@ -173,6 +173,7 @@ def test_saved_strategy_is_read_again(tmp_path: Path) -> None:
         ({"M": "Hungry", "fed": 0, "x": Fraction(1, 2**50)}, "no whole numbers of any part"),
         ({"M": "Hungry", "fed": 0, "x": Fraction(1, 2**90)}, "no whole numbers of any part"),
         ({"M": "Hungry", "fed": "no", "x": 0}, "the value 'no' of fed is no number"),
+        ({"M": "Hungry", "fed": 0, "time": "1/2"}, "by their names; the clocks are x"),
     ],
 )
 def test_what_is_no_state_is_refused(state: dict[str, object], message: str) -> None:
