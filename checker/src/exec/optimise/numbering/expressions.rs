@@ -1,0 +1,97 @@
+//! What an instruction computes, in a form in which equal computations are equal.
+
+use crate::ir::{
+    Address, DoubleOperator, Instruction, IntegerOperator, MathFunction, Register, Relation,
+};
+
+/// A constant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Literal {
+    Integer(i32),
+    Double(f64),
+}
+
+/// An expression over values.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Expression {
+    Integer(i32),
+    /// The bits of a double.
+    Double(u64),
+    Arithmetic(IntegerOperator, Register, Register),
+    CompareIntegers(Relation, Register, Register),
+    CompareDoubles(Relation, Register, Register),
+    Not(Register),
+    DoubleArithmetic(DoubleOperator, Register, Register),
+    ToDouble(Register),
+    ToInteger(Register),
+    Math(MathFunction, Vec<Register>),
+    Address(Address),
+    Scale(Register, i32, u32, u32),
+    AddIndices(Register, Register),
+}
+
+/// The expression that an instruction computes, if computing it again gives the same; operands of commutative operators
+/// are sorted.
+pub(super) fn expression_of(instruction: &Instruction) -> Option<Expression> {
+    let sorted = |left: Register, right: Register| (left.min(right), left.max(right));
+    Some(match instruction {
+        &Instruction::Arithmetic {
+            operator,
+            left,
+            right,
+            ..
+        } => {
+            use IntegerOperator::{Add, And, Maximum, Minimum, Multiply, Or, Xor};
+            let (left, right) = match operator {
+                Add | Multiply | And | Or | Xor | Minimum | Maximum => sorted(left, right),
+                _ => (left, right),
+            };
+            Expression::Arithmetic(operator, left, right)
+        }
+        &Instruction::CompareIntegers {
+            relation,
+            left,
+            right,
+            ..
+        } => Expression::CompareIntegers(relation, left, right),
+        &Instruction::CompareDoubles {
+            relation,
+            left,
+            right,
+            ..
+        } => Expression::CompareDoubles(relation, left, right),
+        &Instruction::Not { source, .. } => Expression::Not(source),
+        &Instruction::DoubleArithmetic {
+            operator,
+            left,
+            right,
+            ..
+        } => {
+            let (left, right) = match operator {
+                DoubleOperator::Add | DoubleOperator::Multiply => sorted(left, right),
+                _ => (left, right),
+            };
+            Expression::DoubleArithmetic(operator, left, right)
+        }
+        &Instruction::IntegerToDouble { source, .. } => Expression::ToDouble(source),
+        &Instruction::DoubleToInteger { source, .. } => Expression::ToInteger(source),
+        Instruction::Math {
+            function,
+            arguments,
+            ..
+        } => Expression::Math(*function, arguments.clone()),
+        &Instruction::AddressOf { address, .. } => Expression::Address(address),
+        &Instruction::ScaleIndex {
+            index,
+            first,
+            length,
+            stride,
+            ..
+        } => Expression::Scale(index, first, length, stride),
+        &Instruction::AddIndices { left, right, .. } => {
+            let (left, right) = sorted(left, right);
+            Expression::AddIndices(left, right)
+        }
+        _ => return None,
+    })
+}
