@@ -1,0 +1,317 @@
+//! Instructions that compute registers from registers, and their checks.
+
+use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
+use cranelift_codegen::ir::types::{F64, I32, I64};
+use cranelift_codegen::ir::{InstBuilder, Value};
+
+use crate::exec::jit::runtime;
+use crate::exec::math::{self, MathCode};
+use crate::ir::{
+    DoubleOperator, Instruction, IntegerOperator, MathFunction, Register, Relation,
+    RunTimeErrorKind, SiteId,
+};
+
+use super::Translator;
+
+impl Translator<'_> {
+    /// The instructions that compute a register from others and cannot fail.
+    pub(super) fn compute(&mut self, instruction: &Instruction) {
+        let (target, value) = match *instruction {
+            Instruction::Integer { target, value } => (target, self.integer(value)),
+            Instruction::Double { target, value } => (target, self.builder.ins().f64const(value)),
+            Instruction::Copy { target, source } => (target, self.get(source)),
+            Instruction::CompareIntegers {
+                relation,
+                target,
+                left,
+                right,
+            } => {
+                let (left, right) = (self.get(left), self.get(right));
+                let holds = self
+                    .builder
+                    .ins()
+                    .icmp(integer_condition(relation), left, right);
+                (target, self.truth(holds))
+            }
+            Instruction::CompareDoubles {
+                relation,
+                target,
+                left,
+                right,
+            } => {
+                let (left, right) = (self.get(left), self.get(right));
+                let holds = self
+                    .builder
+                    .ins()
+                    .fcmp(double_condition(relation), left, right);
+                (target, self.truth(holds))
+            }
+            Instruction::Not { target, source } => {
+                let source = self.get(source);
+                let is_zero = self.builder.ins().icmp_imm_s(IntCC::Equal, source, 0);
+                (target, self.truth(is_zero))
+            }
+            Instruction::DoubleArithmetic {
+                operator,
+                target,
+                left,
+                right,
+            } => {
+                let (left, right) = (self.get(left), self.get(right));
+                (target, self.double_arithmetic(operator, left, right))
+            }
+            Instruction::IntegerToDouble { target, source } => {
+                let source = self.get(source);
+                (target, self.builder.ins().fcvt_from_sint(F64, source))
+            }
+            Instruction::AddIndices {
+                target,
+                left,
+                right,
+            } => {
+                let (left, right) = (self.get(left), self.get(right));
+                (target, self.builder.ins().iadd(left, right))
+            }
+            _ => unreachable!("sorted out by instruction"),
+        };
+        self.set(target, value);
+    }
+
+    /// The instructions that compute a register from others and can fail.
+    pub(super) fn compute_checked(&mut self, instruction: &Instruction) {
+        let (target, value) = match instruction {
+            &Instruction::Arithmetic {
+                operator,
+                target,
+                left,
+                right,
+                site,
+            } => {
+                let (left, right) = (self.get(left), self.get(right));
+                (target, self.arithmetic(operator, left, right, site))
+            }
+            &Instruction::DoubleToInteger {
+                target,
+                source,
+                site,
+            } => {
+                let source = self.get(source);
+                (target, self.truncate(source, site))
+            }
+            Instruction::Math {
+                function,
+                target,
+                arguments,
+                site,
+            } => (*target, self.math(*function, arguments, *site)),
+            &Instruction::ScaleIndex {
+                target,
+                index,
+                first,
+                length,
+                stride,
+                site,
+            } => {
+                let index = self.get(index);
+                let position = self.builder.ins().iadd_imm_s(index, -i64::from(first));
+                let outside = self.builder.ins().icmp_imm_u(
+                    IntCC::UnsignedGreaterThanOrEqual,
+                    position,
+                    i64::from(length),
+                );
+                self.fail_if(outside, RunTimeErrorKind::IndexOutOfBounds, site);
+                let scaled = self.builder.ins().imul_imm_u(position, i64::from(stride));
+                (target, scaled)
+            }
+            _ => unreachable!("sorted out by instruction"),
+        };
+        self.set(target, value);
+    }
+
+    fn double_arithmetic(&mut self, operator: DoubleOperator, left: Value, right: Value) -> Value {
+        let ins = self.builder.ins();
+        match operator {
+            DoubleOperator::Add => ins.fadd(left, right),
+            DoubleOperator::Subtract => ins.fsub(left, right),
+            DoubleOperator::Multiply => ins.fmul(left, right),
+            DoubleOperator::Divide => ins.fdiv(left, right),
+            DoubleOperator::Minimum => {
+                let less = ins.fcmp(FloatCC::LessThan, left, right);
+                self.builder.ins().select(less, left, right)
+            }
+            DoubleOperator::Maximum => {
+                let greater = ins.fcmp(FloatCC::GreaterThan, left, right);
+                self.builder.ins().select(greater, left, right)
+            }
+        }
+    }
+
+    fn arithmetic(
+        &mut self,
+        operator: IntegerOperator,
+        left: Value,
+        right: Value,
+        site: SiteId,
+    ) -> Value {
+        let ins = self.builder.ins();
+        match operator {
+            IntegerOperator::Add => {
+                let (sum, overflow) = ins.sadd_overflow(left, right);
+                self.without_overflow(sum, overflow, site)
+            }
+            IntegerOperator::Subtract => {
+                let (difference, overflow) = ins.ssub_overflow(left, right);
+                self.without_overflow(difference, overflow, site)
+            }
+            IntegerOperator::Multiply => {
+                let (product, overflow) = ins.smul_overflow(left, right);
+                self.without_overflow(product, overflow, site)
+            }
+            IntegerOperator::Divide => {
+                self.check_divisor(right, site);
+                self.check_quotient(left, right, site);
+                self.builder.ins().sdiv(left, right)
+            }
+            IntegerOperator::Remainder => {
+                self.check_divisor(right, site);
+                self.builder.ins().srem(left, right)
+            }
+            IntegerOperator::Power => self.power(left, right, site),
+            IntegerOperator::ShiftLeft => {
+                self.check_distance(right, site);
+                self.builder.ins().ishl(left, right)
+            }
+            IntegerOperator::ShiftRight => {
+                self.check_distance(right, site);
+                self.builder.ins().sshr(left, right)
+            }
+            IntegerOperator::And => ins.band(left, right),
+            IntegerOperator::Or => ins.bor(left, right),
+            IntegerOperator::Xor => ins.bxor(left, right),
+            IntegerOperator::Minimum => ins.smin(left, right),
+            IntegerOperator::Maximum => ins.smax(left, right),
+        }
+    }
+
+    fn without_overflow(&mut self, value: Value, overflow: Value, site: SiteId) -> Value {
+        self.fail_if(overflow, RunTimeErrorKind::Overflow, site);
+        value
+    }
+
+    fn check_divisor(&mut self, divisor: Value, site: SiteId) {
+        let is_zero = self.builder.ins().icmp_imm_s(IntCC::Equal, divisor, 0);
+        self.fail_if(is_zero, RunTimeErrorKind::DivisionByZero, site);
+    }
+
+    /// Fails for `-2^31 / -1`.
+    fn check_quotient(&mut self, dividend: Value, divisor: Value, site: SiteId) {
+        let is_least = self
+            .builder
+            .ins()
+            .icmp_imm_s(IntCC::Equal, dividend, i64::from(i32::MIN));
+        let is_minus_one = self.builder.ins().icmp_imm_s(IntCC::Equal, divisor, -1);
+        let both = self.builder.ins().band(is_least, is_minus_one);
+        self.fail_if(both, RunTimeErrorKind::Overflow, site);
+    }
+
+    fn check_distance(&mut self, distance: Value, site: SiteId) {
+        let outside = self
+            .builder
+            .ins()
+            .icmp_imm_u(IntCC::UnsignedGreaterThan, distance, 31);
+        self.fail_if(outside, RunTimeErrorKind::ShiftDistance, site);
+    }
+
+    fn power(&mut self, base: Value, exponent: Value, site: SiteId) -> Value {
+        let negative = self
+            .builder
+            .ins()
+            .icmp_imm_s(IntCC::SignedLessThan, exponent, 0);
+        self.fail_if(negative, RunTimeErrorKind::NegativeExponent, site);
+        let code = runtime::power as *const () as usize;
+        let power = self.call_back(code, Some(I64), &[base, exponent]);
+        self.word_of(power, RunTimeErrorKind::Overflow, site)
+    }
+
+    /// The integer that a called-back function gave; fails if it gave none.
+    pub(super) fn word_of(&mut self, result: Value, kind: RunTimeErrorKind, site: SiteId) -> Value {
+        let none = self
+            .builder
+            .ins()
+            .icmp_imm_s(IntCC::SignedLessThan, result, 0);
+        self.fail_if(none, kind, site);
+        self.builder.ins().ireduce(I32, result)
+    }
+
+    fn truncate(&mut self, source: Value, site: SiteId) -> Value {
+        // Both comparisons are false for a NaN, and the conversion is exact between the two.
+        let high = self.builder.ins().f64const(2_147_483_648.0);
+        let below = self.builder.ins().fcmp(FloatCC::LessThan, source, high);
+        self.fail_unless(below, RunTimeErrorKind::NotAnInteger, site);
+        let low = self.builder.ins().f64const(-2_147_483_649.0);
+        let above = self.builder.ins().fcmp(FloatCC::GreaterThan, source, low);
+        self.fail_unless(above, RunTimeErrorKind::NotAnInteger, site);
+        self.builder.ins().fcvt_to_sint_sat(I32, source)
+    }
+
+    fn math(&mut self, function: MathFunction, arguments: &[Register], site: SiteId) -> Value {
+        let arguments: Vec<Value> = arguments
+            .iter()
+            .map(|&register| self.get(register))
+            .collect();
+        let ins = self.builder.ins();
+        // These are exact in IEEE arithmetic, so that the processor's instruction gives what the library gives.
+        match function {
+            MathFunction::Fabs => return ins.fabs(arguments[0]),
+            MathFunction::Sqrt => return ins.sqrt(arguments[0]),
+            _ => {}
+        }
+        let (code, result) = match math::code_of(function) {
+            MathCode::Abs => {
+                let least = i64::from(i32::MIN);
+                let is_least = ins.icmp_imm_s(IntCC::Equal, arguments[0], least);
+                self.fail_if(is_least, RunTimeErrorKind::Overflow, site);
+                return self.builder.ins().iabs(arguments[0]);
+            }
+            MathCode::Ilogb => {
+                let code = runtime::ilogb as *const () as usize;
+                let exponent = self.call_back(code, Some(I64), &arguments);
+                return self.word_of(exponent, RunTimeErrorKind::NotAnInteger, site);
+            }
+            MathCode::Unary(code) => (code as usize, F64),
+            MathCode::Binary(code) => (code as usize, F64),
+            MathCode::Scale(code) => (code as usize, F64),
+            MathCode::Ternary(code) => (code as usize, F64),
+            MathCode::Classify(code) => (code as usize, I32),
+        };
+        self.call_back(code, Some(result), &arguments)
+    }
+
+    /// A condition as 0 or 1.
+    pub(super) fn truth(&mut self, condition: Value) -> Value {
+        self.builder.ins().uextend(I32, condition)
+    }
+}
+
+fn integer_condition(relation: Relation) -> IntCC {
+    match relation {
+        Relation::Less => IntCC::SignedLessThan,
+        Relation::LessEqual => IntCC::SignedLessThanOrEqual,
+        Relation::Greater => IntCC::SignedGreaterThan,
+        Relation::GreaterEqual => IntCC::SignedGreaterThanOrEqual,
+        Relation::Equal => IntCC::Equal,
+        Relation::NotEqual => IntCC::NotEqual,
+    }
+}
+
+/// Cranelift's conditions are ordered but for `NotEqual`, as ours are.
+fn double_condition(relation: Relation) -> FloatCC {
+    match relation {
+        Relation::Less => FloatCC::LessThan,
+        Relation::LessEqual => FloatCC::LessThanOrEqual,
+        Relation::Greater => FloatCC::GreaterThan,
+        Relation::GreaterEqual => FloatCC::GreaterThanOrEqual,
+        Relation::Equal => FloatCC::Equal,
+        Relation::NotEqual => FloatCC::NotEqual,
+    }
+}
