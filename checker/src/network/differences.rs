@@ -6,7 +6,7 @@
 //! is one of the source, and all matter everywhere.
 //!
 //! A bound that the words decide stands for every value that it may take. Where that makes more comparisons than
-//! [`MOST_DIFFERENCES`], there is no such abstraction, and exploring may not end.
+//! `MOST_DIFFERENCES`, there is no such abstraction, and exploring may not end.
 //!
 //! Source: J. Bengtsson, W. Yi, "On Clock Difference Constraints and Termination in Reachability Analysis of Timed Automata",
 //! ICFEM 2003.

@@ -5,7 +5,7 @@
 //! neither the language of models nor that of queries can name a member. So a search may replace every state by another one
 //! of its orbit; if the start is s and p a permutation, all that is reachable from p(s) is p of what is reachable from s,
 //! and so the initial state need not look the same from all members. What *can* tell members apart is found when the model is
-//! loaded ([`crate::ir::ScalarSet`]) or here ([`super::orbits`]), and sets of such members are left as they are.
+//! loaded ([`crate::ir::ScalarSet`]) or here (`network/orbits.rs`), and sets of such members are left as they are.
 //!
 //! [`Symmetry::normalise`] exchanges members as long as that makes the state less in a total order: the words one after the
 //! other, then the bounds of each clock against 0, then those of differences. So the result is the least state among all that
