@@ -5,6 +5,8 @@
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints")]
 
+#[path = "support/needle.rs"]
+mod needle;
 mod support;
 
 use std::error::Error;
@@ -17,7 +19,8 @@ use std::time::{Duration, Instant};
 use checker::exec::{Context, Executor, Interpreter, Jit};
 use checker::ir::{FunctionId, Network};
 
-use support::{Scratch, load};
+use needle::{load, needle_model};
+use support::Scratch;
 
 const ROUNDS: u32 = 2_000;
 /// The fastest of so many repetitions counts; C and compiled code take turns, so that both see the same load.
@@ -58,7 +61,7 @@ struct Functions {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scratch = Scratch::new()?;
-    let model = load(&scratch.needle_model()?)?;
+    let model = load(&needle_model(scratch.folder())?)?;
     let network = model.network();
     let functions = Functions {
         step: function(network, "step")?,
@@ -67,7 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let jit = Jit::new(&network.functions, &network.constants)?;
     jit.compile_function(functions.step)?;
     jit.compile_function(functions.roll)?;
-    let program = scratch.compile("benches/exec.c")?;
+    let program = scratch.compile("benches/exec.c", &[])?;
     let mut c = run_c(&program, network)?;
     let mut compiled = run(&jit, network, &functions)?;
     for _ in 1..REPETITIONS {

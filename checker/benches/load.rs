@@ -8,6 +8,8 @@
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints")]
 
+#[path = "support/needle.rs"]
+mod needle;
 mod support;
 
 use std::error::Error;
@@ -19,7 +21,8 @@ use std::time::Instant;
 use checker::exec::{Jit, JitError};
 use checker::ir::{FunctionId, Instruction, Network};
 
-use support::{Scratch, load};
+use needle::{load, needle_model};
+use support::Scratch;
 
 /// The least of so many repetitions counts; what is compared takes turns, so that both see the same load.
 const REPETITIONS: usize = 15;
@@ -27,8 +30,8 @@ const LARGE_BYTES: usize = 1 << 20;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scratch = Scratch::new()?;
-    let yardstick = scratch.compile("../tests/benchmarks/needle.c")?;
-    let needle = scratch.needle_model()?;
+    let yardstick = scratch.compile("../tests/benchmarks/needle.c", &[])?;
+    let needle = needle_model(scratch.folder())?;
     let large = large_model();
     let mut least = [f64::INFINITY; 6];
     for _ in 0..REPETITIONS {

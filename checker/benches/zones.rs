@@ -1,17 +1,29 @@
 //! How long does one zone operation take, and one full successor?
 //!
 //! `cargo bench --no-default-features --bench zones` prints nanoseconds per operation, copying the source zone included,
-//! over zones that a random walk of successors reaches. The figures in brackets were published for the C code of UDBM on
-//! another machine and are an order of magnitude to compare with, not a limit. The least of several rounds is printed, so a
-//! busy machine disturbs little.
+//! over zones that a random walk of successors reaches. With the folders of the sources of UDBM and of `UUtils`, on which it
+//! rests, in `NTAGEN_UDBM` and `NTAGEN_UUTILS`, the same operations on the same zones are timed in its C code (`udbm.c`), in
+//! turns with ours, and the ratio stands beside each figure. Without them the figures in brackets are those published for
+//! another machine, an order of magnitude. The least of several rounds is printed, so a busy machine disturbs little.
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints its table")]
 
+mod support;
+
+use std::env;
+use std::error::Error;
+use std::ffi::OsString;
+use std::fmt::Write as _;
 use std::hint::black_box;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use checker::zones::extrapolate::{self, Ceilings};
 use checker::zones::{Bound, clocks, dbm, minimal};
+
+use support::Scratch;
 
 /// Clocks and the reference clock.
 const DIMENSIONS: [usize; 5] = [4, 6, 11, 16, 21];
@@ -20,7 +32,9 @@ const ZONES: u16 = 200;
 /// Steps of the random walk between two zones that are kept.
 const STRIDE: usize = 7;
 /// Rounds over all zones; the fastest counts.
-const ROUNDS: usize = 200;
+const ROUNDS: usize = 50;
+/// Turns of such rounds.
+const TURNS: usize = 4;
 /// The greatest constant of a guard or invariant.
 const GREATEST: u32 = 20;
 
@@ -42,6 +56,8 @@ struct Case {
 /// Everything that is measured at one dimension.
 struct Bench {
     dimension: usize,
+    /// The greatest constants of comparisons from below and from above.
+    greatest: [Vec<Option<i32>>; 2],
     ceilings: Ceilings,
     cases: Vec<Case>,
     /// Zones of other cases, for comparisons.
@@ -79,16 +95,21 @@ impl Random {
 impl Step {
     /// The zone after the step; returns whether something is left.
     fn take(&self, zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) -> bool {
+        let is_left = self.delay(zone, dimension);
+        if is_left {
+            extrapolate::lu_plus(zone, dimension, ceilings);
+        }
+        is_left
+    }
+
+    /// The same without extrapolation.
+    fn delay(&self, zone: &mut [Bound], dimension: usize) -> bool {
         if !dbm::constrain(zone, dimension, 0, self.guarded, self.at_least) {
             return false;
         }
         clocks::reset(zone, dimension, self.reset, 0);
         clocks::up(zone, dimension);
-        if !dbm::constrain(zone, dimension, self.limited, 0, self.at_most) {
-            return false;
-        }
-        extrapolate::lu_plus(zone, dimension, ceilings);
-        true
+        dbm::constrain(zone, dimension, self.limited, 0, self.at_most)
     }
 }
 
@@ -118,6 +139,7 @@ impl Bench {
             .collect();
         Bench {
             dimension,
+            greatest: [lower, upper],
             ceilings,
             cases,
             others,
@@ -178,26 +200,130 @@ impl Bench {
         }
     }
 
-    /// Extrapolation is measured where it happens: after delay and invariant, before which little is forgotten.
-    fn measure_delayed(&self) -> f64 {
+    /// The zones of the cases after delay and invariant, where extrapolation happens: before, little would be forgotten.
+    fn delayed(&self) -> Vec<Vec<Bound>> {
         let without = |case: &Case| {
-            let (mut zone, step) = (case.zone.clone(), &case.step);
-            dbm::constrain(&mut zone, self.dimension, 0, step.guarded, step.at_least);
-            clocks::reset(&mut zone, self.dimension, step.reset, 0);
-            clocks::up(&mut zone, self.dimension);
-            dbm::constrain(&mut zone, self.dimension, step.limited, 0, step.at_most);
+            let mut zone = case.zone.clone();
+            case.step.delay(&mut zone, self.dimension);
             zone
         };
-        let delayed: Vec<Vec<Bound>> = self.cases.iter().map(without).collect();
+        self.cases.iter().map(without).collect()
+    }
+
+    fn measure_delayed(&self) -> f64 {
+        let delayed = self.delayed();
         self.measure(|zone, index| {
             zone.copy_from_slice(&delayed[index]);
             extrapolate::lu_plus(zone, self.dimension, &self.ceilings);
             true
         })
     }
+
+    /// What `udbm.c` reads.
+    fn cases_as_text(&self) -> String {
+        let mut text = format!("{} {ZONES}\n", self.dimension);
+        let mut line = |numbers: &mut dyn Iterator<Item = i32>| {
+            for number in numbers {
+                // Writing to a string does not fail.
+                let _ = write!(text, "{number} ");
+            }
+            text.push('\n');
+        };
+        for greatest in &self.greatest {
+            line(
+                &mut (0..).zip(greatest).map(|(clock, constant)| match clock {
+                    0 => 0,
+                    _ => constant.unwrap_or(i32::MIN / 4),
+                }),
+            );
+        }
+        for (case, other) in self.cases.iter().zip(&self.others) {
+            let step = &case.step;
+            line(
+                &mut [
+                    step.guarded as i32,
+                    encoded(step.at_least),
+                    step.reset as i32,
+                    step.limited as i32,
+                    encoded(step.at_most),
+                ]
+                .into_iter(),
+            );
+            line(&mut case.zone.iter().copied().map(encoded));
+            line(&mut other.iter().copied().map(encoded));
+        }
+        text
+    }
+
+    /// What UDBM takes for the operations of [`TABLE`] that it is asked for, in their order.
+    fn time_udbm(&self, program: &Path) -> Result<Vec<f64>, Box<dyn Error>> {
+        let mut child = Command::new(program)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()?;
+        let mut input = child.stdin.take().ok_or("the program has an input")?;
+        input.write_all(self.cases_as_text().as_bytes())?;
+        drop(input);
+        let output = String::from_utf8(child.wait_with_output()?.stdout)?;
+        let mut fields = output.split_whitespace();
+        let sum: i64 = fields.next().ok_or("the program wrote nothing")?.parse()?;
+        let delayed = self.delayed();
+        let finite = delayed.iter().flatten().filter(|bound| bound.is_finite());
+        let ours: i64 = finite.map(|&bound| i64::from(encoded(bound))).sum();
+        assert_eq!(sum, ours, "UDBM and we reach the same zones");
+        let times: Result<Vec<f64>, _> = fields.map(str::parse).collect();
+        Ok(times?)
+    }
 }
 
-/// The operations with the published figures in nanoseconds, where there are any.
+/// The bound as `udbm.c` reads it.
+fn encoded(bound: Bound) -> i32 {
+    if bound.is_infinite() {
+        return i32::MAX;
+    }
+    2 * bound.value() + i32::from(!bound.is_strict())
+}
+
+/// The yardstick, if the folders of its sources are given.
+fn compile_udbm(scratch: &Scratch) -> Result<Option<PathBuf>, Box<dyn Error>> {
+    let Some(udbm) = env::var_os("NTAGEN_UDBM").map(PathBuf::from) else {
+        return Ok(None);
+    };
+    let uutils = env::var_os("NTAGEN_UUTILS").map(PathBuf::from);
+    let uutils =
+        uutils.ok_or("UDBM rests on UUtils: set NTAGEN_UUTILS to the folder of its sources")?;
+    let include = |folder: PathBuf| {
+        let mut option = OsString::from("-I");
+        option.push(folder);
+        option
+    };
+    // The sources of UDBM leave out a header that they need; what is not used needs nothing of `UUtils` but headers.
+    let mut arguments: Vec<OsString> = [
+        "-O3",
+        "-march=native",
+        "-DNDEBUG",
+        "-w",
+        "-ffunction-sections",
+        "-Wl,--gc-sections",
+        "-include",
+        "stdlib.h",
+    ]
+    .map(OsString::from)
+    .into();
+    arguments.extend(
+        [
+            udbm.join("include"),
+            udbm.join("src"),
+            uutils.join("include"),
+        ]
+        .map(include),
+    );
+    arguments
+        .extend([udbm.join("src/dbm.c"), uutils.join("src/base/bitstring.c")].map(OsString::from));
+    scratch.compile("benches/udbm.c", &arguments).map(Some)
+}
+
+/// The operations with the published figures in nanoseconds, where there are any: those that `udbm.c` times, in its order.
 const TABLE: [(&str, [u32; 5]); 12] = [
     ("copy", [4, 5, 9, 17, 27]),
     ("close", [75, 262, 561, 1_017, 3_106]),
@@ -206,29 +332,72 @@ const TABLE: [(&str, [u32; 5]); 12] = [
     ("reset", [13, 17, 32, 52, 69]),
     ("extrapolate LU+", [66, 153, 1_038, 1_958, 4_205]),
     ("is_subset", [6, 8, 10, 15, 23]),
+    ("full successor", [113, 220, 1_253, 2_512, 4_272]),
     ("intersect", [0; 5]),
     ("down", [0; 5]),
     ("hash", [0; 5]),
     ("minimal constraints", [0; 5]),
-    ("full successor", [113, 220, 1_253, 2_512, 4_272]),
 ];
 
-fn main() {
+/// Nanoseconds of every operation at one dimension, and those of UDBM as far as it was timed.
+struct Figures {
+    ours: Vec<f64>,
+    udbm: Vec<f64>,
+}
+
+impl Figures {
+    fn of(bench: &Bench, udbm: Option<&Path>) -> Result<Figures, Box<dyn Error>> {
+        let mut figures = Figures {
+            ours: vec![f64::INFINITY; TABLE.len()],
+            udbm: Vec::new(),
+        };
+        for _ in 0..TURNS {
+            for (least, (name, _)) in figures.ours.iter_mut().zip(TABLE) {
+                *least = least.min(bench.time(name));
+            }
+            if let Some(program) = udbm {
+                let times = bench.time_udbm(program)?;
+                figures.udbm.resize(times.len(), f64::INFINITY);
+                for (least, time) in figures.udbm.iter_mut().zip(times) {
+                    *least = least.min(time);
+                }
+            }
+        }
+        Ok(figures)
+    }
+
+    /// Our figure, and what stands beside it.
+    fn cell(&self, operation: usize, published: u32) -> String {
+        let ours = self.ours[operation];
+        match (self.udbm.get(operation), published) {
+            (Some(udbm), _) => format!("{ours:>7.0} /{udbm:>6.0} = {:<5.2}", ours / udbm),
+            (None, 0) => format!("{ours:>7.0} {:>6}", ""),
+            (None, _) => format!("{ours:>7.0} {:>6}", format!("({published})")),
+        }
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let scratch = Scratch::new()?;
+    let udbm = compile_udbm(&scratch)?;
     let benches = DIMENSIONS.map(Bench::new);
-    print!("{:20}", "ns (published)");
+    let figures = benches
+        .iter()
+        .map(|bench| Figures::of(bench, udbm.as_deref()));
+    let figures: Vec<Figures> = figures.collect::<Result<_, _>>()?;
+    let (title, width) = match udbm {
+        Some(_) => ("ns / UDBM = ratio", 22),
+        None => ("ns (published)", 14),
+    };
+    print!("{title:20}");
     for dimension in DIMENSIONS {
-        print!("{dimension:>14}");
+        print!("{dimension:>width$}");
     }
     println!();
-    for (name, published) in TABLE {
+    for (operation, (name, published)) in TABLE.iter().enumerate() {
         print!("{name:20}");
-        for (bench, published) in benches.iter().zip(published) {
-            let figure = if published == 0 {
-                String::new()
-            } else {
-                format!("({published})")
-            };
-            print!("{:>7.0} {figure:>6}", bench.time(name));
+        for (figures, &published) in figures.iter().zip(published) {
+            print!("{:width$}", figures.cell(operation, published));
         }
         println!();
     }
@@ -243,4 +412,5 @@ fn main() {
             100 * finite / all
         );
     }
+    Ok(())
 }
