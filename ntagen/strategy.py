@@ -29,6 +29,12 @@ ForcedRule = Literal["tiga", "product", "neutral"]
 
 PriorityRule = Literal["ignore", "keep"]
 
+ExactNumber = int | Fraction | Decimal | str
+"""A clock value; texts are such as ``"3/2"`` and ``"1.5"``."""
+
+_TIME = "#time"
+"""The clock of strategies with a limit of time: the time since the start."""
+
 _DECISIONS_SHOWN = 5
 """Decisions that a message lists."""
 
@@ -141,6 +147,9 @@ class Strategy:
         winning: Whether the controller wins: whether it is the controller's strategy.
         is_permissive: Whether every decision that applies is allowed, and not only the first. Such
             strategies keep something, and are the most permissive ones.
+        time_limit: Of ``control_t*``: the time within which the controller gets to the goal, or for
+            as long as the environment keeps it from there. The strategy looks at the clock
+            ``#time`` then, the time since the start. ``None`` without a limit.
         forced: The rule for forced moves of the game.
         priorities: Whether priorities count in the game.
     """
@@ -158,6 +167,7 @@ class Strategy:
         self.owner: Owner = raw.owner
         self.winning = raw.owner == "controller"
         self.is_permissive = raw.is_permissive
+        self.time_limit = raw.time_limit
 
     def __repr__(self) -> str:
         states = "1 state" if len(self) == 1 else f"{len(self)} states"
@@ -178,21 +188,30 @@ class Strategy:
         """
         return _state(json.loads(self._at(self._given(state))))
 
-    def action(self, state: StateLike) -> Advice:
+    def action(self, state: StateLike, *, time: ExactNumber | None = None) -> Advice:
         """What it does in a state.
 
         A permissive strategy waits as long as it may, and then takes the first of what it allows.
+
+        Args:
+            state: The state.
+            time: The time since the start, for a strategy with a `time_limit`, unless the state
+                has it as ``#time``.
 
         Raises:
             UndecidedError: It says nothing of the state.
             InputError: It is no state of the model.
             ModelError: The model fails in it.
         """
-        allowed = self.allowed(state)
+        allowed = self.allowed(state, time=time)
         return next((one for one in allowed if one.kind == "wait"), allowed[0])
 
-    def allowed(self, state: StateLike) -> tuple[Advice, ...]:
+    def allowed(self, state: StateLike, *, time: ExactNumber | None = None) -> tuple[Advice, ...]:
         """All that it allows in a state: one thing, unless it is permissive.
+
+        Args:
+            state: The state.
+            time: As of `action`.
 
         Raises:
             UndecidedError: It says nothing of the state.
@@ -205,6 +224,13 @@ class Strategy:
                 "hint: ask `at`, which gives the decisions with their zones, or write the values"
             )
         given = self._given(state)
+        if time is not None:
+            given["clocks"][_TIME] = _pair(_TIME, time)
+        if self.time_limit is not None and _TIME not in given["clocks"]:
+            raise InputError(
+                "the strategy keeps to a limit of time, and the state does not say how late it is\n"
+                f"hint: give the time since the start: time=…, or {_TIME} among the clocks"
+            )
         try:
             raw = json.loads(self._raw.advice_json(json.dumps(given)))
         except LookupError as error:

@@ -9,7 +9,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use checker::engine::{CodeEngine, LoadedModel, Options, controller};
+use checker::engine::{CodeEngine, LoadedModel, Options, controller, timing};
 use checker::game::closed_loop;
 use checker::game::strategy::{Decision, Selection, Strategy};
 use checker::network::Part;
@@ -70,9 +70,8 @@ fn solve(path: &Path, query: &str) -> Option<Case> {
         ..Options::default()
     };
     let strategy = model.check(&text, &options).ok()?.evidence.strategy?;
-    let network = model.network();
-    let text = controller::write(network, &strategy, query).ok()?;
-    let again = controller::write(network, &strategy, query);
+    let text = controller::write(model.network(), &strategy, query).ok()?;
+    let again = controller::write(model.network(), &strategy, query);
     assert_eq!(again.as_ref(), Ok(&text), "the text is always the same");
     let (_, after) = text.split_once("controller_texts[] = {\n")?;
     let (list, _) = after.split_once("};")?;
@@ -80,6 +79,7 @@ fn solve(path: &Path, query: &str) -> Option<Case> {
         let line = line.trim().strip_prefix('"')?.strip_suffix("\",")?;
         Some(line.replace("\\\"", "\"").replace("\\?", "?"))
     });
+    let network = timing::network_of(model.network(), &strategy).into_owned();
     Some(Case {
         name: format!("{}: {query}", path.display()),
         actions: actions.collect(),
@@ -87,7 +87,7 @@ fn solve(path: &Path, query: &str) -> Option<Case> {
         strategy: (*strategy).clone(),
         words: network.layout.identity_words as usize,
         clocks: network.clocks.len().saturating_sub(1),
-        network: network.clone(),
+        network,
     })
 }
 
@@ -302,7 +302,7 @@ fn games() -> Vec<(PathBuf, String)> {
         let queries = text
             .lines()
             .filter_map(|line| line.strip_prefix("// query: "));
-        let control = queries.filter(|query| query.starts_with("control: "));
+        let control = queries.filter(|query| query.starts_with("control"));
         games.extend(control.map(|query| (path.clone(), query.to_owned())));
     }
     games

@@ -1,5 +1,6 @@
 //! Strategies read from files: what does not fit the model is refused with its place.
 
+use checker::engine::Verdict;
 use checker::engine::{CodeEngine, LoadedModel, Options, strategy_file};
 use serde_json::{Value, json};
 
@@ -260,17 +261,82 @@ fn strategies_are_saved_and_loaded_beside_the_model() {
 fn questions_without_a_strategy_say_so() {
     let text = "clock x; process P() { state A { x <= 2 }, B; init A; trans A -> B { guard x >= 1; }; } system P;";
     let mut model = LoadedModel::load("model.xta", text.as_bytes()).expect("the model is right");
-    for query in [
-        "strategy S = E<> control: A<> P.B",
-        "strategy S = control_t*: A<> P.B",
-    ] {
+    let query = model.add_query("strategy S = E<> control: A<> P.B");
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        strategy: true,
+        ..Options::default()
+    };
+    let answer = model.check(&query, &options).expect("it is accepted");
+    let message = answer.message.unwrap_or_default();
+    assert!(message.contains("gives no strategy"), "{message}");
+}
+
+const RACE: &str = "clock x; process P() { state A { x <= 5 }, B, C; init A; trans A -> B { guard x >= 1; }, B -> C { }; } system P;";
+
+/// Under the strategy of a time-optimal game, the goal comes within the time; traces are about the model, without the clock.
+#[test]
+fn strategies_within_a_time_are_asked_under() {
+    let mut model = LoadedModel::load("model.xta", RACE.as_bytes()).expect("the model is right");
+    let mut ask = |query: &str| {
         let query = model.add_query(query);
         let options = Options {
-            strategy: true,
+            code: CodeEngine::Interpreter,
+            runs: true,
             ..Options::default()
         };
-        let answer = model.check(&query, &options).expect("it is accepted");
-        let message = answer.message.unwrap_or_default();
-        assert!(message.contains("gives no strategy"), "{message}");
-    }
+        let answer = model.check(&query, &options).expect("the query is right");
+        let witnesses = &answer.evidence.witnesses;
+        let trace = checker::engine::json::witnesses(model.network(), witnesses, "");
+        (answer.verdict, answer.evidence.is_verified(), trace)
+    };
+    assert_eq!(
+        ask("strategy S = control_t*(4): A<> P.C").0,
+        Verdict::Satisfied
+    );
+    assert_eq!(
+        ask("A[] not P.C imply x <= 1 under S").0,
+        Verdict::Satisfied
+    );
+    assert_eq!(ask("A[] x <= 1 under S").0, Verdict::NotSatisfied);
+    let (verdict, verified, trace) = ask("E<> P.C and x > 3 under S");
+    assert_eq!((verdict, verified), (Verdict::Satisfied, Some(true)));
+    let last = &trace["run"]["states"].as_array().expect("there are states");
+    let clocks = last[0]["clocks"].as_object().expect("there are clocks");
+    assert_eq!(clocks.keys().collect::<Vec<_>>(), ["x"]);
+}
+
+#[test]
+fn limit_of_time_is_read_with_care() {
+    let mut model = LoadedModel::load("model.xta", RACE.as_bytes()).expect("the model is right");
+    let query = model.add_query("control_t*: A<> P.C");
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        strategy: true,
+        ..Options::default()
+    };
+    let answer = model.check(&query, &options).expect("the query is right");
+    let strategy = answer.evidence.strategy.expect("the controller wins");
+    let file = strategy_file::write(model.network(), &strategy, "control_t*: A<> P.C");
+    assert_eq!(file["time_limit"], 1);
+    let mut other = file.clone();
+    other["time_limit"] = "soon".into();
+    let read = |file: &serde_json::Value| {
+        strategy_file::read(model.network(), file.to_string().as_bytes())
+            .map_err(|mismatch| (mismatch.place, mismatch.message))
+    };
+    assert_eq!(
+        read(&other).map(|_| ()),
+        Err((
+            "time_limit".to_owned(),
+            "\"soon\" is no limit of time".to_owned()
+        ))
+    );
+    other["time_limit"] = serde_json::Value::Null;
+    let (place, message) = read(&other).map(|_| ()).expect_err("the clock is missing");
+    assert!(place.starts_with("states[0].decisions[0].zones"), "{place}");
+    assert!(
+        message.contains("the model has no clocks #time"),
+        "{message}"
+    );
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from fractions import Fraction
 from pathlib import Path
@@ -206,8 +207,6 @@ def test_what_gives_no_strategy_says_so() -> None:
         model.synthesize("A<> M.Full")
     with pytest.raises(ntagen.InputError, match="asks for no strategy"):
         model.synthesize("E<> control: A<> M.Full")
-    with pytest.raises(ntagen.InputError, match=r"control_t\* gives no strategy"):
-        model.synthesize("control_t*(5, 0): A<> M.Full")
     with pytest.raises(ntagen.NtagenError, match="stopped by the limit of states"):
         ntagen.load(COUNTER).synthesize("control: A<> n == 30000", states=100)
     with pytest.raises(ntagen.RejectedError):
@@ -231,3 +230,47 @@ def test_simulation_follows_a_strategy() -> None:
     run = model.simulate(choose=choose)
     assert run.states[-1].locations == {"M": "Full"}
     assert run.duration == 2
+
+
+def test_strategies_within_a_time_look_at_a_clock() -> None:
+    model = ntagen.load(FEEDER)
+    strategy = model.synthesize("control_t*: A<> M.Full", verify=True)
+    assert (strategy.winning, strategy.time_limit) == (True, 2)
+    state = {"M": "Hungry", "fed": 0, "x": 1}
+    advice = strategy.action(state, time=1)
+    assert (advice.kind, advice.delay) == ("wait", 1)
+    assert strategy.action({**state, "#time": "3/2", "x": "3/2"}).delay == Fraction(1, 2)
+    with pytest.raises(ntagen.InputError, match="does not say how late it is"):
+        strategy.action(state)
+    with pytest.raises(ntagen.UndecidedError, match="no decision for x=1 #time=2"):
+        strategy.action(state, time=2)
+    play = strategy.play()
+    play.follow()
+    assert play.state.clocks["#time"] == 2
+    assert play.situation().winner == "controller"
+    log = play.trace_json()
+    assert log is not None
+    assert model.verify(log).holds
+    late = json.loads(log) | {"time_limit": 1}
+    assert model.verify(json.dumps(late)).holds is False
+    lost = model.synthesize("control_t*(1): A<> M.Full", verify=True)
+    assert (lost.owner, lost.time_limit) == ("environment", 1)
+    assert model.synthesize("control: A<> M.Full").time_limit is None
+
+
+def test_strategies_within_a_time_are_saved_and_played(tmp_path: Path) -> None:
+    model = ntagen.load(FEEDER)
+    path = tmp_path / "strategy.json"
+    model.synthesize("control_t*(9): A<> M.Full").save(path)
+    again = ntagen.load_strategy(path, ntagen.load(FEEDER))
+    assert again.time_limit == 2
+    assert again.verify().holds
+    hasty = json.loads(path.read_text()) | {"time_limit": 1}
+    path.write_text(json.dumps(hasty))
+    assert ntagen.load_strategy(path, model).verify().holds is False
+    other = hasty | {"query": "control_t*(1): A<> M.Full", "time_limit": 2}
+    path.write_text(json.dumps(other))
+    strategy = ntagen.load_strategy(path, model)
+    assert strategy.verify().lines[0].endswith("it is for another limit of time than the query")
+    with pytest.raises(ntagen.InputError, match="for another limit of time than"):
+        strategy.play()

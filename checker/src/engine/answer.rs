@@ -63,6 +63,20 @@ pub struct Evidence {
 }
 
 impl Evidence {
+    /// Leaves the last clock, which is none of the model, out of all runs.
+    pub(super) fn forget_last_clock(&mut self) {
+        for witness in &mut self.witnesses {
+            for (_, zone) in &mut witness.trace.states {
+                *zone = zone.without_last_clock();
+            }
+            if let Some(Proof::Replayed(_, states, _)) = &mut witness.run {
+                for state in states {
+                    state.clocks.pop();
+                }
+            }
+        }
+    }
+
     /// Whether the strategy and all runs passed their independent checks; `None` if there was none, or one came to no end.
     pub fn is_verified(&self) -> Option<bool> {
         let strategy = self.verification.iter().map(|check| match check {

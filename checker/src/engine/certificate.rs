@@ -23,6 +23,7 @@ use crate::verify::{self, Part};
 
 use super::describe;
 use super::evidence::{Missing, Proof};
+use super::verification::{Asked, Played};
 use super::{LoadedModel, Rejection, json, strategy_file, verification};
 
 /// What a file with a certificate says that it is.
@@ -194,13 +195,13 @@ fn check_strategy(
     strategy: &Strategy,
     rules: (Forced, Priorities),
 ) -> Result<Checked, Unreadable> {
-    let QueryKind::Control { objective, .. } = query else {
+    let Some(asked) = Asked::of(query) else {
         return Err("the query of a strategy begins with control:".to_owned());
     };
     let decisions = verification::decisions(network, strategy);
-    let played = (&decisions[..], strategy.owner, strategy.selection);
+    let played = Played::new(strategy, &decisions);
     let most = verification::MOST_REGIONS;
-    let result = verification::verify(network, objective, played, rules, most);
+    let result = verification::verify(network, asked, played, rules, most);
     let holds = match &result {
         Ok(StrategyOutcome::Verified(_)) => Some(true),
         Ok(StrategyOutcome::Violated(..)) => Some(false),
@@ -359,7 +360,8 @@ fn replay_of(
     run: Run,
 ) -> Result<Proof, Unreadable> {
     let always = Predicate::Constant(true);
-    let (first, second);
+    let (first, second, game);
+    let mut network = network;
     let claim = match query {
         _ if trace["kind"] == "failure" => Claim::Possible,
         QueryKind::Reachable(goal) => Claim::Reaches(goal),
@@ -400,8 +402,13 @@ fn replay_of(
             let what = verify::Error::Unsupported("plays that ignore the priorities of the model");
             return Ok(Proof::Missing(Missing::NotCovered(what)));
         }
-        QueryKind::Control { objective, .. } if trace["kind"] == "play" => {
-            match (trace["winner"].as_str(), objective) {
+        QueryKind::Control { .. } if trace["kind"] == "play" => {
+            let limit = trace["time_limit"].as_i64();
+            let limit = limit.map(|limit| i32::try_from(limit).unwrap_or(i32::MAX));
+            let asked = Asked::of(query).expect("it is a control query");
+            game = asked.game(network, limit);
+            network = &game.network;
+            match (trace["winner"].as_str(), &*game.objective) {
                 (None, _) => Claim::Possible,
                 (
                     Some("controller"),

@@ -19,7 +19,7 @@ use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, minimal};
 
 use super::decision_table::{self, Entry, Rule};
-use super::describe;
+use super::{describe, timing};
 
 /// What does not depend on the strategy.
 const RUNTIME: &str = include_str!("controller_runtime.c");
@@ -49,6 +49,7 @@ pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Result<Stri
     if network.features.stopwatches {
         return Err(NoController::Stopwatches);
     }
+    let network = &*timing::network_of(network, strategy);
     let tables = Tables::new(network, strategy);
     let mut text = opening(network, strategy, query, &tables);
     tables.write(network, &mut text);
@@ -331,7 +332,12 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
     );
     text.push_str(" * clocks:\n");
     for (index, clock) in network.clocks.iter().skip(1).enumerate() {
-        let _ = writeln!(text, " *   [{index}] {}", comment(&clock.name));
+        let what = if clock.name == timing::TIME {
+            ": the time since the start"
+        } else {
+            ""
+        };
+        let _ = writeln!(text, " *   [{index}] {}{what}", comment(&clock.name));
     }
     text.push_str(" * state:\n");
     for (index, process) in network.processes.iter().enumerate() {

@@ -35,7 +35,7 @@ pub struct Entry<'s> {
     pub rules: Vec<Rule>,
 }
 
-/// The table of a strategy: the states about which it says something, in its order.
+/// The table of a strategy of this network, which has the clock that measures time if the strategy looks at it: the states about which it says something, in its order.
 pub fn entries<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Entry<'s>> {
     let dimension = network.clocks.len().max(1);
     let joined = closed_loop::joined(network, strategy).into_iter();

@@ -4,11 +4,16 @@
 //! the clock may start at any value up to u, and the greatest one from which the controller wins leaves just the time that is
 //! needed: the least limit with which the game is won. Where g is what it is meant to be, a time that certainly passes before the
 //! goal, that is the least time. Without u, the limit is doubled until it is enough, if the goal can be forced at all.
+//!
+//! For a strategy the game is solved again, with the time that was found as the limit and a clock that starts at 0.
+
+use std::sync::Arc;
 
 use crate::exec::Executor;
 use crate::game::Player;
 use crate::game::graph::{Deadline, Graph, Objective as GameObjective};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver, Win};
+use crate::game::strategy::{self, Strategy};
 use crate::ir::{ClockAtom, ClockId, ClockRange, FunctionId, Network, Objective, Predicate};
 use crate::network::{Abstraction, ClockBounds, Failure, Stepper};
 use crate::search::extremum::{Extreme, Extremes};
@@ -17,9 +22,11 @@ use crate::zones::{Bound, Zone};
 
 use super::Options;
 use super::answer::{Answer, Evidence, Values, Verdict, has_differences, new_answer};
+use super::certificate::stop_text;
 use super::games::{self, objective_atoms};
 use super::limits::LimitWatch;
-use super::reachable::with_time;
+use super::timing::{TIME, with_time};
+use super::verification::Asked;
 
 /// The limit to start from if the query has none.
 const FIRST_LIMIT: i32 = 16;
@@ -49,10 +56,12 @@ pub(super) fn fastest(
     watch: &mut LimitWatch,
 ) -> Answer {
     let mut counters = Counters::default();
+    let is_strategy_wanted = options.strategy || options.verify;
     let mut limit = if let Some(limit) = race.limit {
         let mut words = network.initial.clone();
         match Stepper::new(network, executor).evaluate(limit, &mut words) {
-            Ok(limit) => limit,
+            // Time is never negative.
+            Ok(limit) => limit.max(-1),
             Err(error) => {
                 let failure = Verdict::Error(error.into());
                 return new_answer(failure, Evidence::default(), counters);
@@ -67,6 +76,14 @@ pub(super) fn fastest(
             ..Options::default()
         };
         let answer = games::game(network, executor, asked, &plain, watch);
+        if answer.verdict == Verdict::NotSatisfied && is_strategy_wanted {
+            let with_strategy = Options {
+                strategy: options.strategy,
+                verify: options.verify,
+                ..plain
+            };
+            return games::game(network, executor, asked, &with_strategy, watch);
+        }
         if answer.verdict != Verdict::Satisfied {
             return answer;
         }
@@ -74,16 +91,15 @@ pub(super) fn fastest(
         FIRST_LIMIT
     };
     let (timed, clock) = with_time(network);
+    let game = Timed {
+        network: &timed,
+        clock,
+        executor,
+        race,
+        options,
+    };
     loop {
-        let run = within(
-            (&timed, clock),
-            executor,
-            race,
-            limit,
-            options,
-            &mut counters,
-            watch,
-        );
+        let run = game.time_needed(limit, &mut counters, watch);
         let (verdict, time) = match run {
             Ok(Run::Time(None)) if race.limit.is_none() && limit <= Bound::MAX_VALUE / 2 => {
                 limit *= 2;
@@ -96,6 +112,7 @@ pub(super) fn fastest(
             Err(failure) => (Verdict::Error(failure), None),
         };
         let mut answer = new_answer(verdict, Evidence::default(), counters);
+        let mut remarks = Vec::new();
         if let Some((value, is_reached)) = time {
             let least = Some(Extreme::Value { value, is_reached });
             answer.value = Some(Values {
@@ -106,66 +123,132 @@ pub(super) fn fastest(
                     greatest: None,
                 }],
             });
-            let mut remarks = Vec::new();
             if !is_reached {
                 remarks.push(format!("time > {value}: the value itself is not reached"));
             }
-            if options.strategy || options.verify {
-                let text = "control_t* gives no strategy: ask control: for the goal within the time, with a clock of the model";
-                remarks.push(text.to_owned());
-            }
-            answer.message = (!remarks.is_empty()).then(|| remarks.join("; "));
         }
+        // Where the time is only approached, the strategy needs less than a unit more.
+        let limit = match (verdict, time) {
+            (Verdict::Satisfied, Some((value, is_reached))) => Some(value + i32::from(!is_reached)),
+            (Verdict::NotSatisfied, _) if race.limit.is_some() => Some(limit),
+            _ => None,
+        };
+        if let Some(limit) = limit.filter(|_| is_strategy_wanted) {
+            match game.strategy(limit, watch) {
+                Ok(Ok(strategy)) => {
+                    if options.verify {
+                        let asked = Asked {
+                            objective: race.objective,
+                            time_optimal: Some((race.limit, race.rest)),
+                        };
+                        let verification = games::verified(network, asked, &strategy, options);
+                        answer.evidence.verification = Some(verification);
+                    }
+                    remarks.push(match strategy.owner {
+                        Player::Controller => {
+                            format!("the strategy gets there within {TIME} <= {limit}")
+                        }
+                        Player::Environment => {
+                            format!("the environment holds out as long as {TIME} <= {limit}")
+                        }
+                    });
+                    answer.evidence.strategy = Some(Arc::new(strategy));
+                }
+                Ok(Err(reason)) => remarks.push(format!("no strategy: {}", stop_text(reason))),
+                Err(failure) => answer.verdict = Verdict::Error(failure),
+            }
+        }
+        answer.message = (!remarks.is_empty()).then(|| remarks.join("; "));
         return answer;
     }
 }
 
-/// Solves the game with a limit.
-fn within(
-    (timed, clock): (&Network, usize),
-    executor: &dyn Executor,
-    race: &Race<'_>,
-    limit: i32,
-    options: &Options,
-    counters: &mut Counters,
-    watch: &mut dyn Watch,
-) -> Result<Run, Failure> {
-    if limit < 0 {
-        return Ok(Run::Time(None));
+/// The game on the network with the clock.
+struct Timed<'a, 'q> {
+    network: &'a Network,
+    clock: usize,
+    executor: &'a dyn Executor,
+    race: &'a Race<'q>,
+    options: &'a Options,
+}
+
+impl Timed<'_, '_> {
+    /// The time that is needed, if it is at most the limit.
+    fn time_needed(
+        &self,
+        limit: i32,
+        counters: &mut Counters,
+        watch: &mut dyn Watch,
+    ) -> Result<Run, Failure> {
+        if limit < 0 {
+            return Ok(Run::Time(None));
+        }
+        self.solve((limit, true), Extent::Start, watch, |result, solver, _| {
+            *counters = *counters + solver.counters();
+            Ok(match result {
+                GameAnswer::Stopped(reason) => Run::Stopped(reason),
+                GameAnswer::Won(_) if solver.graph.symbolic.is_approximate() => Run::Approximate,
+                GameAnswer::Won(_) => Run::Time(needed(solver, self.clock, limit)),
+            })
+        })
     }
-    let mut atoms = objective_atoms(race.objective);
-    atoms.extend(limits_of(clock, limit));
-    let abstraction = if has_differences(timed, &atoms) {
-        Abstraction::Differences
-    } else {
-        Abstraction::Maximum
-    };
-    let bounds = ClockBounds::new(timed, &atoms, abstraction);
-    let mut symbolic = games::zones_of(timed, executor, bounds, options);
-    let (goal, keep): (&Predicate, _) = match race.objective {
-        Objective::Until(keep, goal) => (goal, Some(keep)),
-        Objective::Reach(goal) => (goal, None),
-        _ => unreachable!("other objectives were refused"),
-    };
-    let wanted = GameObjective {
-        goal: Some(goal),
-        keep,
-        must_progress: true,
-        deadline: Some(Deadline {
-            clock,
-            limit,
-            rest: race.rest,
-        }),
-    };
-    let mut graph = Graph::new(&mut symbolic, wanted)?;
-    let mut solver = Solver::new(&mut graph, Player::Controller, options.forced);
-    let result = solver.solve(Extent::Start, watch)?;
-    *counters = *counters + solver.counters();
-    Ok(match result {
-        GameAnswer::Stopped(reason) => Run::Stopped(reason),
-        GameAnswer::Won(_) if solver.graph.symbolic.is_approximate() => Run::Approximate,
-        GameAnswer::Won(_) => Run::Time(needed(&solver, clock, limit)),
-    })
+
+    /// The strategy of the player who wins with this limit.
+    fn strategy(
+        &self,
+        limit: i32,
+        watch: &mut dyn Watch,
+    ) -> Result<Result<Strategy, StopReason>, Failure> {
+        let extent = Extent::Verdict;
+        self.solve((limit, false), extent, watch, |result, solver, watch| {
+            if let GameAnswer::Stopped(reason) = result {
+                return Ok(Err(reason));
+            }
+            solver.put_into_layers(watch)?;
+            let mut strategy = strategy::extract(solver)?;
+            strategy.time_limit = Some(limit);
+            Ok(Ok(strategy))
+        })
+    }
+
+    /// Solves the game with a limit; the clock starts at 0, or anywhere up to the limit.
+    fn solve<R>(
+        &self,
+        (limit, starts_anywhere): (i32, bool),
+        extent: Extent,
+        watch: &mut dyn Watch,
+        conclude: impl FnOnce(GameAnswer, &mut Solver<'_, '_, '_>, &mut dyn Watch) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
+        let mut atoms = objective_atoms(self.race.objective);
+        atoms.extend(limits_of(self.clock, limit.max(0)));
+        let abstraction = if has_differences(self.network, &atoms) {
+            Abstraction::Differences
+        } else {
+            Abstraction::Maximum
+        };
+        let bounds = ClockBounds::new(self.network, &atoms, abstraction);
+        let mut symbolic = games::zones_of(self.network, self.executor, bounds, self.options);
+        let (goal, keep): (&Predicate, _) = match self.race.objective {
+            Objective::Until(keep, goal) => (goal, Some(keep)),
+            Objective::Reach(goal) => (goal, None),
+            _ => unreachable!("other objectives were refused"),
+        };
+        let wanted = GameObjective {
+            goal: Some(goal),
+            keep,
+            must_progress: true,
+            deadline: Some(Deadline {
+                clock: self.clock,
+                limit,
+                starts_anywhere,
+                rest: self.race.rest,
+            }),
+        };
+        let mut graph = Graph::new(&mut symbolic, wanted)?;
+        let mut solver = Solver::new(&mut graph, Player::Controller, self.options.forced);
+        let result = solver.solve(extent, watch)?;
+        conclude(result, &mut solver, watch)
+    }
 }
 
 /// The comparisons of the clock with values up to the limit, in both directions.

@@ -16,7 +16,7 @@ use crate::search::limits::{Counters, StopReason, Watch};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
 use super::limits::LimitWatch;
-use super::verification::{self, Verification};
+use super::verification::{self, Asked, Played, Verification};
 use super::{Options, PlansWanted};
 /// Names the part of a game query that there is no algorithm for.
 pub(super) fn unsupported_game(
@@ -285,7 +285,11 @@ fn played(
         match strategy {
             Ok(strategy) => {
                 if options.verify {
-                    let verification = verified(network, objective, &strategy, options);
+                    let asked = Asked {
+                        objective,
+                        time_optimal: None,
+                    };
+                    let verification = verified(network, asked, &strategy, options);
                     answer.evidence.verification = Some(verification);
                 }
                 answer.evidence.strategy = Some(Arc::new(strategy));
@@ -297,17 +301,17 @@ fn played(
 }
 
 /// Checks a strategy in closed loop.
-fn verified(
+pub(super) fn verified(
     network: &Network,
-    objective: &Objective,
+    asked: Asked<'_>,
     strategy: &Strategy,
     options: &Options,
 ) -> Verification {
     let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
     let decisions = verification::decisions(network, strategy);
-    let played = (&decisions[..], strategy.owner, strategy.selection);
+    let played = Played::new(strategy, &decisions);
     let rules = (options.forced, options.priorities);
-    verification::verify(network, objective, played, rules, most)
+    verification::verify(network, asked, played, rules, most)
 }
 
 /// Adds the plans that are wanted to the answer for a solved game.

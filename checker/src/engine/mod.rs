@@ -22,6 +22,7 @@ pub mod simulation;
 pub mod strategies;
 pub mod strategy_file;
 pub mod strategy_text;
+pub mod timing;
 mod values;
 pub mod verification;
 
@@ -39,15 +40,16 @@ use crate::syntax::{
     self,
     ast::{QueryText, Template},
 };
-use crate::verify::{self, strategy::Decisions};
+use crate::verify;
 
 pub use answer::{Answer, Evidence, Verdict};
 pub use limits::Limits;
 pub use strategies::NamedStrategy;
 pub use verification::Verification;
+use verification::{Asked, Played};
 
-use crate::game::strategy::Selection;
-use crate::game::{Forced, Nodes, Player, Priorities};
+use crate::game::closed_loop::ClosedLoop;
+use crate::game::{Forced, Nodes, Priorities};
 pub use crate::search::reach::MOST_THREADS;
 use crate::search::reach::{Manner, Order};
 
@@ -328,16 +330,23 @@ impl LoadedModel {
     /// Answers a query that is no file operation; keeps the strategy that it defines.
     fn answer(&mut self, query: &crate::ir::Query, options: &Options) -> Result<Answer, Rejection> {
         let under = query.under.as_ref();
-        let under = under.map(|name| self.closed_loop(name, query.span));
+        let under = under.map(|name| self.existing_strategy(name, query.span));
         let under = under.transpose()?;
+        let time_limit = under.as_ref().and_then(|strategy| strategy.time_limit);
+        let network = timing::with_limit(&self.model.network, time_limit);
+        let under = under.map(|strategy| ClosedLoop::new(&network, &strategy));
         let subject = answer::Subject {
-            network: &self.model.network,
+            network: &network,
             executor: self.executor(),
             under: under.as_ref(),
             priorities: options.priorities,
         };
         let Some(name) = &query.strategy else {
-            return Ok(answer::answer(subject, query, options));
+            let mut answer = answer::answer(subject, query, options);
+            if time_limit.is_some() {
+                answer.evidence.forget_last_clock();
+            }
+            return Ok(answer);
         };
         let with_strategy = Options {
             strategy: true,
@@ -371,22 +380,19 @@ impl LoadedModel {
         code.executor()
     }
 
-    /// Checks in closed loop that decisions for a control query win, wherever they come from: those of which player, and
-    /// which of several that apply counts.
+    /// Checks in closed loop that decisions for a control query win, wherever they come from.
     pub fn verify_strategy(
         &mut self,
         text: &QueryText,
-        strategy: (&[Decisions], Player, Selection),
+        strategy: Played<'_>,
         rules: (Forced, Priorities),
         most_regions: u64,
     ) -> Result<Verification, Rejection> {
         let (query, _) = self.compile(text.span)?;
         let network = &self.model.network;
-        Ok(match &query.kind {
-            QueryKind::Control { objective, .. } => {
-                verification::verify(network, objective, strategy, rules, most_regions)
-            }
-            _ => Err(verify::Error::Unsupported("queries other than control")),
+        Ok(match Asked::of(&query.kind) {
+            Some(asked) => verification::verify(network, asked, strategy, rules, most_regions),
+            None => Err(verify::Error::Unsupported("queries other than control")),
         })
     }
 

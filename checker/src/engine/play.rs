@@ -2,6 +2,7 @@
 //!
 //! Whatever happens here is computed by [`crate::verify`], so that playing does not depend on the solver.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use serde_json::{Map, Value as Json, json};
 use crate::game::closed_loop;
 use crate::game::strategy::{Selection, Strategy};
 use crate::game::{Forced, Player, Priorities};
-use crate::ir::{Network, Objective, Query, QueryKind};
+use crate::ir::{Network, Query};
 use crate::verify::play::{self, Ending, Gap, Next, Situation, Timing, Window};
 use crate::verify::replay::{End, Moment, Run, Step};
 use crate::verify::strategy::{Outcome, Owner};
@@ -18,7 +19,8 @@ use crate::verify::timed::{Timed, least_multiple};
 use crate::verify::{self, Part, Semantics};
 
 use super::strategy_file::Mismatch;
-use super::{LoadedModel, Rejection, json, strategy_file, verification};
+use super::verification::{Asked, Played};
+use super::{LoadedModel, Rejection, json, strategy_file, timing, verification};
 
 /// A strategy that can be followed.
 #[derive(Debug)]
@@ -84,6 +86,7 @@ impl Follower {
         Strategy {
             owner: self.strategy.owner,
             selection: self.strategy.selection,
+            time_limit: self.strategy.time_limit,
             states: states
                 .map(|&index| self.strategy.states[index as usize].clone())
                 .collect(),
@@ -105,6 +108,7 @@ impl Follower {
     /// (null: it waits) and its `rank`; and if one of them is to wait, for how many `ticks` of `ticks_per_unit` (null: for ever), and
     /// the decisions that apply `then`.
     pub fn advice(&self, network: &Network, state: &Json) -> Result<Json, Unadvised> {
+        let network = &*timing::network_of(network, &self.strategy);
         let words = strategy_file::read_words(network, state)?;
         let part = self.at(network, &words);
         let joined = closed_loop::joined(network, &part);
@@ -150,9 +154,8 @@ impl Follower {
         most_regions: u64,
     ) -> Result<(Option<bool>, Vec<String>), Rejection> {
         let text = model.add_query(&self.query);
-        let (owner, selection) = (self.strategy.owner, self.strategy.selection);
         let decisions = verification::decisions(model.network(), &self.strategy);
-        let played = (&decisions[..], owner, selection);
+        let played = Played::new(&self.strategy, &decisions);
         let result = model.verify_strategy(&text, played, rules, most_regions)?;
         let holds = match &result {
             Ok(Outcome::Verified(_)) => Some(true),
@@ -282,17 +285,29 @@ impl LoadedModel {
     ) -> Result<Result<Play, verify::Error>, Rejection> {
         let text = self.add_query(query);
         let (query, _) = self.compile(text.span)?;
-        if !matches!(query.kind, QueryKind::Control { .. }) {
-            let message = format!(
+        let rejection = |message: String| Rejection {
+            diagnostics: Vec::new(),
+            rendered: vec![message],
+        };
+        let Some(asked) = Asked::of(&query.kind) else {
+            return Err(rejection(format!(
                 "error: {} is no game: it does not begin with control:",
                 text.text
-            );
-            return Err(Rejection {
-                diagnostics: Vec::new(),
-                rendered: vec![message],
-            });
+            )));
+        };
+        let (owner, time_limit) = (follower.strategy.owner, follower.strategy.time_limit);
+        match verification::is_for_time(self.network(), asked, owner, time_limit) {
+            Ok(true) => {}
+            Ok(false) => {
+                return Err(rejection(format!(
+                    "error: the strategy is for another limit of time than {}",
+                    text.text
+                )));
+            }
+            Err(error) => return Ok(Err(error)),
         }
-        let initial = Semantics::new(self.network(), 1).initial();
+        let network = timing::network_of(self.network(), &follower.strategy);
+        let initial = Semantics::new(&network, 1).initial();
         Ok(initial.map(|state| Play {
             follower,
             query,
@@ -308,11 +323,13 @@ impl LoadedModel {
 }
 
 impl Play {
-    fn objective(&self) -> &Objective {
-        match &self.query.kind {
-            QueryKind::Control { objective, .. } => objective,
-            _ => unreachable!("only games are played"),
-        }
+    fn game<'n>(&'n self, network: &'n Network) -> timing::Game<'n> {
+        let asked = Asked::of(&self.query.kind).expect("only games are played");
+        asked.game(network, self.follower.strategy.time_limit)
+    }
+
+    fn network<'n>(&self, network: &'n Network) -> Cow<'n, Network> {
+        timing::network_of(network, &self.follower.strategy)
     }
 
     fn now(&self) -> &Timed {
@@ -322,10 +339,11 @@ impl Play {
     fn look(&self, network: &Network, timed: &Timed) -> Result<Situation, verify::Error> {
         let strategy = &self.follower.strategy;
         let played = (strategy.owner, strategy.selection);
-        let claim = verification::claim(self.objective(), played, self.rules);
+        let game = self.game(network);
+        let claim = verification::claim(&game.objective, played, self.rules);
         let part = self.follower.at(network, &timed.state.words);
         let decisions = verification::decisions(network, &part);
-        play::look(network, &decisions, &claim, timed)
+        play::look(&game.network, &decisions, &claim, timed)
     }
 
     /// How many steps were made.
@@ -336,7 +354,8 @@ impl Play {
     /// The state as JSON, and how many of its ticks make a unit of time.
     pub fn state(&self, network: &Network) -> (Json, i64) {
         let now = self.now();
-        (json::state(network, &now.state), now.ticks_per_unit)
+        let network = self.network(network);
+        (json::state(&network, &now.state), now.ticks_per_unit)
     }
 
     /// What can happen in the state, as JSON.
@@ -446,7 +465,8 @@ impl Play {
         parts: Vec<Part>,
     ) -> Result<(), Refused> {
         let action = (!parts.is_empty()).then_some(&parts[..]);
-        let later = play::after(network, now, wait, action)?.ok_or(Refused::Impossible)?;
+        let network = self.network(network);
+        let later = play::after(&network, now, wait, action)?.ok_or(Refused::Impossible)?;
         let later = later.at_multiple_of(1).ok_or(Refused::TooFine)?;
         let last = self.states.len() - 1;
         self.states[last] = now.clone();
@@ -508,7 +528,8 @@ impl Play {
             },
             from: Moment { state: 0, wait: 0 },
         };
-        Ok(Some(json!({
+        let network = &*self.network(network);
+        let mut trace = json!({
             "format": json::TRACE_FORMAT,
             "version": 1,
             "query": self.query_text,
@@ -519,7 +540,11 @@ impl Play {
                 Priorities::Kept => "keep",
             },
             "run": json::run(network, &run, &states),
-        })))
+        });
+        if let Some(limit) = self.follower.strategy.time_limit {
+            trace["time_limit"] = json!(limit);
+        }
+        Ok(Some(trace))
     }
 }
 

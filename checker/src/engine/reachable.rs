@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::ir::{Clock, ClockAtom, ClockId, ClockRange, Network, Predicate};
+use crate::ir::{ClockAtom, ClockId, ClockRange, Predicate};
 use crate::network::{Abstraction, Symbolic, Symmetry, predicate};
 use crate::search::limits::Counters;
 use crate::search::plain;
@@ -14,6 +14,7 @@ use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, found, new_ans
 use super::certificate;
 use super::evidence::Shows;
 use super::limits::LimitWatch;
+use super::timing::with_time;
 use super::{Options, TraceWanted};
 
 /// Is there a state in which the goal holds?
@@ -165,22 +166,6 @@ fn best(
         // The search for any trace did not come to the state that fails.
         Err(_) => Err("the model fails in a state beside it".to_owned()),
     }
-}
-
-/// The network with a clock that nothing sets or compares, and its index.
-pub(super) fn with_time(network: &Network) -> (Network, usize) {
-    let mut timed = network.clone();
-    while timed.clocks.len() < network.clocks.len().max(1) + 1 {
-        timed.clocks.push(Clock {
-            name: "time".to_owned(),
-            owner: None,
-            hybrid: false,
-            coordinates: Vec::new(),
-        });
-    }
-    timed.initial_clocks.resize(timed.clocks.len(), 0);
-    let clock = timed.clocks.len() - 1;
-    (timed, clock)
 }
 
 /// A comparison that keeps the lower bounds of the clock apart.

@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::diagnostics::{Diagnostic, Span};
-use crate::game::closed_loop::ClosedLoop;
 use crate::game::strategy::Strategy;
 
 use super::answer::{Answer, Evidence, Verdict, new_answer};
@@ -53,7 +52,7 @@ impl LoadedModel {
         self.strategies.push(named);
     }
 
-    /// The closed loop of a strategy that a query is asked under, or that is to be saved.
+    /// The strategy that a query is asked under, or that is to be saved.
     pub(super) fn existing_strategy(
         &self,
         name: &str,
@@ -68,12 +67,6 @@ impl LoadedModel {
         let diagnostic = Diagnostic::new(codes::NO_STRATEGY, span, message)
             .help(format!("the query was {query}"));
         Err(Rejection::new(vec![diagnostic], &self.sources))
-    }
-
-    /// What the strategy leaves of the model.
-    pub(super) fn closed_loop(&self, name: &str, span: Span) -> Result<ClosedLoop, Rejection> {
-        let strategy = self.existing_strategy(name, span)?;
-        Ok(ClosedLoop::new(self.network(), &strategy))
     }
 
     /// Answers `saveStrategy`.

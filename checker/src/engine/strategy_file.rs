@@ -16,7 +16,7 @@ use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
 
 use super::describe::{self, Place};
-use super::json;
+use super::{json, timing};
 
 /// The name of the format.
 pub const FORMAT: &str = "ntagen-strategy";
@@ -41,6 +41,7 @@ const SEE_FORMAT: &str = "docs/strategy.md describes the format";
 
 /// A strategy as JSON. Decisions of states with the same words are joined and come in the order of their ranks.
 pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
+    let network = &*timing::network_of(network, strategy);
     let joined = closed_loop::joined(network, strategy);
     let states = joined.iter().map(|(words, is_goal, decisions)| {
         let decisions: Vec<Json> = decisions.iter().map(|one| decision(network, one)).collect();
@@ -52,7 +53,7 @@ pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
         })
     });
     let states: Vec<Json> = states.collect();
-    json!({
+    let mut file = json!({
         "format": FORMAT,
         "version": VERSION,
         "query": query,
@@ -65,7 +66,11 @@ pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
             Selection::Any => "any",
         },
         "states": states,
-    })
+    });
+    if let Some(limit) = strategy.time_limit {
+        file["time_limit"] = json!(limit);
+    }
+    file
 }
 
 fn decision(network: &Network, decision: &Decision) -> Json {
@@ -127,16 +132,29 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
             return Err(whole.field("selection")?.wrong(message, help));
         }
     };
+    let time_limit = match file.get("time_limit") {
+        None | Some(Json::Null) => None,
+        Some(limit) => Some(time_limit(&At(limit, "time_limit".to_owned()))?),
+    };
+    let network = &*timing::with_limit(network, time_limit);
     let reader = Reader { network, owner };
     let mut strategy = Strategy {
         owner,
         selection,
+        time_limit,
         states: Vec::new(),
     };
     for state in whole.list("states")? {
         strategy.states.push(reader.state(&state)?);
     }
     Ok((query, strategy))
+}
+
+/// A limit of time, which zones can compare a clock with; -1 is one that nobody keeps.
+fn time_limit(at: &At<'_>) -> Result<i32, Mismatch> {
+    let limit = at.0.as_i64().and_then(|limit| i32::try_from(limit).ok());
+    let limit = limit.filter(|&limit| limit >= -1 && Bound::is_allowed(limit));
+    limit.ok_or_else(|| at.wrong(format!("{} is no limit of time", at.0), SEE_FORMAT))
 }
 
 /// The words of a state that is given as an object with `locations` and `variables`, as in a strategy.

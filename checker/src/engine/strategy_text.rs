@@ -8,16 +8,21 @@ use crate::ir::Network;
 use crate::zones::{Federation, Zone};
 
 use super::decision_table::{self, Rule};
-use super::describe;
+use super::{describe, timing};
 
 /// A strategy as text: the initial state, whose strategy it is, and a paragraph for each discrete state about which it says
 /// something. Each line stands on its own; of a strategy that leaves a choice, several may apply.
 pub fn write(network: &Network, strategy: &Strategy) -> String {
+    let network = &*timing::network_of(network, strategy);
     let mut text = format!(
         "Initial state:\n{}\n{}\n\n",
         describe::words_line(network, &network.initial),
         initial_clocks(network)
     );
+    if let Some(limit) = strategy.time_limit {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "Time limit: {} <= {limit}\n", timing::TIME);
+    }
     text.push_str(match (strategy.owner, strategy.selection) {
         (Player::Environment, _) => "Strategy of the environment:\n",
         (Player::Controller, Selection::First) => "Strategy to win:\n",

@@ -3,15 +3,15 @@
 use crate::game::closed_loop;
 use crate::game::strategy::{Decision, Selection, Strategy};
 use crate::game::{Forced, Player, Priorities};
-use crate::ir::{Network, Objective, Predicate};
+use crate::ir::{FunctionId, Network, Objective, Predicate, QueryKind};
 use crate::network::{Part, predicate};
 use crate::verify::strategy::{
-    self, Aim, Claim, Constraint, Decisions, Defect, Forcing, Owner, Step, Violation,
+    self, Aim, Claim, Constraint, Coverage, Decisions, Defect, Forcing, Owner, Step, Violation,
 };
-use crate::verify::{self, regions};
+use crate::verify::{self, Semantics, regions};
 use crate::zones::{Bound, Federation, minimal};
 
-use super::describe;
+use super::{describe, timing};
 
 /// Regions that a check explores before it gives up.
 pub const MOST_REGIONS: u64 = 2_000_000;
@@ -19,20 +19,115 @@ pub const MOST_REGIONS: u64 = 2_000_000;
 /// How the check of a strategy ended; an error says why it could not be done.
 pub type Verification = Result<strategy::Outcome, verify::Error>;
 
-/// Checks that the owner of a strategy wins, in closed loop. The network must hold the code of the objective.
+/// What a control query asks for.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'q> {
+    /// The objective.
+    pub objective: &'q Objective,
+    /// The bounds u and g of `control_t*(u, g)`; `None` for plain `control`.
+    pub time_optimal: Option<(Option<FunctionId>, Option<FunctionId>)>,
+}
+
+impl<'q> Asked<'q> {
+    /// What a query asks for; `None` if it is no control query.
+    pub fn of(query: &'q QueryKind) -> Option<Asked<'q>> {
+        match query {
+            QueryKind::Control {
+                objective,
+                time_optimal,
+                ..
+            } => Some(Asked {
+                objective,
+                time_optimal: *time_optimal,
+            }),
+            _ => None,
+        }
+    }
+
+    /// The game that is played within a limit of time, if there is one.
+    pub(super) fn game<'n>(&self, network: &'n Network, limit: Option<i32>) -> timing::Game<'n>
+    where
+        'q: 'n,
+    {
+        let rest = self.time_optimal.and_then(|(_, rest)| rest);
+        timing::game(network, self.objective, limit, rest)
+    }
+}
+
+/// A strategy as it is checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Played<'s> {
+    /// What it decides: see [`decisions`].
+    pub decisions: &'s [Decisions],
+    /// Who plays by it.
+    pub owner: Player,
+    /// Which of the decisions that apply counts.
+    pub selection: Selection,
+    /// The limit of time that it is for, if it is for one.
+    pub time_limit: Option<i32>,
+}
+
+impl<'s> Played<'s> {
+    /// A strategy with these decisions.
+    pub fn new(strategy: &Strategy, decisions: &'s [Decisions]) -> Played<'s> {
+        Played {
+            decisions,
+            owner: strategy.owner,
+            selection: strategy.selection,
+            time_limit: strategy.time_limit,
+        }
+    }
+}
+
+/// Checks that the owner of a strategy wins, in closed loop. The network must hold the code of the query.
 pub fn verify(
     network: &Network,
-    objective: &Objective,
-    (strategy, owner, selection): (&[Decisions], Player, Selection),
+    asked: Asked<'_>,
+    played: Played<'_>,
     rules: (Forced, Priorities),
     most_regions: u64,
 ) -> Verification {
-    let claim = claim(objective, (owner, selection), rules);
-    strategy::verify(network, strategy, &claim, most_regions)
+    if !is_for_time(network, asked, played.owner, played.time_limit)? {
+        let violation = Violation {
+            defect: Defect::OtherTime,
+            states: vec![Semantics::new(network, 1).initial()?],
+            steps: Vec::new(),
+            ticks_per_unit: 1,
+        };
+        let outcome = strategy::Outcome::Violated(Box::new(violation), Coverage::default());
+        return Ok(outcome);
+    }
+    let game = asked.game(network, played.time_limit);
+    let claim = claim(&game.objective, (played.owner, played.selection), rules);
+    strategy::verify(&game.network, played.decisions, &claim, most_regions)
+}
+
+/// Whether a strategy that wins with a limit of time answers the query: the controller is to need no more time than the query leaves it,
+/// the environment to hold out for as long.
+pub(super) fn is_for_time(
+    network: &Network,
+    asked: Asked<'_>,
+    owner: Player,
+    time_limit: Option<i32>,
+) -> Result<bool, verify::Error> {
+    let Some((longest, _)) = asked.time_optimal else {
+        return Ok(time_limit.is_none());
+    };
+    let semantics = Semantics::new(network, 1);
+    let initial = semantics.initial()?;
+    let longest = longest.map(|longest| semantics.value(longest, &initial));
+    Ok(match (owner, time_limit, longest.transpose()?) {
+        (Player::Controller, Some(limit), longest) => {
+            longest.is_none_or(|longest| limit <= longest)
+        }
+        (Player::Environment, Some(limit), Some(longest)) => limit >= longest,
+        (Player::Environment, None, None) => true,
+        _ => false,
+    })
 }
 
 /// What is claimed of a strategy for an objective.
-pub fn claim(
+pub(super) fn claim(
     objective: &Objective,
     (owner, selection): (Player, Selection),
     (forced, priorities): (Forced, Priorities),
@@ -167,10 +262,14 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
         Defect::Broken => "what must be kept does not hold here",
         Defect::GoalReached => "the goal of the controller holds here",
         Defect::Stuck => "it waits where time cannot pass and it may not",
+        Defect::OtherTime => "it is for another limit of time than the query",
         Defect::Recurring => "the goal of the controller comes again and again",
         Defect::Endless => "the run goes on for ever without what the strategy is for",
     };
     let mut lines = vec![format!("strategy violated: {defect}")];
+    let mut clocks = violation.states.iter().map(|state| state.clocks.len());
+    let is_timed = clocks.any(|clocks| clocks > network.clocks.len().max(1));
+    let network = &*timing::with_limit(network, is_timed.then_some(0));
     for (index, state) in violation.states.iter().enumerate() {
         lines.push(format!(
             "  {}",

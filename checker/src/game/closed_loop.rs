@@ -25,7 +25,7 @@ pub struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// The restriction that a strategy is.
+    /// The restriction that a strategy is of its network, which has the clock that measures time if the strategy looks at it.
     pub fn new(network: &Network, strategy: &Strategy) -> ClosedLoop {
         let dimension = network.clocks.len().max(1);
         let mut store = StateStore::new(network);

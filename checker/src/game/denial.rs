@@ -28,6 +28,7 @@ pub fn extract(solver: &mut Solver<'_, '_, '_>, rounds: &[Vec<Win>]) -> Result<S
     let mut strategy = Strategy {
         owner: Player::Environment,
         selection: Selection::First,
+        time_limit: None,
         states: Vec::new(),
     };
     let mut seen = vec![false; solver.graph.nodes.len()];

@@ -115,11 +115,13 @@ pub struct Objective<'q> {
 /// A limit on the time that play takes.
 #[derive(Clone, Copy, Debug)]
 pub struct Deadline {
-    /// The clock that measures the time; nothing sets it. It may start at any value up to the limit, so that the valuations of the
-    /// initial node show how much time is needed.
+    /// The clock that measures the time; nothing sets it.
     pub clock: usize,
     /// The limit.
     pub limit: i32,
+    /// Whether the clock may start at any value up to the limit, so that the valuations of the initial node show how much time is
+    /// needed; else it starts at 0.
+    pub starts_anywhere: bool,
     /// How much time, at least, is still to be left in a state before the goal; a negative value counts as 0.
     pub rest: Option<FunctionId>,
 }
@@ -243,7 +245,7 @@ impl<'s, 'a> Graph<'s, 'a> {
     /// The initial words, the zone before time passes, and the invariants.
     pub(super) fn start(&mut self) -> Result<(Vec<i32>, Zone, Vec<Constraint>), Failure> {
         let (words, mut zone, invariant) = self.symbolic.start()?;
-        if let Some(deadline) = self.objective.deadline {
+        if let Some(deadline) = self.objective.deadline.filter(|one| one.starts_anywhere) {
             clocks::free_clock(zone.bounds_mut(), self.dimension(), deadline.clock);
             zone.constrain(deadline.clock, 0, weak(deadline.limit)?);
         }

@@ -68,6 +68,9 @@ pub struct Strategy {
     pub owner: Player,
     /// Which of the decisions that apply counts. Decisions of states with the same words are one list, in the order of ranks.
     pub selection: Selection,
+    /// Within which time the controller reaches the goal, or up to which the environment prevents it, if that is limited. Zones have
+    /// a clock more then: the last one is 0 in the initial state and nothing sets it.
+    pub time_limit: Option<i32>,
     /// The states, the initial one first.
     pub states: Vec<StrategyState>,
 }
@@ -85,6 +88,7 @@ pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
             Player::Controller if !is_seeking => Selection::Any,
             _ => Selection::First,
         },
+        time_limit: None,
         states: Vec::new(),
     };
     let mut steps_to_end = Vec::new();

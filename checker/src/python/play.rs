@@ -10,7 +10,7 @@ use super::{Answer, FailedError, Model, forced_rule, priority_rule, rejected};
 use crate::diagnostics::Span;
 use crate::engine::play::{self as engine, Done, Follower, Refused, Unadvised, player_name};
 use crate::engine::strategies::{NamedStrategy, unnamed};
-use crate::engine::{LoadedModel, describe, strategy_file, verification};
+use crate::engine::{LoadedModel, describe, strategy_file, timing, verification};
 use crate::game::strategy::Selection;
 use crate::verify;
 
@@ -81,7 +81,7 @@ impl Strategy {
     /// The names of the model's processes and clocks.
     fn names(&self) -> (Vec<String>, Vec<String>) {
         self.model.get().with(|model| {
-            let network = model.network();
+            let network = timing::network_of(model.network(), &self.inner.strategy);
             let processes = network.processes.iter().map(|one| one.name.clone());
             let clocks = network.clocks.iter().skip(1).map(|one| one.name.clone());
             (processes.collect(), clocks.collect())
@@ -104,6 +104,12 @@ impl Strategy {
     #[getter]
     fn is_permissive(&self) -> bool {
         self.inner.strategy.selection == Selection::Any
+    }
+
+    /// The limit of time that it is for; `None` without one.
+    #[getter]
+    fn time_limit(&self) -> Option<i32> {
+        self.inner.strategy.time_limit
     }
 
     /// The strategy as a file.

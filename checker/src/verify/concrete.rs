@@ -325,7 +325,7 @@ impl<'a> Semantics<'a> {
     }
 
     /// The value of a function without parameters.
-    pub(super) fn value(&self, function: FunctionId, state: &State) -> Result<i32, Error> {
+    pub fn value(&self, function: FunctionId, state: &State) -> Result<i32, Error> {
         self.code.value(function, &state.words)
     }
 }

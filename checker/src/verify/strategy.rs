@@ -168,6 +168,8 @@ pub enum Defect {
     Endless,
     /// The goal comes again and again, against the environment.
     Recurring,
+    /// The strategy is for another limit of time than what is asked.
+    OtherTime,
 }
 
 /// A step of a run.

@@ -65,6 +65,17 @@ impl Zone {
         self.bounds[left * self.dimension + right]
     }
 
+    /// What it says of all clocks but the last.
+    #[must_use]
+    pub fn without_last_clock(&self) -> Zone {
+        let dimension = self.dimension - 1;
+        let rows = self.bounds.chunks(self.dimension).take(dimension);
+        Zone {
+            dimension,
+            bounds: rows.flat_map(|row| &row[..dimension]).copied().collect(),
+        }
+    }
+
     /// Whether the zone contains no valuation.
     pub fn is_empty(&self) -> bool {
         dbm::is_empty(&self.bounds)

@@ -99,6 +99,7 @@ impl Random {
             } else {
                 Selection::Any
             },
+            time_limit: None,
             states: Vec::new(),
         };
         for (words, moves) in words {

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict};
+use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict, strategy_file};
 use checker::game::strategy::Strategy;
 use checker::game::{Forced, Nodes, Player, Priorities};
 use checker::search::extremum::Extreme;
+use proptest::prop_assert_eq;
 use proptest::test_runner::TestCaseError;
 
 use crate::compare::{self, Tally};
@@ -216,12 +217,13 @@ fn compare_times(
     let text = format!("clock t;\n{}", network.text());
     let mut model = compare::load(&text);
     let (goal, keep) = (network.formula(goal), network.formula(keep));
-    let mut ask = |query: &str| {
+    let options = Options {
+        priorities: Priorities::Kept,
+        verify: true,
+        ..compare::options()
+    };
+    let ask = |model: &mut LoadedModel, query: &str| {
         let query = model.add_query(query);
-        let options = Options {
-            priorities: Priorities::Kept,
-            ..compare::options()
-        };
         model.check(&query, &options)
     };
     for limit in ["", "(4)", "(3, 1)"] {
@@ -234,7 +236,7 @@ fn compare_times(
             _ => format!("control: A[ {keep} U ({goal}) && t <= {value} ]"),
         };
         let query = format!("control_t*{limit}: A[ {keep} U {goal} ]");
-        let answer = ask(&query);
+        let answer = ask(&mut model, &query);
         let describe = || format!("{text}{query}\n{answer:?}");
         let value = answer.as_ref().ok().and_then(|answer| answer.value.clone());
         let least = value.and_then(|values| values.items[0].least);
@@ -242,7 +244,7 @@ fn compare_times(
             // At the time itself it is won if the time is reached, before it never, after it always.
             for (value, wins) in [(value, is_reached), (value - 1, false), (value + 1, true)] {
                 let game = within(value);
-                compare::check(&ask(&game), Ok(wins), tally, || {
+                compare::check(&ask(&mut model, &game), Ok(wins), tally, || {
                     format!("{}\n{game}", describe())
                 })?;
             }
@@ -253,7 +255,7 @@ fn compare_times(
                 "(4)" => within(4),
                 _ => within(3),
             };
-            let other = ask(&game);
+            let other = ask(&mut model, &game);
             let is_error = |answer: &Answer| matches!(answer.verdict, Verdict::Error(_));
             if other.as_ref().is_ok_and(is_error) {
                 return Ok(());
@@ -264,7 +266,35 @@ fn compare_times(
             false
         };
         compare::check(&answer, Ok(expected), tally, describe)?;
+        compare::check_strategy(&model, &answer, tally, describe)?;
+        if let Ok(answer) = &answer {
+            check_file(&model, &query, answer, describe)?;
+            let strategy = answer.evidence.strategy.clone();
+            if let Some(strategy) = strategy.filter(|one| one.owner == Player::Controller) {
+                let enforced = format!("A<> {goal}");
+                check_under(&mut model, strategy, &enforced, tally)
+                    .map_err(|error| TestCaseError::fail(format!("{}\n{error}", describe())))?;
+            }
+        }
     }
+    Ok(())
+}
+
+/// A strategy must be the same after it was written and read again.
+fn check_file(
+    model: &LoadedModel,
+    query: &str,
+    answer: &Answer,
+    describe: impl Fn() -> String,
+) -> Result<(), TestCaseError> {
+    let Some(strategy) = &answer.evidence.strategy else {
+        return Ok(());
+    };
+    let file = strategy_file::write(model.network(), strategy, query);
+    let read = strategy_file::read(model.network(), file.to_string().as_bytes());
+    let again =
+        read.map(|(query, strategy)| strategy_file::write(model.network(), &strategy, &query));
+    prop_assert_eq!(again.as_ref(), Ok(&file), "{}", describe());
     Ok(())
 }
 

@@ -2,8 +2,11 @@
 //!
 //! The first game is the running example of the TIGA manual (section 3), for which every decision matters.
 
-use checker::engine::{LoadedModel, verification};
-use checker::game::strategy::Selection;
+use std::sync::Arc;
+
+use checker::engine::LoadedModel;
+use checker::engine::verification::{self, Played};
+use checker::game::strategy::{Selection, Strategy};
 use checker::game::{Forced, Player, Priorities};
 use checker::syntax::ast::QueryText;
 use checker::verify::Part;
@@ -45,9 +48,8 @@ system P;
 struct Solved {
     model: LoadedModel,
     query: QueryText,
-    strategy: Vec<Decisions>,
-    owner: Player,
-    selection: Selection,
+    strategy: Arc<Strategy>,
+    decisions: Vec<Decisions>,
 }
 
 fn solved(game: &str, query: &str) -> Solved {
@@ -60,9 +62,8 @@ fn solved(game: &str, query: &str) -> Solved {
     let answer = model.check(&query, &options).expect("the query is right");
     let strategy = answer.evidence.strategy.expect("somebody wins");
     Solved {
-        strategy: verification::decisions(model.network(), &strategy),
-        owner: strategy.owner,
-        selection: strategy.selection,
+        decisions: verification::decisions(model.network(), &strategy),
+        strategy,
         model,
         query,
     }
@@ -74,10 +75,10 @@ fn defect_of(
     location: i32,
     mutate: impl Fn(&mut Vec<Decision>),
 ) -> Option<Defect> {
-    let mut states = solved.strategy.iter_mut();
+    let mut states = solved.decisions.iter_mut();
     let state = states.find(|state| state.words[0] == location);
     mutate(&mut state.expect("play gets there").decisions);
-    let played = (&solved.strategy[..], solved.owner, solved.selection);
+    let played = Played::new(&solved.strategy, &solved.decisions);
     let verification = solved
         .model
         .verify_strategy(
@@ -166,7 +167,7 @@ const SAFE: &str = "control: A[] not P.L4";
 fn permissive_strategy_as_it_is_passes() {
     let solved = solved(GAME, SAFE);
     assert_eq!(
-        (solved.owner, solved.selection),
+        (solved.strategy.owner, solved.strategy.selection),
         (Player::Controller, Selection::Any)
     );
     assert_eq!(defect_of(solved, 0, |_| {}), None);
@@ -195,7 +196,7 @@ fn counter_strategies() -> [Solved; 2] {
     ["control: A<> P.G", "control: A[] not P.Bad"].map(|query| {
         let solved = solved(RACE, query);
         assert_eq!(
-            (solved.owner, solved.selection),
+            (solved.strategy.owner, solved.strategy.selection),
             (Player::Environment, Selection::First)
         );
         solved
@@ -304,7 +305,7 @@ system P;
 #[test]
 fn strategy_that_does_not_let_the_goal_recur_is_caught() {
     let game = || solved(RETURNING, "control: A[] (true && A<> P.G)");
-    assert_eq!(game().owner, Player::Controller);
+    assert_eq!(game().strategy.owner, Player::Controller);
     assert_eq!(defect_of(game(), 1, |_| {}), None);
     let wait = |decisions: &mut Vec<Decision>| acts(decisions).action = None;
     let widen_waiting = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
@@ -318,5 +319,71 @@ fn strategy_that_does_not_let_the_goal_recur_is_caught() {
     assert_eq!(
         defect_of(game(), 1, widen_action),
         Some(Defect::ImpossibleAction)
+    );
+}
+
+/// The goal may be left out only for so long: waiting costs time.
+const HURRY: &str = "
+process P() {
+  clock x;
+  state L { x <= 4 }, M { x <= 6 }, G;
+  init L;
+  trans L -> M { guard x >= 1; },
+        M -> G { guard x >= 3; },
+        M -u-> L { guard x <= 2; assign x = 0; };
+}
+system P;
+";
+
+#[test]
+fn strategy_that_takes_more_time_than_it_has_is_caught() {
+    let game = || solved(HURRY, "control_t*: A<> P.G");
+    assert_eq!(
+        (game().strategy.owner, game().strategy.time_limit),
+        (Player::Controller, Some(3))
+    );
+    assert_eq!(defect_of(game(), 0, |_| {}), None);
+    let wait = |decisions: &mut Vec<Decision>| acts(decisions).action = None;
+    assert_eq!(defect_of(game(), 1, wait), Some(Defect::Broken));
+    let widen = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
+    assert_eq!(defect_of(game(), 1, widen), Some(Defect::Broken));
+}
+
+#[test]
+fn counter_strategy_that_gives_in_before_its_time_is_caught() {
+    let game = || solved(HURRY, "control_t*(2): A<> P.G");
+    assert_eq!(game().strategy.owner, Player::Environment);
+    assert_eq!(defect_of(game(), 0, |_| {}), None);
+    let mut longer = game();
+    longer.query = longer.model.add_query("control_t*(3): A<> P.G");
+    assert_eq!(defect_of(longer, 0, |_| {}), Some(Defect::OtherTime));
+}
+
+#[test]
+fn strategy_for_another_time_than_it_says_is_caught() {
+    let with_limit = |query: &str, limit: Option<i32>| {
+        let mut game = solved(HURRY, "control_t*: A<> P.G");
+        let mut other = (*game.strategy).clone();
+        other.time_limit = limit;
+        game.strategy = Arc::new(other);
+        game.query = game.model.add_query(query);
+        defect_of(game, 0, |_| {})
+    };
+    assert_eq!(with_limit("control_t*(3): A<> P.G", Some(3)), None);
+    assert_eq!(
+        with_limit("control_t*(2): A<> P.G", Some(3)),
+        Some(Defect::OtherTime)
+    );
+    assert_eq!(
+        with_limit("control_t*: A<> P.G", Some(2)),
+        Some(Defect::Broken)
+    );
+    assert_eq!(
+        with_limit("control: A<> P.G", Some(3)),
+        Some(Defect::OtherTime)
+    );
+    assert_eq!(
+        with_limit("control_t*: A<> P.G", None),
+        Some(Defect::OtherTime)
     );
 }
