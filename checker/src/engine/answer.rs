@@ -28,7 +28,7 @@ use super::limits::LimitWatch;
 use super::reachable::reachable;
 use super::values::extremum;
 use super::verification::Verification;
-use super::{Options, games};
+use super::{Options, games, observed};
 
 /// What a query came out as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -206,6 +206,14 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
                 rest,
             };
             fastest(network, executor, &race, options, &mut watch)
+        }
+        QueryKind::Control {
+            objective,
+            observations: Some(observations),
+            ..
+        } => {
+            let asked = (objective, &observations[..]);
+            observed::game(network, executor, asked, options, &mut watch)
         }
         QueryKind::Control {
             objective,

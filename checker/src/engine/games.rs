@@ -26,8 +26,8 @@ pub(super) fn unsupported_game(
     has_observations: bool,
 ) -> Option<&'static str> {
     let can_race = matches!(objective, Objective::Reach(_) | Objective::Until(..));
-    if has_observations {
-        Some("partial observation")
+    if has_observations && matches!(objective, Objective::Buchi(..)) {
+        Some("observations and A[] (p && A<> q)")
     } else if is_time_optimal && (is_cooperative || !can_race) {
         Some("control_t* and other objectives than A<> and A[ U ]")
     } else {

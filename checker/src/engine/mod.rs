@@ -16,6 +16,7 @@ mod fastest;
 mod games;
 pub mod json;
 pub mod limits;
+mod observed;
 pub mod play;
 mod reachable;
 pub mod simulation;
@@ -308,7 +309,7 @@ impl LoadedModel {
     pub fn check(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
         let start = Instant::now();
         let (query, warnings) = self.compile(text.span)?;
-        self.refuse_unsupported(&query)?;
+        self.refuse_unsupported(&query, options.priorities)?;
         self.prepare_code(options.code, query.span)?;
         self.load_seconds += start.elapsed().as_secs_f64();
         let mut answer = match &query.kind {
@@ -448,7 +449,11 @@ impl LoadedModel {
     }
 
     /// Refuses, by name, what there is no algorithm for.
-    fn refuse_unsupported(&self, query: &crate::ir::Query) -> Result<(), Rejection> {
+    fn refuse_unsupported(
+        &self,
+        query: &crate::ir::Query,
+        priorities: Priorities,
+    ) -> Result<(), Rejection> {
         let is_game = matches!(query.kind, QueryKind::Control { .. });
         let is_under = query.under.is_some();
         let kind = match &query.kind {
@@ -472,11 +477,22 @@ impl LoadedModel {
                 observations.is_some(),
             ),
         };
+        let is_observed = matches!(
+            query.kind,
+            QueryKind::Control {
+                observations: Some(_),
+                ..
+            }
+        );
         let features = &self.model.network.features;
+        let is_kept = query.strategy.is_some() && is_observed;
+        let kind = kind.or(is_kept.then_some("observations and a named strategy"));
         let kind = kind.map(|kind| format!("queries with {kind}"));
         let under = (is_under && is_game).then(|| "games under a strategy".to_owned());
         let construct = if is_under && features.stopwatches {
             Some("stopwatches in a query under a strategy")
+        } else if is_observed {
+            observed::unsupported(&self.model.network, priorities)
         } else if !features.clock_guarded_urgent {
             None
         } else if features.stopwatches {
@@ -484,22 +500,15 @@ impl LoadedModel {
         } else {
             None
         };
-        let has_observations = matches!(
-            query.kind,
-            QueryKind::Control {
-                observations: Some(_),
-                ..
-            }
-        );
         let diagnostic = if let Some(kind) = kind.or(under) {
             Diagnostic::new(
                 codes::UNSUPPORTED_QUERY,
                 query.span,
                 format!("{kind} are not supported"),
             )
-            .help(if has_observations {
-                "such a game is played on sets of states that the observations do not tell apart, which the engine does not \
-                 build; ask without them, for a controller that sees everything"
+            .help(if is_observed {
+                "supported with observations are control: with A<>, A[], A[ U ] and A[ W ]; or ask without them, for a controller \
+                 that sees everything"
             } else {
                 "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, E<> control: and control_t*:"
             })

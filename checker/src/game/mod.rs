@@ -10,6 +10,7 @@ mod gains;
 pub mod graph;
 mod hopes;
 mod layers;
+pub mod observed;
 pub mod plans;
 pub mod programs;
 pub mod reach;

@@ -1,7 +1,7 @@
 //! Where time stops, and who must move there.
 
-use crate::network::Failure;
-use crate::zones::Federation;
+use crate::network::{Failure, Symbolic};
+use crate::zones::{Bound, Federation};
 
 use super::reach::Solver;
 use super::{Forced, Player};
@@ -79,27 +79,12 @@ impl Solver<'_, '_, '_> {
         node: u32,
         words: &mut [i32],
     ) -> Result<Vec<(Option<u32>, Federation)>, Failure> {
-        let dimension = self.graph.dimension();
+        let delays = self.graph.nodes[node as usize].delays;
         let whole = self.whole(node);
-        let network = self.graph.symbolic.stepper.network();
-        let mut stops = Vec::new();
-        for (index, process) in network.processes.iter().enumerate() {
-            let urgency = process.locations[words[index] as usize].urgency;
-            if urgency != crate::ir::Urgency::Normal {
-                stops.push((Some(index as u32), whole.clone()));
-            }
-        }
-        if stops.is_empty() && !self.graph.nodes[node as usize].delays {
-            stops.push((None, whole));
-        }
+        let zone = self.graph.zone(node).to_vec();
+        let mut stops = stops(self.graph.symbolic, words, (&zone, &whole), delays)?;
         if let Some(urgent) = self.graph.urgent(node) {
             stops.push((None, urgent.standstill()));
-        }
-        let stopped = self.graph.symbolic.stopped(words)?;
-        for (process, bound) in self.graph.symbolic.upper_bounds(words)? {
-            let mut faces = Federation::empty(dimension);
-            faces.add_upper_faces(self.graph.zone(node), &[bound], &stopped);
-            stops.push((Some(process), faces));
         }
         Ok(stops)
     }
@@ -123,4 +108,34 @@ impl Solver<'_, '_, '_> {
             })
             .collect())
     }
+}
+
+/// The valuations of a state in which time cannot pass, with the process that stops it (`None`: an urgent channel without clock
+/// guards). `whole` is what counts of the zone of the state, and `delays` says whether time may pass as far as locations and such
+/// channels say.
+pub(super) fn stops(
+    symbolic: &mut Symbolic<'_>,
+    words: &mut [i32],
+    (zone, whole): (&[Bound], &Federation),
+    delays: bool,
+) -> Result<Vec<(Option<u32>, Federation)>, Failure> {
+    let dimension = symbolic.dimension();
+    let network = symbolic.stepper.network();
+    let mut stops = Vec::new();
+    for (index, process) in network.processes.iter().enumerate() {
+        let urgency = process.locations[words[index] as usize].urgency;
+        if urgency != crate::ir::Urgency::Normal {
+            stops.push((Some(index as u32), whole.clone()));
+        }
+    }
+    if stops.is_empty() && !delays {
+        stops.push((None, whole.clone()));
+    }
+    let stopped = symbolic.stopped(words)?;
+    for (process, bound) in symbolic.upper_bounds(words)? {
+        let mut faces = Federation::empty(dimension);
+        faces.add_upper_faces(zone, &[bound], &stopped);
+        stops.push((Some(process), faces));
+    }
+    Ok(stops)
 }

@@ -65,6 +65,8 @@ pub struct Move {
     pub parts: Vec<Part>,
     /// Whether the controller owns it: all participating edges are controllable.
     pub controllable: bool,
+    /// The index of the channel of the synchronisation; `None` for an internal edge.
+    pub channel: Option<u32>,
     /// Whether it synchronises on an urgent channel.
     pub is_urgent: bool,
     /// The priority of its channel, then the greatest of its participants.
@@ -205,6 +207,7 @@ impl<'a> Semantics<'a> {
         let is_urgent = |channel: u32| channels[channel as usize].urgent;
         Move {
             controllable: one.parts.iter().all(|&part| self.edge(part).controllable),
+            channel: one.channel,
             is_urgent: one.channel.is_some_and(is_urgent),
             level: self.code.level(&one.parts, one.channel),
             parts: one.parts,

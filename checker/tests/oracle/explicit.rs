@@ -10,6 +10,14 @@ pub(crate) struct Step {
     pub target: usize,
     pub controllable: bool,
     pub processes: Vec<u32>,
+    pub label: Label,
+}
+
+/// What tells controllable moves apart under partial observation: the channel, else the edge with its select values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) enum Label {
+    Channel(u32),
+    Edge(u32, u32, u32),
 }
 
 /// What stops time in a state.
@@ -118,6 +126,10 @@ fn successors(
             target: known.id(target),
             controllable: one.controllable,
             processes: one.parts.iter().map(|part| part.process).collect(),
+            label: match (one.channel, one.parts[0]) {
+                (Some(channel), _) => Label::Channel(channel),
+                (None, part) => Label::Edge(part.process, part.edge, part.select),
+            },
         });
     }
     let mut next = state.clone();
@@ -245,7 +257,7 @@ fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule
 }
 
 /// Whether the environment must move where time is stopped: something stops time to which the controller has no move.
-fn is_forced(stoppers: &[Stopper], own: &[&Step], rule: Rule) -> bool {
+pub(crate) fn is_forced(stoppers: &[Stopper], own: &[&Step], rule: Rule) -> bool {
     stoppers.iter().any(|stopper| match (rule, stopper) {
         (Rule::Neutral, _) => true,
         (Rule::Product, _) | (Rule::Tiga, Stopper::Channel) => own.is_empty(),

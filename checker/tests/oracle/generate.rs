@@ -21,6 +21,8 @@ pub(crate) struct Network {
     priority: usize,
     /// Whether edges on urgent channels keep their clock guards.
     guards_urgency: bool,
+    /// Whether controllable edges have no strict lower bounds, and receivers of a broadcast no clock guards at all.
+    is_observable: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -368,6 +370,7 @@ pub(crate) fn network(shape: Shape) -> impl Strategy<Value = Network> {
         processes,
         priority,
         guards_urgency,
+        is_observable: false,
     };
     (parts, priority, guarded).prop_map(network)
 }
@@ -388,6 +391,42 @@ pub(crate) fn formula(shape: Shape) -> impl Strategy<Value = Formula> {
         4 => location,
         3 => leaf,
         2 => vec(inner.clone(), 2..=3).prop_map(Formula::And),
+        1 => vec(inner.clone(), 2..=2).prop_map(Formula::Or),
+        1 => inner.prop_map(|formula| Formula::Not(Box::new(formula))),
+    ]
+}
+
+/// Networks that may be played under partial observation.
+pub(crate) fn observable_network(shape: Shape) -> impl Strategy<Value = Network> {
+    network(shape).prop_map(|network| Network {
+        is_observable: true,
+        ..network
+    })
+}
+
+/// What may be observed: clocks only by `x >= c` and `x < c`.
+pub(crate) fn observation(shape: Shape) -> impl Strategy<Value = Formula> {
+    let location = (any_index(), any_index())
+        .prop_map(|(process, location)| Formula::Location { process, location })
+        .boxed();
+    let clock = (any_index(), any::<bool>(), 0..=shape.constant)
+        .prop_map(|(clock, is_lower, bound)| Atom::Clock {
+            clock,
+            relation: if is_lower {
+                Relation::GreaterEqual
+            } else {
+                Relation::Less
+            },
+            bound,
+        })
+        .prop_map(Formula::Atom)
+        .boxed();
+    let variable = variable_atom().prop_map(Formula::Atom).boxed();
+    let leaf = Union::new_weighted(vec![(3, location), (3, clock), (1, variable)]).boxed();
+    let inner = leaf.clone();
+    prop_oneof![
+        8 => leaf,
+        1 => vec(inner.clone(), 2..=3).prop_map(Formula::And),
         1 => vec(inner.clone(), 2..=2).prop_map(Formula::Or),
         1 => inner.prop_map(|formula| Formula::Not(Box::new(formula))),
     ]
@@ -505,9 +544,17 @@ impl Network {
             .guards
             .iter()
             .filter(|atom| {
-                !is_urgent || self.guards_urgency || matches!(atom, Atom::Variable { .. })
+                let is_free = (!is_urgent || self.guards_urgency)
+                    && !(self.is_observable && edge.receives_broadcast());
+                is_free || matches!(atom, Atom::Variable { .. })
             })
-            .map(|atom| self.atom(atom))
+            .map(|atom| {
+                if self.is_observable && edge.controllable {
+                    self.atom(&atom.with_first_moment())
+                } else {
+                    self.atom(atom)
+                }
+            })
             .collect();
         if !guards.is_empty() {
             labels.push(format!("guard {};", guards.join(" && ")));
@@ -710,6 +757,28 @@ impl Network {
                 bound,
             } => relation.holds(value(variable), i64::from(bound)),
         }
+    }
+}
+
+impl Edge {
+    fn receives_broadcast(&self) -> bool {
+        match self.sync {
+            Sync::Channel { channel, send } => !send && CHANNELS[channel].1.contains("broadcast"),
+            _ => false,
+        }
+    }
+}
+
+impl Atom {
+    /// The same with a weak lower bound of a clock in the place of a strict one.
+    fn with_first_moment(&self) -> Atom {
+        let mut atom = self.clone();
+        if let Atom::Clock { relation, .. } | Atom::ClockByVariable { relation, .. } = &mut atom
+            && *relation == Relation::Greater
+        {
+            *relation = Relation::GreaterEqual;
+        }
+        atom
     }
 }
 

@@ -12,4 +12,5 @@ mod explicit;
 mod games;
 mod generate;
 mod mutations;
+mod observed;
 mod reachability;

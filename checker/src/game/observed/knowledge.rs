@@ -1,0 +1,80 @@
+//! Knowledge sets: states that have the same observation.
+//!
+//! Invariant: the discrete states are in ascending order, and no federation is empty.
+
+use std::collections::BTreeMap;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use crate::zones::{Bound, Federation};
+
+/// The values of the observed predicates, in the order of the query.
+pub type Observation = Arc<[bool]>;
+
+/// The states in which play may be when an observation has just begun.
+#[derive(Clone, Debug)]
+pub struct Knowledge {
+    /// What is observed in all of them.
+    pub observation: Observation,
+    /// Clock values by words.
+    pub states: BTreeMap<Box<[i32]>, Federation>,
+}
+
+impl Knowledge {
+    /// The empty set.
+    pub(super) fn empty(observation: Observation) -> Knowledge {
+        Knowledge {
+            observation,
+            states: BTreeMap::new(),
+        }
+    }
+
+    /// Adds a zone.
+    pub(super) fn add(&mut self, words: &[i32], zone: &[Bound], dimension: usize) {
+        if let Some(federation) = self.states.get_mut(words) {
+            federation.add(zone);
+        } else {
+            let federation = Federation::of_zone(dimension, zone);
+            self.states.insert(words.into(), federation);
+        }
+    }
+
+    /// Makes the descriptions of federations short.
+    pub(super) fn reduce(&mut self) {
+        self.states.values_mut().for_each(Federation::reduce);
+    }
+
+    /// A hash of what does not hang on how federations are described.
+    pub(super) fn hash(&self) -> u64 {
+        let mut hasher = rustc_hash::FxHasher::default();
+        self.observation.hash(&mut hasher);
+        self.states.keys().for_each(|words| words.hash(&mut hasher));
+        hasher.finish()
+    }
+
+    /// Whether both are the same set.
+    pub(super) fn is_same(&self, other: &Knowledge) -> bool {
+        self.observation == other.observation
+            && self.states.len() == other.states.len()
+            && self
+                .states
+                .iter()
+                .zip(&other.states)
+                .all(|((words, zones), (others, more))| words == others && zones.is_same_set(more))
+    }
+
+    /// The number of zones.
+    pub fn zone_count(&self) -> usize {
+        self.states.values().map(Federation::zone_count).sum()
+    }
+
+    /// The bytes that it takes, about.
+    pub(super) fn bytes(&self) -> usize {
+        let mut bytes = self.observation.len();
+        for (words, zones) in &self.states {
+            let zone = 4 * zones.dimension() * zones.dimension();
+            bytes += 96 + 4 * words.len() + zone * zones.zone_count();
+        }
+        bytes
+    }
+}

@@ -1,0 +1,259 @@
+//! Games under partial observation, against the subset construction on the graph of regions.
+//!
+//! Regions are exact here: two valuations of one region allow the same observations, moves and goals, now and after delays into the
+//! same regions, and a controller that sees observations only cannot tell how long it takes. So plays over regions have the same
+//! observations as plays over valuations. Where time passes from region to region, an observation `x >= c` or `x < c` changes when a
+//! region is entered, and so does what is possible for the controller: strict lower bounds are not generated for it.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use checker::engine::Verdict;
+use checker::game::Forced;
+use proptest::collection::vec;
+use proptest::test_runner::TestCaseError;
+
+use crate::compare::{self, Tally};
+use crate::explicit::{self, Graph, Label, Objective, Rule, winning};
+use crate::generate::{self, Formula, Network, Shape};
+
+const SHAPE: Shape = Shape {
+    clocks: 2,
+    constant: 3,
+    strict_invariants: false,
+    uncontrollable: true,
+    deadlock: false,
+    priorities: false,
+    guarded_urgency: false,
+};
+
+/// Knowledge sets that brute force explores before it gives a case up.
+const MOST_SETS: usize = 400;
+
+/// What is seen and what is wanted, region by region.
+struct Game<'g> {
+    graph: &'g Graph,
+    seen: &'g [Vec<bool>],
+    objective: &'g Objective<'g>,
+    rule: Rule,
+}
+
+/// A knowledge set.
+type Set = BTreeSet<usize>;
+
+impl Game<'_> {
+    /// The sets that the action leads to, by what is seen in them; `None` if play may be lost before.
+    fn outcome(&self, from: &Set, action: Option<Label>) -> Option<Vec<Set>> {
+        let nodes = &self.graph.nodes;
+        let Objective {
+            goal,
+            keep,
+            must_reach,
+        } = *self.objective;
+        let here = &self.seen[*from.first()?];
+        let mut exits: BTreeMap<&Vec<bool>, Set> = BTreeMap::new();
+        let mut inside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        let mut waiting: Vec<usize> = from.iter().copied().collect();
+        while let Some(index) = waiting.pop() {
+            if inside.contains_key(&index) {
+                continue;
+            }
+            if !keep[index] {
+                return None;
+            }
+            let node = &nodes[index];
+            let is_proposed =
+                |step: &&explicit::Step| step.controllable && Some(step.label) == action;
+            let own = node.steps.iter().filter(is_proposed);
+            let others = node.steps.iter().filter(|step| !step.controllable);
+            let controllable: Vec<_> = node.steps.iter().filter(|step| step.controllable).collect();
+            let mut next: Vec<usize> = own.clone().map(|step| step.target).collect();
+            let is_possible = !next.is_empty();
+            next.extend(others.clone().map(|step| step.target));
+            match node.later {
+                _ if is_possible => {}
+                Some(later) => next.push(later),
+                None if must_reach => {
+                    let has_move = others.count() > 0;
+                    if !has_move || !explicit::is_forced(&node.stoppers, &controllable, self.rule) {
+                        return None;
+                    }
+                }
+                None if !controllable.is_empty() && others.count() == 0 => return None,
+                None => {}
+            }
+            let mut edges = Vec::new();
+            for target in next.into_iter().filter(|&target| !goal[target]) {
+                if self.seen[target] == *here {
+                    edges.push(target);
+                    waiting.push(target);
+                } else {
+                    exits.entry(&self.seen[target]).or_default().insert(target);
+                }
+            }
+            inside.insert(index, edges);
+        }
+        if must_reach && goes_on_for_ever(&inside) {
+            return None;
+        }
+        Some(exits.into_values().collect())
+    }
+
+    /// Whether the controller wins; `None` if there are too many knowledge sets.
+    fn is_won(&self) -> Option<bool> {
+        if self.objective.goal[0] {
+            return Some(true);
+        }
+        let steps = self.graph.nodes.iter().flat_map(|node| &node.steps);
+        let labels: BTreeSet<Label> = steps
+            .filter(|step| step.controllable)
+            .map(|step| step.label)
+            .collect();
+        let mut actions: Vec<Option<Label>> = labels.into_iter().map(Some).collect();
+        actions.push(None);
+        let mut sets = vec![Set::from([0])];
+        let mut numbers = HashMap::from([(sets[0].clone(), 0)]);
+        let mut choices: Vec<Vec<Vec<usize>>> = Vec::new();
+        while choices.len() < sets.len() {
+            if sets.len() > MOST_SETS {
+                return None;
+            }
+            let set = sets[choices.len()].clone();
+            let outcomes = actions
+                .iter()
+                .filter_map(|&action| self.outcome(&set, action));
+            let outcomes: Vec<Vec<Set>> = outcomes.collect();
+            let number = |target: Set| {
+                *numbers.entry(target.clone()).or_insert_with(|| {
+                    sets.push(target);
+                    sets.len() - 1
+                })
+            };
+            let mut number = number;
+            let outcomes = outcomes
+                .into_iter()
+                .map(|exits| exits.into_iter().map(&mut number).collect());
+            choices.push(outcomes.collect());
+        }
+        let mut win = vec![!self.objective.must_reach; sets.len()];
+        loop {
+            let wins = choices.iter().map(|choices| {
+                let mut choices = choices.iter();
+                choices.any(|targets| targets.iter().all(|&target| win[target]))
+            });
+            let wins: Vec<bool> = wins.collect();
+            if wins == win {
+                return Some(win[0]);
+            }
+            win = wins;
+        }
+    }
+}
+
+/// Whether a graph has a cycle: nodes that lead nowhere else are taken away until there is none.
+fn goes_on_for_ever(edges: &BTreeMap<usize, Vec<usize>>) -> bool {
+    let mut left: BTreeSet<usize> = edges.keys().copied().collect();
+    loop {
+        let goes_on = |node: &usize| edges[node].iter().any(|target| left.contains(target));
+        let next: BTreeSet<usize> = left.iter().copied().filter(goes_on).collect();
+        if next.len() == left.len() {
+            return !left.is_empty();
+        }
+        left = next;
+    }
+}
+
+fn compare(
+    (network, observations, (goal, keep)): &(Network, Vec<Formula>, (Formula, Formula)),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let text = network.text();
+    let mut model = compare::load(&text);
+    let has_differences = generate::has_differences(goal) || generate::has_differences(keep);
+    let constant = i64::from(SHAPE.constant);
+    let Ok(Some(graph)) = compare::regions(&model, constant, has_differences, tally) else {
+        return Ok(());
+    };
+    let labels = |formula: &Formula| -> Vec<bool> {
+        let nodes = graph.nodes.iter();
+        let holds = nodes.map(|node| {
+            let state = &node.state;
+            network.holds(formula, &state.words, &state.clocks, graph.ticks, &|| false)
+        });
+        holds.collect()
+    };
+    let columns: Vec<Vec<bool>> = observations.iter().map(&labels).collect();
+    let seen: Vec<Vec<bool>> = (0..graph.nodes.len())
+        .map(|node| columns.iter().map(|column| column[node]).collect())
+        .collect();
+    let shown: Vec<String> = observations
+        .iter()
+        .map(|one| network.formula(one))
+        .collect();
+    let shown = shown.join(", ");
+    let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
+    let (goals, kept) = (labels(goal), labels(keep));
+    let never = vec![false; seen.len()];
+    let always = vec![true; seen.len()];
+    for (query, goal, keep, must_reach) in [
+        (format!("A<> {goal_text}"), &goals, &always, true),
+        (
+            format!("A[ {keep_text} U {goal_text} ]"),
+            &goals,
+            &kept,
+            true,
+        ),
+        (format!("A[] {keep_text}"), &never, &kept, false),
+        (
+            format!("A[ {keep_text} W {goal_text} ]"),
+            &goals,
+            &kept,
+            false,
+        ),
+    ] {
+        let objective = Objective {
+            goal,
+            keep,
+            must_reach,
+        };
+        for (rule, forced) in [
+            (Rule::Tiga, Forced::Tiga),
+            (Rule::Product, Forced::Product),
+            (Rule::Neutral, Forced::Neutral),
+        ] {
+            let game = Game {
+                graph: &graph,
+                seen: &seen,
+                objective: &objective,
+                rule,
+            };
+            let Some(expected) = game.is_won() else {
+                continue;
+            };
+            let query = format!("{{{shown}}} control: {query}");
+            let query_text = model.add_query(&query);
+            let options = checker::engine::Options {
+                forced,
+                ..compare::options()
+            };
+            let answer = model.check(&query_text, &options);
+            let describe = || format!("{text}{query}\n{forced:?}");
+            compare::check(&answer, Ok(expected), tally, describe)?;
+            let is_won = answer.is_ok_and(|answer| answer.verdict == Verdict::Satisfied);
+            if is_won && !winning(&graph, &objective, rule)[0] {
+                let text = describe();
+                return Err(TestCaseError::fail(format!("{text}\nlost if all is seen")));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn games_under_partial_observation_equal_the_subset_construction() {
+    let strategy = (
+        generate::observable_network(SHAPE),
+        vec(generate::observation(SHAPE), 1..=3),
+        (generate::formula(SHAPE), generate::formula(SHAPE)),
+    );
+    compare::run("games under partial observation", 150, &strategy, compare);
+}
