@@ -87,6 +87,14 @@ fn compare(
                     ..compare::options()
                 };
                 let query_text = model.add_query(&query);
+                // Without a strategy games may end earlier.
+                let quick = Options {
+                    verify: false,
+                    ..options.clone()
+                };
+                compare::check(&model.check(&query_text, &quick), expected, tally, || {
+                    format!("{text}{query}\n{forced:?} {nodes:?} without strategy")
+                })?;
                 let answer = model.check(&query_text, &options);
                 compare::check(&answer, expected, tally, || {
                     format!("{text}{query}\n{forced:?} {nodes:?}")
