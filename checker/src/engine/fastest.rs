@@ -204,6 +204,9 @@ impl Timed<'_, '_> {
             if let GameAnswer::Stopped(reason) = result {
                 return Ok(Err(reason));
             }
+            if let Some(reason) = solver.explore_dead_ends(watch)? {
+                return Ok(Err(reason));
+            }
             solver.put_into_layers(watch)?;
             let mut strategy = strategy::extract(solver)?;
             strategy.time_limit = Some(limit);
@@ -243,6 +246,7 @@ impl Timed<'_, '_> {
                 starts_anywhere,
                 rest: self.race.rest,
             }),
+            leaves_dead_ends: true,
         };
         let mut graph = Graph::new(&mut symbolic, wanted)?;
         let mut solver = Solver::new(&mut graph, Player::Controller, self.options.forced);

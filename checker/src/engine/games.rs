@@ -207,11 +207,14 @@ fn played(
         }
     };
     let is_recurring = matches!(objective, Objective::Buchi(..));
+    let is_strategy_wanted = (options.strategy || options.verify) && !is_cooperative;
     let wanted = GameObjective {
         goal,
         keep,
         must_progress: seeker == Player::Controller,
         deadline: None,
+        // The most permissive strategy says what to do there too.
+        leaves_dead_ends: !is_recurring && (!is_strategy_wanted || seeker == Player::Controller),
     };
     let plain = |verdict, counters| (new_answer(verdict, Evidence::default(), counters), false);
     let graph = match nodes {
@@ -229,7 +232,6 @@ fn played(
     let is_planned = options.plans != PlansWanted::No
         && matches!(objective, Objective::Reach(_) | Objective::Until(..))
         && !is_cooperative;
-    let is_strategy_wanted = (options.strategy || options.verify) && !is_cooperative;
     let extent = match options.plans {
         PlansWanted::All(_) if is_planned => Extent::Everything,
         // A strategy that keeps out of what was not explored would not be the most permissive one.
@@ -277,6 +279,11 @@ fn played(
         add_plans(&mut answer, &mut solver, options);
     }
     if is_strategy_wanted {
+        match solver.explore_dead_ends(watch) {
+            Ok(None) => answer.counters = solver.counters(),
+            Ok(Some(reason)) => return plain(Verdict::Unknown(reason), solver.counters()),
+            Err(failure) => return plain(Verdict::Error(failure), solver.counters()),
+        }
         let layered = solver.put_into_layers(watch);
         let strategy = layered.and_then(|()| match winner {
             Player::Environment if is_recurring => denial::extract(&mut solver, &rounds),

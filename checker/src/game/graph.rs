@@ -11,6 +11,8 @@
 //! * In a graph of discrete states ([`Graph::of_discrete_states`]) there is one node for each discrete state, whose zone is all that its
 //!   invariants allow. Who wins from a valuation does not hang on how it is reached, so the answer is the same. There may be far
 //!   fewer nodes, but also ones that no run reaches, so a run-time error in such a graph means nothing.
+//! * All states from which what is sought cannot come any more are one node ([`super::dead_ends`]), unless the initial one is among them;
+//!   what follows after them is left out.
 //!
 //! Where synchronisations on urgent channels have clock guards, time does not reach all of a node's zone: see
 //! [`super::urgency`].
@@ -25,6 +27,7 @@ use crate::search::zone_table::{ZoneId, ZoneTable};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::{Bound, Federation, Zone, clocks};
 
+use super::dead_ends::DeadEnds;
 use super::programs::{ProgramId, ProgramStep, Programs};
 use super::trails::{Ending, Root, Trails};
 use super::urgency::Urgent;
@@ -67,6 +70,8 @@ pub enum Standing {
     Broken,
     /// Both depend on the clocks; see [`Graph::parts`].
     Mixed,
+    /// What is sought cannot come any more: see [`super::dead_ends`].
+    Dead,
 }
 
 /// The parts of a mixed node.
@@ -110,6 +115,8 @@ pub struct Objective<'q> {
     pub must_progress: bool,
     /// By when the goal must be reached.
     pub deadline: Option<Deadline>,
+    /// Whether what follows after dead ends is left out.
+    pub leaves_dead_ends: bool,
 }
 
 /// A limit on the time that play takes.
@@ -158,6 +165,7 @@ pub struct Graph<'s, 'a> {
     pub(super) trails: Trails,
     /// Whether there is one node for each discrete state.
     has_discrete_nodes: bool,
+    pub(super) dead_ends: DeadEnds,
 }
 
 /// Where an edge starts.
@@ -228,6 +236,11 @@ impl<'s, 'a> Graph<'s, 'a> {
             chains_delays: objective.must_progress && !network.features.stopwatches,
             trails: Trails::new(symbolic.is_fixed(), &objective),
             has_discrete_nodes: false,
+            dead_ends: if objective.leaves_dead_ends {
+                DeadEnds::new(network, &objective)
+            } else {
+                DeadEnds::default()
+            },
             objective,
             symbolic,
         }
@@ -302,10 +315,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         id: ZoneId,
         urgent: Option<Urgent>,
     ) -> Result<u32, Failure> {
-        let (discrete, is_new) = self.store.intern(words);
-        if is_new {
-            self.heads.push(NONE);
-        }
+        let discrete = self.discrete_of(words);
         let mut node = self.heads[discrete.0 as usize];
         while node != NONE {
             let Node {
@@ -320,21 +330,56 @@ impl<'s, 'a> Graph<'s, 'a> {
         }
         let made = self.nodes.len() as u32;
         let standing = self.standing(made, words, zone, urgent.as_ref())?;
+        self.push_node(discrete, id, standing);
+        let head = &mut self.heads[discrete.0 as usize];
+        self.nodes[made as usize].next = std::mem::replace(head, made);
+        if let Some(urgent) = urgent {
+            self.urgent.insert(made, urgent);
+        }
+        Ok(made)
+    }
+
+    /// The id of words.
+    pub(super) fn discrete_of(&mut self, words: &[i32]) -> DiscreteId {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        discrete
+    }
+
+    /// Evaluates the objective in a node anew.
+    pub(super) fn judge_anew(&mut self, node: u32) -> Result<(), Failure> {
+        let mut words = self.words.clone();
+        self.load(node, &mut words);
+        let zone = Zone::from_bounds(self.dimension(), self.zone(node));
+        let urgent = self.urgent.remove(&node);
+        let standing = self.standing(node, &mut words, &zone, urgent.as_ref())?;
+        self.nodes[node as usize].standing = standing;
+        if let Some(urgent) = urgent {
+            self.urgent.insert(node, urgent);
+        }
+        Ok(())
+    }
+
+    /// Makes a node that is not found by its words.
+    pub(super) fn push_node(
+        &mut self,
+        discrete: DiscreteId,
+        zone: ZoneId,
+        standing: Standing,
+    ) -> u32 {
         self.nodes.push(Node {
             discrete,
-            zone: id,
-            next: self.heads[discrete.0 as usize],
+            zone,
+            next: NONE,
             edges: (0, 0),
             first_in: NONE,
             is_expanded: false,
             delays: false,
             standing,
         });
-        self.heads[discrete.0 as usize] = made;
-        if let Some(urgent) = urgent {
-            self.urgent.insert(made, urgent);
-        }
-        Ok(made)
+        self.nodes.len() as u32 - 1
     }
 
     /// Evaluates the objective in a state that becomes the node `made`.
@@ -348,8 +393,9 @@ impl<'s, 'a> Graph<'s, 'a> {
         let (goal, keep) = self.extents(words, zone)?;
         match (goal, keep) {
             (Extent::Everywhere, _) => Ok(Standing::Goal),
-            (Extent::Nowhere, Extent::Everywhere) => Ok(Standing::Open),
             (Extent::Nowhere, Extent::Nowhere) => Ok(Standing::Broken),
+            (Extent::Nowhere, _) if self.dead_ends.contain(words) => Ok(Standing::Dead),
+            (Extent::Nowhere, Extent::Everywhere) => Ok(Standing::Open),
             (goal, keep) => {
                 let dimension = self.dimension();
                 let goal = goal.to_federation(zone.bounds(), dimension);
@@ -563,6 +609,11 @@ impl<'s, 'a> Graph<'s, 'a> {
     /// Ends an edge whose first move enters in several zones, or none: an edge to each.
     fn end_in_pieces(&mut self, target: &mut [i32], origin: Origin) -> Result<(), Failure> {
         let mut zones = std::mem::take(&mut self.entries);
+        if !zones.is_empty() && self.dead_ends.contain(target) {
+            let program = self.programs.intern(&self.steps);
+            self.end_dead(target, program, origin, 1);
+            return Ok(());
+        }
         for zone in &mut zones {
             delay_after(self.symbolic, target, &self.steps, zone)?;
         }
@@ -586,6 +637,11 @@ impl<'s, 'a> Graph<'s, 'a> {
         origin: Origin,
         length: u32,
     ) -> Result<(), Failure> {
+        if self.dead_ends.contain(target) {
+            let program = self.programs.intern(&self.steps);
+            self.end_dead(target, program, origin, length);
+            return Ok(());
+        }
         if self.has_discrete_nodes {
             zone = Zone::of_constraints(self.dimension(), invariant_after(&self.steps));
         } else {
@@ -609,6 +665,10 @@ impl<'s, 'a> Graph<'s, 'a> {
         length: u32,
     ) -> Result<(), Failure> {
         let source = origin.node;
+        if self.dead_ends.contain(words) {
+            self.end_dead(words, ending.program, origin, length);
+            return Ok(());
+        }
         let target = self.node_of(words, &ending.zone, ending.id, None)?;
         let program = ending.program;
         let (from, to) = (

@@ -497,7 +497,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     }
 
     /// Gives nodes that were just made their place: what is sought is won from the start.
-    fn adopt_new_nodes(&mut self) {
+    pub(super) fn adopt_new_nodes(&mut self) {
         for node in self.win.len()..self.graph.nodes.len() {
             let win = self.sought(node as u32);
             if let Win::Part(part) = &win {
@@ -550,7 +550,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// Whether the words decide who has won in a node.
     pub(super) fn is_decided(&self, node: u32) -> bool {
         match self.graph.nodes[node as usize].standing {
-            Standing::Broken => true,
+            Standing::Broken | Standing::Dead => true,
             Standing::Goal => self.targets.is_none(),
             Standing::Open | Standing::Mixed => false,
         }
@@ -586,6 +586,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let is_left = match known.standing {
             Standing::Goal => !self.goes_on,
             Standing::Broken => !self.is_cooperative,
+            Standing::Dead => true,
             Standing::Open | Standing::Mixed => false,
         };
         if !known.is_expanded && !is_left && !self.is_waiting[node as usize] {

@@ -85,7 +85,7 @@ pub fn solve(
 /// The part of a node in which what must be kept holds.
 fn unbroken(solver: &Solver<'_, '_, '_>, node: u32) -> Win {
     match solver.graph.nodes[node as usize].standing {
-        Standing::Broken => Win::Nothing,
+        Standing::Broken | Standing::Dead => Win::Nothing,
         Standing::Open | Standing::Goal => Win::Everything,
         Standing::Mixed => {
             let mut rest = solver.whole(node);
@@ -122,7 +122,7 @@ fn is_within(solver: &Solver<'_, '_, '_>, node: u32, one: &Win, other: &Win) -> 
 /// The part of a node in which the goal holds, and from which the controller can go on without leaving what is kept.
 fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Win, Failure> {
     let mut goal = match solver.graph.nodes[node as usize].standing {
-        Standing::Open | Standing::Broken => return Ok(Win::Nothing),
+        Standing::Open | Standing::Broken | Standing::Dead => return Ok(Win::Nothing),
         Standing::Goal => solver.whole(node),
         Standing::Mixed => {
             let parts = solver.graph.parts(node);

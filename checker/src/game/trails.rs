@@ -348,8 +348,11 @@ impl Graph<'_, '_> {
         self.add_edge(words, ending, origin, trail.length)
     }
 
-    /// Whether neither the goal holds anywhere in the state nor is anything broken.
+    /// Whether play goes on: neither the goal holds anywhere in the state, nor is anything broken, nor is it a dead end.
     pub(super) fn is_open(&mut self, words: &mut [i32], zone: &Zone) -> Result<bool, Failure> {
+        if self.dead_ends.contain(words) {
+            return Ok(false);
+        }
         let extents = self.extents(words, zone)?;
         Ok(matches!(extents, (Extent::Nowhere, Extent::Everywhere)))
     }

@@ -133,10 +133,16 @@ impl Graph<'_, '_> {
             self.effect.entry_zones(piece, dimension, &mut self.entries);
             entries.append(&mut self.entries);
         }
-        self.symbolic.extrapolate_all(target, &mut entries);
         self.steps.clear();
         push_step(&mut self.steps, false, &self.effect);
         let program = self.programs.intern(&self.steps);
+        if self.dead_ends.contain(target) {
+            if !entries.is_empty() {
+                self.end_dead(target, program, origin, 1);
+            }
+            return Ok(());
+        }
+        self.symbolic.extrapolate_all(target, &mut entries);
         let invariant = self.effect.invariant.clone();
         let first = self.edges.len();
         for (zone, urgent) in self.futures(target, &invariant, entries)? {

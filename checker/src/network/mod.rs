@@ -21,6 +21,7 @@ mod offers;
 mod orbits;
 mod pairing;
 mod passage;
+pub mod possibility;
 pub mod predicate;
 mod reads;
 pub mod restriction;

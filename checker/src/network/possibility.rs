@@ -1,0 +1,260 @@
+//! Whether a predicate can hold where nothing is known of a state but the location of one process.
+//!
+//! Code is run with unknown values: where one decides how it goes on, both ways are looked at. What frames and references hold
+//! counts as unknown. The answer errs towards "it can": a way that ends in a run-time error, and whatever takes too many steps, counts
+//! as holding.
+
+use crate::exec::{arithmetic, target};
+use crate::ir::{
+    Address, Base, FunctionId, Instruction, LocationId, Network, Predicate, ProcessId, Register,
+    Terminator,
+};
+
+/// Instructions that are looked at for all questions together: a few milliseconds.
+const MOST_STEPS: u32 = 1 << 20;
+
+/// Instructions that are looked at for one truth value of one function.
+const MOST_STEPS_OF_A_QUESTION: u32 = 1 << 14;
+
+/// Answers whether predicates can hold.
+pub struct Possibility<'a> {
+    network: &'a Network,
+    /// By word: its value, if it is always the same.
+    words: Vec<Option<i32>>,
+    steps: u32,
+}
+
+/// One way through a function.
+#[derive(Clone)]
+struct Way {
+    /// The running function and its callers, outermost first.
+    calls: Vec<Call>,
+}
+
+#[derive(Clone)]
+struct Call {
+    function: FunctionId,
+    block: usize,
+    /// The instruction of the block that comes next.
+    next: usize,
+    registers: Vec<Option<i32>>,
+}
+
+/// How a way goes on.
+enum Onward {
+    /// Here.
+    Here,
+    /// In two blocks, since the value that decides is not known.
+    Fork(usize, usize),
+    /// Nowhere, with this result.
+    Returned(Option<i32>),
+    /// Nowhere: a run-time error.
+    Failed,
+}
+
+impl<'a> Possibility<'a> {
+    /// Knows of words only those that nothing ever writes.
+    pub fn new(network: &'a Network) -> Possibility<'a> {
+        let written = network.written_words();
+        let words = network.initial.iter().zip(written);
+        Possibility {
+            network,
+            words: words
+                .map(|(&value, is_written)| (!is_written).then_some(value))
+                .collect(),
+            steps: 0,
+        }
+    }
+
+    /// Whether the predicate can have the truth value in a state in which the process is in the location.
+    pub fn can_be(
+        &mut self,
+        truth: bool,
+        predicate: &Predicate,
+        (process, location): (ProcessId, LocationId),
+    ) -> bool {
+        self.words[process.0 as usize] = Some(location.0 as i32);
+        let can_be = self.may_be(truth, predicate);
+        self.words[process.0 as usize] = None;
+        can_be
+    }
+
+    fn may_be(&mut self, truth: bool, predicate: &Predicate) -> bool {
+        match predicate {
+            Predicate::Constant(value) => *value == truth,
+            Predicate::Location(process, location) => self.words[process.0 as usize]
+                .is_none_or(|known| (known == location.0 as i32) == truth),
+            Predicate::Data(function) => self.can_return(*function, truth),
+            Predicate::Clock(_) | Predicate::Deadlock => true,
+            Predicate::Not(inner) => self.may_be(!truth, inner),
+            Predicate::And(parts) if truth => parts.iter().all(|part| self.may_be(truth, part)),
+            Predicate::Or(parts) if !truth => parts.iter().all(|part| self.may_be(truth, part)),
+            Predicate::And(parts) | Predicate::Or(parts) => {
+                parts.iter().any(|part| self.may_be(truth, part))
+            }
+        }
+    }
+
+    /// Whether a function without parameters can return a truth value.
+    fn can_return(&mut self, function: FunctionId, truth: bool) -> bool {
+        let most = MOST_STEPS.min(self.steps + MOST_STEPS_OF_A_QUESTION);
+        let mut ways = vec![Way {
+            calls: vec![self.call(function, &[])],
+        }];
+        while let Some(mut way) = ways.pop() {
+            loop {
+                self.steps += 1;
+                if self.steps >= most {
+                    return true;
+                }
+                match self.step(&mut way) {
+                    Onward::Here => {}
+                    Onward::Fork(one, other) => {
+                        let mut second = way.clone();
+                        second.enter(other);
+                        ways.push(second);
+                        way.enter(one);
+                    }
+                    Onward::Failed => return true,
+                    Onward::Returned(value) => {
+                        if value.is_none_or(|value| (value != 0) == truth) {
+                            return true;
+                        }
+                        break;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    fn call(&self, function: FunctionId, arguments: &[Option<i32>]) -> Call {
+        let mut registers = vec![None; self.network.functions[function.0 as usize].registers.len()];
+        registers[..arguments.len()].copy_from_slice(arguments);
+        Call {
+            function,
+            block: 0,
+            next: 0,
+            registers,
+        }
+    }
+
+    /// Does the next instruction of a way, or goes to the next block.
+    fn step(&self, way: &mut Way) -> Onward {
+        let Some(active) = way.calls.last_mut() else {
+            return Onward::Failed;
+        };
+        let code = &self.network.functions[active.function.0 as usize].blocks[active.block];
+        let Some(instruction) = code.instructions.get(active.next) else {
+            return self.leave(way, code.terminator);
+        };
+        active.next += 1;
+        if let Instruction::Call {
+            function,
+            arguments,
+            ..
+        } = instruction
+        {
+            let arguments: Vec<_> = arguments.iter().map(|&one| active.value(one)).collect();
+            let callee = self.call(*function, &arguments);
+            way.calls.push(callee);
+            return Onward::Here;
+        }
+        let value = self.value_of(active, instruction);
+        if let Some(target) = target(instruction) {
+            active.registers[target.0 as usize] = value;
+        }
+        Onward::Here
+    }
+
+    /// Takes the end of a block.
+    fn leave(&self, way: &mut Way, terminator: Terminator) -> Onward {
+        let Some(active) = way.calls.last_mut() else {
+            return Onward::Failed;
+        };
+        match terminator {
+            Terminator::Jump(block) => way.enter(block.0 as usize),
+            Terminator::Branch(condition, yes, no) => match active.value(condition) {
+                None => return Onward::Fork(yes.0 as usize, no.0 as usize),
+                Some(0) => way.enter(no.0 as usize),
+                Some(_) => way.enter(yes.0 as usize),
+            },
+            Terminator::Fail(..) => return Onward::Failed,
+            Terminator::Return(register) => {
+                let value = register.and_then(|register| active.value(register));
+                way.calls.pop();
+                let Some(caller) = way.calls.last_mut() else {
+                    return Onward::Returned(value);
+                };
+                let code = &self.network.functions[caller.function.0 as usize].blocks[caller.block];
+                if let Some(target) = target(&code.instructions[caller.next - 1]) {
+                    caller.registers[target.0 as usize] = value;
+                }
+            }
+        }
+        Onward::Here
+    }
+
+    /// What an instruction computes, as far as it is known.
+    fn value_of(&self, active: &Call, instruction: &Instruction) -> Option<i32> {
+        let value = |register| active.value(register);
+        match *instruction {
+            Instruction::Integer { value, .. } => Some(value),
+            Instruction::Copy { source, .. } => value(source),
+            Instruction::Not { source, .. } => Some(i32::from(value(source)? == 0)),
+            Instruction::Arithmetic {
+                operator,
+                left,
+                right,
+                ..
+            } => arithmetic::integer(operator, value(left)?, value(right)?).ok(),
+            Instruction::CompareIntegers {
+                relation,
+                left,
+                right,
+                ..
+            } => {
+                let holds = arithmetic::integers_relate(relation, value(left)?, value(right)?);
+                Some(i32::from(holds))
+            }
+            Instruction::ScaleIndex {
+                index,
+                first,
+                length,
+                stride,
+                ..
+            } => arithmetic::scale_index(value(index)?, first, length, stride).ok(),
+            Instruction::AddIndices { left, right, .. } => value(left)?.checked_add(value(right)?),
+            Instruction::LoadInteger { address, .. } => self.loaded(active, address),
+            _ => None,
+        }
+    }
+
+    fn loaded(&self, active: &Call, address: Address) -> Option<i32> {
+        let index = match address.index {
+            None => 0,
+            Some(index) => usize::try_from(active.value(index)?).ok()?,
+        };
+        let place = address.offset as usize + index;
+        match address.base {
+            Base::State => self.words.get(place).copied().flatten(),
+            Base::Constants => self.network.constants.get(place).copied(),
+            Base::Frame | Base::Register(_) => None,
+        }
+    }
+}
+
+impl Way {
+    fn enter(&mut self, block: usize) {
+        if let Some(active) = self.calls.last_mut() {
+            active.block = block;
+            active.next = 0;
+        }
+    }
+}
+
+impl Call {
+    fn value(&self, register: Register) -> Option<i32> {
+        self.registers[register.0 as usize]
+    }
+}
