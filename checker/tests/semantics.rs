@@ -310,3 +310,61 @@ fn every_code_has_a_line_in_the_corpus() {
         .collect();
     assert_eq!(missing, OUTSIDE_CORPUS);
 }
+
+/// Whether static analysis takes comparisons of clocks in a guard for able to matter, and the guard for able to hold.
+fn matters(guard: &str) -> (bool, bool) {
+    let text = format!(
+        "const bool late[3] = {{false, false, false}};
+         const bool mixed[int[2, 4]] = {{false, true, true}};
+         const struct {{ int low; int rows[2][2]; }} table[2] = {{{{1, {{{{2, 3}}, {{4, 5}}}}}}, {{6, {{{{7, 8}}, {{9, 9}}}}}}}};
+         int[0, 2] who; int[3, 4] last; int[0, 1] side; bool b; clock x; clock y[2];
+         process P() {{ state A, B; init A; trans A -> B {{ guard {guard}; assign who = 1, last = 4, side = 1, b = true; }}; }}
+         system P;"
+    );
+    let loaded = load("guard.xta", &text);
+    let model = loaded.model.unwrap_or_else(|| {
+        panic!(
+            "{guard}: {}",
+            rendered(&loaded.diagnostics, &loaded.sources)
+        )
+    });
+    let guard = &model.network.processes[0].edges[0].guard;
+    (!guard.atoms.is_empty(), !guard.never_holds)
+}
+
+#[test]
+fn comparisons_behind_what_is_known_do_not_matter() {
+    for (guard, expected) in [
+        ("x < 5", (true, true)),
+        ("late[who] && x < 5", (false, false)),
+        ("x < 5 && late[who]", (false, false)),
+        ("late[who] && (b || x < 5)", (false, false)),
+        ("!late[who] || x < 5", (false, true)),
+        ("!late[who] && x < 5", (true, true)),
+        ("mixed[last] || x < 5", (false, true)),
+        ("mixed[last - 1] || x < 5", (true, true)),
+        ("table[side].low > 6 && x < 5", (false, false)),
+        ("table[side].low > 5 && x < 5", (true, true)),
+        ("table[side].rows[1][side] >= 4 imply b", (false, true)),
+        (
+            "table[side].rows[1][side] < 4 && x == y[side]",
+            (false, false),
+        ),
+        (
+            "table[side].rows[side][0] == 9 && x == y[side]",
+            (true, true),
+        ),
+        ("who + last < 3 && x >= 5", (false, false)),
+        ("who + last <= 3 && x >= 5", (true, true)),
+        (
+            "forall (i : int[0, 1]) (late[i] && y[i] < 5)",
+            (false, true),
+        ),
+        ("(exists (i : int[0, 2]) late[i]) && x > 1", (false, false)),
+        ("(b || (late[who] && x > 1)) && true", (false, true)),
+        ("(b || x > 1) && who != 3", (true, true)),
+        ("(b || x > 1) && who == 3", (false, false)),
+    ] {
+        assert_eq!(matters(guard), expected, "{guard}");
+    }
+}

@@ -270,8 +270,10 @@ pub struct Guard {
     pub fixed: Vec<FixedConstraint>,
     /// Whether `function` may emit constraints.
     pub emits: bool,
-    /// All clock comparisons in it, fixed ones included: for static analysis.
+    /// All clock comparisons in it that can matter, fixed ones included: for static analysis.
     pub atoms: Vec<ClockAtom>,
+    /// Whether it is known to fail in every state, if it does not end in a run-time error.
+    pub never_holds: bool,
 }
 
 impl Guard {

@@ -1,7 +1,8 @@
 //! Clock bounds for extrapolation: the constants that matter to each clock, location by location.
 //!
 //! For a process in location l and a clock x, `lower` is the greatest c of a comparison `x > c` or `x >= c`, and `upper` of a
-//! comparison `x < c` or `x <= c`, that some path from l may evaluate before x is assigned. Bounds of a state are the
+//! comparison `x < c` or `x <= c`, that some path from l may evaluate before x is assigned; an edge whose guard is known never
+//! to hold is on no path. Bounds of a state are the
 //! greatest over its processes. A clock without bounds is *inactive*: its value no longer matters.
 //!
 //! Source: G. Behrmann, P. Bouyer, E. Fleury, K. G. Larsen, "Static guard analysis in timed automata verification", TACAS 2003
@@ -184,7 +185,7 @@ fn fixpoint(process: &Process, clock_count: usize, reset: i32) -> Table {
     }
     loop {
         let mut changed = false;
-        for edge in &process.edges {
+        for edge in process.edges.iter().filter(|edge| !edge.guard.never_holds) {
             for branch in 0..edge.branches.len() {
                 changed |= propagate(edge, branch, &mut table);
             }

@@ -2,13 +2,16 @@
 
 use super::checker::Checker;
 use super::codes;
-use super::operators::{as_truth, integer_operator, to_double};
+use super::operators::{as_truth, integer_operator, to_double, truth_interval};
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{Class, Index, Memory, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::syntax::ast::{self, BinaryOp, ExprKind, Name, Quantifier, TypeExpr, UnaryOp};
+
+/// So many parts of constant arrays are looked at for the interval of their values.
+const MOST_VALUES: usize = 4096;
 
 impl Checker<'_> {
     /// Checks an expression.
@@ -224,7 +227,8 @@ impl Checker<'_> {
         }
     }
 
-    /// The value of a scalar in the constant memory at a known place; anything else as it is.
+    /// The value of a scalar in the constant memory at a known place; at one of several places, the interval of their
+    /// values; anything else as it is.
     fn folded(&self, expr: Expr) -> Expr {
         let Some(place) = expr.variable() else {
             return expr;
@@ -232,10 +236,19 @@ impl Checker<'_> {
         if place.root != Root::Constants || !expr.ty.is_register() {
             return expr;
         }
+        let constants = &self.world.network.constants;
         let Some(offset) = known_offset(&expr, Memory::Words) else {
-            return expr;
+            let Some(offsets) = possible_offsets(&expr).filter(|_| expr.ty.is_integral()) else {
+                return expr;
+            };
+            let values = || offsets.iter().map(|&offset| constants[offset as usize]);
+            let interval = values().min().zip(values().max());
+            return match interval {
+                Some(interval) => expr.within(interval),
+                None => expr,
+            };
         };
-        let constants = &self.world.network.constants[offset as usize..];
+        let constants = &constants[offset as usize..];
         match expr.ty {
             Type::Double => {
                 let value = arithmetic::double_of_words(constants[0], constants[1]);
@@ -507,13 +520,19 @@ impl Checker<'_> {
         let Some(ty) = self.quantified_type(quantifier, &checked) else {
             return Expr::error(span);
         };
+        // The range may be empty.
+        let interval = match (quantifier, truth_interval(&checked)) {
+            (Quantifier::ForAll, (low, _)) => (low, 1),
+            (Quantifier::Exists, (_, high)) => (0, high),
+            (Quantifier::Sum, _) => ty.bounds(),
+        };
         let kind = Kind::Quantifier {
             quantifier,
             local,
             range,
             body: Box::new(checked),
         };
-        Expr::new(kind, ty, span)
+        Expr::new(kind, ty, span).within(interval)
     }
 
     /// The type of a quantified expression with this body; reports a body that does not fit.
@@ -621,6 +640,40 @@ fn joined(left: &Type, right: &Type) -> Type {
     Type::Int {
         low: a.min(c),
         high: b.max(d),
+    }
+}
+
+/// Where in the constant memory a place may lie, wherever its indices are inside; `None` if these are too many.
+fn possible_offsets(expr: &Expr) -> Option<Vec<u32>> {
+    match &expr.kind {
+        Kind::Variable(place) => Some(vec![place.base.of(Memory::Words)]),
+        Kind::Field { record, offset } => {
+            let mut offsets = possible_offsets(record)?;
+            for base in &mut offsets {
+                *base += offset.of(Memory::Words);
+            }
+            Some(offsets)
+        }
+        Kind::Index {
+            array,
+            index,
+            first,
+            length,
+            stride,
+        } => {
+            let position = |index: i32| {
+                let position = i64::from(index) - i64::from(*first);
+                position.clamp(-1, i64::from(*length)) as i32
+            };
+            let (low, high) = index.interval;
+            let positions = position(low).max(0)..=position(high).min(*length as i32 - 1);
+            let bases = possible_offsets(array)?;
+            let count = positions.clone().count().saturating_mul(bases.len());
+            let stride = stride.of(Memory::Words);
+            let each = |base: u32| positions.clone().map(move |at| base + at as u32 * stride);
+            (count <= MOST_VALUES).then(|| bases.into_iter().flat_map(each).collect())
+        }
+        _ => None,
     }
 }
 

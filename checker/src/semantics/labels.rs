@@ -45,7 +45,10 @@ impl Checker<'_> {
 
     /// Lowers a conjunction of conditions.
     pub(super) fn make_guard(&mut self, parts: &[Expr], locals: &[LocalId], place: &str) -> Guard {
-        let mut guard = Guard::default();
+        let mut guard = Guard {
+            never_holds: parts.iter().any(|part| part.interval == (0, 0)),
+            ..Guard::default()
+        };
         if !self.can_lower() {
             guard.atoms = parts.iter().flat_map(fixed_constraints).map(atom).collect();
             return guard;
@@ -62,12 +65,17 @@ impl Checker<'_> {
         if rest.is_empty() {
             return guard;
         }
+        if guard.never_holds {
+            guard.atoms.clear();
+        }
         let known = self.locals.clone();
         let mut builder = self.builder(&known);
         builder.select_parameters(locals);
         let (function, effects, emits) = builder.guard(place.to_owned(), &rest);
         guard.function = Some(function);
-        guard.atoms.extend(effects.atoms);
+        if !guard.never_holds {
+            guard.atoms.extend(effects.atoms);
+        }
         guard.emits = emits;
         guard
     }

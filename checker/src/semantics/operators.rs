@@ -134,7 +134,8 @@ impl Checker<'_> {
             Type::Constraint(_) => Type::Constraint(Class::Query),
             _ => Type::Bool,
         };
-        Expr::new(Kind::Not(Box::new(inner)), ty, span)
+        let (low, high) = truth_interval(&inner);
+        Expr::new(Kind::Not(Box::new(inner)), ty, span).within((1 - high, 1 - low))
     }
 
     /// `left && right`
@@ -151,7 +152,11 @@ impl Checker<'_> {
             (Some(0), _) => Expr::bool(false, span),
             (Some(_), _) => as_truth(right, span),
             (_, Some(value)) if value != 0 => as_truth(left, span),
-            _ => Expr::new(Kind::And(Box::new(left), Box::new(right)), ty, span),
+            _ => {
+                let ((a, b), (c, d)) = (truth_interval(&left), truth_interval(&right));
+                let kind = Kind::And(Box::new(left), Box::new(right));
+                Expr::new(kind, ty, span).within((a.min(c), b.min(d)))
+            }
         }
     }
 
@@ -174,7 +179,11 @@ impl Checker<'_> {
             (Some(0), _) => as_truth(right, span),
             (Some(_), _) => Expr::bool(true, span),
             (_, Some(0)) => as_truth(left, span),
-            _ => Expr::new(Kind::Or(Box::new(left), Box::new(right)), ty, span),
+            _ => {
+                let ((a, b), (c, d)) = (truth_interval(&left), truth_interval(&right));
+                let kind = Kind::Or(Box::new(left), Box::new(right));
+                Expr::new(kind, ty, span).within((a.max(c), b.max(d)))
+            }
         }
     }
 
@@ -272,8 +281,31 @@ pub(super) fn compare_integers(relation: Relation, left: Expr, right: Expr, span
     if let (Some(a), Some(b)) = (left.constant(), right.constant()) {
         return Expr::bool(arithmetic::integers_relate(relation, a, b), span);
     }
+    let interval = comparison_interval(relation, left.interval, right.interval);
     let kind = Kind::Compare(relation, Box::new(left), Box::new(right));
-    Expr::new(kind, Type::Bool, span)
+    Expr::new(kind, Type::Bool, span).within(interval)
+}
+
+/// The truth values of a comparison of values in these intervals.
+fn comparison_interval(relation: Relation, (a, b): (i32, i32), (c, d): (i32, i32)) -> (i32, i32) {
+    let (always, never) = match relation {
+        Relation::Less => (b < c, a >= d),
+        Relation::LessEqual => (b <= c, a > d),
+        Relation::Greater => (a > d, b <= c),
+        Relation::GreaterEqual => (a >= d, b < c),
+        Relation::Equal => ((a, b) == (c, c) && c == d, b < c || d < a),
+        Relation::NotEqual => (b < c || d < a, (a, b) == (c, c) && c == d),
+    };
+    (always.into(), (!never).into())
+}
+
+/// The truth values of a condition.
+pub(super) fn truth_interval(condition: &Expr) -> (i32, i32) {
+    match condition.interval {
+        (0, 0) => (0, 0),
+        (low, high) if low > 0 || high < 0 => (1, 1),
+        _ => (0, 1),
+    }
 }
 
 fn compare_doubles(relation: Relation, left: Expr, right: Expr, span: Span) -> Expr {

@@ -41,8 +41,17 @@ pub(in crate::semantics) fn bound_range((low, high): (i32, i32), negated: bool) 
 }
 
 impl Builder<'_> {
-    /// Emits the clock constraints of a condition; goes to `fail` if its data part is false.
+    /// Emits the clock constraints of a condition; goes to `fail` if its data part is false. Static analysis hears nothing
+    /// of comparisons that cannot matter, since the condition holds or fails without them.
     pub(super) fn constrain(&mut self, expr: &Expr, fail: BlockId) {
+        let before = self.effects.atoms.len();
+        self.emit_constraints(expr, fail);
+        if expr.interval.0 == expr.interval.1 {
+            self.effects.atoms.truncate(before);
+        }
+    }
+
+    fn emit_constraints(&mut self, expr: &Expr, fail: BlockId) {
         if !expr.mentions_clocks() {
             let next = self.new_block();
             self.condition(expr, next, fail);
