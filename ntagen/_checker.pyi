@@ -72,6 +72,7 @@ class Model:
         wanted_trace: str,
         certificate: bool,
         symmetry: bool,
+        partial_order: bool,
         folder: str | None,
         progress: Callable[[int, int, int, int], object] | None,
     ) -> Answer: ...

@@ -409,6 +409,7 @@ class Model:
         wanted_trace: TraceWanted = "any",
         certificate: bool = False,
         symmetry: bool = True,
+        partial_order: bool = True,
         folder: Path | None = None,
         progress: Progress | None = None,
     ) -> Answer:
@@ -448,6 +449,8 @@ class Model:
             symmetry: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may take states
                 that differ only by exchanged members of scalar sets for one; verdicts, values
                 and traces do not depend on it, counts do.
+            partial_order: Whether ``E<>`` and ``A[]`` may leave out orders of independent moves
+                while time stands still; verdicts do not depend on it, counts do.
             folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
                 folder of the model.
             progress: Is called some twenty times a second with the numbers of explored,
@@ -486,6 +489,7 @@ class Model:
                 wanted_trace=wanted_trace,
                 certificate=certificate,
                 symmetry=symmetry,
+                partial_order=partial_order,
                 folder=None if folder is None else str(folder),
                 progress=progress,
             )

@@ -305,7 +305,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, folder, progress))]
+    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, partial_order, folder, progress))]
     #[expect(
         clippy::too_many_arguments,
         clippy::fn_params_excessive_bools,
@@ -330,6 +330,7 @@ impl Model {
         wanted_trace: &str,
         certificate: bool,
         symmetry: bool,
+        partial_order: bool,
         folder: Option<PathBuf>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
@@ -368,6 +369,7 @@ impl Model {
             },
             certificate,
             symmetry,
+            partial_order,
             folder,
         };
         let model = slf.get();

@@ -191,6 +191,13 @@ class _Outputs:
     help="Whether states that differ only by exchanged members of scalar sets are one (E<>, A[], "
     "sup, inf, bounds; where the model cannot tell them apart).",
 )
+@click.option(
+    "--partial-order",
+    type=click.Choice(["on", "off"]),
+    default="on",
+    help="Whether independent moves are taken in one order only where urgent or committed "
+    "locations keep time from passing (E<>, A[]).",
+)
 @forced_rule()
 @priority_rule(
     "Whether priorities of channels and processes count in games and under strategies. TIGA "
@@ -217,6 +224,7 @@ def command(
     search: Any,  # noqa: ANN401
     threads: int,
     symmetry: str,
+    partial_order: str,
     seed: int,
     forced: Any,  # noqa: ANN401
     priorities: Any,  # noqa: ANN401
@@ -281,6 +289,7 @@ def command(
                     wanted_trace=wanted_trace or "any",
                     certificate=certificate is not None,
                     symmetry=symmetry == "on",
+                    partial_order=partial_order == "on",
                     folder=query.folder,
                     progress=report,
                 )

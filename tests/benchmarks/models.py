@@ -220,3 +220,67 @@ process P(const int[0, N - 1] pid) {{
 }}
 system P;
 """
+
+
+def alarms(sensors: int) -> str:
+    """Sensors that all wake at once and measure and report in urgent steps; one may meet smoke."""
+    return f"""
+const int N = {sensors};
+broadcast chan wake;
+int[0, N] smoke = N;
+bool reported[N];
+
+process Beat() {{
+    clock t;
+    state waiting {{ t <= 10 }}, working, looking {{ t <= 2 }};
+    urgent working;
+    init waiting;
+    trans
+        waiting -> working {{ select where : int[0, N]; guard t == 10; assign smoke = where; }},
+        working -> looking {{ sync wake!; assign t = 0; }},
+        looking -> waiting {{ guard t == 2; assign t = 0; }};
+}}
+
+process Sensor(const int[0, N - 1] me) {{
+    int[0, 1] heat;
+    state asleep, measuring, judging, reporting, storing;
+    urgent measuring, judging, reporting, storing;
+    init asleep;
+    trans
+        asleep -> measuring {{ sync wake?; }},
+        measuring -> judging {{ assign heat = smoke == me; }},
+        judging -> reporting {{ guard heat == 1; }},
+        judging -> storing {{ guard heat == 0; }},
+        reporting -> asleep {{ assign reported[me] = true; }},
+        storing -> asleep {{ assign reported[me] = false, heat = 0; }};
+}}
+system Beat, Sensor;
+"""
+
+
+def entangled(processes: int) -> str:
+    """Urgent processes of which each reads what all write: no order may be left out."""
+    return f"""
+const int N = {processes};
+int[0, 3] total;
+broadcast chan wake;
+
+process Beat() {{
+    clock t;
+    state waiting {{ t <= 5 }};
+    init waiting;
+    trans waiting -> waiting {{ guard t == 5; sync wake!; assign t = 0; }};
+}}
+
+process P(const int[0, N - 1] me) {{
+    int[0, 3] seen;
+    state asleep, reading, writing;
+    urgent reading, writing;
+    init asleep;
+    trans
+        asleep -> reading {{ sync wake?; }},
+        reading -> writing {{ assign seen = total; }},
+        writing -> asleep {{ assign total = (seen + me) % 4; }};
+}}
+system Beat, P;
+"""

@@ -139,6 +139,8 @@ pub struct Options {
     pub certificate: bool,
     /// Whether a search may take states that differ only in which member of a scalar set is which for the same.
     pub symmetry: bool,
+    /// Whether a search for a state need not take independent moves in every order where time stands still.
+    pub partial_order: bool,
 }
 
 impl Options {
@@ -169,6 +171,7 @@ impl Default for Options {
             trace: TraceWanted::default(),
             certificate: false,
             symmetry: true,
+            partial_order: true,
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::ir::{ClockAtom, ClockId, ClockRange, Predicate};
-use crate::network::{Abstraction, Symbolic, Symmetry, predicate};
+use crate::network::{Abstraction, PartialOrder, Symbolic, Symmetry, predicate};
 use crate::search::limits::Counters;
 use crate::search::plain;
 use crate::search::reach::{self, Outcome, Report, Trace};
@@ -18,18 +18,26 @@ use super::timing::with_time;
 use super::{Options, TraceWanted};
 
 /// Is there a state in which the goal holds?
-pub(super) fn reachable(
-    subject: Subject<'_>,
+pub(super) fn reachable<'a>(
+    subject: Subject<'a>,
     goal: &Predicate,
     options: &Options,
     symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Answer {
-    if let Some((mut symbolic, report)) = reach_coarsely(subject, goal, options, symmetry, watch) {
+    // A strategy may forbid moves in one order and allow them in another.
+    let is_ordered = options.partial_order && subject.under.is_none();
+    let order = is_ordered
+        .then(|| PartialOrder::new(subject.network, goal))
+        .flatten();
+    let reduced = |symbolic: Symbolic<'a>| {
+        let symbolic = symbolic.reduced_by(symmetry.cloned());
+        symbolic.ordered_by(order.clone())
+    };
+    if let Some((mut symbolic, report)) = reach_coarsely(subject, goal, options, reduced, watch) {
         return conclude(subject, &mut symbolic, goal, report, options, watch);
     }
-    let mut symbolic =
-        symbolic(subject, &[goal], &[], Abstraction::LowerUpper).reduced_by(symmetry.cloned());
+    let mut symbolic = reduced(symbolic(subject, &[goal], &[], Abstraction::LowerUpper));
     let mut look = goal;
     let report = reach::search_shared(&mut symbolic, &mut look, options.manner(), watch);
     conclude(subject, &mut symbolic, goal, report, options, watch)
@@ -41,7 +49,7 @@ fn reach_coarsely<'a>(
     subject: Subject<'a>,
     goal: &Predicate,
     options: &Options,
-    symmetry: Option<&Arc<Symmetry>>,
+    reduced: impl FnOnce(Symbolic<'a>) -> Symbolic<'a>,
     watch: &mut LimitWatch,
 ) -> Option<(Symbolic<'a>, Report)> {
     // The zones of a certificate must be free of deadlocks themselves, and the best trace is found in them.
@@ -49,7 +57,7 @@ fn reach_coarsely<'a>(
     if is_exact || !predicate::has_deadlock(goal) {
         return None;
     }
-    let mut coarse = coarser(subject, &[goal])?.reduced_by(symmetry.cloned());
+    let mut coarse = reduced(coarser(subject, &[goal])?);
     let mut look = goal;
     let report = reach::search_shared(&mut coarse, &mut look, options.manner(), watch);
     let is_settled = match &report.outcome {

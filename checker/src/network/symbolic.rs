@@ -19,7 +19,7 @@ use crate::zones::{Bound, ClockSet, Federation, Zone};
 
 use super::bounds::ClockBounds;
 use super::scope::Scope;
-use super::{Failure, MoveRef, Moves, Part, Restriction, Stepper, Symmetry};
+use super::{Failure, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, Symmetry};
 
 /// Zones on top of the moves of a network. One per thread.
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
@@ -34,6 +34,7 @@ pub struct Symbolic<'a> {
     pub(super) has_priorities: bool,
     pub(super) restriction: Option<&'a dyn Restriction>,
     symmetry: Option<Arc<Symmetry>>,
+    order: Option<Arc<PartialOrder>>,
     is_approximate: bool,
     ceilings: Ceilings,
     pub(super) inner_moves: Moves,
@@ -71,6 +72,7 @@ impl<'a> Symbolic<'a> {
             has_priorities: network.features.priorities,
             restriction: None,
             symmetry: None,
+            order: None,
             is_approximate: false,
             ceilings: bounds.everywhere().clone(),
             bounds,
@@ -87,6 +89,7 @@ impl<'a> Symbolic<'a> {
             has_priorities: self.has_priorities,
             restriction: self.restriction,
             symmetry: self.symmetry.clone(),
+            order: self.order.clone(),
             ..Symbolic::new(self.stepper.another(), self.bounds.clone())
         }
     }
@@ -125,6 +128,18 @@ impl<'a> Symbolic<'a> {
     /// What states may be exchanged by.
     pub fn symmetry(&self) -> Option<&Arc<Symmetry>> {
         self.symmetry.as_ref()
+    }
+
+    /// The same, where a search need not take independent moves in every order.
+    #[must_use]
+    pub fn ordered_by(mut self, order: Option<Arc<PartialOrder>>) -> Symbolic<'a> {
+        self.order = order;
+        self
+    }
+
+    /// What decides which orders of independent moves a search need not take.
+    pub fn order(&self) -> Option<&Arc<PartialOrder>> {
+        self.order.as_ref()
     }
 
     /// Whether it is under a restriction.
@@ -425,6 +440,21 @@ impl ClockEffect {
             && self.invariant.is_empty()
     }
 
+    /// Whether the move is possible at all valuations of a zone; of one that copies clocks that is not known.
+    pub fn keeps_all_of(&self, zone: &Zone) -> bool {
+        let dimension = zone.dimension();
+        let mut after = zone.clone();
+        let holds = |zone: &Zone, one: &Constraint| {
+            zone.bounds()[one.left * dimension + one.right] <= one.bound
+        };
+        let only_sets = |one: &Assignment| matches!(one, Assignment::Value { .. });
+        self.excluded.is_empty()
+            && self.assignments.iter().all(only_sets)
+            && self.guard.iter().all(|one| holds(zone, one))
+            && after.assign(&self.assignments)
+            && self.invariant.iter().all(|one| holds(&after, one))
+    }
+
     /// The zones on entry of the target: the source's zone within the guard, after the assignments, within the invariant.
     /// More than one only if some clock-guarded receiver abstains.
     pub fn entry_zones(&self, zone: &[Bound], dimension: usize, out: &mut Vec<Zone>) {
@@ -494,7 +524,7 @@ pub(super) fn to_constraints(
 }
 
 /// An emitted constraint as one on zones, which may compare a clock with itself.
-fn to_constraint(emitted: &EmittedConstraint) -> Result<Constraint, Failure> {
+pub(super) fn to_constraint(emitted: &EmittedConstraint) -> Result<Constraint, Failure> {
     let bound = if emitted.strict {
         Bound::strict(emitted.bound)
     } else {

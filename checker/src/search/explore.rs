@@ -7,8 +7,8 @@
 //!
 //! Where states are stored, and when they are explored, the [`Sink`] decides.
 
-use crate::ir::{Network, Urgency};
-use crate::network::{Failure, Moves, Symbolic};
+use crate::ir::Urgency;
+use crate::network::{Agenda, Failure, Moves, StubbornSets, Symbolic};
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Zone};
 
@@ -26,8 +26,8 @@ const MOST_AT_ONCE: u64 = 4096;
 
 /// Takes the states that exploration comes to. Ways begin at the state that is being explored.
 pub(super) trait Sink {
-    /// Stores a state and lets it wait, unless a stored one contains it.
-    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]);
+    /// Stores a state and lets it wait, unless a stored one contains it. Returns whether it is known to wait now.
+    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool;
 
     /// Stores a committed state that has a choice; returns whether it is to be explored at once, and not if a stored state
     /// contains it.
@@ -93,6 +93,9 @@ struct Frame {
     words: Vec<i32>,
     zone: Zone,
     moves: Moves,
+    /// In which order moves are taken, and whether all are.
+    agenda: Agenda,
+    /// The place of the next move in it.
     next: usize,
 }
 
@@ -111,14 +114,22 @@ pub(super) struct Explorer {
     representative: Representative,
     /// Whether some location is committed.
     has_committed: bool,
+    /// Finds moves that are enough.
+    stubborn: Option<StubbornSets>,
+    /// Whether the move at hand is possible in the whole zone and leads to states that are still to be explored.
+    leads_on: bool,
     explored: u64,
     /// The value of `explored` when the exploration of the stored state began.
     explored_before: u64,
 }
 
 impl Explorer {
-    pub(super) fn new(network: &Network) -> Explorer {
+    pub(super) fn new(symbolic: &Symbolic<'_>) -> Explorer {
+        let network = symbolic.stepper.network();
+        let order = symbolic.order().cloned();
         Explorer {
+            stubborn: order.map(|order| StubbornSets::new(network, order)),
+            leads_on: false,
             recent: RecentStates::new(),
             frames: Vec::new(),
             depth: 0,
@@ -164,7 +175,7 @@ impl Explorer {
         let frame = &mut self.frames[0];
         load(&mut frame.words, frame.zone.bounds_mut());
         self.explored += 1;
-        open(symbolic, frame)
+        open(symbolic, &mut self.stubborn, frame)
     }
 
     /// Explores what has begun, until so many moves are used up.
@@ -188,7 +199,10 @@ impl Explorer {
         let mut depth = self.depth;
         while *moves > 0 {
             *moves -= 1;
-            if frames[depth].next == frames[depth].moves.len() {
+            if frames[depth].is_done() {
+                if let Some(stubborn) = &mut self.stubborn {
+                    stubborn.count(&frames[depth].agenda);
+                }
                 if depth == 0 {
                     return Ok(Visit::Done);
                 }
@@ -201,14 +215,15 @@ impl Explorer {
             }
             let (above, below) = frames.split_at_mut(depth + 1);
             match self.take_next(scene, &mut above[depth], &mut below[0], depth)? {
-                Taken::Nothing => {}
+                Taken::Nothing => self.close(&mut above[depth]),
                 Taken::Found => return Ok(Visit::Found),
                 Taken::Stopped(reason) => return Ok(Visit::Stopped(reason)),
                 Taken::Down => {
                     let frame = &mut frames[depth + 1];
                     self.explored += 1;
-                    open(scene.symbolic, frame)?;
+                    open(scene.symbolic, &mut self.stubborn, frame)?;
                     if self.is_link_or_new(scene, frame) {
+                        self.close(&mut frames[depth]);
                         depth += 1;
                     } else {
                         self.way.pop();
@@ -218,6 +233,14 @@ impl Explorer {
         }
         self.depth = depth;
         Ok(Visit::Paused)
+    }
+
+    /// Leaves the moves that do not belong to the stubborn set, if the move at hand makes that enough.
+    fn close(&mut self, frame: &mut Frame) {
+        if self.leads_on {
+            self.leads_on = false;
+            frame.agenda.close();
+        }
     }
 
     /// Stores a committed state that has a choice; returns false if it is not to be explored here.
@@ -246,10 +269,12 @@ impl Explorer {
         target: &mut Frame,
         depth: usize,
     ) -> Result<Taken, Failure> {
-        let one = source.moves.get(source.next);
+        let one = source.moves.get(source.agenda.index(source.next));
+        let may_lead_on = source.agenda.is_open(source.next) && one.is_unconditional();
         source.next += 1;
+        self.leads_on = false;
         let symbolic = &mut *scene.symbolic;
-        if symbolic.stays_whole(one) {
+        if !may_lead_on && symbolic.stays_whole(one) {
             if !symbolic.may_satisfy(one, source.zone.bounds())? {
                 return Ok(Taken::Nothing);
             }
@@ -271,6 +296,14 @@ impl Explorer {
         };
         let mut entries = std::mem::take(&mut self.entries);
         effect.entry_zones(source.zone.bounds(), symbolic.dimension(), &mut entries);
+        if may_lead_on && effect.keeps_all_of(&source.zone) {
+            let stubborn = self.stubborn.as_ref();
+            if stubborn.is_some_and(|stubborn| stubborn.is_passing(one.parts)) {
+                source.agenda.close();
+            } else {
+                self.leads_on = true;
+            }
+        }
         self.way.push(one.rank);
         let taken = self.enter(scene, &effect.invariant, &mut entries, target, depth);
         self.entries = entries;
@@ -329,26 +362,26 @@ impl Explorer {
             return Ok(self.descend(scene.sink, &target.words, entry.bounds()));
         }
         for entry in &*entries {
-            self.add_waiting(scene, &target.words, entry.bounds());
+            let waits = self.add_waiting(scene, &target.words, entry.bounds());
+            self.leads_on &= waits;
         }
         self.way.pop();
         Ok(Taken::Nothing)
     }
 
-    /// Stores a state and lets it wait, unless a stored one contains it.
+    /// Stores a state and lets it wait, unless a stored one contains it; returns whether it is known to wait.
     fn add_waiting<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
         words: &[i32],
         zone: &[Bound],
-    ) {
+    ) -> bool {
         let Some(symmetry) = scene.symbolic.symmetry() else {
-            scene.sink.add_waiting(words, zone, &self.way);
-            return;
+            return scene.sink.add_waiting(words, zone, &self.way);
         };
         let representative = &mut self.representative;
         let (words, zone, way) = representative.of(symmetry, (words, zone), &self.way);
-        scene.sink.add_waiting(words, zone, way);
+        scene.sink.add_waiting(words, zone, way)
     }
 
     /// Whether a state is to be explored at once and not stored.
@@ -363,6 +396,7 @@ impl Explorer {
     fn descend<S: Sink>(&mut self, sink: &mut S, words: &[i32], zone: &[Bound]) -> Taken {
         let stored = sink.stored();
         if self.recent.enter(sink.pack(words), zone, stored) {
+            self.leads_on = false;
             self.way.pop();
             return Taken::Nothing;
         }
@@ -395,15 +429,36 @@ fn new_frame(symbolic: &Symbolic<'_>) -> Frame {
         words: symbolic.stepper.network().initial.clone(),
         zone: Zone::zero(symbolic.dimension()),
         moves: Moves::default(),
+        agenda: Agenda::default(),
         next: 0,
     }
 }
 
-/// Finds the moves of a state.
-fn open(symbolic: &mut Symbolic<'_>, frame: &mut Frame) -> Result<(), Failure> {
+/// Finds the moves of a state, and which of them come first.
+fn open(
+    symbolic: &mut Symbolic<'_>,
+    stubborn: &mut Option<StubbornSets>,
+    frame: &mut Frame,
+) -> Result<(), Failure> {
     frame.next = 0;
     let Frame {
-        words, zone, moves, ..
+        words,
+        zone,
+        moves,
+        agenda,
+        ..
     } = frame;
-    symbolic.moves_within(words, zone.bounds(), moves)
+    symbolic.moves_within(words, zone.bounds(), moves)?;
+    if let Some(stubborn) = stubborn {
+        let network = symbolic.stepper.network();
+        stubborn.choose(network, (words, zone), moves, agenda);
+    }
+    Ok(())
+}
+
+impl Frame {
+    /// Whether all moves that are to be taken were.
+    fn is_done(&self) -> bool {
+        self.next >= self.agenda.end(self.moves.len())
+    }
 }

@@ -127,7 +127,7 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         let network = symbolic.stepper.network();
         let (dimension, greatest) = (symbolic.dimension(), symbolic.greatest_constant());
         Worker {
-            explorer: Explorer::new(network),
+            explorer: Explorer::new(symbolic),
             shard: Shard::new(network, dimension, greatest, (index, count)),
             incoming: (0..count).map(|_| Mail::default()).collect(),
             symbolic,

@@ -128,10 +128,10 @@ struct Store {
 }
 
 impl Sink for Store {
-    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) {
-        if let Some(stored) = self.tree.add(words, zone, self.current, way) {
-            self.waiting.push_back(stored);
-        }
+    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool {
+        let stored = self.tree.add(words, zone, self.current, way);
+        self.waiting.extend(stored);
+        stored.is_some()
     }
 
     fn add_choice(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool {
@@ -156,7 +156,7 @@ impl<'s, 'a> Search<'s, 'a> {
     ) -> Search<'s, 'a> {
         let network = symbolic.stepper.network();
         Search {
-            explorer: Explorer::new(network),
+            explorer: Explorer::new(symbolic),
             store: Store {
                 tree: Tree::new(network, symbolic.dimension(), symbolic.greatest_constant()),
                 waiting: VecDeque::new(),

@@ -197,9 +197,10 @@ impl Shard {
 }
 
 impl Sink for Shard {
-    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) {
+    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool {
         let stored = self.store_or_send(words, zone, way, false);
         self.next.extend(stored);
+        stored.is_some()
     }
 
     fn add_choice(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool {

@@ -305,6 +305,30 @@ def test_members_of_scalar_sets_are_told_apart_only_if_asked(
     assert (answer["verdict"], answer["stored"]) == ("not satisfied", stored)
 
 
+SIDE_BY_SIDE = """
+process P() {
+  state First, Second, Done;
+  urgent First, Second;
+  init First;
+  trans First -> Second { }, Second -> Done { };
+}
+A = P(); B = P(); C = P();
+system A, B, C;
+"""
+
+
+@pytest.mark.parametrize(("order", "stored"), [("on", 7), ("off", 27)])
+def test_independent_urgent_moves_are_interleaved_only_if_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], order: str, stored: int
+) -> None:
+    model = tmp_path / "side_by_side.xta"
+    model.write_text(SIDE_BY_SIDE)
+    options = ("--partial-order", order, "--json")
+    out, _ = check_run(capsys, 1, model, "--query", "E<> false", *options)
+    answer = json.loads(out)
+    assert (answer["verdict"], answer["stored"]) == ("not satisfied", stored)
+
+
 FAILING = """
 int[0,3] n; int a[3];
 process P() {

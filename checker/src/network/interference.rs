@@ -1,0 +1,202 @@
+//! Which processes may get in each other's way in a state in which time stands still, learnt when it is asked for.
+//!
+//! A *situation* of a process is its location, and whether the edges that may sleep do; situations alone decide.
+
+use crate::ir::{LocationId, Network, Urgency};
+use crate::zones::{Zone, dbm};
+
+use super::footprints::{Footprint, Footprints, Ground, Moment, Sleeper, Still};
+
+/// A situation: twice the number of the location among all, and one more if edges sleep.
+pub(super) type Situation = u32;
+
+/// What is known of the processes of a network.
+#[derive(Debug)]
+pub(super) struct Interference {
+    footprints: Footprints,
+    /// By process: the number of its first location among all.
+    first: Vec<u32>,
+    /// By location: its process.
+    owners: Vec<u32>,
+    urgencies: Vec<Urgency>,
+    urgent: Table,
+    committed: Table,
+}
+
+/// What is known of one of the ways in which time stands still.
+#[derive(Debug, Default)]
+struct Table {
+    /// By location: what keeps edges that the process may come to asleep.
+    sleepers: Vec<Option<Vec<Sleeper>>>,
+    /// By situation: the footprints now and in the future.
+    now: Vec<Option<Box<Footprint>>>,
+    future: Vec<Option<Box<Footprint>>>,
+    /// By situation of one process, then of another: whether what the other may do gets in the way of what the one can do now.
+    meets: Vec<Vec<Option<bool>>>,
+}
+
+impl Table {
+    fn new(locations: usize) -> Table {
+        Table {
+            sleepers: vec![None; locations],
+            now: vec![None; 2 * locations],
+            future: vec![None; 2 * locations],
+            meets: vec![Vec::new(); 2 * locations],
+        }
+    }
+}
+
+impl Interference {
+    pub(super) fn new(network: &Network) -> Interference {
+        let (mut first, mut owners, mut urgencies) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, process) in (0..).zip(&network.processes) {
+            first.push(urgencies.len() as u32);
+            urgencies.extend(process.locations.iter().map(|location| location.urgency));
+            owners.resize(urgencies.len(), index);
+        }
+        Interference {
+            footprints: Footprints::default(),
+            first,
+            owners,
+            urgent: Table::new(urgencies.len()),
+            committed: Table::new(urgencies.len()),
+            urgencies,
+        }
+    }
+
+    /// Why time stands still in a state with these words, if a location is the reason.
+    pub(super) fn still(&self, words: &[i32]) -> Option<Still> {
+        let mut still = None;
+        for (&first, &location) in self.first.iter().zip(words) {
+            match self.urgencies[(first + location as u32) as usize] {
+                Urgency::Normal => {}
+                Urgency::Urgent => still = Some(Still::Urgent),
+                Urgency::Committed => return Some(Still::Committed),
+            }
+        }
+        still
+    }
+
+    /// The urgency of the location of a situation.
+    pub(super) fn urgency(&self, situation: Situation) -> Urgency {
+        self.urgencies[situation as usize / 2]
+    }
+
+    /// By process: the situations of a state with these words and this zone.
+    pub(super) fn situations(
+        &mut self,
+        ground: Ground<'_>,
+        (words, zone): (&[i32], &Zone),
+        still: Still,
+        out: &mut Vec<Situation>,
+    ) {
+        out.clear();
+        for (process, &location) in words[..self.first.len()].iter().enumerate() {
+            let number = self.first[process] + location as u32;
+            let sleeps = |one: &Sleeper| !dbm::satisfies(zone.bounds(), zone.dimension(), one);
+            let sleepers = self.sleepers(ground, number, still);
+            let are_asleep = !sleepers.is_empty() && sleepers.iter().all(sleeps);
+            out.push(2 * number + u32::from(are_asleep));
+        }
+    }
+
+    fn sleepers(&mut self, ground: Ground<'_>, location: u32, still: Still) -> &[Sleeper] {
+        if self.table(still).sleepers[location as usize].is_none() {
+            let found = self.future(ground, 2 * location, still).sleepers.clone();
+            self.table(still).sleepers[location as usize] = Some(found);
+        }
+        self.table(still).sleepers[location as usize]
+            .as_deref()
+            .unwrap_or_default()
+    }
+
+    fn table(&mut self, still: Still) -> &mut Table {
+        match still {
+            Still::Urgent => &mut self.urgent,
+            Still::Committed => &mut self.committed,
+        }
+    }
+
+    /// Whether what a process in the situation `other` may do may get in the way of what one in the situation `member` can do now.
+    #[inline]
+    pub(super) fn meets(
+        &mut self,
+        ground: Ground<'_>,
+        (member, other): (Situation, Situation),
+        still: Still,
+    ) -> bool {
+        let row = &self.table(still).meets[member as usize];
+        match row.get(other as usize) {
+            Some(&Some(known)) => known,
+            _ => self.learn(ground, (member, other), still),
+        }
+    }
+
+    #[cold]
+    fn learn(
+        &mut self,
+        ground: Ground<'_>,
+        (member, other): (Situation, Situation),
+        still: Still,
+    ) -> bool {
+        self.now(ground, member, still);
+        self.future(ground, other, still);
+        let situations = 2 * self.urgencies.len();
+        let table = self.table(still);
+        let now = &table.now[member as usize];
+        let future = &table.future[other as usize];
+        let meets = now
+            .iter()
+            .zip(future)
+            .any(|(now, future)| now.meets(future, still));
+        let row = &mut table.meets[member as usize];
+        row.resize(situations, None);
+        row[other as usize] = Some(meets);
+        meets
+    }
+
+    /// What a process in the situation can do now.
+    pub(super) fn now(
+        &mut self,
+        ground: Ground<'_>,
+        situation: Situation,
+        still: Still,
+    ) -> &Footprint {
+        let (place, moment) = self.place(situation, still);
+        let footprints = &mut self.footprints;
+        let table = match still {
+            Still::Urgent => &mut self.urgent,
+            Still::Committed => &mut self.committed,
+        };
+        table.now[situation as usize]
+            .get_or_insert_with(|| Box::new(footprints.now(ground, place, moment)))
+    }
+
+    /// What a process in the situation may do while time stands still.
+    pub(super) fn future(
+        &mut self,
+        ground: Ground<'_>,
+        situation: Situation,
+        still: Still,
+    ) -> &Footprint {
+        let (place, moment) = self.place(situation, still);
+        let footprints = &mut self.footprints;
+        let table = match still {
+            Still::Urgent => &mut self.urgent,
+            Still::Committed => &mut self.committed,
+        };
+        table.future[situation as usize]
+            .get_or_insert_with(|| Box::new(footprints.future(ground, place, moment)))
+    }
+
+    fn place(&self, situation: Situation, still: Still) -> ((usize, LocationId), Moment) {
+        let number = situation / 2;
+        let process = self.owners[number as usize] as usize;
+        let location = LocationId(number - self.first[process]);
+        let moment = Moment {
+            still,
+            is_asleep: situation % 2 == 1,
+        };
+        ((process, location), moment)
+    }
+}

@@ -1,0 +1,435 @@
+//! Searches that leave out orders of independent moves where time stands still, against searches of all moves.
+//!
+//! Random networks have urgent and committed locations, variables and clocks of their own and in common, and channels of every kind. Every
+//! run that is found must pass its replay, which knows nothing of the reduction.
+//!
+//! `NETWORKS=50000 cargo test --release --test partial_order` runs more of them than the usual number.
+
+use std::fmt::Write as _;
+
+use checker::engine::evidence::Proof;
+use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+use checker::search::reach::Order;
+
+/// Networks without the environment variable `NETWORKS`.
+const NETWORKS: u64 = 250;
+
+fn answer_in(
+    (order, threads): (Order, usize),
+    text: &str,
+    query: &str,
+    partial_order: bool,
+) -> Answer {
+    let mut model = LoadedModel::load("ordered.xta", text.as_bytes())
+        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
+    let query_text = model.add_query(query);
+    let mut options = Options {
+        order,
+        threads,
+        code: CodeEngine::Interpreter,
+        runs: true,
+        partial_order,
+        ..Options::default()
+    };
+    options.limits.states = Some(MOST_STATES);
+    let answer = model
+        .check(&query_text, &options)
+        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
+    for witness in &answer.evidence.witnesses {
+        // The replay runs every move that is possible on the way, and some of those may fail.
+        let is_cut = |run: &Option<Proof>| format!("{run:?}").contains("NotCovered(RunTime(");
+        assert!(
+            matches!(witness.run, Some(Proof::Replayed(..))) || is_cut(&witness.run),
+            "{query}: {:#?}\n{text}",
+            witness.run
+        );
+    }
+    answer
+}
+
+/// Larger networks are left out.
+const MOST_STATES: u64 = 4000;
+
+/// Whether verdicts of two searches agree: where a failure can be met and what is looked for can be found, either may come first.
+fn agree(one: Verdict, other: Verdict, found: Verdict) -> bool {
+    let is_end = |verdict| verdict == found || matches!(verdict, Verdict::Error(_));
+    one == other
+        || is_end(one) && is_end(other)
+        || [one, other]
+            .iter()
+            .any(|one| matches!(one, Verdict::Unknown(_)))
+}
+
+/// How many states are stored without and with the reduction, which must agree in any manner of search.
+fn stored(text: &str, query: &str) -> (u64, u64) {
+    let one = (Order::BreadthFirst, 1);
+    let found = if query.starts_with("E<>") {
+        Verdict::Satisfied
+    } else {
+        Verdict::NotSatisfied
+    };
+    let full = answer_in(one, text, query, false);
+    let manners = [
+        one,
+        (Order::DepthFirst, 1),
+        (Order::Random(7), 1),
+        (Order::BreadthFirst, 2),
+    ];
+    let reduced = manners.map(|manner| {
+        let reduced = answer_in(manner, text, query, true);
+        let is_failure = |verdict| matches!(verdict, Verdict::Error(_));
+        assert!(
+            agree(full.verdict, reduced.verdict, found)
+                && (is_failure(full.verdict)
+                    || is_failure(reduced.verdict)
+                    || full.evidence.witnesses.is_empty() == reduced.evidence.witnesses.is_empty()),
+            "{:?} in all, {:?} with the reduction, {manner:?}: {query}\n{text}",
+            full.verdict,
+            reduced.verdict,
+        );
+        reduced.counters.stored
+    });
+    (full.counters.stored, reduced[0])
+}
+
+fn sensors(count: usize, urgency: &str) -> String {
+    let mut text = String::from("broadcast chan tick;\n");
+    let mut names = Vec::new();
+    for sensor in 0..count {
+        let _ = writeln!(
+            text,
+            "int[0,3] level{sensor};
+             process S{sensor}() {{ state wait, read, judge, tell; {urgency} read, judge, tell; init wait; trans
+               wait -> read {{ sync tick?; }}, read -> judge {{ assign level{sensor} = (level{sensor} + 1) % 4; }},
+               judge -> tell {{ guard level{sensor} < 3; }}, judge -> wait {{ guard level{sensor} == 3; }},
+               tell -> wait {{ }}; }}"
+        );
+        names.push(format!("S{sensor}"));
+    }
+    format!(
+        "{text} process Bell() {{ clock x; state on {{ x <= 5 }}; init on; trans on -> on {{ guard x == 5; sync tick!; assign x = 0; }}; }}
+         system Bell, {};",
+        names.join(", ")
+    )
+}
+
+#[test]
+fn independent_processes_are_not_interleaved() {
+    for urgency in ["urgent", "commit"] {
+        for query in [
+            "A[] !(S0.wait && S0.read)",
+            "E<> deadlock",
+            "A[] level0 <= 3",
+            "A[] S0.tell imply level0 < 3",
+        ] {
+            let (full, reduced) = stored(&sensors(5, urgency), query);
+            assert!(
+                reduced * 20 < full || reduced < 60,
+                "{urgency}, {query}: {full} states, {reduced} with the reduction"
+            );
+        }
+    }
+}
+
+/// In each of these a run exists only in an order that a careless reduction leaves out.
+#[test]
+fn orders_that_matter_are_kept() {
+    let cases = [
+        // One process reads what the other writes.
+        (
+            "int[0,1] v;",
+            "trans a -> b { assign v = 1; };",
+            "trans a -> b { guard v == 0; };",
+            "E<> P.b && Q.b",
+        ),
+        // A clock is set between.
+        (
+            "clock x;",
+            "trans a -> b { assign x = 0; };",
+            "trans a -> b { guard x >= 1; };",
+            "E<> Q.b",
+        ),
+        // A partner comes only after some moves.
+        (
+            "chan c;",
+            "trans a -> b { sync c!; }, a -> d { };",
+            "trans a -> b { }, b -> d { sync c?; };",
+            "E<> P.b",
+        ),
+        // A broadcast takes along whoever is there.
+        (
+            "broadcast chan c;",
+            "trans a -> b { sync c!; };",
+            "trans a -> b { }, b -> d { sync c?; };",
+            "E<> P.b && Q.b",
+        ),
+        // A loop would put the other off for ever.
+        ("", "trans a -> a { };", "trans a -> b { };", "E<> Q.b"),
+        (
+            "int[0,2] v;",
+            "trans a -> a { assign v = (v + 1) % 3; };",
+            "trans a -> b { };",
+            "E<> Q.b",
+        ),
+        // So it would a failure.
+        (
+            "int[0,1] v;",
+            "trans a -> a { };",
+            "trans a -> b { assign v = 2; };",
+            "E<> Q.d",
+        ),
+        // Seen only in one order.
+        (
+            "",
+            "trans a -> b { };",
+            "trans a -> b { };",
+            "E<> P.a && Q.b",
+        ),
+        (
+            "",
+            "trans a -> b { };",
+            "trans a -> b { };",
+            "E<> Q.a && P.b",
+        ),
+        // An invariant of the other forbids a move.
+        (
+            "int[0,1] v;",
+            "trans a -> b { assign v = 1; };",
+            "trans a -> d { };",
+            "E<> P.b && Q.d",
+        ),
+        // A deadlock in the one that the other runs into.
+        (
+            "int[0,1] v;",
+            "trans a -> b { guard v == 0; };",
+            "trans a -> b { assign v = 1; };",
+            "E<> deadlock && P.a",
+        ),
+    ];
+    for urgency in ["urgent", "commit"] {
+        for (declarations, left, right, query) in cases {
+            for swapped in [false, true] {
+                let order = if swapped { "Q, P" } else { "P, Q" };
+                let invariant = if declarations.contains('v') {
+                    " { v <= 0 || true }"
+                } else {
+                    ""
+                };
+                let text = format!(
+                    "{declarations} process P() {{ state a, b, d; {urgency} a, b; init a; {left} }}
+                     process Q() {{ state a{invariant}, b, d; {urgency} a, b; init a; {right} }} system {order};"
+                );
+                stored(&text, query);
+            }
+        }
+    }
+}
+
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        ((self.0 >> 20) % limit as u64) as usize
+    }
+
+    fn chance(&mut self, percent: usize) -> bool {
+        self.below(100) < percent
+    }
+
+    fn one_of<'t>(&mut self, texts: &[&'t str]) -> &'t str {
+        texts[self.below(texts.len())]
+    }
+}
+
+const GUARDS: [&str; 12] = [
+    "own == 0",
+    "own < 2",
+    "x >= 1",
+    "x <= 1",
+    "a[ME] == 0",
+    "a[OTHER] == 0",
+    "v == 0",
+    "v < 2",
+    "g >= 2",
+    "g < 1",
+    "a[v] == 1",
+    "x - g <= 1",
+];
+
+const UPDATES: [&str; 12] = [
+    "own = (own + 1) % 3",
+    "own = 0",
+    "x = 0",
+    "a[ME] = 1",
+    "a[ME] = 1 - a[ME]",
+    "a[OTHER] = 0",
+    "v = (v + 1) % 3",
+    "v = own",
+    "g = 0",
+    "swap(own)",
+    "v = v + own",
+    "x = 1",
+];
+
+const OWN: [&str; 4] = ["own == 0", "own < 2", "x >= 1", "x <= 1"];
+const OWN_UPDATES: [&str; 4] = ["own = (own + 1) % 3", "own = 0", "x = 0", "x = 1"];
+
+const INVARIANTS: [&str; 5] = ["x <= 2", "x <= 1", "own < 2", "v < 2", "g <= 3"];
+
+const SYNCS: [&str; 9] = [
+    "c!",
+    "c?",
+    "d[ME]!",
+    "d[OTHER]?",
+    "b!",
+    "b?",
+    "u!",
+    "u?",
+    "d[v]!",
+];
+
+fn process(random: &mut Random, index: usize, count: usize) -> String {
+    // Most of what a process does concerns itself, else there is nothing to reduce.
+    let is_sociable = random.chance(25);
+    let mut text = format!("process P{index}() {{ clock x; int[0,2] own; state ");
+    let places = ["p", "q", "r", "s"];
+    let states: Vec<String> = places
+        .iter()
+        .map(|place| {
+            let invariant = if random.chance(6) {
+                let pool = if is_sociable {
+                    &INVARIANTS[..]
+                } else {
+                    &INVARIANTS[..3]
+                };
+                format!(" {{ {} }}", random.one_of(pool))
+            } else {
+                String::new()
+            };
+            format!("{place}{invariant}")
+        })
+        .collect();
+    let _ = write!(text, "{};", states.join(", "));
+    let (mut committed, mut urgent) = (Vec::new(), Vec::new());
+    for place in places {
+        match random.below(10) {
+            0..4 => committed.push(place),
+            4..7 => urgent.push(place),
+            _ => {}
+        }
+    }
+    for (keyword, places) in [("commit", committed), ("urgent", urgent)] {
+        if !places.is_empty() {
+            let _ = write!(text, " {keyword} {};", places.join(", "));
+        }
+    }
+    let edges: Vec<String> = (0..4 + random.below(3))
+        .map(|edge| {
+            let source = if edge < 4 { edge } else { random.below(4) };
+            let target = if random.chance(60) {
+                (source + 1) % 4
+            } else {
+                random.below(4)
+            };
+            let is_social = is_sociable || random.chance(7);
+            let guards: Vec<&str> = (0..usize::from(random.chance(35)))
+                .map(|_| random.one_of(if is_social { &GUARDS[..] } else { &OWN[..] }))
+                .collect();
+            let updates: Vec<&str> = (0..random.below(3))
+                .map(|_| {
+                    random.one_of(if is_social {
+                        &UPDATES[..]
+                    } else {
+                        &OWN_UPDATES[..]
+                    })
+                })
+                .collect();
+            let sync = if is_social && random.chance(50) {
+                random.one_of(&SYNCS)
+            } else {
+                ""
+            };
+            // Clocks in guards of receivers of broadcasts and on urgent channels are left out as often as not.
+            let guards: Vec<&str> = guards
+                .into_iter()
+                .filter(|guard| {
+                    !(sync.starts_with('u') || sync == "b?")
+                        || !(guard.starts_with('x') || guard.starts_with('g'))
+                })
+                .collect();
+            let part = |keyword: &str, parts: String| {
+                if parts.is_empty() {
+                    parts
+                } else {
+                    format!("{keyword} {parts};")
+                }
+            };
+            format!(
+                "{} -> {} {{ {} {} {} }}",
+                places[source],
+                places[target],
+                part("guard", guards.join(" && ")),
+                part("sync", sync.to_owned()),
+                part("assign", updates.join(", ")),
+            )
+            .replace("ME", &index.to_string())
+            .replace("OTHER", &((index + 1) % count).to_string())
+        })
+        .collect();
+    let _ = writeln!(text, " init p; trans {}; }}", edges.join(",\n  "));
+    text
+}
+
+const QUERIES: [&str; 14] = [
+    "E<> P0.q && P1.r",
+    "A[] !(P0.s && P1.s)",
+    "A[] P2.r imply P0.own < 2",
+    "E<> deadlock",
+    "A[] not deadlock",
+    "E<> deadlock && P1.q",
+    "E<> a[0] == 1 && a[1] == 0 && v == 2",
+    "E<> P0.x - P1.x > 2 && P2.q",
+    "A[] !P1.s || g < 3",
+    "E<> P0.own == 2 && !P1.p",
+    "E<> (P0.s || P1.s) && P2.s && v == 1",
+    "E<> P0.s && P1.s && P2.s && P3.s && v == 2",
+    "A[] P3.own <= 2",
+    "A[] v + P0.own < 4",
+];
+
+#[test]
+fn verdicts_are_those_of_all_orders() {
+    let networks = std::env::var("NETWORKS").map_or(NETWORKS, |number| {
+        number.parse().expect("NETWORKS is a number")
+    });
+    let (mut full_states, mut reduced_states, mut reduced_searches) = (0, 0, 0);
+    for seed in 1..=networks {
+        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+        for _ in 0..4 {
+            random.below(2);
+        }
+        let count = 4 + random.below(2);
+        let mut text = String::from(
+            "int[0,2] v; int[0,1] a[5]; clock g; chan c; chan d[5]; broadcast chan b; urgent chan u;
+             void swap(int[0,2] &w) { int[0,2] old = w; w = v; v = old; }\n",
+        );
+        for index in 0..count {
+            text += &process(&mut random, index, count);
+        }
+        let names: Vec<String> = (0..count).map(|index| format!("P{index}")).collect();
+        let _ = writeln!(text, "system {};", names.join(", "));
+        for _ in 0..2 {
+            let (full, reduced) = stored(&text, random.one_of(&QUERIES));
+            full_states += full;
+            reduced_states += reduced;
+            reduced_searches += u64::from(reduced < full);
+        }
+    }
+    assert!(
+        reduced_states < full_states && reduced_searches * 20 > networks,
+        "{full_states} states, {reduced_states} with the reduction, fewer in {reduced_searches} searches"
+    );
+}
