@@ -17,7 +17,7 @@
     reason = "the dimension is a constant at some calls"
 )]
 
-use super::dbm::{Constraint, UpperBounds, constrain, is_empty, set_empty};
+use super::dbm::{Constraint, constrain, is_empty, least_sum, set_empty, upper_bounds};
 use super::rows::{for_small_dimension, rows, rows_mut};
 use super::{Bound, ClockSet};
 
@@ -60,9 +60,16 @@ pub fn up(zone: &mut [Bound], dimension: usize) {
 /// Only upper bounds end a delay, and of the closed future within them only upper bounds are new: the least that a bound of
 /// another clock and the difference to it allow. Differences were possible before and stay so. Cost: O(n) for each upper bound.
 pub fn up_within(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) {
-    let upper_bounds = UpperBounds::new(dimension, constraints);
+    let mut buffer = [Bound::INFINITY; ClockSet::CAPACITY];
+    let upper_bounds = upper_bounds(constraints, &mut buffer[..dimension]);
+    for_small_dimension!(dimension, delay_below(zone, upper_bounds));
+}
+
+#[inline(always)]
+fn delay_below(zone: &mut [Bound], upper_bounds: &[Bound], dimension: usize) {
+    let upper_bounds = &upper_bounds[..dimension];
     for row in rows_mut(zone, dimension).skip(1) {
-        row[0] = upper_bounds.least_over(row);
+        row[0] = least_sum(row, upper_bounds);
     }
 }
 

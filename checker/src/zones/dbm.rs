@@ -210,14 +210,21 @@ fn constrain_by(zone: &mut [Bound], dimension: usize, constraint: &Constraint) -
 /// All the new bounds lead to the reference clock, so a path that uses two of them passes it twice and is no shorter than
 /// without what lies between. Each row is closed again by its new upper bound and the lower bounds.
 fn constrain_above(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) -> bool {
-    let upper_bounds = UpperBounds::new(dimension, constraints);
+    let mut buffer = [Bound::INFINITY; ClockSet::CAPACITY];
+    let upper_bounds = upper_bounds(constraints, &mut buffer[..dimension]);
+    for_small_dimension!(dimension, tighten_above(zone, upper_bounds))
+}
+
+#[inline(always)]
+fn tighten_above(zone: &mut [Bound], upper_bounds: &[Bound], dimension: usize) -> bool {
+    let upper_bounds = &upper_bounds[..dimension];
     let (lower_bounds, others) = zone.split_at_mut(dimension);
-    if upper_bounds.least_over(lower_bounds) < Bound::LE_ZERO {
+    if least_sum(lower_bounds, upper_bounds) < Bound::LE_ZERO {
         set_empty(zone);
         return false;
     }
     for row in rows_mut(others, dimension) {
-        let bound = upper_bounds.least_over(row);
+        let bound = least_sum(row, upper_bounds);
         if bound < row[0] {
             relax_row(row, bound, lower_bounds);
         }
@@ -225,38 +232,26 @@ fn constrain_above(zone: &mut [Bound], dimension: usize, constraints: &[Constrai
     true
 }
 
-/// The upper bounds of clocks among some constraints.
-pub(super) struct UpperBounds {
-    /// By clock; infinite without one, and that of the reference clock.
-    bounds: [Bound; ClockSet::CAPACITY],
-    dimension: usize,
-}
-
-impl UpperBounds {
-    pub(super) fn new(dimension: usize, constraints: &[Constraint]) -> UpperBounds {
-        let mut bounds = [Bound::INFINITY; ClockSet::CAPACITY];
-        for constraint in constraints
-            .iter()
-            .filter(|constraint| constraint.right == 0)
-        {
+/// Lowers the entries of `bounds`, by clock, to the upper bounds among some constraints; that of the reference clock stays.
+pub(super) fn upper_bounds<'b>(constraints: &[Constraint], bounds: &'b mut [Bound]) -> &'b [Bound] {
+    for constraint in constraints {
+        if constraint.right == 0 && constraint.left != 0 {
             let bound = &mut bounds[constraint.left];
             *bound = (*bound).min(constraint.bound);
         }
-        bounds[0] = Bound::INFINITY;
-        UpperBounds { bounds, dimension }
     }
+    bounds
+}
 
-    /// The least upper bound on the clock of a row that follows from the differences in it to the clocks with upper bounds,
-    /// its own among them: its bound against itself is `<= 0`.
-    #[inline]
-    pub(super) fn least_over(&self, row: &[Bound]) -> Bound {
-        let bounds = &self.bounds[..self.dimension];
-        let sums = row
-            .iter()
-            .zip(bounds)
-            .map(|(difference, bound)| difference.plus(*bound));
-        sums.fold(Bound::INFINITY, Bound::min)
-    }
+/// The least upper bound on the clock of a row that follows from the differences in it to the clocks with upper bounds, its
+/// own among them: its bound against itself is `<= 0`.
+#[inline(always)]
+pub(super) fn least_sum(row: &[Bound], upper_bounds: &[Bound]) -> Bound {
+    let sums = row
+        .iter()
+        .zip(upper_bounds)
+        .map(|(difference, bound)| difference.plus(*bound));
+    sums.fold(Bound::INFINITY, Bound::min)
 }
 
 /// Whether some valuation of the zone satisfies the constraint.

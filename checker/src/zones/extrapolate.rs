@@ -36,12 +36,27 @@ use super::rows::{for_small_dimension, relax_row, rows_mut};
 use super::{Bound, ClockSet};
 
 /// The greatest constants that each clock is compared with, prepared for extrapolation.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub struct Ceilings {
     /// `<= L` of each clock: greater entries of its row are forgotten. Below every bound if there is no L.
     rows: Box<[Bound]>,
     /// `< -U` of each clock: lesser entries of its column are forgotten. Above every bound if there is no U.
     columns: Box<[Bound]>,
+}
+
+impl Clone for Ceilings {
+    fn clone(&self) -> Ceilings {
+        Ceilings {
+            rows: self.rows.clone(),
+            columns: self.columns.clone(),
+        }
+    }
+
+    /// Takes no memory where both are of the same dimension: this happens for every zone.
+    fn clone_from(&mut self, other: &Ceilings) {
+        self.rows.clone_from(&other.rows);
+        self.columns.clone_from(&other.columns);
+    }
 }
 
 /// What one clock is compared with.
