@@ -27,6 +27,13 @@ const MOST_OFFERS: u32 = 64;
 /// A location vector that asks more is unsuited.
 const MOST_QUESTIONS: usize = 256;
 
+/// So many states of a search make a trial of whether remembering pays; one of [`LEAST_FOUND`] must find its moves.
+const TRIAL: u32 = 1024;
+const LEAST_FOUND: u32 = 4;
+/// After a trial that failed so many states do not ask, and four times as many after each further one.
+const FIRST_PAUSE: u32 = 16 * TRIAL;
+const LONGEST_PAUSE: u32 = 256 * TRIAL;
+
 /// The index of a remembered location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct VectorId(u32);
@@ -120,6 +127,18 @@ pub(super) struct Offers {
     /// The moves of every offer.
     moves: Vec<Moves>,
     bytes: usize,
+    trial: Trial,
+}
+
+/// Whether remembering pays where nobody knows beforehand: for a search, which may meet most location vectors a few times only.
+#[derive(Debug, Default)]
+struct Trial {
+    /// How many states asked in this trial, and how many of them found their moves.
+    asked: u32,
+    found: u32,
+    /// How many states will not ask, and how many after the last trial that failed did not.
+    pause: u32,
+    last_pause: u32,
 }
 
 impl Offers {
@@ -133,7 +152,33 @@ impl Offers {
             questions: Vec::new(),
             moves: Vec::new(),
             bytes: 0,
+            trial: Trial::default(),
         }
+    }
+
+    /// Whether a state of a search should ask; to be called for each of them.
+    pub(super) fn is_worth_asking(&mut self) -> bool {
+        let trial = &mut self.trial;
+        if trial.pause > 0 {
+            trial.pause -= 1;
+            return false;
+        }
+        if trial.asked == TRIAL {
+            let is_worth = trial.found > TRIAL / LEAST_FOUND;
+            (trial.asked, trial.found) = (0, 0);
+            if !is_worth {
+                trial.last_pause = (4 * trial.last_pause).clamp(FIRST_PAUSE, LONGEST_PAUSE);
+                trial.pause = trial.last_pause;
+                return false;
+            }
+        }
+        trial.asked += 1;
+        true
+    }
+
+    /// Says that a state of a search found its moves.
+    pub(super) fn note_found(&mut self) {
+        self.trial.found += 1;
     }
 
     /// The bytes that are taken, about.
@@ -167,6 +212,11 @@ impl Offers {
             Knowledge::Tree(root, _) => Some(Way(Some(root))),
             Knowledge::Unsuited => None,
         }
+    }
+
+    /// Whether the moves of a location vector may be remembered.
+    pub(super) fn is_suited(&self, vector: VectorId) -> bool {
+        !matches!(self.known[vector.0 as usize], Knowledge::Unsuited)
     }
 
     /// What comes next on the way.

@@ -154,8 +154,10 @@ impl Symbolic<'_> {
         scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
-        // Searches meet most location vectors a few times only: remembering moves would cost more than it saves.
-        self.stepper.put_together(words, scope, out)?;
+        match scope {
+            Scope::Of(_) => self.stepper.put_together(words, scope, out)?,
+            _ => self.stepper.moves_in(words, scope, out)?,
+        }
         self.apply_priorities(words, out)?;
         if let Some(restriction) = self.restriction {
             restriction::apply(restriction, words, out);

@@ -43,6 +43,8 @@ pub(super) struct Sieve {
     /// How many of them count.
     depth: usize,
     constraints: Vec<Constraint>,
+    /// Whether clocks have decided anything since this was false.
+    pub(super) has_narrowed: bool,
 }
 
 impl Sieve {
@@ -52,6 +54,7 @@ impl Sieve {
             left: Vec::new(),
             depth: 0,
             constraints: Vec::new(),
+            has_narrowed: false,
         }
     }
 
@@ -115,6 +118,7 @@ impl Sieve {
     fn narrow(&mut self, demand: Demand<'_>) -> Result<bool, Failure> {
         let left = &mut self.left[self.depth];
         let (Demand::Takes(_, emitted) | Demand::Abstains(_, emitted)) = demand;
+        self.has_narrowed |= !emitted.is_empty();
         // A conjunction in which a clock is less than itself never holds.
         let may_hold = add_constraints(emitted, &mut self.constraints)?;
         match demand {

@@ -180,9 +180,46 @@ impl<'a> Stepper<'a> {
         self.offers.vector(words)
     }
 
+    /// As [`Stepper::moves`], without combinations that the scope leaves out: for a search, which cannot know whether remembering pays.
+    pub(super) fn moves_in(
+        &mut self,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        if self.offers.is_worth_asking()
+            && let Some(vector) = self.offers.vector(words)
+        {
+            if let Some(offer) = self.known_offer(vector, words)? {
+                self.offers.note_found();
+                out.copy_from(self.offers.moves(offer));
+                return Ok(());
+            }
+            if self.offers.is_suited(vector) {
+                return self.remember(vector, words, scope, out).map(|_| ());
+            }
+        }
+        self.put_together(words, scope, out)
+    }
+
     /// The moves of a state with this location vector, if they depend on locations and answers of guards alone and there is place
     /// to remember them.
     pub fn offer(
+        &mut self,
+        vector: VectorId,
+        words: &mut [i32],
+    ) -> Result<Option<OfferId>, Failure> {
+        if let Some(offer) = self.known_offer(vector, words)? {
+            return Ok(Some(offer));
+        }
+        if !self.offers.is_suited(vector) {
+            return Ok(None);
+        }
+        self.remember(vector, words, Scope::Everything, &mut Moves::default())
+    }
+
+    /// The moves of a state with this location vector, if they are remembered.
+    fn known_offer(
         &mut self,
         vector: VectorId,
         words: &mut [i32],
@@ -202,15 +239,28 @@ impl<'a> Stepper<'a> {
                     let answer = self.executor.call(function, arguments, &mut context)?;
                     self.offers.answer(&mut way, answer);
                 }
-                Next::Unknown => break,
+                Next::Unknown => return Ok(None),
             }
         }
-        let mut moves = Moves::default();
+    }
+
+    /// Puts the moves of a state with this location vector together and remembers them if they do not depend on the scope.
+    fn remember(
+        &mut self,
+        vector: VectorId,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<Option<OfferId>, Failure> {
+        self.sieve.has_narrowed = false;
         self.record = Some(Record::default());
-        let result = self.put_together(words, Scope::Everything, &mut moves);
-        let record = self.record.take().unwrap_or_default();
+        let result = self.put_together(words, scope, out);
+        let mut record = self.record.take().unwrap_or_default();
         result?;
-        Ok(self.offers.remember(vector, record, &moves))
+        if self.sieve.has_narrowed {
+            record.spoil();
+        }
+        Ok(self.offers.remember(vector, record, out))
     }
 
     /// The moves of an offer.
