@@ -15,6 +15,9 @@ use crate::zones::Bound;
 use super::store::{hash_bytes, spread, table_bytes};
 use super::zone_table::ZoneId;
 
+/// The sum of every eighth of the bytes of a zone of at most this dimension is below 2^15.
+const NARROW: usize = 44;
+
 /// How many bytes a bound takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Width {
@@ -103,6 +106,23 @@ fn sums<T: Entry<N>, const N: usize>(matrix: &[u8], greatest: i32) -> [i32; 8] {
     }
     add(rest);
     sums
+}
+
+/// As [`sums`] for entries of one byte whose greatest sum is below 2^15, in as narrow lanes.
+fn sums_of_bytes(matrix: &[u8], greatest: i16) -> [i32; 8] {
+    let mut sums = [0_i16; 8];
+    let mut add = |entries: &[u8]| {
+        for (sum, byte) in sums.iter_mut().zip(entries) {
+            // Infinity is greater than what it counts for.
+            *sum += i16::from(*byte as i8).clamp(-greatest, greatest + 1);
+        }
+    };
+    let (blocks, rest) = matrix.as_chunks::<8>();
+    for block in blocks {
+        add(block);
+    }
+    add(rest);
+    sums.map(i32::from)
 }
 
 fn unpack<T: Entry<N>, const N: usize>(bytes: &[u8], zone: &mut [Bound]) {
@@ -208,6 +228,9 @@ impl PackedZones {
     /// The signature of the candidate.
     pub(super) fn signature(&self) -> Signature {
         let sums = match self.width {
+            Width::One if self.greatest < i8::MAX.into() && self.dimension <= NARROW => {
+                sums_of_bytes(&self.candidate, self.greatest as i16)
+            }
             Width::One => sums::<i8, 1>(&self.candidate, self.greatest),
             Width::Two => sums::<i16, 2>(&self.candidate, self.greatest),
             Width::Four => sums::<i32, 4>(&self.candidate, self.greatest),
