@@ -16,6 +16,7 @@ from typing import Literal
 
 from ntagen import _checker
 from ntagen.errors import InputError, LimitError, ModelError, NtagenError
+from ntagen.machine import Machine
 from ntagen.model.facts import (
     Channel,
     Clock,
@@ -255,8 +256,20 @@ class Answer:
         raw = _checker.Strategy.of_answer(self._raw)
         return None if raw is None else Strategy(raw, *self._rules)
 
+    @property
+    def machine(self) -> Machine | None:
+        """How the controller wins a game with observations.
+
+        ``None`` if no strategy was asked for or found.
+        """
+        text = self._raw.strategy_json()
+        return None if text is None or self.strategy is not None else Machine.from_json(text)
+
     def strategy_json(self) -> str | None:
-        """The strategy as JSON text; ``None`` if none was asked for or found."""
+        """The strategy, or the machine of a game with observations, as JSON text.
+
+        ``None`` if none was asked for or found.
+        """
         return self._raw.strategy_json()
 
     def strategy_text(self) -> str | None:
@@ -566,6 +579,12 @@ class Model:
             raise LimitError("the engine could not decide who wins, since the model stops clocks")
         strategy = answer.strategy
         if strategy is None:
+            if answer.strategy_json() is not None:
+                raise InputError(
+                    f"{answer.query.strip()} gives a machine that goes by observations, and no "
+                    "strategy over states\nhint: check(query, strategy=True).machine is it; "
+                    "on the command line, check --strategy FILE writes it"
+                )
             remark = f": {answer.message}" if answer.message else ""
             raise InputError(
                 f"{answer.query.strip()} is {answer.verdict}, but this kind of query gives no "

@@ -20,7 +20,8 @@ use crate::engine::limits::Observer;
 use crate::engine::verification;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
-    TraceWanted, Verdict, controller, describe, explain, facts, json, strategy_file, strategy_text,
+    TraceWanted, Verdict, controller, describe, explain, facts, json, machine_file, strategy_file,
+    strategy_text,
 };
 use crate::game::{Forced, Nodes, Priorities};
 use crate::search::limits::StopReason;
@@ -582,8 +583,14 @@ impl Answer {
         lines
     }
 
-    /// The strategy as JSON; `None` without a strategy.
+    /// The strategy, or the machine of a game with observations, as JSON; `None` without any.
     fn strategy_json(&self) -> Option<String> {
+        if let Some(machine) = &self.inner.evidence.machine {
+            let write = |model: &mut LoadedModel| {
+                machine_file::write(model.network(), machine, &self.query).to_string()
+            };
+            return Some(self.model.get().with(write));
+        }
         let strategy = self.inner.evidence.strategy.as_ref()?;
         Some(
             self.model.get().with(|model| {
@@ -594,6 +601,10 @@ impl Answer {
 
     /// The strategy as a controller in C; `None` without a strategy.
     fn controller_c(&self) -> PyResult<Option<String>> {
+        if self.inner.evidence.machine.is_some() {
+            let reason = "error: the strategy of a game with observations is a machine, which has no form in C\nhint: --strategy FILE.json writes its table of states";
+            return Err(RejectedError::new_err((vec![reason.to_owned()],)));
+        }
         let Some(strategy) = self.inner.evidence.strategy.as_ref() else {
             return Ok(None);
         };
@@ -605,8 +616,13 @@ impl Answer {
             .map_err(|reason| RejectedError::new_err((vec![format!("error: {reason}")],)))
     }
 
-    /// The strategy as text in TIGA's form; `None` without a strategy.
+    /// The strategy as text in TIGA's form, or the machine of a game with observations; `None` without any.
     fn strategy_text(&self) -> Option<String> {
+        if let Some(machine) = &self.inner.evidence.machine {
+            let write =
+                |model: &mut LoadedModel| machine_file::text(model.network(), machine, &self.query);
+            return Some(self.model.get().with(write));
+        }
         let strategy = self.inner.evidence.strategy.as_ref()?;
         let write = |model: &mut LoadedModel| strategy_text::write(model.network(), strategy);
         Some(self.model.get().with(write))

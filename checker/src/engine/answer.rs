@@ -6,6 +6,7 @@ use std::time::Instant;
 use crate::exec::Executor;
 use crate::game::Priorities;
 use crate::game::closed_loop::ClosedLoop;
+use crate::game::observed::Machine;
 use crate::game::plans::Plan;
 use crate::game::strategy::Strategy;
 use crate::ir::{ClockAtom, Network, Predicate, Query, QueryKind};
@@ -54,6 +55,8 @@ pub struct Evidence {
     pub certificate: Option<Certificate>,
     /// The strategy of the player who wins, if it was wanted.
     pub strategy: Option<Arc<Strategy>>,
+    /// The strategy of the controller in a game with observations, if it wins and it was wanted.
+    pub machine: Option<Arc<Machine>>,
     /// How the check of the strategy ended, if it was wanted.
     pub verification: Option<Verification>,
     /// Plans, if they were wanted.

@@ -23,8 +23,8 @@ use crate::verify::{self, Part};
 
 use super::describe;
 use super::evidence::{Missing, Proof};
-use super::verification::{Asked, Played};
-use super::{LoadedModel, Rejection, json, strategy_file, verification};
+use super::verification::{Asked, Played, Verification};
+use super::{LoadedModel, Rejection, json, machine_file, observed, strategy_file, verification};
 
 /// What a file with a certificate says that it is.
 pub const FORMAT: &str = "ntagen-certificate";
@@ -136,8 +136,22 @@ pub struct Checked {
     pub lines: Vec<String>,
 }
 
+impl Checked {
+    /// What the check of a strategy came to.
+    pub(super) fn of_strategy(network: &Network, result: &Verification) -> Checked {
+        Checked {
+            holds: match result {
+                Ok(StrategyOutcome::Verified(_)) => Some(true),
+                Ok(StrategyOutcome::Violated(..)) => Some(false),
+                Ok(StrategyOutcome::TooLarge(_)) | Err(_) => None,
+            },
+            lines: verification::describe(network, result),
+        }
+    }
+}
+
 /// Why a file is not read.
-type Unreadable = String;
+pub(super) type Unreadable = String;
 
 /// What a file of evidence is.
 const HINT: &str = "hint: it must come from `ntagen check` for this model: with --certificate FILE, --trace FILE.json or --strategy FILE.json; or from `ntagen play` with --log FILE";
@@ -161,10 +175,17 @@ impl LoadedModel {
             .map_err(|error| unreadable(format!("it is no JSON: {error}")))?;
         let kind = header["format"].as_str().unwrap_or_default().to_owned();
         if header["version"] != 1
-            || ![FORMAT, json::TRACE_FORMAT, strategy_file::FORMAT].contains(&kind.as_str())
+            || ![
+                FORMAT,
+                json::TRACE_FORMAT,
+                strategy_file::FORMAT,
+                machine_file::FORMAT,
+            ]
+            .contains(&kind.as_str())
         {
             return Err(unreadable(
-                "it is neither a certificate nor a trace nor a strategy of version 1".to_owned(),
+                "it is neither a certificate nor a trace nor a strategy nor a machine of version 1"
+                    .to_owned(),
             ));
         }
         let query = header["query"].as_str().unwrap_or_default();
@@ -174,6 +195,7 @@ impl LoadedModel {
         let checked = match kind.as_str() {
             FORMAT => check_certificate(network, &compiled.kind, &header, text),
             json::TRACE_FORMAT => check_traces(network, &compiled.kind, &header),
+            machine_file::FORMAT => observed::check_file(network, &compiled.kind, &header, rules),
             _ => strategy_file::read(network, text.as_bytes())
                 .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))
                 .and_then(|(_, strategy)| {
@@ -196,21 +218,13 @@ fn check_strategy(
     rules: (Forced, Priorities),
 ) -> Result<Checked, Unreadable> {
     let Some(asked) = Asked::of(query) else {
-        return Err("the query of a strategy begins with control:".to_owned());
+        return Err("the query of a strategy over states begins with control:".to_owned());
     };
     let decisions = verification::decisions(network, strategy);
     let played = Played::new(strategy, &decisions);
     let most = verification::MOST_REGIONS;
     let result = verification::verify(network, asked, played, rules, most);
-    let holds = match &result {
-        Ok(StrategyOutcome::Verified(_)) => Some(true),
-        Ok(StrategyOutcome::Violated(..)) => Some(false),
-        Ok(StrategyOutcome::TooLarge(_)) | Err(_) => None,
-    };
-    Ok(Checked {
-        holds,
-        lines: verification::describe(network, &result),
-    })
+    Ok(Checked::of_strategy(network, &result))
 }
 
 /// Checks a certificate as read from its file.

@@ -18,6 +18,10 @@ use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
 use super::limits::LimitWatch;
 use super::verification::{self, Asked, Played, Verification};
 use super::{Options, PlansWanted};
+/// What is said of a game whose model has priorities.
+pub(super) const IGNORED_PRIORITIES: &str =
+    "games ignore the priorities of the model, unless they are told to keep them";
+
 /// Names the part of a game query that there is no algorithm for.
 pub(super) fn unsupported_game(
     objective: &Objective,
@@ -268,8 +272,7 @@ fn played(
     };
     let mut answer = new_answer(verdict, Evidence::default(), counters);
     if solver.graph.symbolic.ignores_priorities() {
-        let message = "games ignore the priorities of the model, unless they are told to keep them";
-        answer.message = Some(message.to_owned());
+        answer.message = Some(IGNORED_PRIORITIES.to_owned());
     }
     if is_cooperative && (options.strategy || options.verify) {
         let message = "E<> control: gives no strategy, since both sides have to help on the way: ask control: of a model that starts where the controller wins";

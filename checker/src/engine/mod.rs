@@ -16,7 +16,8 @@ mod fastest;
 mod games;
 pub mod json;
 pub mod limits;
-mod observed;
+pub mod machine_file;
+pub mod observed;
 pub mod play;
 mod reachable;
 pub mod simulation;
@@ -510,8 +511,8 @@ impl LoadedModel {
                 format!("{kind} are not supported"),
             )
             .help(if is_observed {
-                "supported with observations are control: with A<>, A[], A[ U ] and A[ W ]; or ask without them, for a controller \
-                 that sees everything"
+                "supported with observations is control: without a name, with A<>, A[], A[ U ] and A[ W ]; or ask without them, for a \
+                 controller that sees everything"
             } else {
                 "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, E<> control: and control_t*:"
             })

@@ -1,16 +1,23 @@
 //! Games under partial observation: who wins, and how.
 
-use crate::exec::Executor;
-use crate::game::Priorities;
-use crate::game::observed::{Answer as GameAnswer, Question, Solver};
-use crate::ir::{ClockAtom, Network, Objective, Predicate};
-use crate::network::{Abstraction, ClockBounds, predicate};
-use crate::search::limits::Counters;
+use std::sync::Arc;
 
-use super::Options;
+use serde_json::Value as Json;
+
+use crate::exec::Executor;
+use crate::game::observed::{Answer as GameAnswer, Question, Solver};
+use crate::game::strategy::Selection;
+use crate::game::{Forced, Player, Priorities};
+use crate::ir::{ClockAtom, Network, Objective, Predicate, QueryKind};
+use crate::network::{Abstraction, ClockBounds, predicate};
+use crate::verify::observed::{self, MachineState};
+
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
+use super::certificate::{Checked, Unreadable};
 use super::games::{objective_atoms, zones_of};
 use super::limits::LimitWatch;
+use super::verification::Verification;
+use super::{Options, PlansWanted, games, machine_file, verification};
 
 /// Answers a game query with observations.
 pub(super) fn game(
@@ -47,8 +54,8 @@ pub(super) fn game(
         must_reach,
         forced: options.forced,
     };
+    let ignores_priorities = symbolic.ignores_priorities();
     let mut solver = Solver::new(&mut symbolic, question);
-    let plain = |verdict, counters: Counters| new_answer(verdict, Evidence::default(), counters);
     let result = solver.solve(watch);
     let counters = solver.counters();
     let verdict = match result {
@@ -57,12 +64,75 @@ pub(super) fn game(
         Ok(GameAnswer::Stopped(reason)) => Verdict::Unknown(reason),
         Err(failure) => Verdict::Error(failure),
     };
-    let mut answer = plain(verdict, counters);
-    if options.strategy || options.verify {
-        let message = "a game with observations gives no strategy over states, since the controller does not see them";
+    let mut answer = new_answer(verdict, Evidence::default(), counters);
+    if ignores_priorities {
+        answer.message = Some(games::IGNORED_PRIORITIES.to_owned());
+    }
+    if options.plans != PlansWanted::No {
+        let message = "a game with observations gives no plans: its strategy is a machine that goes by what it sees";
         answer.message = Some(message.to_owned());
     }
+    if !(options.strategy || options.verify) {
+        return answer;
+    }
+    match verdict {
+        Verdict::Satisfied => {
+            let machine = solver.machine();
+            if options.verify {
+                let machine = machine_file::to_check(&machine);
+                let asked = (objective, observations);
+                let rules = (options.forced, options.priorities);
+                let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
+                let result = verify(network, asked, &machine, rules, most);
+                answer.evidence.verification = Some(result);
+            }
+            answer.evidence.machine = Some(Arc::new(machine));
+        }
+        Verdict::NotSatisfied => {
+            let message = "where the controller does not see everything, no single strategy of the environment beats all of its machines, so none is given";
+            answer.message = Some(message.to_owned());
+        }
+        _ => {}
+    }
     answer
+}
+
+/// Checks in closed loop that a machine of the controller wins. The network must hold the code of the query.
+pub fn verify(
+    network: &Network,
+    (objective, observations): (&Objective, &[Predicate]),
+    machine: &[MachineState],
+    rules: (Forced, Priorities),
+    most: u64,
+) -> Verification {
+    let owner = (Player::Controller, Selection::First);
+    let mut claim = verification::claim(objective, owner, rules);
+    let (constant, has_differences) = verification::constants(observations.iter());
+    claim.constant = claim.constant.max(constant);
+    claim.has_differences |= has_differences;
+    observed::verify(network, machine, observations, &claim, most)
+}
+
+/// Checks a machine as read from its file.
+pub(super) fn check_file(
+    network: &Network,
+    query: &QueryKind,
+    file: &Json,
+    rules: (Forced, Priorities),
+) -> Result<Checked, Unreadable> {
+    let QueryKind::Control {
+        objective,
+        observations: Some(observations),
+        ..
+    } = query
+    else {
+        return Err("the query of a machine has observations".to_owned());
+    };
+    let machine = machine_file::read(network, file, observations.len())
+        .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))?;
+    let asked = (objective, &observations[..]);
+    let result = verify(network, asked, &machine, rules, verification::MOST_REGIONS);
+    Ok(Checked::of_strategy(network, &result))
 }
 
 /// Names what a model has that there is no algorithm for under partial observation.

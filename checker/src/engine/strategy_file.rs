@@ -102,8 +102,12 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
         message: format!("this is no JSON: {error}"),
         help: Some(SEE_FORMAT),
     })?;
-    let whole = At(&file, String::new());
+    let whole = At::whole(&file);
     let format = whole.text("format").unwrap_or_default();
+    if format == super::machine_file::FORMAT {
+        let message = "this is a machine that goes by observations, and no strategy over states";
+        return Err(whole.wrong(message, "`ntagen verify MODEL FILE` checks it"));
+    }
     if format != FORMAT {
         let message = format!("this is no strategy of ntagen: its \"format\" is not \"{FORMAT}\"");
         return Err(whole.wrong(message, SEE_FORMAT));
@@ -162,22 +166,24 @@ fn time_limit(at: &At<'_>) -> Result<i32, Mismatch> {
 /// # Errors
 /// It is none of the network.
 pub(super) fn read_words(network: &Network, state: &Json) -> Result<Vec<i32>, Mismatch> {
-    let reader = Reader {
-        network,
-        owner: Player::Controller,
-    };
+    let reader = Reader::new(network);
     let mut words = network.initial.clone();
-    let state = At(state, String::new());
+    let state = At::whole(state);
     reader.locations(&state, &mut words)?;
     reader.variables(&state, &mut words)?;
     Ok(words)
 }
 
 /// A part of the file with its place.
-struct At<'j>(&'j Json, String);
+pub(super) struct At<'j>(pub(super) &'j Json, String);
 
 impl<'j> At<'j> {
-    fn wrong(&self, message: impl Into<String>, help: &'static str) -> Mismatch {
+    /// The whole file.
+    pub(super) fn whole(file: &'j Json) -> At<'j> {
+        At(file, String::new())
+    }
+
+    pub(super) fn wrong(&self, message: impl Into<String>, help: &'static str) -> Mismatch {
         Mismatch {
             place: self.1.clone(),
             message: message.into(),
@@ -185,7 +191,7 @@ impl<'j> At<'j> {
         }
     }
 
-    fn field(&self, name: &str) -> Result<At<'j>, Mismatch> {
+    pub(super) fn field(&self, name: &str) -> Result<At<'j>, Mismatch> {
         let place = if self.1.is_empty() {
             name.to_owned()
         } else {
@@ -207,7 +213,7 @@ impl<'j> At<'j> {
         read(field.0).ok_or_else(|| field.wrong(format!("this is no {what}"), SEE_FORMAT))
     }
 
-    fn text(&self, name: &str) -> Result<String, Mismatch> {
+    pub(super) fn text(&self, name: &str) -> Result<String, Mismatch> {
         self.typed(name, "text", |value| value.as_str().map(str::to_owned))
     }
 
@@ -215,13 +221,13 @@ impl<'j> At<'j> {
         self.typed(name, "object", Json::as_object)
     }
 
-    fn index(&self, name: &str) -> Result<u32, Mismatch> {
+    pub(super) fn index(&self, name: &str) -> Result<u32, Mismatch> {
         self.typed(name, "index", |value| {
             value.as_u64().and_then(|index| u32::try_from(index).ok())
         })
     }
 
-    fn list(&self, name: &str) -> Result<Vec<At<'j>>, Mismatch> {
+    pub(super) fn list(&self, name: &str) -> Result<Vec<At<'j>>, Mismatch> {
         self.field(name)?.entries()
     }
 
@@ -236,9 +242,20 @@ impl<'j> At<'j> {
     }
 }
 
-struct Reader<'n> {
+/// Reads parts of a file for a network.
+pub(super) struct Reader<'n> {
     network: &'n Network,
     owner: Player,
+}
+
+impl<'n> Reader<'n> {
+    /// A reader of what the controller does.
+    pub(super) fn new(network: &'n Network) -> Reader<'n> {
+        Reader {
+            network,
+            owner: Player::Controller,
+        }
+    }
 }
 
 impl Reader<'_> {
@@ -328,8 +345,8 @@ impl Reader<'_> {
             None
         } else {
             let edges = action.entries()?;
-            let parts: Result<Vec<Part>, Mismatch> =
-                edges.iter().map(|edge| self.part(edge, words)).collect();
+            let parts = edges.iter().map(|edge| self.part_in(edge, words));
+            let parts: Result<Vec<Part>, Mismatch> = parts.collect();
             let parts = parts?;
             if parts.is_empty() {
                 let help = "write null for waiting";
@@ -408,7 +425,21 @@ impl Reader<'_> {
         Some((clock(left.trim())?, clock(right.trim())?))
     }
 
-    fn part(&self, at: &At<'_>, words: &[i32]) -> Result<Part, Mismatch> {
+    /// An edge that leaves a location of a state.
+    fn part_in(&self, at: &At<'_>, words: &[i32]) -> Result<Part, Mismatch> {
+        let part = self.part(at)?;
+        let process = &self.network.processes[part.process as usize];
+        let source = process.edges[part.edge as usize].source.0;
+        if words[part.process as usize] == source as i32 {
+            return Ok(part);
+        }
+        let (name, source) = (&process.name, &process.locations[source as usize].name);
+        let message = format!("process {name} is not in {source} in this state");
+        Err(at.wrong(message, SEE_FORMAT))
+    }
+
+    /// An edge with its branch and the values of its `select`.
+    pub(super) fn part(&self, at: &At<'_>) -> Result<Part, Mismatch> {
         let name = at.text("process")?;
         let mut processes = self.network.processes.iter().enumerate();
         let Some((index, process)) = processes.find(|(_, one)| one.name == name) else {
@@ -425,10 +456,6 @@ impl Reader<'_> {
             let message = format!("edge {edge_index} of process {name} does not leave {source}");
             return Err(at.wrong(message, OTHER_MODEL));
         };
-        if words[index] != edge.source.0 as i32 {
-            let message = format!("process {name} is not in {source} in this state");
-            return Err(at.wrong(message, SEE_FORMAT));
-        }
         let branch = at.index("branch")?;
         let target_of = edge.branches.get(branch as usize);
         if target_of.is_none_or(|branch| location(branch.target.0) != target) {

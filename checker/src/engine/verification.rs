@@ -29,12 +29,13 @@ pub struct Asked<'q> {
 }
 
 impl<'q> Asked<'q> {
-    /// What a query asks for; `None` if it is no control query.
+    /// What a query asks for; `None` if it is no control query, or one with observations.
     pub fn of(query: &'q QueryKind) -> Option<Asked<'q>> {
         match query {
             QueryKind::Control {
                 objective,
                 time_optimal,
+                observations: None,
                 ..
             } => Some(Asked {
                 objective,
@@ -160,7 +161,7 @@ pub(super) fn claim(
     }
 }
 
-fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> (i64, bool) {
+pub(super) fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> (i64, bool) {
     let atoms: Vec<_> = predicates.flat_map(predicate::atoms).collect();
     let constant = atoms.iter().map(regions::greatest_constant).max();
     let has_differences = atoms

@@ -7,8 +7,12 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use checker::engine::Verdict;
-use checker::game::Forced;
+use checker::engine::{LoadedModel, Verdict, machine_file, observed};
+use checker::game::observed::Machine;
+use checker::game::{Forced, Priorities};
+use checker::ir::QueryKind;
+use checker::verify::observed::{Action, MachineState};
+use checker::verify::strategy::Outcome;
 use proptest::collection::vec;
 use proptest::test_runner::TestCaseError;
 
@@ -28,6 +32,9 @@ const SHAPE: Shape = Shape {
 
 /// Knowledge sets that brute force explores before it gives a case up.
 const MOST_SETS: usize = 400;
+
+/// Places of a machine and a region that a check goes through before it gives up.
+const MOST_PLACES: u64 = 20_000;
 
 /// What is seen and what is wanted, region by region.
 struct Game<'g> {
@@ -149,6 +156,116 @@ impl Game<'_> {
     }
 }
 
+/// Whether a machine wins: the sets that its actions lead to, one after the other, are never lost and, if the goal must be reached,
+/// come to an end. `None` if there are too many.
+fn wins(game: &Game<'_>, machine: &[MachineState]) -> Option<bool> {
+    if game.objective.goal[0] {
+        return Some(true);
+    }
+    let mut numbers = BTreeMap::from([((0, Set::from([0])), 0)]);
+    let mut waiting = vec![(0, Set::from([0]))];
+    let mut edges: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    while let Some((state, set)) = waiting.pop() {
+        if numbers.len() > MOST_SETS {
+            return None;
+        }
+        let here = numbers[&(state, set.clone())];
+        let label = match machine[state].action {
+            Action::Wait => None,
+            Action::Channel(channel) => Some(Label::Channel(channel)),
+            Action::Edge {
+                process,
+                edge,
+                select,
+            } => Some(Label::Edge(process, edge, select)),
+        };
+        let Some(exits) = game.outcome(&set, label) else {
+            return Some(false);
+        };
+        let mut targets = Vec::new();
+        for exit in exits {
+            let seen = &game.seen[*exit.first().expect("no exit is empty")];
+            let mut next = machine[state].next.iter();
+            let Some((_, next)) = next.find(|(one, _)| one == seen) else {
+                return Some(false);
+            };
+            let place = (*next, exit);
+            let number = numbers.len();
+            targets.push(*numbers.entry(place.clone()).or_insert_with(|| {
+                waiting.push(place);
+                number
+            }));
+        }
+        edges.insert(here, targets);
+    }
+    Some(!(game.objective.must_reach && goes_on_for_ever(&edges)))
+}
+
+/// The check in closed loop says of a machine, and of the same with another action in one of its states, what brute force says.
+fn check_machine(
+    model: &mut LoadedModel,
+    query: &str,
+    (game, forced): (&Game<'_>, Forced),
+    machine: &Machine,
+) -> Result<(), TestCaseError> {
+    let text = model.add_query(query);
+    let (compiled, _) = model.compile(text.span).expect("it was answered");
+    let QueryKind::Control {
+        objective,
+        observations: Some(observations),
+        ..
+    } = &compiled.kind
+    else {
+        panic!("it is a game with observations");
+    };
+    let network = model.network();
+    let states = machine_file::to_check(machine);
+    let file = machine_file::write(network, machine, query);
+    let again = machine_file::read(network, &file, observations.len());
+    let again = again.map_err(|mismatch| TestCaseError::fail(format!("{mismatch:?}")))?;
+    let (before, after) = (format!("{states:?}"), format!("{again:?}"));
+    if before != after {
+        return Err(TestCaseError::fail(format!("{before} is read as {after}")));
+    }
+    let steps = game.graph.nodes.iter().flat_map(|node| &node.steps);
+    let labels: BTreeSet<Label> = steps
+        .filter(|step| step.controllable)
+        .map(|step| step.label)
+        .collect();
+    let actions = labels.into_iter().map(|label| match label {
+        Label::Channel(channel) => Action::Channel(channel),
+        Label::Edge(process, edge, select) => Action::Edge {
+            process,
+            edge,
+            select,
+        },
+    });
+    let actions: Vec<Action> = actions.chain([Action::Wait]).collect();
+    for changed in 0..states.len().min(4) {
+        for &action in &actions {
+            let mut states = states.clone();
+            states[changed].action = action;
+            let Some(expected) = wins(game, &states) else {
+                continue;
+            };
+            let asked = (objective, &observations[..]);
+            let rules = (forced, Priorities::Ignored);
+            let checked = observed::verify(network, asked, &states, rules, MOST_PLACES);
+            let is_right = match checked {
+                Ok(Outcome::Verified(_)) => expected,
+                Ok(Outcome::Violated(..)) => !expected,
+                _ => continue,
+            };
+            if !is_right {
+                return Err(TestCaseError::fail(format!(
+                    "{query}\n{forced:?}\n{states:#?}\nbrute force says {expected}, the check {checked:?}"
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Whether a graph has a cycle: nodes that lead nowhere else are taken away until there is none.
 fn goes_on_for_ever(edges: &BTreeMap<usize, Vec<usize>>) -> bool {
     let mut left: BTreeSet<usize> = edges.keys().copied().collect();
@@ -233,11 +350,18 @@ fn compare(
             let query_text = model.add_query(&query);
             let options = checker::engine::Options {
                 forced,
+                verify: true,
                 ..compare::options()
             };
             let answer = model.check(&query_text, &options);
             let describe = || format!("{text}{query}\n{forced:?}");
             compare::check(&answer, Ok(expected), tally, describe)?;
+            compare::check_strategy(&model, &answer, tally, describe)?;
+            let machine = answer.as_ref().ok();
+            if let Some(machine) = machine.and_then(|one| one.evidence.machine.clone()) {
+                check_machine(&mut model, &query, (&game, forced), &machine)
+                    .map_err(|error| TestCaseError::fail(format!("{text}{error}")))?;
+            }
             let is_won = answer.is_ok_and(|answer| answer.verdict == Verdict::Satisfied);
             if is_won && !winning(&graph, &objective, rule)[0] {
                 let text = describe();
