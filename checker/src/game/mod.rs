@@ -6,6 +6,7 @@
 pub mod closed_loop;
 mod dead_ends;
 pub mod denial;
+mod dives;
 mod evasion;
 mod gains;
 pub mod graph;
@@ -13,6 +14,7 @@ mod hopes;
 mod layers;
 pub mod observed;
 pub mod plans;
+mod predecessors;
 pub mod programs;
 pub mod reach;
 pub mod recurrence;

@@ -27,13 +27,8 @@
 //! valuations of one stamp into those of smaller ones makes progress. Where the seeker wins nowhere any more, the evader has only
 //! to stay outside of what is won.
 //!
-//! Forward, the solver dives: it follows a random move of each newly made node as far as this goes, in every other dive one of the
-//! seeker where there is one, then takes up one of the nodes that wait, at random, and dives from there. Dives from everywhere meet
-//! wins that lie close together sooner than dives in the order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial Search Through Randomization",
-//! AAAI 1998). The random numbers are the same in every run.
-//!
-//! Nodes that the evader may move to from where the seeker has won something come before: the win hangs on them. From time to time
-//! it is looked whether the seeker may still win at all ([`super::hopes`]), so that both answers can come early.
+//! Forward, the solver dives ([`super::dives`]). From time to time it is looked whether the seeker may still win at all
+//! ([`super::hopes`]), so that both answers can come early.
 //!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are. What
 //! takes zones is put off until the graph has grown by a part of itself, and goes round in turns: so a node meets what several of
@@ -49,9 +44,10 @@ use rustc_hash::FxHashMap;
 
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
-use crate::zones::{Bound, ClockSet, Federation, past};
+use crate::zones::{Bound, Federation};
 
-use super::graph::{Edge, Graph, NONE, Standing};
+use super::dives::Frontier;
+use super::graph::{Graph, Standing};
 use super::{Forced, Player};
 
 /// So many nodes for each discrete state are many.
@@ -138,15 +134,10 @@ pub struct Solver<'g, 's, 'a> {
     crowded_from: u64,
     /// Whether the solver has given up for having many nodes for each discrete state.
     pub has_given_up: bool,
-    /// Nodes to be expanded; those to dive into stand last.
-    waiting: Vec<u32>,
-    is_waiting: Vec<bool>,
-    /// Nodes that moves of the evader lead to, and of which it hangs whether more of a node is won; those met last stand last.
-    spoilers: Vec<u32>,
+    /// The nodes to be expanded.
+    pub(super) frontier: Frontier,
     /// By node, as far as it was looked at: whether the seeker may still win; see [`super::hopes`].
     pub(super) has_hope: Vec<bool>,
-    random: Random,
-    dive: Dive,
     /// Nodes to be looked at again, first those that were put in first.
     updates: VecDeque<u32>,
     /// Nodes whose winning valuations are to be computed with zones; some may be settled meanwhile.
@@ -154,15 +145,6 @@ pub struct Solver<'g, 's, 'a> {
     pending: Vec<Pending>,
     /// How many states may be explored before the deferred nodes are computed.
     next_computation: u64,
-}
-
-/// How the graph is dived into.
-#[derive(Clone, Copy, Debug)]
-struct Dive {
-    /// Whether moves of the seeker are followed first.
-    prefers_own: bool,
-    /// Whether the last expansion made no node to go on with.
-    is_over: bool,
 }
 
 /// Whether a node is to be updated.
@@ -174,20 +156,6 @@ enum Pending {
     Look,
     /// Words do not decide it; it waits to be computed.
     Computation,
-}
-
-/// Random numbers: G. L. Steele, D. Lea, C. H. Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014.
-#[derive(Clone, Copy, Debug)]
-struct Random(u64);
-
-impl Random {
-    /// A number below `limit`, which is not 0.
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) % limit as u64) as usize
-    }
 }
 
 impl<'g, 's, 'a> Solver<'g, 's, 'a> {
@@ -207,15 +175,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             stamp: 0,
             crowded_from: u64::MAX,
             has_given_up: false,
-            waiting: Vec::new(),
-            spoilers: Vec::new(),
+            frontier: Frontier::default(),
             has_hope: Vec::new(),
-            random: Random(0),
-            dive: Dive {
-                prefers_own: true,
-                is_over: false,
-            },
-            is_waiting: Vec::new(),
             updates: VecDeque::new(),
             deferred: VecDeque::new(),
             pending: Vec::new(),
@@ -241,7 +202,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         Counters {
             explored: self.graph.explored,
             stored: self.graph.nodes.len() as u64,
-            waiting: self.waiting.len() as u64,
+            waiting: self.frontier.len() as u64,
             bytes: self.graph.bytes()
                 + (self.win.capacity() * (size_of::<Win>() + size_of::<Vec<Gain>>() + 2)) as u64
                 + self.gained_zones * (self.graph.dimension().pow(2) * size_of::<Bound>()) as u64,
@@ -254,7 +215,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let mut next_hope = 1;
         loop {
             let explored = self.graph.explored;
-            let reason = if self.waiting.is_empty() || explored >= self.next_computation {
+            let reason = if self.frontier.len() == 0 || explored >= self.next_computation {
                 self.next_computation = explored + explored / BETWEEN_COMPUTATIONS;
                 self.propagate(watch)?
             } else {
@@ -281,7 +242,6 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             let Some(node) = self.next_waiting() else {
                 break;
             };
-            self.is_waiting[node as usize] = false;
             if self.graph.nodes[node as usize].is_expanded
                 || (extent != Extent::Everything && !self.is_relevant(node))
             {
@@ -376,7 +336,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         self.rest.clear();
         self.gained_zones = 0;
         self.gains.clear();
-        self.is_waiting.clear();
+        self.frontier.forget_nodes();
         self.pending.clear();
         self.updates.clear();
         self.deferred.clear();
@@ -416,22 +376,6 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             || edges.any(|edge| edge.length > 1 && !self.spoiling(edge).is_empty())
     }
 
-    fn next_waiting(&mut self) -> Option<u32> {
-        while self.dive.is_over
-            && let Some(node) = self.spoilers.pop()
-        {
-            if !self.graph.nodes[node as usize].is_expanded {
-                return Some(node);
-            }
-        }
-        if self.dive.is_over && !self.waiting.is_empty() {
-            let index = self.random.below(self.waiting.len());
-            Some(self.waiting.swap_remove(index))
-        } else {
-            self.waiting.pop()
-        }
-    }
-
     /// Whether the seeker wins from the initial valuation.
     pub fn is_won(&self) -> bool {
         match &self.win[0] {
@@ -444,56 +388,6 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 part.contains(&values, 1)
             }
         }
-    }
-
-    /// Whether the winning valuations of some predecessor with hope may still grow by those of the node.
-    fn is_relevant(&self, node: u32) -> bool {
-        if node == 0 {
-            return true;
-        }
-        let mut edge = self.graph.nodes[node as usize].first_in;
-        while edge != NONE {
-            let Edge {
-                source, next_in, ..
-            } = self.graph.edges[edge as usize];
-            let has_hope = self.has_hope.get(source as usize).is_none_or(|&it| it);
-            if has_hope && !matches!(self.win[source as usize], Win::Everything) {
-                return true;
-            }
-            edge = next_in;
-        }
-        false
-    }
-
-    fn expand(&mut self, node: u32) -> Result<(), Failure> {
-        self.graph.expand(node)?;
-        self.adopt_new_nodes();
-        let waiting = self.waiting.len();
-        let edges = self.graph.edges_of(node);
-        let first = edges.start + self.random.below(edges.len().max(1));
-        // Every other dive follows moves of the seeker where there are some: those of the evader rather lead away from what is sought,
-        // but sometimes they are the way.
-        let turns: &[Option<bool>] = if self.dive.prefers_own {
-            &[Some(false), Some(true)]
-        } else {
-            &[None]
-        };
-        for turn in turns {
-            for edge in (first..edges.end).chain(edges.start..first) {
-                let Edge {
-                    target,
-                    controllable,
-                    ..
-                } = self.graph.edges[edge];
-                if turn.is_none_or(|is_own| self.seeker.owns(controllable) == is_own) {
-                    self.wait_for(target);
-                }
-            }
-        }
-        self.dive.is_over = self.waiting.len() == waiting;
-        self.dive.prefers_own ^= self.dive.is_over;
-        self.mark(node);
-        Ok(())
     }
 
     /// Gives nodes that were just made their place: what is sought is won from the start.
@@ -519,7 +413,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             };
             self.win.push(win);
             self.gains.push(gains);
-            self.is_waiting.push(false);
+            self.frontier.add_node();
             self.pending.push(Pending::No);
             if node == 0 {
                 self.wait_for(0);
@@ -576,23 +470,6 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let none = || Federation::empty(self.graph.dimension());
         let parts = self.graph.parts(node);
         parts.map_or_else(none, |parts| parts.broken.clone())
-    }
-
-    /// Lets a node wait for its expansion unless it is decided.
-    fn wait_for(&mut self, node: u32) {
-        let Some(known) = self.graph.nodes.get(node as usize) else {
-            return;
-        };
-        let is_left = match known.standing {
-            Standing::Goal => !self.goes_on,
-            Standing::Broken => !self.is_cooperative,
-            Standing::Dead => true,
-            Standing::Open | Standing::Mixed => false,
-        };
-        if !known.is_expanded && !is_left && !self.is_waiting[node as usize] {
-            self.is_waiting[node as usize] = true;
-            self.waiting.push(node);
-        }
     }
 
     /// The nodes that are to be updated, in order; none is any more.
@@ -664,113 +541,5 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             self.note_spoilers(node);
         }
         Ok(())
-    }
-
-    /// The valuations of a node that are won by what is known of its successors.
-    pub(super) fn winnable(&mut self, node: u32) -> Result<Federation, Failure> {
-        let mut won = match self.seeker {
-            Player::Controller => self.controllers_gain(node)?,
-            Player::Environment => self.environments_gain(node)?,
-        };
-        match self.graph.urgent(node) {
-            None => won.intersect_zone(self.graph.zone(node)),
-            Some(urgent) => won = won.intersection(&urgent.reached),
-        }
-        Ok(won)
-    }
-
-    /// Lets the nodes be expanded soon to which the evader may move from a node of which more may be won.
-    fn note_spoilers(&mut self, node: u32) {
-        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
-        if edges.all(|edge| matches!(self.win[edge.target as usize], Win::Nothing)) {
-            return;
-        }
-        for index in self.graph.edges_of(node) {
-            let edge = &self.graph.edges[index];
-            let target = edge.target as usize;
-            if !self.seeker.owns(edge.controllable)
-                && self.is_waiting[target]
-                && !self.graph.nodes[target].is_expanded
-            {
-                self.spoilers.push(edge.target);
-            }
-        }
-    }
-
-    /// What the controller wins as the seeker, as far as known.
-    fn controllers_gain(&mut self, node: u32) -> Result<Federation, Failure> {
-        let mut good = self.known(node);
-        let goal = self.goal(node);
-        let mut bad = self.broken(node);
-        for index in self.graph.edges_of(node) {
-            let edge = self.graph.edges[index];
-            if edge.controllable {
-                good.unite(&self.before(&edge, &self.win[edge.target as usize]));
-            } else {
-                bad.unite(&self.spoiling(&edge));
-            }
-        }
-        bad.subtract(&goal);
-        let forced = self.forced_environment(node, &bad)?;
-        good.unite(&forced);
-        let mut won = self.safe_past(node, good, &bad)?;
-        won.unite(&goal);
-        Ok(won)
-    }
-
-    /// What the environment wins as the seeker, as far as known.
-    fn environments_gain(&mut self, node: u32) -> Result<Federation, Failure> {
-        let goal = self.goal(node);
-        let mut now = self.broken(node);
-        let mut escape = Federation::empty(self.graph.dimension());
-        for index in self.graph.edges_of(node) {
-            let edge = self.graph.edges[index];
-            if edge.controllable {
-                escape.unite(&self.spoiling(&edge));
-            } else {
-                now.unite(&self.before(&edge, &self.win[edge.target as usize]));
-            }
-        }
-        now.subtract(&goal);
-        let mut good = self.forced_controller(node)?;
-        good.subtract(&escape);
-        good.unite(&now);
-        good.unite(&self.known(node));
-        escape.subtract(&now);
-        escape.unite(&goal);
-        self.safe_past(node, good, &escape)
-    }
-
-    /// What was won in a node so far, as far as it is a part of it.
-    fn known(&self, node: u32) -> Federation {
-        match &self.win[node as usize] {
-            Win::Part(part) => part.clone(),
-            _ => Federation::empty(self.graph.dimension()),
-        }
-    }
-
-    /// The valuations of a node that get into `good` without meeting `bad`, by waiting if time may pass.
-    pub(super) fn safe_past(
-        &mut self,
-        node: u32,
-        mut good: Federation,
-        bad: &Federation,
-    ) -> Result<Federation, Failure> {
-        if self.graph.nodes[node as usize].delays {
-            if let Some(urgent) = self.graph.urgent(node) {
-                return Ok(urgent.predecessors(&good, bad));
-            }
-            let stopped = self.stopped(node)?;
-            return Ok(past::predecessors(&good, bad, &stopped));
-        }
-        good.subtract(bad);
-        Ok(good)
-    }
-
-    /// The clocks that stand still in a node.
-    pub(super) fn stopped(&mut self, node: u32) -> Result<ClockSet, Failure> {
-        let mut words = self.graph.symbolic.stepper.network().initial.clone();
-        self.graph.load(node, &mut words);
-        self.graph.symbolic.stopped(&words)
     }
 }
