@@ -20,8 +20,8 @@ use crate::engine::limits::Observer;
 use crate::engine::verification;
 use crate::engine::{
     self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
-    TraceWanted, Verdict, controller, describe, explain, facts, json, machine_file, strategy_file,
-    strategy_text,
+    TraceWanted, Verdict, controller, describe, explain, facts, json, machine_controller,
+    machine_file, strategy_file, strategy_text,
 };
 use crate::game::{Forced, Nodes, Priorities};
 use crate::search::limits::StopReason;
@@ -599,11 +599,13 @@ impl Answer {
         )
     }
 
-    /// The strategy as a controller in C; `None` without a strategy.
+    /// The strategy, or the machine of a game with observations, as a controller in C; `None` without any.
     fn controller_c(&self) -> PyResult<Option<String>> {
-        if self.inner.evidence.machine.is_some() {
-            let reason = "error: the strategy of a game with observations is a machine, which has no form in C\nhint: --strategy FILE.json writes its table of states";
-            return Err(RejectedError::new_err((vec![reason.to_owned()],)));
+        if let Some(machine) = &self.inner.evidence.machine {
+            let write = |model: &mut LoadedModel| {
+                machine_controller::write(model.network(), machine, &self.query)
+            };
+            return Ok(Some(self.model.get().with(write)));
         }
         let Some(strategy) = self.inner.evidence.strategy.as_ref() else {
             return Ok(None);

@@ -244,6 +244,7 @@ def command(
       ntagen check model.xml --queries model.q --json --timeout 60s
       ntagen check game.xml --query "control: A<> Main.Won" --verify --strategy -
       ntagen check game.xml --query "control: A[] not Main.Lost" --controller safe.c
+      ntagen check game.xml --query "{Gate.Shut, x >= 2} control: A<> Main.Won" --strategy -
       ntagen check model.xml --query "bounds{Gate.Open}: x"
       ntagen check model.xml --query "E<> Gate.Open" --fastest --trace open.json
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl

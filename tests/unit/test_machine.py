@@ -60,5 +60,11 @@ def test_what_has_no_machine_says_so() -> None:
     assert "no single strategy of the environment" in (answer.message or "")
     with pytest.raises(InputError, match="machine"):
         model.synthesize(QUERY)
-    with pytest.raises(InputError, match="no form in C"):
-        model.check(QUERY, strategy=True).controller_c()
+    assert answer.controller_c() is None
+
+
+def test_a_machine_is_a_controller_in_c() -> None:
+    text = ntagen.load(BOXES).check(QUERY, strategy=True).controller_c()
+    assert text is not None
+    assert "int controller_next(int state, const unsigned char *seen);" in text
+    assert '"propose push"' in text

@@ -400,14 +400,14 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
 }
 
 /// Text that stays inside a comment.
-fn comment(text: &str) -> String {
+pub(super) fn comment(text: &str) -> String {
     text.replace("*/", "* /")
         .replace("/*", "/ *")
         .replace(['\n', '\r'], " ")
 }
 
 /// Text as a C string. Question marks are escaped, so that none is read as part of a trigraph.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     let mut quoted = "\"".to_owned();
     for byte in text.bytes() {
         match byte {
@@ -420,7 +420,7 @@ fn quoted(text: &str) -> String {
 }
 
 /// Where each of the lists begins if they are put together, and the end of the last.
-fn starts(lengths: impl Iterator<Item = usize>) -> Vec<i64> {
+pub(super) fn starts(lengths: impl Iterator<Item = usize>) -> Vec<i64> {
     let mut end = 0;
     let mut starts = vec![0];
     starts.extend(lengths.map(|length| {
@@ -431,7 +431,7 @@ fn starts(lengths: impl Iterator<Item = usize>) -> Vec<i64> {
 }
 
 /// A table of the smallest type that holds its values.
-fn array(text: &mut String, name: &str, values: Vec<i64>) {
+pub(super) fn array(text: &mut String, name: &str, values: Vec<i64>) {
     let low = values.iter().copied().min().unwrap_or(0);
     let high = values.iter().copied().max().unwrap_or(0);
     let kind = match (low, high) {

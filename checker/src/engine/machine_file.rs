@@ -242,7 +242,8 @@ pub fn text(network: &Network, machine: &Machine, query: &str) -> String {
     text
 }
 
-fn action_text(network: &Network, action: Action) -> String {
+/// What a state of a machine does.
+pub fn action_text(network: &Network, action: Action) -> String {
     match action {
         Action::Wait => "wait".to_owned(),
         Action::Channel(channel) => {

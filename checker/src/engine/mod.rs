@@ -16,6 +16,7 @@ mod fastest;
 mod games;
 pub mod json;
 pub mod limits;
+pub mod machine_controller;
 pub mod machine_file;
 pub mod observed;
 pub mod play;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use crate::zones::{Bound, Federation};
+use crate::zones::{Bound, Federation, dbm};
 
 /// The values of the observed predicates, in the order of the query.
 pub type Observation = Arc<[bool]>;
@@ -44,11 +44,14 @@ impl Knowledge {
         self.states.values_mut().for_each(Federation::reduce);
     }
 
-    /// A hash of what does not hang on how federations are described.
+    /// A hash of what does not hang on how federations are described: of each, the least zone that contains it.
     pub(super) fn hash(&self) -> u64 {
         let mut hasher = rustc_hash::FxHasher::default();
         self.observation.hash(&mut hasher);
-        self.states.keys().for_each(|words| words.hash(&mut hasher));
+        for (words, zones) in &self.states {
+            words.hash(&mut hasher);
+            dbm::hash(&zones.convex_hull()).hash(&mut hasher);
+        }
         hasher.finish()
     }
 
