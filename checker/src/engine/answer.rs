@@ -160,6 +160,7 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
     } = subject;
     let start = Instant::now();
     let mut watch = LimitWatch::new(options.limits.clone());
+    let armed = watch.arm(executor.alarm());
     let mut answer = match &query.kind {
         QueryKind::Reachable(goal) => reduced(subject, options, |symmetry| {
             reachable(subject, goal, options, symmetry, &mut watch)
@@ -230,6 +231,12 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
             unreachable!("strategies are saved and loaded elsewhere")
         }
     };
+    drop(armed);
+    if answer.verdict == Verdict::Error(Failure::Interrupted) {
+        let counters = answer.counters;
+        let verdict = Verdict::Unknown(watch.stop());
+        answer = new_answer(verdict, Evidence::default(), counters);
+    }
     answer.seconds = start.elapsed().as_secs_f64();
     answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
     answer
@@ -249,7 +256,9 @@ fn reduced(
         .flatten();
     let first = answer(symmetry.as_ref());
     match first.verdict {
-        Verdict::Error(_) if symmetry.is_some() => answer(None),
+        Verdict::Error(failure) if symmetry.is_some() && failure != Failure::Interrupted => {
+            answer(None)
+        }
         _ => first,
     }
 }

@@ -449,6 +449,7 @@ pub fn failure_text(model: &LoadedModel, failure: Failure) -> String {
                 "a state has more than {most} moves: too many receivers of a broadcast have a choice"
             )
         }
+        Failure::Interrupted => "interrupted".to_owned(),
         Failure::InitialInvariant => "the initial state breaks an invariant".to_owned(),
     }
 }
@@ -467,5 +468,6 @@ fn run_time_error(kind: RunTimeErrorKind) -> &'static str {
         }
         RunTimeErrorKind::AssertionFailed => "assertion failed",
         RunTimeErrorKind::StepLimit => "a function ran too long",
+        RunTimeErrorKind::Interrupted => "interrupted",
     }
 }

@@ -139,9 +139,13 @@ impl LoadedModel {
         let mut probe = Probe { predicates };
         let order = Order::BreadthFirst;
         let watch = &mut LimitWatch::new(limits);
+        let armed = watch.arm(self.executor().alarm());
         let report = reach::search(&mut symbolic, &mut probe, order, watch);
+        drop(armed);
         let (failure, trace) = report.outcome.err()?;
-        (!is_over_before_the_end(&mut symbolic, objective, &trace)).then_some((failure, trace))
+        let is_one = failure != Failure::Interrupted;
+        (is_one && !is_over_before_the_end(&mut symbolic, objective, &trace))
+            .then_some((failure, trace))
     }
 }
 

@@ -1,8 +1,10 @@
 //! Limits of one query: states, memory, time, and the user's interruption.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
+use crate::exec::{Alarm, Look};
 use crate::search::limits::{Counters, StopReason, Watch};
 
 /// Is shown the counters now and then; true ends the search.
@@ -45,21 +47,108 @@ const SHOW_EVERY: Duration = Duration::from_millis(50);
 #[derive(Debug)]
 pub(super) struct LimitWatch {
     limits: Limits,
-    start: Instant,
-    shown: Instant,
+    patience: Arc<Patience>,
     /// The greatest number of bytes seen.
     pub(super) peak_bytes: u64,
+}
+
+/// What is looked at between states, and also in the middle of a call that runs long.
+struct Patience {
+    start: Instant,
+    timeout: Option<Duration>,
+    observer: Option<Observer>,
+    /// The thread that asked: the observer is called by it alone.
+    owner: ThreadId,
+    seen: Mutex<Seen>,
+}
+
+/// What was seen last.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    counters: Counters,
+    /// When it was shown to the observer.
+    shown: Instant,
+    /// Why an end was called for.
+    stop: Option<StopReason>,
+}
+
+impl Patience {
+    fn look(&self, counters: Option<&Counters>) -> Option<StopReason> {
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(&counters) = counters {
+            seen.counters = counters;
+        }
+        let now = Instant::now();
+        if self.timeout.is_some_and(|limit| now - self.start >= limit) {
+            seen.stop = Some(StopReason::Time);
+        } else if now - seen.shown >= SHOW_EVERY && thread::current().id() == self.owner {
+            seen.shown = now;
+            let counters = seen.counters;
+            // Others that look meanwhile need not wait for what is shown.
+            drop(seen);
+            let ends = self.observer.as_ref().is_some_and(|show| show(&counters));
+            seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+            if ends {
+                seen.stop = Some(StopReason::Interrupted);
+            }
+        }
+        seen.stop
+    }
+}
+
+impl std::fmt::Debug for Patience {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Patience")
+            .field("start", &self.start)
+            .field("timeout", &self.timeout)
+            .field("seen", &self.seen)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Takes the alarm back when it is dropped.
+pub(super) struct Armed<'a>(&'a Alarm);
+
+impl Drop for Armed<'_> {
+    fn drop(&mut self) {
+        self.0.set(None);
+    }
 }
 
 impl LimitWatch {
     pub(super) fn new(limits: Limits) -> LimitWatch {
         let now = Instant::now();
-        LimitWatch {
-            limits,
-            start: now,
+        let seen = Seen {
+            counters: Counters::default(),
             shown: now,
+            stop: None,
+        };
+        LimitWatch {
+            patience: Arc::new(Patience {
+                start: now,
+                timeout: limits.timeout,
+                observer: limits.observer.clone(),
+                owner: thread::current().id(),
+                seen: Mutex::new(seen),
+            }),
+            limits,
             peak_bytes: 0,
         }
+    }
+
+    /// Lets the limit of time and the user end calls of the model's code too, as long as the value lives.
+    pub(super) fn arm<'a>(&self, alarm: &'a Alarm) -> Armed<'a> {
+        let patience = Arc::clone(&self.patience);
+        let look: Look = Arc::new(move || patience.look(None).is_some());
+        alarm.set(Some(look));
+        Armed(alarm)
+    }
+
+    /// Why an end was called for, by the limit of time or by the user.
+    pub(super) fn stop(&self) -> StopReason {
+        let seen = self.patience.seen.lock();
+        let stop = seen.unwrap_or_else(PoisonError::into_inner).stop;
+        stop.unwrap_or(StopReason::Interrupted)
     }
 }
 
@@ -80,25 +169,6 @@ impl Watch for LimitWatch {
         {
             return Some(StopReason::Memory);
         }
-        let now = Instant::now();
-        if self
-            .limits
-            .timeout
-            .is_some_and(|limit| now - self.start >= limit)
-        {
-            return Some(StopReason::Time);
-        }
-        if now - self.shown >= SHOW_EVERY {
-            self.shown = now;
-            if self
-                .limits
-                .observer
-                .as_ref()
-                .is_some_and(|observer| observer(counters))
-            {
-                return Some(StopReason::Interrupted);
-            }
-        }
-        None
+        self.patience.look(Some(counters))
     }
 }

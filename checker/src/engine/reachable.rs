@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::ir::{ClockAtom, ClockId, ClockRange, Predicate};
-use crate::network::{Abstraction, PartialOrder, Symbolic, Symmetry, predicate};
+use crate::network::{Abstraction, Failure, PartialOrder, Symbolic, Symmetry, predicate};
 use crate::search::limits::Counters;
 use crate::search::plain;
 use crate::search::reach::{self, Outcome, Report, Trace};
@@ -171,6 +171,7 @@ fn best(
         }
         Ok(plain::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
         Ok(plain::Outcome::Stopped(reason)) => Err(certificate::stop_text(reason).to_owned()),
+        Err(Failure::Interrupted) => Err(certificate::stop_text(watch.stop()).to_owned()),
         // The search for any trace did not come to the state that fails.
         Err(_) => Err("the model fails in a state beside it".to_owned()),
     }

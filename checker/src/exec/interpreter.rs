@@ -8,12 +8,14 @@
 //! Cost: some nanoseconds an instruction.
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use crate::ir::{
     Address, Base, Block, CLOCK_LIMIT, ClockId, ClockOperand, Function, FunctionId, Instruction,
     MathFunction, Register, RegisterType, RunTimeErrorKind, Terminator,
 };
 
+use super::alarm::{Alarm, ROUNDS_BETWEEN_LOOKS};
 use super::math::{self, MathCode};
 use super::rounds::{ROUND_LIMIT, count_rounds};
 use super::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError, arithmetic};
@@ -23,6 +25,7 @@ use super::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeErro
 pub struct Interpreter {
     functions: Vec<Function>,
     constants: Vec<i32>,
+    alarm: Arc<Alarm>,
 }
 
 impl Interpreter {
@@ -85,6 +88,10 @@ impl Executor for Interpreter {
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
         self.measure(ROUND_LIMIT, function, arguments, context).0
+    }
+
+    fn alarm(&self) -> &Alarm {
+        &self.alarm
     }
 }
 
@@ -446,6 +453,11 @@ impl<'run> Run<'run, '_> {
                 self.effort.rounds += 1;
                 if self.effort.rounds > self.round_limit {
                     return Err(RunTimeErrorKind::StepLimit);
+                }
+                if self.effort.rounds.is_multiple_of(ROUNDS_BETWEEN_LOOKS)
+                    && self.program.alarm.is_due()
+                {
+                    return Err(RunTimeErrorKind::Interrupted);
                 }
             }
             Instruction::Require {

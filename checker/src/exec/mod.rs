@@ -6,6 +6,7 @@
 pub(crate) mod arithmetic;
 pub(crate) mod math;
 
+mod alarm;
 mod rounds;
 
 mod interpreter;
@@ -16,6 +17,7 @@ mod validate;
 #[cfg(feature = "jit")]
 mod jit;
 
+pub use alarm::{Alarm, Look};
 pub use interpreter::Interpreter;
 #[cfg(feature = "jit")]
 pub use jit::{Jit, JitError};
@@ -90,4 +92,7 @@ pub trait Executor: Send + Sync {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError>;
+
+    /// What ends calls that run long.
+    fn alarm(&self) -> &Alarm;
 }

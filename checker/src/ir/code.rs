@@ -432,4 +432,6 @@ pub enum RunTimeErrorKind {
     AssertionFailed,
     /// A loop that ran longer than the limit of one call allows.
     StepLimit,
+    /// None of the model: whoever ran it ended the call.
+    Interrupted,
 }

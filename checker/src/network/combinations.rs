@@ -18,6 +18,9 @@ use super::stepper::Stepper;
 /// The most moves of a state: receivers of a broadcast that have a choice each multiply.
 const MOST_MOVES: usize = 1 << 20;
 
+/// So many moves are put together between two looks at the alarm.
+const MOVES_BETWEEN_LOOKS: usize = 1 << 12;
+
 /// The greatest rank, of what no scope would come to the end of.
 const MOST_RANKS: u64 = 1 << 62;
 
@@ -179,6 +182,9 @@ impl Stepper<'_> {
             } else if !needs_committed || self.has_committed_choice(words) {
                 self.emit(is_possible, out);
                 check_count(out)?;
+                if out.len().is_multiple_of(MOVES_BETWEEN_LOOKS) && self.executor.alarm().is_due() {
+                    return Err(Failure::Interrupted);
+                }
             } else {
                 self.rank += ways;
             }

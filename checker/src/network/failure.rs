@@ -1,6 +1,7 @@
 //! Why exploring a model ended without an answer.
 
 use crate::exec::RunTimeError;
+use crate::ir::RunTimeErrorKind;
 
 /// The model did something that has no meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,10 +21,15 @@ pub enum Failure {
     Moves(usize),
     /// The initial state breaks an invariant.
     InitialInvariant,
+    /// None of the model: the alarm ended a call, or the enumeration of moves ([`crate::exec::Alarm`]).
+    Interrupted,
 }
 
 impl From<RunTimeError> for Failure {
     fn from(error: RunTimeError) -> Failure {
-        Failure::RunTime(error)
+        match error.kind {
+            RunTimeErrorKind::Interrupted => Failure::Interrupted,
+            _ => Failure::RunTime(error),
+        }
     }
 }

@@ -111,7 +111,7 @@ impl Checker<'_> {
             RunTimeErrorKind::NotAnInteger => "a double that fits into no integer",
             RunTimeErrorKind::ClockValue => "a clock value beyond the limits",
             RunTimeErrorKind::AssertionFailed => "an assertion that does not hold",
-            RunTimeErrorKind::StepLimit => {
+            RunTimeErrorKind::StepLimit | RunTimeErrorKind::Interrupted => {
                 "its loops, with those of all constants before it, take more than ten million rounds"
             }
         };

@@ -672,3 +672,43 @@ fn an_endless_loop_ends_at_the_limit_of_rounds() {
         assert_eq!(outcome.result, expected, "{name}");
     }
 }
+
+#[test]
+fn an_alarm_ends_a_call_that_runs_long() {
+    use checker::ir::{Block, BlockId, Function, Terminator};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
+    let functions = [Function {
+        name: "endless".into(),
+        registers: vec![],
+        parameters: 0,
+        frame_words: 0,
+        result: None,
+        blocks: vec![Block {
+            instructions: vec![],
+            terminator: Terminator::Jump(BlockId(0)),
+        }],
+    }];
+    let error = |kind| {
+        Err(RunTimeError {
+            kind,
+            site: SiteId(0),
+        })
+    };
+    for (name, engine) in engines(&functions, &[]) {
+        let looks = Arc::new(AtomicU32::new(0));
+        let seen = Arc::clone(&looks);
+        engine.alarm().set(Some(Arc::new(move || {
+            seen.fetch_add(1, Ordering::Relaxed) == 2
+        })));
+        let outcome = run(&*engine, FunctionId(0), &[], &[]);
+        assert_eq!(outcome.result, error(Kind::Interrupted), "{name}");
+        assert_eq!(looks.load(Ordering::Relaxed), 3, "{name}");
+        // It stays raised until it is set anew.
+        let outcome = run(&*engine, FunctionId(0), &[], &[]);
+        assert_eq!(outcome.result, error(Kind::Interrupted), "{name}");
+        engine.alarm().set(None);
+        let outcome = run(&*engine, FunctionId(0), &[], &[]);
+        assert_eq!(outcome.result, error(Kind::StepLimit), "{name}");
+    }
+}

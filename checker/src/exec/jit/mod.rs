@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
 use crate::ir::{Function, FunctionId};
 
-use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, validate};
+use super::{Alarm, Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, validate};
 
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};
@@ -208,20 +208,18 @@ impl Executor for Jit {
         let frame_words = entry.frame_words.load(Ordering::Relaxed);
         if frame_words == 0 {
             let frame = ptr::dangling_mut();
-            return call_native(code, frame, &self.constants, arguments, context);
+            return self.call_native(code, frame, arguments, context);
         }
         FRAMES.with_borrow_mut(|frames| {
             if frames.len() < frame_words {
                 frames.resize(frame_words, 0);
             }
-            call_native(
-                code,
-                frames.as_mut_ptr(),
-                &self.constants,
-                arguments,
-                context,
-            )
+            self.call_native(code, frames.as_mut_ptr(), arguments, context)
         })
+    }
+
+    fn alarm(&self) -> &Alarm {
+        self.interpreter.alarm()
     }
 }
 
@@ -236,28 +234,30 @@ type Plain = unsafe extern "C" fn(*mut NativeContext<'_>, *mut i32, *mut i32) ->
 type WithArguments =
     unsafe extern "C" fn(*mut NativeContext<'_>, *mut i32, *mut i32, *const i32) -> i64;
 
-#[expect(unsafe_code, reason = "compiled code is called by its address")]
-fn call_native(
-    code: *mut u8,
-    frame: *mut i32,
-    constants: &[i32],
-    arguments: &[i32],
-    context: &mut Context<'_>,
-) -> Result<i32, RunTimeError> {
-    let (mut native, state) = NativeContext::new(constants, context);
-    let state = state.as_mut_ptr();
-    // SAFETY: `code` was made by the compiler of the engine that is borrowed for this call, for a function with as many
-    // parameters as there are arguments (a precondition of `Executor::call`), with the signature of an entry if there are
-    // any and its own if not. The context lives on this stack, the frame is as long as the compiler said that the function
-    // and all that it calls need, and the state has the words of the layout that the code was made for.
-    let status = unsafe {
-        if arguments.is_empty() {
-            let code = std::mem::transmute::<*mut u8, Plain>(code);
-            code(&raw mut native, state, frame)
-        } else {
-            let code = std::mem::transmute::<*mut u8, WithArguments>(code);
-            code(&raw mut native, state, frame, arguments.as_ptr())
-        }
-    };
-    result_of_status(status)
+impl Jit {
+    #[expect(unsafe_code, reason = "compiled code is called by its address")]
+    fn call_native(
+        &self,
+        code: *mut u8,
+        frame: *mut i32,
+        arguments: &[i32],
+        context: &mut Context<'_>,
+    ) -> Result<i32, RunTimeError> {
+        let (mut native, state) = NativeContext::new(&self.constants, self.alarm(), context);
+        let state = state.as_mut_ptr();
+        // SAFETY: `code` was made by the compiler of the engine that is borrowed for this call, for a function with as many
+        // parameters as there are arguments (a precondition of `Executor::call`), with the signature of an entry if there are
+        // any and its own if not. The context lives on this stack, the frame is as long as the compiler said that the function
+        // and all that it calls need, and the state has the words of the layout that the code was made for.
+        let status = unsafe {
+            if arguments.is_empty() {
+                let code = std::mem::transmute::<*mut u8, Plain>(code);
+                code(&raw mut native, state, frame)
+            } else {
+                let code = std::mem::transmute::<*mut u8, WithArguments>(code);
+                code(&raw mut native, state, frame, arguments.as_ptr())
+            }
+        };
+        result_of_status(status)
+    }
 }

@@ -4,8 +4,10 @@
 //! The status of a call is 64 bits: negative for a run-time error (its kind and site in the lower bits), else the integer
 //! that the function returned, or 0. A double or an address is returned beside the status.
 
+use crate::exec::alarm::ROUNDS_BETWEEN_LOOKS;
 use crate::exec::{
-    Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, RunTimeError, arithmetic, math,
+    Alarm, Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, RunTimeError, arithmetic,
+    math,
 };
 use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
 
@@ -13,10 +15,13 @@ use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
 #[derive(Debug)]
 #[repr(C)]
 pub(super) struct NativeContext<'call> {
-    /// How many rounds of loops this call may still take.
+    /// How many rounds of loops this call may still take before it asks for more ([`more_rounds`]).
     pub(super) rounds_left: u64,
     /// The constant memory.
     pub(super) constants: *const i32,
+    /// How many rounds it may take beyond these.
+    rounds_beyond: u64,
+    alarm: &'call Alarm,
     constraints: &'call mut Vec<EmittedConstraint>,
     assignments: &'call mut Vec<EmittedAssignment>,
 }
@@ -25,10 +30,13 @@ impl<'call> NativeContext<'call> {
     /// The context of a call, and the state's words, which go beside it.
     pub(super) fn new(
         constants: &[i32],
+        alarm: &'call Alarm,
         context: &'call mut Context<'_>,
     ) -> (NativeContext<'call>, &'call mut [i32]) {
         let native = NativeContext {
-            rounds_left: ROUND_LIMIT,
+            rounds_left: ROUNDS_BETWEEN_LOOKS,
+            rounds_beyond: ROUND_LIMIT - ROUNDS_BETWEEN_LOOKS,
+            alarm,
             constants: constants.as_ptr(),
             constraints: context.constraints,
             assignments: context.assignments,
@@ -37,7 +45,7 @@ impl<'call> NativeContext<'call> {
     }
 }
 
-const KINDS: [RunTimeErrorKind; 10] = [
+const KINDS: [RunTimeErrorKind; 11] = [
     RunTimeErrorKind::Overflow,
     RunTimeErrorKind::DivisionByZero,
     RunTimeErrorKind::ShiftDistance,
@@ -48,6 +56,7 @@ const KINDS: [RunTimeErrorKind; 10] = [
     RunTimeErrorKind::ClockValue,
     RunTimeErrorKind::AssertionFailed,
     RunTimeErrorKind::StepLimit,
+    RunTimeErrorKind::Interrupted,
 ];
 
 /// The status of a failed call.
@@ -66,6 +75,19 @@ pub(super) fn result_of_status(status: i64) -> Result<i32, RunTimeError> {
         kind: KINDS[(status >> 32 & 0xff) as usize],
         site: SiteId(status as u32),
     })
+}
+
+/// Lets a call take more rounds of loops; returns its status, an error if it must end here.
+pub(super) extern "C" fn more_rounds(context: &mut NativeContext<'_>, site: u32) -> i64 {
+    if context.rounds_beyond == 0 {
+        return failure_status(RunTimeErrorKind::StepLimit, SiteId(site));
+    }
+    if context.alarm.is_due() {
+        return failure_status(RunTimeErrorKind::Interrupted, SiteId(site));
+    }
+    context.rounds_left = context.rounds_beyond.min(ROUNDS_BETWEEN_LOOKS);
+    context.rounds_beyond -= context.rounds_left;
+    0
 }
 
 /// What a called-back function gives where there is no result.

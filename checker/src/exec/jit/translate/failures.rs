@@ -6,7 +6,7 @@ use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::types::I64;
 use cranelift_codegen::ir::{Block as NativeBlock, InstBuilder, MemFlagsData, Value};
 
-use crate::exec::jit::runtime::{NativeContext, failure_status};
+use crate::exec::jit::runtime::{self, NativeContext, failure_status};
 use crate::ir::{Instruction, Register, RunTimeErrorKind, SiteId};
 
 use super::Translator;
@@ -25,8 +25,7 @@ impl Translator<'_> {
                 let offset = offset_of!(NativeContext<'static>, rounds_left) as i32;
                 let flags = MemFlagsData::trusted();
                 let left = self.builder.ins().load(I64, flags, self.context, offset);
-                let none = self.builder.ins().icmp_imm_s(IntCC::Equal, left, 0);
-                self.fail_if(none, RunTimeErrorKind::StepLimit, site);
+                let left = self.refill_rounds(left, site);
                 let left = self.builder.ins().iadd_imm_s(left, -1);
                 self.builder.ins().store(flags, left, self.context, offset);
             }
@@ -40,6 +39,26 @@ impl Translator<'_> {
             }
             _ => unreachable!("sorted out by instruction"),
         }
+    }
+
+    /// The rounds that are left, after more were asked for if there were none.
+    fn refill_rounds(&mut self, left: Value, SiteId(site): SiteId) -> Value {
+        let (refill, next) = (self.builder.create_block(), self.builder.create_block());
+        self.builder.set_cold_block(refill);
+        self.builder.append_block_param(next, I64);
+        let ins = self.builder.ins();
+        ins.brif(left, next, &[left.into()], refill, &[]);
+        self.builder.switch_to_block(refill);
+        let site = self.integer(site as i32);
+        let code = runtime::more_rounds as *const () as usize;
+        let status = self.call_back(code, Some(I64), &[self.context, site]);
+        self.hand_on_failure(status);
+        let offset = offset_of!(NativeContext<'static>, rounds_left) as i32;
+        let flags = MemFlagsData::trusted();
+        let left = self.builder.ins().load(I64, flags, self.context, offset);
+        self.builder.ins().jump(next, &[left.into()]);
+        self.builder.switch_to_block(next);
+        self.builder.block_params(next)[0]
     }
 
     /// Fails unless `low <= value <= high`.

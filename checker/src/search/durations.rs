@@ -1,0 +1,451 @@
+//! Durations of waits under linear bounds, exactly: for runs in which clocks stand still at times.
+//!
+//! A clock's value is the sum of the durations of the waits in which it ran since it was set, so that bounds on clocks are linear in
+//! durations, with coefficients -1, 0 and 1. Numbers are fractions beside a multiple of an infinitesimal, which makes strict bounds weak
+//! ones; in the end the infinitesimal becomes small enough for all of them.
+//!
+//! Invariant: every row is a basic variable as a sum of multiples of the others, which are not basic and at or above their least
+//! values; `value` satisfies all rows.
+//!
+//! Source: B. Dutertre, L. de Moura, "A Fast Linear-Arithmetic Solver for DPLL(T)", CAV 2006 (the tableau, bounds that come and
+//! go, and infinitesimals); R. G. Bland, "New finite pivoting rules for the simplex method", 1977 (why it ends).
+//!
+//! Cost: a step takes rows times columns; numbers that outgrow 128 bits end it.
+
+/// A number outgrew its bits, or there were too many steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TooHard;
+
+/// Steps of one search for durations, at most.
+const MOST_PIVOTS: u32 = 20_000;
+/// Rows times columns, at most.
+const MOST_CELLS: usize = 4_000_000;
+
+/// A fraction in lowest terms, with a positive denominator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Fraction {
+    over: i128,
+    under: i128,
+}
+
+impl Fraction {
+    const ZERO: Fraction = Fraction { over: 0, under: 1 };
+    const ONE: Fraction = Fraction { over: 1, under: 1 };
+
+    fn new(over: i128, under: i128) -> Result<Fraction, TooHard> {
+        let divisor = greatest_common_divisor(over.unsigned_abs(), under.unsigned_abs());
+        let divisor = i128::try_from(divisor).map_err(|_| TooHard)?;
+        let divisor = if under < 0 { -divisor } else { divisor };
+        Ok(Fraction {
+            over: over / divisor,
+            under: under / divisor,
+        })
+    }
+
+    fn whole(value: i64) -> Fraction {
+        Fraction {
+            over: i128::from(value),
+            under: 1,
+        }
+    }
+
+    fn plus(self, other: Fraction) -> Result<Fraction, TooHard> {
+        if self.under == 1 && other.under == 1 {
+            let over = self.over.checked_add(other.over).ok_or(TooHard)?;
+            return Ok(Fraction { over, under: 1 });
+        }
+        let left = self.over.checked_mul(other.under).ok_or(TooHard)?;
+        let right = other.over.checked_mul(self.under).ok_or(TooHard)?;
+        let under = self.under.checked_mul(other.under).ok_or(TooHard)?;
+        Fraction::new(left.checked_add(right).ok_or(TooHard)?, under)
+    }
+
+    fn times(self, other: Fraction) -> Result<Fraction, TooHard> {
+        let over = self.over.checked_mul(other.over).ok_or(TooHard)?;
+        let under = self.under.checked_mul(other.under).ok_or(TooHard)?;
+        Fraction::new(over, under)
+    }
+
+    fn negated(self) -> Fraction {
+        Fraction {
+            over: -self.over,
+            under: self.under,
+        }
+    }
+
+    /// One over it; it is not 0.
+    fn inverse(self) -> Result<Fraction, TooHard> {
+        Fraction::new(self.under, self.over)
+    }
+
+    fn is_zero(self) -> bool {
+        self.over == 0
+    }
+
+    fn is_positive(self) -> bool {
+        self.over > 0
+    }
+
+    fn is_less(self, other: Fraction) -> Result<bool, TooHard> {
+        let difference = self.plus(other.negated())?;
+        Ok(difference.over < 0)
+    }
+}
+
+fn greatest_common_divisor(mut one: u128, mut other: u128) -> u128 {
+    while other != 0 {
+        (one, other) = (other, one % other);
+    }
+    one.max(1)
+}
+
+/// A fraction, and how many infinitesimals more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Amount(Fraction, Fraction);
+
+impl Amount {
+    const ZERO: Amount = Amount(Fraction::ZERO, Fraction::ZERO);
+
+    fn plus(self, other: Amount) -> Result<Amount, TooHard> {
+        Ok(Amount(self.0.plus(other.0)?, self.1.plus(other.1)?))
+    }
+
+    fn times(self, factor: Fraction) -> Result<Amount, TooHard> {
+        Ok(Amount(self.0.times(factor)?, self.1.times(factor)?))
+    }
+
+    fn minus(self, other: Amount) -> Result<Amount, TooHard> {
+        self.plus(Amount(other.0.negated(), other.1.negated()))
+    }
+
+    fn is_less(self, other: Amount) -> Result<bool, TooHard> {
+        let Amount(difference, infinitesimals) = self.minus(other)?;
+        Ok(difference.over < 0 || difference.is_zero() && infinitesimals.over < 0)
+    }
+}
+
+/// A sum of durations that is at least so much: waits that count once, those that count negatively, and the least value with how
+/// many infinitesimals more.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct LinearBound {
+    pub(super) plus: Vec<usize>,
+    pub(super) minus: Vec<usize>,
+    pub(super) least: (i64, i64),
+}
+
+/// Durations under bounds, with a way back.
+#[derive(Debug, Default)]
+pub(super) struct Durations {
+    /// By variable: its value, and the least one that it may have. Those of waits come as they were added.
+    value: Vec<Amount>,
+    least: Vec<Option<Amount>>,
+    /// The variables of the waits.
+    waits: Vec<usize>,
+    /// By row: its basic variable, and by variable its coefficient.
+    rows: Vec<(usize, Vec<Fraction>)>,
+    /// By variable: its row, if it is basic.
+    row_of: Vec<Option<usize>>,
+    /// The variables of bounds in the order in which they were required.
+    required: Vec<usize>,
+    pivots: u32,
+}
+
+impl Durations {
+    /// Adds a wait; returns its number, from 0.
+    pub(super) fn add_wait(&mut self) -> usize {
+        let variable = self.add_variable();
+        self.least[variable] = Some(Amount::ZERO);
+        self.waits.push(variable);
+        self.waits.len() - 1
+    }
+
+    fn add_variable(&mut self) -> usize {
+        self.value.push(Amount::ZERO);
+        self.least.push(None);
+        self.row_of.push(None);
+        for (_, row) in &mut self.rows {
+            row.push(Fraction::ZERO);
+        }
+        self.value.len() - 1
+    }
+
+    /// Where to go back to.
+    pub(super) fn mark(&self) -> usize {
+        self.required.len()
+    }
+
+    /// Takes back what was required since; what was required before could be satisfied.
+    pub(super) fn undo(&mut self, mark: usize) -> Result<(), TooHard> {
+        for variable in self.required.drain(mark..) {
+            self.least[variable] = None;
+        }
+        self.repair().map(|_| ())
+    }
+
+    /// Whether the durations at hand satisfy a bound.
+    pub(super) fn is_met(&self, bound: &LinearBound) -> Result<bool, TooHard> {
+        let mut sum = Amount::ZERO;
+        for &wait in &bound.plus {
+            sum = sum.plus(self.value[self.waits[wait]])?;
+        }
+        for &wait in &bound.minus {
+            sum = sum.minus(self.value[self.waits[wait]])?;
+        }
+        Ok(!sum.is_less(amount(bound.least))?)
+    }
+
+    /// Adds a bound and finds durations that satisfy all; returns false if there are none, and then they mean nothing until it is undone.
+    pub(super) fn require(&mut self, bound: &LinearBound) -> Result<bool, TooHard> {
+        let variable = self.add_variable();
+        if self.rows.len().saturating_mul(self.value.len()) > MOST_CELLS {
+            return Err(TooHard);
+        }
+        let mut row = vec![Fraction::ZERO; self.value.len()];
+        let signed = bound.plus.iter().map(|&wait| (wait, Fraction::ONE));
+        let minus = bound.minus.iter().map(|&wait| (wait, Fraction::ONE.negated()));
+        for (wait, factor) in signed.chain(minus) {
+            let wait = self.waits[wait];
+            match self.row_of[wait] {
+                None => row[wait] = row[wait].plus(factor)?,
+                Some(other) => add_multiple(&mut row, &self.rows[other].1, factor)?,
+            }
+        }
+        self.value[variable] = self.sum(&row)?;
+        self.least[variable] = Some(amount(bound.least));
+        self.row_of[variable] = Some(self.rows.len());
+        self.rows.push((variable, row));
+        self.required.push(variable);
+        self.repair()
+    }
+
+    fn sum(&self, row: &[Fraction]) -> Result<Amount, TooHard> {
+        let mut sum = Amount::ZERO;
+        for (factor, value) in row.iter().zip(&self.value) {
+            if !factor.is_zero() {
+                sum = sum.plus(value.times(*factor)?)?;
+            }
+        }
+        Ok(sum)
+    }
+
+    fn is_below(&self, variable: usize) -> Result<bool, TooHard> {
+        self.least[variable].map_or(Ok(false), |least| self.value[variable].is_less(least))
+    }
+
+    /// Moves variables until all have their least values; returns false if they cannot.
+    fn repair(&mut self) -> Result<bool, TooHard> {
+        loop {
+            // The first basic variable that is too small.
+            let mut lowest: Option<usize> = None;
+            for &(basic, _) in &self.rows {
+                if lowest.is_none_or(|lowest| basic < lowest) && self.is_below(basic)? {
+                    lowest = Some(basic);
+                }
+            }
+            let Some(low) = lowest else {
+                return Ok(true);
+            };
+            let Some(row) = self.row_of[low] else {
+                return Err(TooHard);
+            };
+            let Some(helper) = self.helper(row)? else {
+                return Ok(false);
+            };
+            self.pivots += 1;
+            if self.pivots > MOST_PIVOTS {
+                return Err(TooHard);
+            }
+            self.pivot(row, helper)?;
+        }
+    }
+
+    /// The first variable that can change so that the sum of a row grows.
+    fn helper(&self, row: usize) -> Result<Option<usize>, TooHard> {
+        for (variable, factor) in self.rows[row].1.iter().enumerate() {
+            let can_sink = || match self.least[variable] {
+                None => Ok(true),
+                Some(least) => least.is_less(self.value[variable]),
+            };
+            if factor.is_positive() || !factor.is_zero() && can_sink()? {
+                return Ok(Some(variable));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Makes the basic variable of a row its least value, by changing another one, which becomes basic.
+    fn pivot(&mut self, row: usize, helper: usize) -> Result<(), TooHard> {
+        let (basic, mut own) = (self.rows[row].0, self.rows[row].1.clone());
+        let Some(least) = self.least[basic] else {
+            return Err(TooHard);
+        };
+        let factor = own[helper].inverse()?;
+        let change = least.minus(self.value[basic])?.times(factor)?;
+        // The row solved for the helper.
+        own[helper] = Fraction::ZERO;
+        for one in &mut own {
+            if !one.is_zero() {
+                *one = one.times(factor.negated())?;
+            }
+        }
+        own[basic] = factor;
+        self.value[basic] = least;
+        self.value[helper] = self.value[helper].plus(change)?;
+        for index in 0..self.rows.len() {
+            if index == row {
+                continue;
+            }
+            let (variable, other) = &mut self.rows[index];
+            let share = std::mem::replace(&mut other[helper], Fraction::ZERO);
+            if share.is_zero() {
+                continue;
+            }
+            self.value[*variable] = self.value[*variable].plus(change.times(share)?)?;
+            add_multiple(other, &own, share)?;
+        }
+        self.rows[row] = (helper, own);
+        self.row_of[helper] = Some(row);
+        self.row_of[basic] = None;
+        Ok(())
+    }
+
+    /// The durations as whole numbers of ticks, and how many ticks make a unit.
+    pub(super) fn in_ticks(&self) -> Result<(Vec<i64>, i64), TooHard> {
+        let epsilon = self.epsilon()?;
+        let mut durations = Vec::new();
+        let mut ticks_per_unit = 1_i128;
+        for &wait in &self.waits {
+            let Amount(whole, infinitesimals) = self.value[wait];
+            let duration = whole.plus(infinitesimals.times(epsilon)?)?;
+            let common =
+                greatest_common_divisor(ticks_per_unit.unsigned_abs(), duration.under.unsigned_abs());
+            let common = i128::try_from(common).map_err(|_| TooHard)?;
+            ticks_per_unit = ticks_per_unit
+                .checked_mul(duration.under / common)
+                .filter(|&ticks| ticks < 1 << 40)
+                .ok_or(TooHard)?;
+            durations.push(duration);
+        }
+        let ticks = durations.iter().map(|one| {
+            let ticks = one.over.checked_mul(ticks_per_unit / one.under);
+            ticks.and_then(|ticks| i64::try_from(ticks).ok()).ok_or(TooHard)
+        });
+        let ticks = ticks.collect::<Result<_, _>>()?;
+        Ok((ticks, i64::try_from(ticks_per_unit).map_err(|_| TooHard)?))
+    }
+
+    /// A number for the infinitesimal that keeps every variable at or above its least value.
+    fn epsilon(&self) -> Result<Fraction, TooHard> {
+        let mut epsilon = Fraction::ONE;
+        for (value, least) in self.value.iter().zip(&self.least) {
+            let Some(least) = *least else { continue };
+            let Amount(room, infinitesimals) = value.minus(least)?;
+            if room.is_positive() && infinitesimals.over < 0 {
+                let most = room.times(infinitesimals.negated().inverse()?)?;
+                if most.is_less(epsilon)? {
+                    epsilon = most;
+                }
+            }
+        }
+        Ok(epsilon)
+    }
+}
+
+fn amount((whole, infinitesimals): (i64, i64)) -> Amount {
+    Amount(Fraction::whole(whole), Fraction::whole(infinitesimals))
+}
+
+fn add_multiple(row: &mut [Fraction], other: &[Fraction], factor: Fraction) -> Result<(), TooHard> {
+    for (one, other) in row.iter_mut().zip(other) {
+        if !other.is_zero() {
+            *one = one.plus(other.times(factor)?)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Durations, LinearBound};
+
+    fn bound(plus: &[usize], minus: &[usize], least: (i64, i64)) -> LinearBound {
+        LinearBound {
+            plus: plus.to_vec(),
+            minus: minus.to_vec(),
+            least,
+        }
+    }
+
+    /// A walk through all small half-unit durations finds some exactly if the tableau does.
+    #[test]
+    fn durations_are_found_if_there_are_any() {
+        let mut random = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut below = |limit: u64| {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            (random >> 20) % limit
+        };
+        let (mut found, mut none) = (0, 0);
+        for _ in 0..400 {
+            let mut durations = Durations::default();
+            for _ in 0..3 {
+                durations.add_wait();
+            }
+            let mut bounds = Vec::new();
+            let mut is_possible = true;
+            for _ in 0..2 + below(5) {
+                let (mut plus, mut minus) = (Vec::new(), Vec::new());
+                for wait in 0..3 {
+                    match below(3) {
+                        0 => plus.push(wait),
+                        1 => minus.push(wait),
+                        _ => {}
+                    }
+                }
+                let one = bound(&plus, &minus, (below(7) as i64 - 3, below(2) as i64));
+                is_possible = durations.require(&one).expect("numbers are small");
+                bounds.push(one);
+                if !is_possible {
+                    break;
+                }
+            }
+            // A bound of each wait keeps the walk small; fourths are fine enough for three variables with strict bounds.
+            let is_met = |values: [i64; 3], per_unit: i64| {
+                bounds.iter().all(|one| {
+                    let sum = |waits: &[usize]| waits.iter().map(|&wait| values[wait]).sum::<i64>();
+                    let sum = sum(&one.plus) - sum(&one.minus);
+                    let least = one.least.0 * per_unit;
+                    sum > least || sum == least && one.least.1 == 0
+                })
+            };
+            if is_possible {
+                let (ticks, per_unit) = durations.in_ticks().expect("numbers are small");
+                assert!(ticks.iter().all(|&one| one >= 0), "{ticks:?}");
+                assert!(is_met([ticks[0], ticks[1], ticks[2]], per_unit), "{bounds:?} {ticks:?}");
+                found += 1;
+            } else {
+                let quarters = 0..=48;
+                let some = quarters.clone().any(|a| {
+                    quarters.clone().any(|b| quarters.clone().any(|c| is_met([a, b, c], 4)))
+                });
+                assert!(!some, "{bounds:?}");
+                none += 1;
+            }
+        }
+        assert!(found > 50 && none > 50, "{found} with durations, {none} without");
+    }
+
+    #[test]
+    fn what_is_taken_back_no_longer_counts() {
+        let mut durations = Durations::default();
+        let wait = durations.add_wait();
+        assert_eq!(durations.require(&bound(&[], &[wait], (-3, 0))), Ok(true));
+        let mark = durations.mark();
+        assert_eq!(durations.require(&bound(&[wait], &[], (4, 0))), Ok(false));
+        assert_eq!(durations.undo(mark), Ok(()));
+        assert_eq!(durations.require(&bound(&[wait], &[], (2, 1))), Ok(true));
+        let (ticks, per_unit) = durations.in_ticks().expect("numbers are small");
+        assert!(ticks[0] > 2 * per_unit && ticks[0] <= 3 * per_unit);
+    }
+}

@@ -1,0 +1,181 @@
+//! Time limits and interruptions in the middle of one call of the model's code, or of one enumeration of moves.
+//!
+//! What runs there would end in an error of the model if nothing ended it before, so that no test measures time.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::search::StopReason;
+
+/// An update that runs for too many rounds.
+const BUSY: &str = "
+    int[0,1000003] n;
+    void spin() { int[0,200000000] i = 0; while (i < 200000000) { n = (n * 31 + i % 5) % 1000003; i++; } }
+    process P() { state S, T; init S; trans S -> S { assign spin(); }, S -> T { guard n == 7; }; }
+    process Q() { state A, B, C; urgent A; init A; trans A -> B { }, B -> C { }; }
+    system P, Q;";
+
+/// A guard that does.
+const SLOW_GUARD: &str = "
+    typedef scalar[3] id; id last;
+    bool holds() { int[0,200000000] i = 0; while (i < 200000000) i++; return true; }
+    process P(const id me) { state S, T; init S; trans S -> T { guard holds(); assign last = me; }; }
+    system P;";
+
+/// Broadcasts of more combinations than a state may have moves.
+const CROWD: &str = "
+    broadcast chan go; int[0,3] n;
+    process S() { state S; init S; trans S -> S { sync go!; }; }
+    process R(const int[1,24] me) { state A; init A;
+      trans A -> A { sync go?; assign n = me % 4; }, A -> A { sync go?; assign n = (n * 3) % 4; }; }
+    system S, R;";
+
+const ENGINES: [CodeEngine; 2] = [
+    CodeEngine::Interpreter,
+    #[cfg(feature = "jit")]
+    CodeEngine::Jit,
+    #[cfg(not(feature = "jit"))]
+    CodeEngine::Interpreter,
+];
+
+fn check(text: &str, query: &str, options: &Options) -> Answer {
+    let mut model = LoadedModel::load("slow.xta", text.as_bytes())
+        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    let query = model.add_query(query);
+    model
+        .check(&query, options)
+        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
+}
+
+fn limits_of(stop: StopReason) -> Limits {
+    match stop {
+        StopReason::Time => Limits {
+            timeout: Some(Duration::from_millis(5)),
+            ..Limits::default()
+        },
+        _ => Limits {
+            observer: Some(Arc::new(|_| true)),
+            ..Limits::default()
+        },
+    }
+}
+
+fn check_stops(text: &str, queries: &[&str], stops: &[StopReason]) {
+    for query in queries {
+        for &stop in stops {
+            for code in ENGINES {
+                for threads in [1, 2] {
+                    let options = Options {
+                        limits: limits_of(stop),
+                        code,
+                        threads,
+                        ..Options::default()
+                    };
+                    let answer = check(text, query, &options);
+                    let case = format!("{query}, {code:?}, {threads} threads");
+                    assert_eq!(answer.verdict, Verdict::Unknown(stop), "{case}");
+                    assert!(answer.evidence.witnesses.is_empty(), "{case}");
+                    assert!(answer.evidence.strategy.is_none(), "{case}");
+                    assert_eq!(answer.value, None, "{case}");
+                }
+            }
+        }
+    }
+}
+
+const SYMBOLIC: [&str; 8] = [
+    "E<> P.T",
+    "A[] !P.T",
+    "E<> deadlock",
+    "E[] P.S",
+    "A<> P.T",
+    "P.S --> P.T",
+    "sup: n",
+    "inf{P.T}: n",
+];
+
+const GAMES: [&str; 4] = [
+    "control: A<> P.T",
+    "control: A[] P.S",
+    "E<> control: A<> P.T",
+    "control_t*(10, 0): A<> P.T",
+];
+
+#[test]
+fn one_call_ends_in_every_kind_of_query() {
+    let both = [StopReason::Time, StopReason::Interrupted];
+    check_stops(BUSY, &SYMBOLIC, &both);
+    check_stops(BUSY, &GAMES, &both);
+}
+
+#[test]
+fn one_guard_ends_with_members_exchanged_too() {
+    let queries = [
+        "A[] forall (i : id) !P(i).T",
+        "E<> deadlock",
+        "sup{exists (i : id) P(i).T}: 1",
+    ];
+    check_stops(
+        SLOW_GUARD,
+        &queries,
+        &[StopReason::Time, StopReason::Interrupted],
+    );
+}
+
+#[test]
+fn one_enumeration_of_moves_ends() {
+    check_stops(
+        CROWD,
+        &["E<> n == 5", "sup: n", "control: A<> n == 2"],
+        &[StopReason::Time],
+    );
+}
+
+#[test]
+fn counters_go_on_being_shown_during_a_call() {
+    let shown = Arc::new(std::sync::atomic::AtomicU32::new(0));
+    let seen = Arc::clone(&shown);
+    let options = Options {
+        limits: Limits {
+            observer: Some(Arc::new(move |_| {
+                seen.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == 2
+            })),
+            ..Limits::default()
+        },
+        code: CodeEngine::Interpreter,
+        ..Options::default()
+    };
+    let answer = check(BUSY, "E<> P.T", &options);
+    assert_eq!(answer.verdict, Verdict::Unknown(StopReason::Interrupted));
+    assert_eq!(shown.load(std::sync::atomic::Ordering::Relaxed), 3);
+}
+
+#[test]
+fn an_alarm_of_one_query_is_none_of_the_next() {
+    let text =
+        "bool slow(int[0,200000000] n) { int[0,200000000] i = 0; while (i < n) i++; return true; }
+        process P() { state S; init S; } system P;";
+    let mut model = LoadedModel::load("slow.xta", text.as_bytes())
+        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    let interrupted = Verdict::Unknown(StopReason::Interrupted);
+    for (query, limits, verdict) in [
+        (
+            "E<> slow(200000000)",
+            limits_of(StopReason::Interrupted),
+            interrupted,
+        ),
+        ("E<> slow(200000)", Limits::default(), Verdict::Satisfied),
+    ] {
+        let options = Options {
+            limits,
+            code: CodeEngine::Interpreter,
+            ..Options::default()
+        };
+        let query = model.add_query(query);
+        let answer = model
+            .check(&query, &options)
+            .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+        assert_eq!(answer.verdict, verdict);
+    }
+}
