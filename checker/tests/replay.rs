@@ -5,8 +5,8 @@
     reason = "UPDATE_EXPECT=1 writes them"
 )]
 
-use checker::engine::evidence::{Missing, Proof};
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, describe};
+use checker::engine::evidence::Proof;
+use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict, describe};
 use checker::ir::{Predicate, QueryKind};
 use checker::verify::replay::{self, Claim, Coverage, Defect, End, Moment, Outcome, Run};
 use expect_test::{Expect, expect};
@@ -210,14 +210,48 @@ fn replay_says_what_it_looked_at() {
     assert_eq!((coverage.states, coverage.moves), (4, 3));
 }
 
+/// Work of three units that is interrupted twice, while two other clocks run.
+const WORK: &str = "
+clock work, pause, t;
+process P() {
+  state Working { work <= 3 }, Paused { work' == 0 && pause <= 2 }, Done;
+  init Working;
+  trans Working -> Paused { guard work > 0; assign pause = 0; },
+        Paused -> Working { guard pause >= 1; },
+        Working -> Done { guard work >= 3; };
+}
+system P;
+";
+
 #[test]
-fn stopped_clocks_have_no_exact_times() {
+fn stopped_clocks_have_exact_times() {
+    let mut model = model(WORK);
+    for (query, verdict) in [
+        ("E<> P.Done && t > 7 && t < 8", Verdict::Satisfied),
+        ("E<> P.Paused && t == 3 && work == 1", Verdict::Satisfied),
+        ("A[] P.Done imply t <= 6", Verdict::NotSatisfied),
+        ("A[] P.Done imply t >= 3", Verdict::Satisfied),
+    ] {
+        let answer = answer(&mut model, query);
+        assert_eq!(answer.verdict, verdict, "{query}");
+        if !answer.evidence.witnesses.is_empty() {
+            run_of(&answer);
+        }
+    }
+}
+
+/// The zones contain what no run reaches: that t is as large as the two clocks together, of which one stands still at a time.
+#[test]
+fn what_only_too_large_zones_have_stays_a_maybe() {
     let mut model = model(
-        "clock x; process P() { state A { x' == 0 }, B; init A; trans A -> B { }; } system P;",
+        "clock a, b, t;
+         process P() { state A { b' == 0 }, B { a' == 0 }, C; init A; trans A -> B { }, B -> C { }; }
+         system P;",
     );
-    let answer = answer(&mut model, "E<> P.B");
-    let run = &answer.evidence.witnesses[0].run;
-    assert!(matches!(run, Some(Proof::Missing(Missing::StoppedClock))));
+    let possible = answer(&mut model, "E<> P.B && a == 2 && b == 3 && t == 5");
+    assert_eq!(possible.verdict, Verdict::Satisfied);
+    let impossible = answer(&mut model, "E<> P.B && a == 2 && b == 3 && t == 6");
+    assert_eq!(impossible.verdict, Verdict::Maybe);
 }
 
 const REACH: &str = "E<> Lamp.Broken";

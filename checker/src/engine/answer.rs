@@ -425,8 +425,9 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         }
     }
 
-    /// Adds a trace, with its run if runs are wanted.
-    pub(super) fn add(&mut self, trace: Trace, ending: Option<Ending>, shows: Shows<'_>) {
+    /// Adds a trace, with its run if runs are wanted; returns whether a run was replayed, which is tried also where zones are too
+    /// large, since then it alone makes sure.
+    pub(super) fn add(&mut self, trace: Trace, ending: Option<Ending>, shows: Shows<'_>) -> bool {
         let kind = match shows {
             Shows::Possible => Kind::Failure,
             Shows::Reaches(..) | Shows::Stays(_) => Kind::Predicate,
@@ -443,12 +444,16 @@ impl<'w, 'a> Witnesses<'w, 'a> {
             Shows::Possible => false,
         };
         let is_comparable = !(self.is_restricted && is_dead || self.symbolic.ignores_priorities());
-        if self.has_runs && is_comparable && !witness.trace.states.is_empty() {
+        let mut is_replayed = false;
+        let is_wanted = self.has_runs || self.symbolic.is_approximate();
+        if is_wanted && is_comparable && !witness.trace.states.is_empty() {
             let network = self.symbolic.stepper.network();
             let proof = evidence::prove(self.symbolic, network, &witness.trace, ending, shows);
-            witness.run = Some(proof);
+            is_replayed = matches!(proof, Proof::Replayed(..));
+            witness.run = self.has_runs.then_some(proof);
         }
         self.found.push(witness);
+        is_replayed
     }
 
     pub(super) fn into_evidence(self) -> Evidence {

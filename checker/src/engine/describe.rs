@@ -374,7 +374,6 @@ pub fn witness_text(network: &Network, witness: &Witness) -> String {
 /// Why there is no run with exact times.
 pub fn missing_text(missing: Missing) -> String {
     match missing {
-        Missing::StoppedClock => "a clock stands still on the way".to_owned(),
         Missing::Approximate => "the zones are too large, the moves may not be possible".to_owned(),
         Missing::TooHard => "too many ways to choose between".to_owned(),
         Missing::OpenLoop => "the loop was not found to close exactly".to_owned(),

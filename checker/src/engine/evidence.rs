@@ -79,8 +79,6 @@ pub enum Proof {
 /// Why there is no run with exact times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
-    /// A clock stands still while time passes.
-    StoppedClock,
     /// The zones of the trace are too large, and its moves are not possible in this order.
     Approximate,
     /// Too many alternatives.
@@ -160,7 +158,6 @@ pub fn prove(
 impl From<Unscheduled> for Missing {
     fn from(unscheduled: Unscheduled) -> Missing {
         match unscheduled {
-            Unscheduled::StoppedClock => Missing::StoppedClock,
             Unscheduled::Impossible => Missing::Approximate,
             Unscheduled::TooHard => Missing::TooHard,
             Unscheduled::Failed(failure) => Missing::Failed(failure),

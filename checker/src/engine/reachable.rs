@@ -103,8 +103,8 @@ fn conclude(
                     (trace, None)
                 }
             };
-            witnesses.add(trace, None, Shows::Reaches(goal, deadline));
-            found(witnesses.symbolic.is_approximate())
+            let is_sure = witnesses.add(trace, None, Shows::Reaches(goal, deadline));
+            found(witnesses.symbolic.is_approximate() && !is_sure)
         }
         Ok(Outcome::Exhausted) => {
             if options.certificate && subject.under.is_some() {

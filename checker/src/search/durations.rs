@@ -202,7 +202,10 @@ impl Durations {
         }
         let mut row = vec![Fraction::ZERO; self.value.len()];
         let signed = bound.plus.iter().map(|&wait| (wait, Fraction::ONE));
-        let minus = bound.minus.iter().map(|&wait| (wait, Fraction::ONE.negated()));
+        let minus = bound
+            .minus
+            .iter()
+            .map(|&wait| (wait, Fraction::ONE.negated()));
         for (wait, factor) in signed.chain(minus) {
             let wait = self.waits[wait];
             match self.row_of[wait] {
@@ -317,8 +320,10 @@ impl Durations {
         for &wait in &self.waits {
             let Amount(whole, infinitesimals) = self.value[wait];
             let duration = whole.plus(infinitesimals.times(epsilon)?)?;
-            let common =
-                greatest_common_divisor(ticks_per_unit.unsigned_abs(), duration.under.unsigned_abs());
+            let common = greatest_common_divisor(
+                ticks_per_unit.unsigned_abs(),
+                duration.under.unsigned_abs(),
+            );
             let common = i128::try_from(common).map_err(|_| TooHard)?;
             ticks_per_unit = ticks_per_unit
                 .checked_mul(duration.under / common)
@@ -328,7 +333,9 @@ impl Durations {
         }
         let ticks = durations.iter().map(|one| {
             let ticks = one.over.checked_mul(ticks_per_unit / one.under);
-            ticks.and_then(|ticks| i64::try_from(ticks).ok()).ok_or(TooHard)
+            ticks
+                .and_then(|ticks| i64::try_from(ticks).ok())
+                .ok_or(TooHard)
         });
         let ticks = ticks.collect::<Result<_, _>>()?;
         Ok((ticks, i64::try_from(ticks_per_unit).map_err(|_| TooHard)?))
@@ -422,18 +429,26 @@ mod tests {
             if is_possible {
                 let (ticks, per_unit) = durations.in_ticks().expect("numbers are small");
                 assert!(ticks.iter().all(|&one| one >= 0), "{ticks:?}");
-                assert!(is_met([ticks[0], ticks[1], ticks[2]], per_unit), "{bounds:?} {ticks:?}");
+                assert!(
+                    is_met([ticks[0], ticks[1], ticks[2]], per_unit),
+                    "{bounds:?} {ticks:?}"
+                );
                 found += 1;
             } else {
                 let quarters = 0..=48;
                 let some = quarters.clone().any(|a| {
-                    quarters.clone().any(|b| quarters.clone().any(|c| is_met([a, b, c], 4)))
+                    quarters
+                        .clone()
+                        .any(|b| quarters.clone().any(|c| is_met([a, b, c], 4)))
                 });
                 assert!(!some, "{bounds:?}");
                 none += 1;
             }
         }
-        assert!(found > 50 && none > 50, "{found} with durations, {none} without");
+        assert!(
+            found > 50 && none > 50,
+            "{found} with durations, {none} without"
+        );
     }
 
     #[test]

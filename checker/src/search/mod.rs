@@ -1,5 +1,6 @@
 //! Search over symbolic states: stores, orders, limits, reachability, liveness, extrema and traces.
 
+mod durations;
 mod explore;
 pub mod extremum;
 pub mod goal;

@@ -11,7 +11,10 @@
 //! end the infinitesimal becomes `1 / (n + 1)`, where n is the greatest count: a bound that is not met exactly then has at
 //! least one whole unit of room, which n of them do not fill.
 //!
-//! Invariant: times are the least that satisfy all bounds so far, or the bounds contradict each other.
+//! Where clocks stand still at times, a clock's value is the sum of the waits in which it ran, and bounds become linear in durations
+//! ([`super::durations`]), with the same alternatives.
+//!
+//! Invariant: without such clocks times are the least that satisfy all bounds so far, or the bounds contradict each other.
 //!
 //! Source: R. Dechter, I. Meiri, J. Pearl, "Temporal constraint networks", Artificial Intelligence 49, 1991 (times as shortest
 //! paths, alternatives by backtracking); A. Armando, C. Castellini, E. Giunchiglia, "SAT-based procedures for temporal reasoning",
@@ -28,6 +31,7 @@ use crate::zones::clocks::Assignment;
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone, minimal};
 
+use super::durations::{Durations, LinearBound, TooHard};
 use super::liveness;
 
 /// Alternatives that are tried before a schedule is given up.
@@ -84,8 +88,6 @@ pub struct Schedule {
 /// Why there are no times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unscheduled {
-    /// A clock stands still while time passes.
-    StoppedClock,
     /// The moves are not possible in this order.
     Impossible,
     /// Too many alternatives.
@@ -94,16 +96,28 @@ pub enum Unscheduled {
     Failed(Failure),
 }
 
+impl From<TooHard> for Unscheduled {
+    fn from(_: TooHard) -> Unscheduled {
+        Unscheduled::TooHard
+    }
+}
+
 impl From<Failure> for Unscheduled {
     fn from(failure: Failure) -> Unscheduled {
         Unscheduled::Failed(failure)
     }
 }
 
-/// The earliest times of a run.
+/// The earliest times of a run; if clocks stand still on the way, any times.
 pub fn schedule(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<Schedule, Unscheduled> {
-    let mut plan = Plan::new(symbolic)?;
-    plan.write(wanted)?;
+    let mut plan = Plan::new(symbolic, Solver::Times(Times::new()))?;
+    let written = plan.write(wanted);
+    if plan.meets_stopped {
+        let mut plan = Plan::new(symbolic, Solver::Durations(Durations::default()))?;
+        plan.write(wanted)?;
+        return plan.solve();
+    }
+    written?;
     plan.solve()
 }
 
@@ -118,8 +132,15 @@ struct Distance {
     apart: Time,
 }
 
-/// Ways to satisfy something: all distances of one of them must hold.
-type Alternatives = Vec<Vec<Distance>>;
+/// A bound on times or durations.
+#[derive(Clone, Debug)]
+enum Limit {
+    Apart(Distance),
+    Linear(LinearBound),
+}
+
+/// Ways to satisfy something: all bounds of one of them must hold.
+type Alternatives = Vec<Vec<Limit>>;
 
 /// The run that is being written down.
 struct Plan<'s, 'a> {
@@ -127,11 +148,15 @@ struct Plan<'s, 'a> {
     words: Vec<i32>,
     /// By clock: the event that set it last, and to what; nothing for the reference clock.
     set: Vec<(usize, i64)>,
+    /// By clock: the waits in which it ran since then, if durations are looked for.
+    ran: Vec<Vec<usize>>,
+    /// Whether a clock stands still in some wait.
+    meets_stopped: bool,
     /// The event at which the state at hand was entered or last looked at.
     now: usize,
     /// What must stay in the state at hand.
     keep: Option<Predicate>,
-    times: Times,
+    solver: Solver,
     alternatives: Vec<Alternatives>,
     /// The events of the moves, of the look, and of the end.
     moves: Vec<usize>,
@@ -140,7 +165,7 @@ struct Plan<'s, 'a> {
 }
 
 impl<'s, 'a> Plan<'s, 'a> {
-    fn new(symbolic: &'s mut Symbolic<'a>) -> Result<Plan<'s, 'a>, Unscheduled> {
+    fn new(symbolic: &'s mut Symbolic<'a>, solver: Solver) -> Result<Plan<'s, 'a>, Unscheduled> {
         let (words, _, invariant) = symbolic.start()?;
         let network = symbolic.stepper.network();
         let initial = network.initial_clocks.iter();
@@ -149,10 +174,12 @@ impl<'s, 'a> Plan<'s, 'a> {
         let mut plan = Plan {
             symbolic,
             words,
+            ran: vec![Vec::new(); set.len()],
+            meets_stopped: false,
             set,
             now: 0,
             keep: None,
-            times: Times::new(),
+            solver,
             alternatives: Vec::new(),
             moves: Vec::new(),
             look: 0,
@@ -250,7 +277,7 @@ impl<'s, 'a> Plan<'s, 'a> {
 
     /// A new event, reached by waiting in the state at hand.
     fn wait(&mut self) -> Result<usize, Unscheduled> {
-        let (start, end) = (self.now, self.times.add());
+        let (start, end) = (self.now, self.solver.add_event());
         self.require(Distance {
             earlier: start,
             later: end,
@@ -266,8 +293,16 @@ impl<'s, 'a> Plan<'s, 'a> {
                 })
                 .map(|()| end);
         }
-        if !self.symbolic.stopped(&self.words)?.is_empty() {
-            return Err(Unscheduled::StoppedClock);
+        let stopped = self.symbolic.stopped(&self.words)?;
+        if let Solver::Durations(_) = self.solver {
+            for (clock, ran) in self.ran.iter_mut().enumerate().skip(1) {
+                if !stopped.contains(clock) {
+                    ran.push(start);
+                }
+            }
+        } else if !stopped.is_empty() {
+            self.meets_stopped = true;
+            return Err(Unscheduled::Impossible);
         }
         let whole = self.whole()?;
         let invariant = self.symbolic.invariant(&mut self.words)?;
@@ -319,14 +354,17 @@ impl<'s, 'a> Plan<'s, 'a> {
         self.require_all(event, &effect.guard)?;
         for conjunction in &effect.excluded {
             let broken = conjunction.iter().map(|one| one.negated());
-            let broken = broken.filter_map(|one| self.distance(event, one));
+            let broken = broken.filter_map(|one| self.limit(event, one));
             let broken: Alternatives = broken.map(|one| vec![one]).collect();
             self.alternatives.push(broken);
         }
         self.words = words;
         for assignment in &effect.assignments {
             match *assignment {
-                Assignment::Value { clock, value } => self.set[clock] = (event, i64::from(value)),
+                Assignment::Value { clock, value } => {
+                    self.set[clock] = (event, i64::from(value));
+                    self.ran[clock].clear();
+                }
                 Assignment::Copy {
                     clock,
                     source,
@@ -334,6 +372,8 @@ impl<'s, 'a> Plan<'s, 'a> {
                 } => {
                     let (since, value) = self.set[source];
                     self.set[clock] = (since, value + i64::from(increment));
+                    let ran = self.ran[source].clone();
+                    self.ran[clock] = ran;
                     // No clock is negative.
                     self.require_all(event, &[at_least_zero(clock)])?;
                 }
@@ -346,15 +386,19 @@ impl<'s, 'a> Plan<'s, 'a> {
 
     fn require_all(&mut self, event: usize, all: &[Constraint]) -> Result<(), Unscheduled> {
         for &one in all {
-            if let Some(distance) = self.distance(event, one) {
-                self.require(distance)?;
+            if let Some(limit) = self.limit(event, one) {
+                self.require_limit(&limit)?;
             }
         }
         Ok(())
     }
 
     fn require(&mut self, distance: Distance) -> Result<(), Unscheduled> {
-        if self.times.require(distance) {
+        self.require_limit(&Limit::Apart(distance))
+    }
+
+    fn require_limit(&mut self, limit: &Limit) -> Result<(), Unscheduled> {
+        if self.solver.require(limit)? {
             Ok(())
         } else {
             Err(Unscheduled::Impossible)
@@ -366,16 +410,16 @@ impl<'s, 'a> Plan<'s, 'a> {
         let alternatives: Alternatives = part
             .zones()
             .map(|zone| {
-                let mut distances = Vec::new();
+                let mut limits = Vec::new();
                 minimal::for_each_minimal(zone, part.dimension(), |one| {
-                    distances.extend(self.distance(event, one));
+                    limits.extend(self.limit(event, one));
                 });
-                distances
+                limits
             })
             .collect();
         match alternatives.as_slice() {
             [] => Err(Unscheduled::Impossible),
-            [only] => only.iter().try_for_each(|&distance| self.require(distance)),
+            [only] => only.iter().try_for_each(|limit| self.require_limit(limit)),
             _ => {
                 self.alternatives.push(alternatives);
                 Ok(())
@@ -407,26 +451,57 @@ impl<'s, 'a> Plan<'s, 'a> {
                 let one = Constraint { left, right, bound };
                 one.negated()
             };
-            // A lower bound fails up to the end; an upper one from the start on, and one on a difference all the time.
-            let event = if is_lower { end } else { start };
-            alternatives.extend(self.distance(event, failing).map(|one| vec![one]));
+            // A lower bound fails up to the end, and an upper one from the start on; one on a difference fails all the time if it
+            // does so at both, for it changes in one direction where one of the clocks stands still, and else not at all.
+            let events = match (left, right) {
+                (0, _) => vec![end],
+                (_, 0) => vec![start],
+                _ if matches!(self.solver, Solver::Times(_)) => vec![start],
+                _ => vec![start, end],
+            };
+            let limits = events.into_iter().map(|event| self.limit(event, failing));
+            alternatives.extend(limits.collect::<Option<Vec<Limit>>>());
         }
         if may_meet {
             // No wait meets nothing new.
-            alternatives.push(vec![Distance {
+            alternatives.push(vec![Limit::Apart(Distance {
                 earlier: end,
                 later: start,
                 apart: (0, 0),
-            }]);
+            })]);
         }
         self.alternatives.push(alternatives);
     }
 
-    /// A constraint on the clock values at an event as one on times; `None` for one that says nothing.
-    fn distance(&self, event: usize, one: Constraint) -> Option<Distance> {
+    /// A constraint on the clock values at an event as one on times or durations; `None` for one that says nothing.
+    fn limit(&self, event: usize, one: Constraint) -> Option<Limit> {
         if one.bound.is_infinite() {
             return None;
         }
+        Some(match self.solver {
+            Solver::Times(_) => Limit::Apart(self.distance(event, one)),
+            Solver::Durations(_) => Limit::Linear(self.linear(event, one)),
+        })
+    }
+
+    /// The value of a clock is what it was set to and the waits in which it ran.
+    fn linear(&self, event: usize, one: Constraint) -> LinearBound {
+        let waits = |clock: usize, other: usize| {
+            let ran = self.ran[clock].iter().copied();
+            let ran = ran.filter(|&wait| wait < event);
+            ran.filter(|wait| self.ran[other].binary_search(wait).is_err())
+                .collect()
+        };
+        let offset = |clock: usize| if clock == 0 { 0 } else { self.set[clock].1 };
+        let bound = i64::from(one.bound.value()) - offset(one.left) + offset(one.right);
+        LinearBound {
+            plus: waits(one.right, one.left),
+            minus: waits(one.left, one.right),
+            least: (-bound, i64::from(one.bound.is_strict())),
+        }
+    }
+
+    fn distance(&self, event: usize, one: Constraint) -> Distance {
         // A clock's value is `times[event] - times[since] + offset`.
         let (left, right) = (self.set[one.left], self.set[one.right]);
         let bound = i64::from(one.bound.value());
@@ -435,19 +510,17 @@ impl<'s, 'a> Plan<'s, 'a> {
             (0, _) => (event, right.0, bound + right.1),
             _ => (left.0, right.0, bound - left.1 + right.1),
         };
-        Some(Distance {
+        Distance {
             earlier,
             later,
             apart: (-bound, i64::from(one.bound.is_strict())),
-        })
+        }
     }
 
     fn solve(mut self) -> Result<Schedule, Unscheduled> {
         self.choose()?;
-        let times = &self.times.least;
-        let greatest = times.iter().map(|time| time.1).max().unwrap_or(0);
-        let ticks_per_unit = greatest + 1;
-        let ticks = |event: usize| times[event].0 * ticks_per_unit + times[event].1;
+        let (times, ticks_per_unit) = self.solver.in_ticks()?;
+        let ticks = |event: usize| times[event];
         Ok(Schedule {
             ticks_per_unit,
             moves: self.moves.iter().map(|&event| ticks(event)).collect(),
@@ -461,14 +534,14 @@ impl<'s, 'a> Plan<'s, 'a> {
         // By decision: what is chosen from, which is tried next, and the state before.
         let mut decisions: Vec<(usize, usize, Mark)> = Vec::new();
         let mut attempts = 0;
-        while let Some(violated) = self.first_violated() {
-            decisions.push((violated, 0, self.times.mark()));
+        while let Some(violated) = self.first_violated()? {
+            decisions.push((violated, 0, self.solver.mark()));
             loop {
                 let Some((index, next, mark)) = decisions.last_mut() else {
                     return Err(Unscheduled::Impossible);
                 };
-                self.times.undo(*mark);
-                let Some(distances) = self.alternatives[*index].get(*next) else {
+                self.solver.undo(*mark)?;
+                let Some(limits) = self.alternatives[*index].get(*next) else {
                     decisions.pop();
                     continue;
                 };
@@ -477,7 +550,7 @@ impl<'s, 'a> Plan<'s, 'a> {
                 if attempts > MOST_ATTEMPTS {
                     return Err(Unscheduled::TooHard);
                 }
-                if distances.iter().all(|&one| self.times.require(one)) {
+                if self.solver.require_all(limits)? {
                     break;
                 }
             }
@@ -485,11 +558,124 @@ impl<'s, 'a> Plan<'s, 'a> {
         Ok(())
     }
 
-    fn first_violated(&self) -> Option<usize> {
-        let is_met = |one: &Distance| self.times.is_met(*one);
-        self.alternatives
-            .iter()
-            .position(|ways| !ways.iter().any(|way| way.iter().all(is_met)))
+    fn first_violated(&self) -> Result<Option<usize>, TooHard> {
+        for (index, ways) in self.alternatives.iter().enumerate() {
+            let mut is_met = false;
+            for way in ways {
+                is_met |= self.solver.are_met(way)?;
+            }
+            if !is_met {
+                return Ok(Some(index));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Finds times: the least, from distances alone, or any, from bounds on durations.
+#[derive(Debug)]
+enum Solver {
+    Times(Times),
+    Durations(Durations),
+}
+
+impl Solver {
+    /// Adds an event after a wait; events count from 1, since the start is one.
+    fn add_event(&mut self) -> usize {
+        match self {
+            Solver::Times(times) => times.add(),
+            Solver::Durations(durations) => durations.add_wait() + 1,
+        }
+    }
+
+    fn mark(&self) -> Mark {
+        match self {
+            Solver::Times(times) => times.mark(),
+            Solver::Durations(durations) => Mark {
+                distances: durations.mark(),
+                changes: 0,
+            },
+        }
+    }
+
+    fn undo(&mut self, mark: Mark) -> Result<(), TooHard> {
+        match self {
+            Solver::Times(times) => {
+                times.undo(mark);
+                Ok(())
+            }
+            Solver::Durations(durations) => durations.undo(mark.distances),
+        }
+    }
+
+    /// Adds a bound; returns false if it contradicts the others.
+    fn require(&mut self, limit: &Limit) -> Result<bool, TooHard> {
+        match (self, limit) {
+            (Solver::Times(times), Limit::Apart(distance)) => Ok(times.require(*distance)),
+            (Solver::Durations(durations), limit) => durations.require(&linear(limit)),
+            (Solver::Times(_), Limit::Linear(_)) => Err(TooHard),
+        }
+    }
+
+    fn require_all(&mut self, limits: &[Limit]) -> Result<bool, TooHard> {
+        for limit in limits {
+            if !self.require(limit)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Whether the times at hand satisfy all.
+    fn are_met(&self, limits: &[Limit]) -> Result<bool, TooHard> {
+        for limit in limits {
+            let is_met = match (self, limit) {
+                (Solver::Times(times), Limit::Apart(distance)) => times.is_met(*distance),
+                (Solver::Durations(durations), limit) => durations.is_met(&linear(limit))?,
+                (Solver::Times(_), Limit::Linear(_)) => return Err(TooHard),
+            };
+            if !is_met {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The times of the events in ticks, and how many make a unit.
+    fn in_ticks(&self) -> Result<(Vec<i64>, i64), TooHard> {
+        match self {
+            Solver::Times(Times { least, .. }) => {
+                let greatest = least.iter().map(|time| time.1).max().unwrap_or(0);
+                let ticks_per_unit = greatest + 1;
+                let ticks = least.iter().map(|time| time.0 * ticks_per_unit + time.1);
+                Ok((ticks.collect(), ticks_per_unit))
+            }
+            Solver::Durations(durations) => {
+                let (waits, ticks_per_unit) = durations.in_ticks()?;
+                let mut times = vec![0];
+                for wait in waits {
+                    let before = times.last().copied().unwrap_or(0);
+                    times.push(wait.checked_add(before).ok_or(TooHard)?);
+                }
+                Ok((times, ticks_per_unit))
+            }
+        }
+    }
+}
+
+/// A bound on times as one on durations: the wait with this number leads from the event with this number to the next.
+fn linear(limit: &Limit) -> LinearBound {
+    match limit {
+        Limit::Linear(bound) => bound.clone(),
+        Limit::Apart(Distance {
+            earlier,
+            later,
+            apart,
+        }) => LinearBound {
+            plus: (*earlier..*later).collect(),
+            minus: (*later..*earlier).collect(),
+            least: *apart,
+        },
     }
 }
 
