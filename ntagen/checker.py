@@ -23,6 +23,7 @@ from ntagen.model.facts import (
     Facts,
     Process,
     Query,
+    ScalarSet,
     StateSize,
     Template,
     Variable,
@@ -361,6 +362,11 @@ class Model:
     def features(self) -> tuple[str, ...]:
         """Names of what the model uses beyond plain timed automata, such as ``urgent-channels``."""
         return self.facts.features
+
+    @property
+    def scalar_sets(self) -> tuple[ScalarSet, ...]:
+        """The scalar sets, and whether symmetry reduction applies to them."""
+        return self.facts.scalar_sets
 
     @property
     def state(self) -> StateSize:

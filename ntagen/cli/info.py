@@ -57,6 +57,8 @@ def command(path: Path, as_json: bool, folder: Path | None) -> None:
       clocks     name, process, hybrid
       channels   name, broadcast, urgent, priority
       features   names of what the model uses beyond plain timed automata
+      scalar_sets  size, whether symmetry reduction applies (reduced), else why not (obstacle) and
+                 where (place, at)
       state      words (of 32 bits) of the discrete state: location_, variable_ and meta_words
       queries    text, comment, expect (the verdict that the file states, or null)
       warnings, load_seconds
@@ -101,6 +103,13 @@ def _show(path: Path, model: Model) -> None:
     )
     features = ", ".join(feature.replace("-", " ") for feature in model.features)
     console.print(f"features: {features or 'plain timed automata'}", soft_wrap=True)
+    for one in model.scalar_sets:
+        if one.reduced:
+            reduction = "symmetry reduction exchanges its members"
+        else:
+            where = "" if one.place is None else f", at {one.place}: {one.at}"
+            reduction = f"no symmetry reduction: {one.obstacle}{where}"
+        console.print(f"scalar set of {_count(one.size, 'member')}: {reduction}", soft_wrap=True)
     for table in _tables(model):
         console.print()
         console.print(table)

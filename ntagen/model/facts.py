@@ -237,6 +237,26 @@ class Query:
 
 
 @dataclass(frozen=True, slots=True)
+class ScalarSet:
+    """A scalar set.
+
+    Attributes:
+        size: How many members it has.
+        reduced: Whether states that differ only by exchanged members are one for symmetry
+            reduction.
+        obstacle: Why not, or ``None``.
+        place: Where what tells its members apart stands, as ``file:line:column``, or ``None``.
+        at: The text there, or ``None``.
+    """
+
+    size: int
+    reduced: bool
+    obstacle: str | None = None
+    place: str | None = None
+    at: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Facts:
     """All that is in a model.
 
@@ -247,6 +267,7 @@ class Facts:
         clocks: Without the reference clock.
         channels: In the order of their declarations.
         features: Names of what the model uses beyond plain timed automata.
+        scalar_sets: In the order of their declarations.
         state: How large a state is.
         queries: Those of the file.
     """
@@ -257,6 +278,7 @@ class Facts:
     clocks: tuple[Clock, ...]
     channels: tuple[Channel, ...]
     features: tuple[str, ...]
+    scalar_sets: tuple[ScalarSet, ...]
     state: StateSize
     queries: tuple[Query, ...]
 
@@ -282,6 +304,7 @@ class Facts:
             clocks=tuple(Clock(**entry) for entry in found["clocks"]),
             channels=tuple(Channel(**entry) for entry in found["channels"]),
             features=tuple(found["features"]),
+            scalar_sets=tuple(ScalarSet(**entry) for entry in found["scalar_sets"]),
             state=StateSize(**found["state"]),
             queries=queries_from(found["queries"]),
         )

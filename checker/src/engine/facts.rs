@@ -11,6 +11,8 @@
 //! * `variables`: `name`, `process` (null if global), `type`, `dimensions`, `meta`, `words`; constants are none.
 //! * `clocks`: `name`, `process`, `hybrid`; `channels`: `name`, `broadcast`, `urgent`, `priority`; arrays of both part by part.
 //! * `features`: names of what the model uses beyond plain timed automata.
+//! * `scalar_sets`: `size`, whether symmetry reduction applies (`reduced`), and else why not (`obstacle`, a text) and, if something tells
+//!   members apart, its place and text (`place`, `at`), or null.
 //! * `state`: the 32-bit `words` of the discrete state, and of these the `location_words`, `variable_words`, `meta_words`.
 //! * `queries`: `text`, `comment`, `expect` (the verdict that the file states, or null).
 //! * `warnings` as text, and `load_seconds`.
@@ -20,6 +22,7 @@ use serde_json::{Map, Value as Json, json};
 use super::LoadedModel;
 use crate::diagnostics::{SourceMap, Span};
 use crate::ir::{Features, Network, ProcessId, Shape, Urgency};
+use crate::network::{Obstacle, Symmetry};
 use crate::syntax::ast::{
     Edge, Expectation, Expr, LabelKind, Location, Parameter, Point, QueryText, Template,
 };
@@ -41,11 +44,46 @@ pub fn facts(model: &LoadedModel) -> Json {
         "clocks": clocks(network),
         "channels": channels(network),
         "features": features(model),
+        "scalar_sets": scalar_sets(model),
         "state": state(network),
         "queries": queries(&model.queries),
         "warnings": model.warnings,
         "load_seconds": model.load_seconds,
     })
+}
+
+fn scalar_sets(model: &LoadedModel) -> Vec<Json> {
+    let network = model.network();
+    let sets = network.scalar_sets.iter().zip(Symmetry::obstacles(network));
+    let facts = sets.map(|(set, obstacle)| {
+        let place = match obstacle {
+            Some(Obstacle::ToldApart(span)) => Some(model.place(span)),
+            _ => None,
+        };
+        json!({
+            "size": set.size,
+            "reduced": obstacle.is_none(),
+            "obstacle": obstacle.map(obstacle_text),
+            "place": place.as_ref().map(|(place, _)| place),
+            "at": place.as_ref().map(|(_, text)| text),
+        })
+    });
+    facts.collect()
+}
+
+fn obstacle_text(obstacle: Obstacle) -> String {
+    match obstacle {
+        Obstacle::ToldApart(_) => "something tells its members apart".to_owned(),
+        Obstacle::OneMember => "it has one member".to_owned(),
+        Obstacle::ManyMembers(most) => format!("it has more than {most} members"),
+        Obstacle::OrderedReceivers => {
+            "receivers of a broadcast run updates whose order matters".to_owned()
+        }
+        Obstacle::FirstValues => {
+            "values that never change, or processes, differ between members".to_owned()
+        }
+        Obstacle::Unused => "nothing in a state depends on its members".to_owned(),
+    }
 }
 
 fn template(template: &Template, sources: &SourceMap) -> Json {

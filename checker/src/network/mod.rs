@@ -42,6 +42,7 @@ pub use failure::Failure;
 pub use fixed::FixedMove;
 pub use moves::{MoveRef, Moves, Part};
 pub use offers::{OfferId, VectorId};
+pub use orbits::Obstacle;
 pub use predicate::Extent;
 pub use restriction::{Allowed, Restriction};
 pub use stepper::Stepper;

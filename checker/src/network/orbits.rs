@@ -9,6 +9,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use crate::diagnostics::Span;
 use crate::ir::{AssignedValue, ClockRange, Coordinate, Edge, Network, Process, Shape, Update};
 
 use super::reads::read_words;
@@ -26,33 +27,81 @@ impl Symmetry {
             swaps: Vec::new(),
             dimension: network.clocks.len().max(1),
         };
-        for (number, set) in (0..).zip(&network.scalar_sets) {
-            let is_candidate =
-                set.told_apart_by.is_none() && (2..=MOST_MEMBERS).contains(&set.size);
-            if !is_candidate || has_ordered_receivers(network, number) {
-                continue;
-            }
-            let members = Members {
-                set: number,
-                count: set.size,
-                first: symmetry.sets.iter().map(|set| set.count as usize).sum(),
-                first_swap: symmetry.swaps.len(),
-            };
-            let pairs = (0..set.size).flat_map(|a| (a + 1..set.size).map(move |b| (a, b)));
-            let swaps: Option<Vec<Swap>> = pairs
-                .map(|pair| places.swap(symmetry.sets.len(), members, pair))
-                .collect();
-            if let Some(swaps) = swaps
-                && swaps
-                    .iter()
-                    .any(|swap| !(swap.words.is_empty() && swap.clock_pairs.is_empty()))
-            {
+        for number in 0..network.scalar_sets.len() as u32 {
+            if let Ok((members, swaps)) = symmetry.exchanges_of(&places, number) {
                 symmetry.sets.push(members);
                 symmetry.swaps.extend(swaps);
             }
         }
         (!symmetry.sets.is_empty()).then(|| Arc::new(symmetry))
     }
+
+    /// By scalar set: why it is not reduced, if it is not.
+    pub fn obstacles(network: &Network) -> Vec<Option<Obstacle>> {
+        let places = Places::new(network);
+        let none = Symmetry {
+            sets: Vec::new(),
+            swaps: Vec::new(),
+            dimension: network.clocks.len().max(1),
+        };
+        let sets = 0..network.scalar_sets.len() as u32;
+        sets.map(|number| none.exchanges_of(&places, number).err())
+            .collect()
+    }
+
+    /// The exchanges of the members of a set, which would come after those that are there.
+    fn exchanges_of(
+        &self,
+        places: &Places<'_>,
+        number: u32,
+    ) -> Result<(Members, Vec<Swap>), Obstacle> {
+        let set = &places.network.scalar_sets[number as usize];
+        if let Some(span) = set.told_apart_by {
+            return Err(Obstacle::ToldApart(span));
+        }
+        if set.size < 2 {
+            return Err(Obstacle::OneMember);
+        }
+        if set.size > MOST_MEMBERS {
+            return Err(Obstacle::ManyMembers(MOST_MEMBERS));
+        }
+        if has_ordered_receivers(places.network, number) {
+            return Err(Obstacle::OrderedReceivers);
+        }
+        let members = Members {
+            set: number,
+            count: set.size,
+            first: self.sets.iter().map(|set| set.count as usize).sum(),
+            first_swap: self.swaps.len(),
+        };
+        let pairs = (0..set.size).flat_map(|a| (a + 1..set.size).map(move |b| (a, b)));
+        let swaps: Option<Vec<Swap>> = pairs
+            .map(|pair| places.swap(self.sets.len(), members, pair))
+            .collect();
+        let swaps = swaps.ok_or(Obstacle::FirstValues)?;
+        let moves = |swap: &Swap| !(swap.words.is_empty() && swap.clock_pairs.is_empty());
+        if !swaps.iter().any(moves) {
+            return Err(Obstacle::Unused);
+        }
+        Ok((members, swaps))
+    }
+}
+
+/// Why members of a scalar set are not exchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Obstacle {
+    /// This tells them apart.
+    ToldApart(Span),
+    /// There is only one.
+    OneMember,
+    /// There are more than this number.
+    ManyMembers(u32),
+    /// Receivers of a broadcast run updates whose order matters.
+    OrderedReceivers,
+    /// Processes or values that never change differ.
+    FirstValues,
+    /// Nothing in a state depends on them.
+    Unused,
 }
 
 /// Receivers whose updates read more words count as reading all.

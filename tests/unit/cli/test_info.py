@@ -71,7 +71,7 @@ def test_json_is_one_object_and_nothing_else(
     assert (found["format"], found["version"]) == ("ntagen-model", 1)
     assert set(found) == {
         *("format", "version", "templates", "processes", "variables", "clocks", "channels"),
-        *("features", "state", "queries", "warnings", "load_seconds"),
+        *("features", "scalar_sets", "state", "queries", "warnings", "load_seconds"),
     }
     assert found["templates"][0]["edges"][0]["sync"] == "go[id]!"
     assert found["queries"] == [{"text": "E<> Worker(0).Busy", "comment": "", "expect": None}]
@@ -120,3 +120,26 @@ def test_wrong_input_is_rejected_as_by_check(
     _, machine = info_run(capsys, 2, path, "--json")
     assert "ntagen explain" not in machine
     info_run(capsys, 2, tmp_path / "nothing.xml")
+
+
+@pytest.mark.parametrize(
+    ("function", "reduction"),
+    [
+        ("void act(id i) { last = i; }", "symmetry reduction exchanges its members"),
+        (
+            "void act(id i) { for (j : id) if (seen[j]) last = j; }",
+            "no symmetry reduction: something tells its members apart, at ",
+        ),
+    ],
+)
+def test_scalar_sets_say_whether_they_are_reduced(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], function: str, reduction: str
+) -> None:
+    path = tmp_path / "members.xta"
+    path.write_text(
+        f"typedef scalar[3] id; id last; bool seen[id]; {function}\n"
+        "process P(const id me) { state A; init A; "
+        "trans A -> A { assign act(me), seen[me] = true; }; }\nsystem P;\n"
+    )
+    out, _ = info_run(capsys, 0, path)
+    assert f"scalar set of 3 members: {reduction}" in out
