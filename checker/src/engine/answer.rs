@@ -29,7 +29,7 @@ use super::limits::LimitWatch;
 use super::reachable::reachable;
 use super::values::extremum;
 use super::verification::Verification;
-use super::{Options, games, observed};
+use super::{Options, TraceWanted, games, observed};
 
 /// What a query came out as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -236,6 +236,15 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
         let counters = answer.counters;
         let verdict = Verdict::Unknown(watch.stop());
         answer = new_answer(verdict, Evidence::default(), counters);
+    }
+    let has_best = matches!(
+        query.kind,
+        QueryKind::Reachable(_) | QueryKind::Invariantly(_)
+    );
+    let has_trace = !answer.evidence.witnesses.is_empty();
+    if options.trace != TraceWanted::Any && has_trace && !has_best && answer.message.is_none() {
+        let message = "the trace is any one: shortest and fastest ones are found for E<> and A[]";
+        answer.message = Some(message.to_owned());
     }
     answer.seconds = start.elapsed().as_secs_f64();
     answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);

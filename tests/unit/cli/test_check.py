@@ -305,6 +305,20 @@ def test_members_of_scalar_sets_are_told_apart_only_if_asked(
     assert (answer["verdict"], answer["stored"]) == ("not satisfied", stored)
 
 
+@pytest.mark.parametrize("wanted", ["--shortest", "--fastest"])
+@pytest.mark.parametrize("query", ["E[] !P.Done", "sup: n"])
+def test_traces_that_are_neither_shortest_nor_fastest_say_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], wanted: str, query: str
+) -> None:
+    model = tmp_path / "loop.xta"
+    model.write_text(
+        "int[0,1] n; process P() { state A, Done; init A;"
+        " trans A -> A { assign n = 1 - n; }, A -> Done { }; } system P;"
+    )
+    out, _ = check_run(capsys, 0, model, "--query", query, wanted, "--json")
+    assert "shortest and fastest ones are found for E<> and A[]" in json.loads(out)["message"]
+
+
 SIDE_BY_SIDE = """
 process P() {
   state First, Second, Done;
