@@ -1,13 +1,14 @@
 //! The valuations that nodes win, the rest of them, and where edges lead into either.
 
-use crate::zones::Federation;
+use crate::zones::{Federation, Patience};
 
 use super::graph::{Edge, NONE};
 use super::reach::{Gain, Solver, Win};
 
 impl Solver<'_, '_, '_> {
-    /// Records that these valuations of a node are won; if they are more than before, its predecessors are to be updated.
-    pub(super) fn gain(&mut self, node: u32, mut won: Federation) {
+    /// Records that these valuations of a node are won, unless the patience is over; if they are more than before, its predecessors
+    /// are to be updated.
+    pub(super) fn gain(&mut self, node: u32, mut won: Federation, patience: &mut Patience<'_>) {
         let (mut rest, old_count) = match &self.win[node as usize] {
             Win::Everything => return,
             Win::Part(old) => {
@@ -19,20 +20,26 @@ impl Solver<'_, '_, '_> {
         if !rest.intersects(&won) {
             return;
         }
-        won.reduce();
+        won.reduce_within(patience);
         let is_first = old_count == 0;
         let part = if is_first {
             won.clone()
         } else {
-            rest.intersection(&won)
+            rest.intersection_within(&won, patience)
         };
-        rest.subtract(&won);
+        rest.subtract_within(&won, patience);
+        if patience.is_over() {
+            return;
+        }
         if rest.is_empty() {
             self.rest.remove(&node);
             self.record(node, Win::Everything, (!is_first).then_some(part));
             return;
         }
-        rest.merge();
+        rest.merge_within(patience);
+        if patience.is_over() {
+            return;
+        }
         let new_count = won.zone_count() + part.zone_count() + rest.zone_count();
         self.gained_zones += new_count as u64;
         self.gained_zones -= old_count as u64;

@@ -9,6 +9,7 @@
 
 use crate::network::Failure;
 use crate::search::limits::Watch;
+use crate::zones::Patience;
 
 use super::reach::{Solver, Win};
 
@@ -61,7 +62,14 @@ impl Solver<'_, '_, '_> {
                 match self.quick(node) {
                     Some(true) => gained.push((node, None)),
                     Some(false) => {}
-                    None => gained.push((node, Some(self.winnable(node)?))),
+                    None => {
+                        let (won, reason) = self
+                            .patiently(watch, |solver, patience| solver.winnable(node, patience));
+                        if reason.is_some() {
+                            return Ok(false);
+                        }
+                        gained.push((node, Some(won?)));
+                    }
                 }
                 until_look -= 1;
                 if until_look == 0 {
@@ -76,7 +84,14 @@ impl Solver<'_, '_, '_> {
                 self.stamp = layer;
                 match won {
                     None => self.gain_everything(node),
-                    Some(won) => self.gain(node, won),
+                    Some(won) => {
+                        let gain = |solver: &mut Self, patience: &mut Patience<'_>| {
+                            solver.gain(node, won, patience);
+                        };
+                        if self.patiently(watch, gain).1.is_some() {
+                            return Ok(false);
+                        }
+                    }
                 }
             }
         }

@@ -1,17 +1,21 @@
 //! What a node wins by what is known of its successors: the formulas at the head of [`super::reach`].
 
 use crate::network::Failure;
-use crate::zones::{ClockSet, Federation, past};
+use crate::zones::{ClockSet, Federation, Patience, past};
 
 use super::Player;
 use super::reach::{Solver, Win};
 
 impl Solver<'_, '_, '_> {
     /// The valuations of a node that are won by what is known of its successors.
-    pub(super) fn winnable(&mut self, node: u32) -> Result<Federation, Failure> {
+    pub(super) fn winnable(
+        &mut self,
+        node: u32,
+        patience: &mut Patience<'_>,
+    ) -> Result<Federation, Failure> {
         let mut won = match self.seeker {
-            Player::Controller => self.controllers_gain(node)?,
-            Player::Environment => self.environments_gain(node)?,
+            Player::Controller => self.controllers_gain(node, patience)?,
+            Player::Environment => self.environments_gain(node, patience)?,
         };
         match self.graph.urgent(node) {
             None => won.intersect_zone(self.graph.zone(node)),
@@ -21,7 +25,11 @@ impl Solver<'_, '_, '_> {
     }
 
     /// What the controller wins as the seeker, as far as known.
-    fn controllers_gain(&mut self, node: u32) -> Result<Federation, Failure> {
+    fn controllers_gain(
+        &mut self,
+        node: u32,
+        patience: &mut Patience<'_>,
+    ) -> Result<Federation, Failure> {
         let mut good = self.known(node);
         let goal = self.goal(node);
         let mut bad = self.broken(node);
@@ -33,16 +41,20 @@ impl Solver<'_, '_, '_> {
                 bad.unite(&self.spoiling(&edge));
             }
         }
-        bad.subtract(&goal);
+        bad.subtract_within(&goal, patience);
         let forced = self.forced_environment(node, &bad)?;
         good.unite(&forced);
-        let mut won = self.safe_past(node, good, &bad)?;
+        let mut won = self.safe_past(node, good, &bad, patience)?;
         won.unite(&goal);
         Ok(won)
     }
 
     /// What the environment wins as the seeker, as far as known.
-    fn environments_gain(&mut self, node: u32) -> Result<Federation, Failure> {
+    fn environments_gain(
+        &mut self,
+        node: u32,
+        patience: &mut Patience<'_>,
+    ) -> Result<Federation, Failure> {
         let goal = self.goal(node);
         let mut now = self.broken(node);
         let mut escape = Federation::empty(self.graph.dimension());
@@ -54,14 +66,14 @@ impl Solver<'_, '_, '_> {
                 now.unite(&self.before(&edge, &self.win[edge.target as usize]));
             }
         }
-        now.subtract(&goal);
+        now.subtract_within(&goal, patience);
         let mut good = self.forced_controller(node)?;
-        good.subtract(&escape);
+        good.subtract_within(&escape, patience);
         good.unite(&now);
         good.unite(&self.known(node));
-        escape.subtract(&now);
+        escape.subtract_within(&now, patience);
         escape.unite(&goal);
-        self.safe_past(node, good, &escape)
+        self.safe_past(node, good, &escape, patience)
     }
 
     /// What was won in a node so far, as far as it is a part of it.
@@ -78,15 +90,16 @@ impl Solver<'_, '_, '_> {
         node: u32,
         mut good: Federation,
         bad: &Federation,
+        patience: &mut Patience<'_>,
     ) -> Result<Federation, Failure> {
         if self.graph.nodes[node as usize].delays {
             if let Some(urgent) = self.graph.urgent(node) {
                 return Ok(urgent.predecessors(&good, bad));
             }
             let stopped = self.stopped(node)?;
-            return Ok(past::predecessors(&good, bad, &stopped));
+            return Ok(past::predecessors_within(&good, bad, &stopped, patience));
         }
-        good.subtract(bad);
+        good.subtract_within(bad, patience);
         Ok(good)
     }
 

@@ -44,7 +44,7 @@ use rustc_hash::FxHashMap;
 
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
-use crate::zones::{Bound, Federation};
+use crate::zones::{Bound, Federation, Patience};
 
 use super::dives::Frontier;
 use super::graph::{Graph, Standing};
@@ -63,7 +63,7 @@ const BETWEEN_COMPUTATIONS: u64 = 4;
 /// Updates by words between two looks at the limits, where no node is expanded.
 const UPDATES_BETWEEN_LOOKS: u32 = 1024;
 
-/// Computations with zones between two looks at the limits.
+/// Computations with few zones between two looks at the limits.
 const COMPUTATIONS_BETWEEN_LOOKS: u32 = 16;
 
 /// The valuations of a node from which the seeker wins.
@@ -205,8 +205,12 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             waiting: self.frontier.len() as u64,
             bytes: self.graph.bytes()
                 + (self.win.capacity() * (size_of::<Win>() + size_of::<Vec<Gain>>() + 2)) as u64
-                + self.gained_zones * (self.graph.dimension().pow(2) * size_of::<Bound>()) as u64,
+                + self.gained_zones * self.zone_bytes(),
         }
+    }
+
+    fn zone_bytes(&self) -> u64 {
+        (self.graph.dimension().pow(2) * size_of::<Bound>()) as u64
     }
 
     /// Solves the game.
@@ -281,7 +285,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 continue;
             }
             self.pending[node as usize] = Pending::No;
-            self.compute(node)?;
+            if let Some(reason) = self.compute(node, watch)? {
+                return Ok(Some(reason));
+            }
             until_look -= 1;
             if until_look == 0 {
                 until_look = COMPUTATIONS_BETWEEN_LOOKS;
@@ -533,13 +539,41 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         None
     }
 
+    /// Does something with zones unless, or until, the watch gives a reason to stop; then the result is of no use.
+    pub(super) fn patiently<R>(
+        &mut self,
+        watch: &mut dyn Watch,
+        work: impl FnOnce(&mut Self, &mut Patience<'_>) -> R,
+    ) -> (R, Option<StopReason>) {
+        let counters = self.counters();
+        let zone_bytes = self.zone_bytes();
+        let mut reason = None;
+        let mut goes_on = |zones: usize| {
+            let bytes = counters.bytes + zones as u64 * zone_bytes;
+            reason = watch.look(&Counters { bytes, ..counters });
+            reason.is_none()
+        };
+        let mut patience = Patience::as_long_as(&mut goes_on);
+        let result = work(self, &mut patience);
+        (result, reason)
+    }
+
     /// Computes the winning valuations of a node anew.
-    fn compute(&mut self, node: u32) -> Result<(), Failure> {
-        let won = self.winnable(node)?;
-        self.gain(node, won);
+    fn compute(&mut self, node: u32, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
+        let (result, reason) = self.patiently(watch, |solver, patience| {
+            let won = solver.winnable(node, patience)?;
+            if !patience.is_over() {
+                solver.gain(node, won, patience);
+            }
+            Ok::<_, Failure>(())
+        });
+        result?;
+        if reason.is_some() {
+            return Ok(reason);
+        }
         if !matches!(self.win[node as usize], Win::Everything) {
             self.note_spoilers(node);
         }
-        Ok(())
+        Ok(None)
     }
 }

@@ -19,7 +19,7 @@
 
 use crate::network::Failure;
 use crate::search::limits::Watch;
-use crate::zones::Federation;
+use crate::zones::{Federation, Patience};
 
 use super::Player;
 use super::graph::Standing;
@@ -161,5 +161,5 @@ pub(super) fn leave(
     let mut held = solver.forced_controller(node)?;
     held.subtract(&back);
     out.unite(&held);
-    solver.safe_past(node, out, &back)
+    solver.safe_past(node, out, &back, &mut Patience::endless())
 }

@@ -18,7 +18,7 @@
 use super::clocks::{self, Assignment};
 use super::dbm::{self, Constraint, Relation};
 use super::rows::rows;
-use super::{Bound, ClockSet, Zone, minimal};
+use super::{Bound, ClockSet, Patience, Zone, minimal};
 
 /// A finite union of zones of the same dimension.
 #[derive(Clone, Debug)]
@@ -114,8 +114,21 @@ impl Federation {
     /// The valuations in both.
     #[must_use]
     pub fn intersection(&self, other: &Federation) -> Federation {
+        self.intersection_within(other, &mut Patience::endless())
+    }
+
+    /// As [`Federation::intersection`], with limited patience.
+    #[must_use]
+    pub fn intersection_within(
+        &self,
+        other: &Federation,
+        patience: &mut Patience<'_>,
+    ) -> Federation {
         let mut result = Federation::empty(self.dimension);
         for zone in other.zones() {
+            if patience.ends_with(self.zone_count() + result.zone_count()) {
+                break;
+            }
             let mut part = self.clone();
             part.intersect_zone(zone);
             result.unite(&part);
@@ -206,7 +219,15 @@ impl Federation {
 
     /// Removes the valuations of another federation.
     pub fn subtract(&mut self, other: &Federation) {
+        self.subtract_within(other, &mut Patience::endless());
+    }
+
+    /// As [`Federation::subtract`], with limited patience.
+    pub fn subtract_within(&mut self, other: &Federation, patience: &mut Patience<'_>) {
         for zone in other.zones() {
+            if patience.ends_with(self.zone_count()) {
+                return;
+            }
             self.subtract_zone(zone);
         }
     }
@@ -291,25 +312,38 @@ impl Federation {
     /// Makes the description shorter: joins pairs of zones whose union is a zone, and removes zones that the rest
     /// covers. The set stays the same.
     pub fn reduce(&mut self) {
-        self.merge();
-        self.remove_covered();
+        self.reduce_within(&mut Patience::endless());
+    }
+
+    /// As [`Federation::reduce`], with limited patience.
+    pub fn reduce_within(&mut self, patience: &mut Patience<'_>) {
+        self.merge_within(patience);
+        self.remove_covered(patience);
     }
 
     /// Makes the description shorter as [`Federation::reduce`] does, but leaves zones that only several others cover. Cheaper.
     pub fn merge(&mut self) {
+        self.merge_within(&mut Patience::endless());
+    }
+
+    /// As [`Federation::merge`], with limited patience.
+    pub fn merge_within(&mut self, patience: &mut Patience<'_>) {
         self.remove_included();
-        self.join_pairs();
+        self.join_pairs(patience);
     }
 
     /// Replaces pairs of zones by their hull where that adds no valuation, until there is no such pair.
     ///
     /// Zones enter one by one; one that joins with another enters again as their hull.
-    fn join_pairs(&mut self) {
+    fn join_pairs(&mut self, patience: &mut Patience<'_>) {
         let size = self.size();
         let zones = std::mem::take(&mut self.bounds);
         let mut entering = vec![Bound::LE_ZERO; size];
         let mut hull = entering.clone();
         for zone in zones.chunks_exact(size) {
+            if patience.ends_with(self.zone_count()) {
+                return;
+            }
             entering.copy_from_slice(zone);
             while let Some(index) = self
                 .zones()
@@ -323,10 +357,13 @@ impl Federation {
     }
 
     /// Removes the zones that all others together cover.
-    fn remove_covered(&mut self) {
+    fn remove_covered(&mut self, patience: &mut Patience<'_>) {
         let size = self.size();
         let mut index = 0;
         while index < self.zone_count() && self.zone_count() > 1 {
+            if patience.ends_with(self.zone_count()) {
+                return;
+            }
             let zone: Vec<Bound> = self
                 .bounds
                 .drain(index * size..(index + 1) * size)

@@ -19,7 +19,7 @@
 //! Timed Games", CONCUR 2005, section 4.
 
 use super::federation::Federation;
-use super::{Bound, ClockSet, clocks, dbm};
+use super::{Bound, ClockSet, Patience, clocks, dbm};
 
 /// Subtracting a zone can multiply the zones of the rest, reducing costs the square of their number: from about this
 /// many zones on, reducing first was faster on random federations.
@@ -28,6 +28,17 @@ const WORTH_REDUCING: usize = 16;
 /// The safe timed predecessors of `good` with respect to `bad`, with the clocks of `stopped` at rest.
 #[must_use]
 pub fn predecessors(good: &Federation, bad: &Federation, stopped: &ClockSet) -> Federation {
+    predecessors_within(good, bad, stopped, &mut Patience::endless())
+}
+
+/// As [`predecessors`], with limited patience.
+#[must_use]
+pub fn predecessors_within(
+    good: &Federation,
+    bad: &Federation,
+    stopped: &ClockSet,
+    patience: &mut Patience<'_>,
+) -> Federation {
     let dimension = good.dimension();
     let with_past = |zone| WithPast::new(zone, dimension, stopped);
     let bad: Vec<WithPast> = bad.zones().map(with_past).collect();
@@ -35,16 +46,19 @@ pub fn predecessors(good: &Federation, bad: &Federation, stopped: &ClockSet) -> 
     for good in good.zones().map(with_past) {
         let mut lost = Federation::empty(dimension);
         for bad in &bad {
+            if patience.ends_with(result.zone_count() + lost.zone_count()) {
+                return result;
+            }
             // Where the pasts do not meet, this bad zone forbids nothing.
             if !dbm::are_apart(&good.past, &bad.past, dimension) {
                 lost.unite(&lost_to(&good, bad, dimension, stopped));
             }
         }
         if lost.zone_count() > WORTH_REDUCING {
-            lost.reduce();
+            lost.reduce_within(patience);
         }
         let mut safe = Federation::of_zone(dimension, &good.past);
-        safe.subtract(&lost);
+        safe.subtract_within(&lost, patience);
         result.unite(&safe);
     }
     result
