@@ -59,7 +59,7 @@ _ReachedEntry = tuple[
 MAX_PLANS = 1_000_000
 """Plans that are listed at most, unless the caller says otherwise."""
 
-_GAME = re.compile(r"\s*(strategy\s+\w+\s*=\s*)?(\{[^{}]*\}\s*)?control(_t\*|\b)")
+_GAME = re.compile(r"\s*(strategy\s+\w+\s*=\s*)?(\{[^{}]*\}\s*)?(E\s*<>\s*)?control(_t\*|\b)")
 """How a query begins that asks for a strategy."""
 
 _PROCESSES_SHOWN = 5

@@ -19,7 +19,7 @@ from typing import Any, Literal, Protocol
 from ntagen import _checker
 from ntagen.errors import InputError, ModelError, UndecidedError
 from ntagen.play import Play
-from ntagen.runs import Edge, State, edge_of
+from ntagen.runs import Edge, Run, State, edge_of, runs_of
 
 __all__ = ["Advice", "Decision", "Discrete", "Strategy", "StrategyState", "Verification"]
 
@@ -178,6 +178,24 @@ class Strategy:
 
     def __iter__(self) -> Iterator[StrategyState]:
         return map(_state, json.loads(self.json())["states"])
+
+    @property
+    def start(self) -> Literal["initial", "anywhere"] | Run:
+        """Where play by it begins.
+
+        In the initial state; or, of ``E<> control:``, where both players together get to by a run,
+        if the controller wins; and ``anywhere`` that can be reached if the environment does.
+
+        Raises:
+            InputError: The run is not possible in the model.
+            ModelError: The model fails on the way.
+        """
+        with _rejecting():
+            start: Literal["initial", "anywhere"] | dict[str, Any] | None
+            start = json.loads(self._raw.start_json(self.priorities))
+        if start is None:
+            raise InputError("the way to where the strategy begins is not possible in the model")
+        return runs_of(start)[0] if isinstance(start, dict) else start
 
     def at(self, state: StateLike | Discrete) -> StrategyState:
         """What it says of the locations and variables of a state; clocks are not looked at.

@@ -257,21 +257,6 @@ fn strategies_are_saved_and_loaded_beside_the_model() {
     std::fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
-#[test]
-fn questions_without_a_strategy_say_so() {
-    let text = "clock x; process P() { state A { x <= 2 }, B; init A; trans A -> B { guard x >= 1; }; } system P;";
-    let mut model = LoadedModel::load("model.xta", text.as_bytes()).expect("the model is right");
-    let query = model.add_query("strategy S = E<> control: A<> P.B");
-    let options = Options {
-        code: CodeEngine::Interpreter,
-        strategy: true,
-        ..Options::default()
-    };
-    let answer = model.check(&query, &options).expect("it is accepted");
-    let message = answer.message.unwrap_or_default();
-    assert!(message.contains("gives no strategy"), "{message}");
-}
-
 const RACE: &str = "clock x; process P() { state A { x <= 5 }, B, C; init A; trans A -> B { guard x >= 1; }, B -> C { }; } system P;";
 
 /// Under the strategy of a time-optimal game, the goal comes within the time; traces are about the model, without the clock.

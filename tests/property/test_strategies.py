@@ -30,7 +30,9 @@ def queries() -> list[tuple[Path, str]]:
     """The games of the corpus that are asked without options."""
     found: list[tuple[Path, str]] = []
     for path in sorted(GAMES.glob("*.xta")):
-        asked = re.findall(r"^// query: (control.*)$", path.read_text("utf-8"), re.MULTILINE)
+        asked = re.findall(
+            r"^// query: ((?:E<> )?control.*)$", path.read_text("utf-8"), re.MULTILINE
+        )
         found += [(path, query) for query in asked if " under " not in query]
     return found
 
@@ -148,6 +150,8 @@ QUERIES = [
     "control: A[ not Q.L1 W P.L2 ]",
     "control: A[] (not Q.L1 && A<> P.L2)",
     "control_t*: A<> P.L2",
+    "E<> control: A[ not Q.L1 U P.L2 ]",
+    "E<> control: A[] not Q.L1",
     "control_t*(3): A[ not Q.L1 U P.L2 ]",
     "control_t*(4, 1): A<> P.L2",
 ]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import ntagen
-from ntagen.runs import Choice, State
+from ntagen.runs import Choice, Run, State
 
 FEEDER = """
 clock x;
@@ -205,8 +205,6 @@ def test_what_gives_no_strategy_says_so() -> None:
     model = ntagen.load(FEEDER)
     with pytest.raises(ntagen.InputError, match="asks for no strategy"):
         model.synthesize("A<> M.Full")
-    with pytest.raises(ntagen.InputError, match="asks for no strategy"):
-        model.synthesize("E<> control: A<> M.Full")
     with pytest.raises(ntagen.NtagenError, match="stopped by the limit of states"):
         ntagen.load(COUNTER).synthesize("control: A<> n == 30000", states=100)
     with pytest.raises(ntagen.RejectedError):
@@ -271,6 +269,73 @@ def test_strategies_within_a_time_are_saved_and_played(tmp_path: Path) -> None:
     other = hasty | {"query": "control_t*(1): A<> M.Full", "time_limit": 2}
     path.write_text(json.dumps(other))
     strategy = ntagen.load_strategy(path, model)
-    assert strategy.verify().lines[0].endswith("it is for another limit of time than the query")
-    with pytest.raises(ntagen.InputError, match="for another limit of time than"):
+    assert (
+        strategy.verify()
+        .lines[0]
+        .endswith("it is for another start or limit of time than the query")
+    )
+    with pytest.raises(ntagen.InputError, match="for another start or limit of time than"):
         strategy.play()
+
+
+HELP = """
+process P() {
+  clock x;
+  state Shut, Open { x <= 5 }, G, Bad;
+  init Shut;
+  trans Shut -u-> Open { guard x >= 2; assign x = 0; },
+        Open -> G { guard x >= 1; },
+        Open -u-> Bad { guard x >= 3; };
+}
+system P;
+"""
+
+
+def test_strategies_after_help_begin_where_it_leads(tmp_path: Path) -> None:
+    model = ntagen.load(HELP)
+    query = "E<> control: A<> P.G"
+    strategy = model.synthesize(query, verify=True)
+    assert strategy.winning
+    start = strategy.start
+    assert isinstance(start, Run)
+    assert [str(step) for step in start.steps] == ["wait 2, then P.Shut -> P.Open"]
+    assert strategy.action({"P": "Open", "P.x": 0}).delay == 1
+    with pytest.raises(ntagen.UndecidedError):
+        strategy.action({"P": "Shut", "P.x": 0})
+    path = tmp_path / "strategy.json"
+    strategy.save(path)
+    again = ntagen.load_strategy(path, ntagen.load(HELP))
+    assert again.start == start
+    assert again.verify().holds
+    assert again.json() == strategy.json()
+    play = again.play()
+    assert (len(play), play.state.locations) == (0, {"P": "Open"})
+    play.undo(0)
+    play.follow()
+    assert play.situation().winner == "controller"
+    log = play.trace_json()
+    assert log is not None
+    assert model.verify(log).holds
+    raw = json.loads(path.read_text())
+    raw["start"]["steps"][0]["wait"] = 0
+    path.write_text(json.dumps(raw))
+    hasty = ntagen.load_strategy(path, model)
+    assert hasty.verify().lines[0].endswith("the way to where it begins is not possible")
+    with pytest.raises(ntagen.InputError, match="the way to where the strategy begins"):
+        hasty.play()
+    with pytest.raises(ntagen.InputError, match="the way to where the strategy begins"):
+        _ = hasty.start
+    raw["start"]["kind"] = "sometime"
+    path.write_text(json.dumps(raw))
+    with pytest.raises(ntagen.RejectedError, match=r"at start\.kind: play does not begin sometime"):
+        ntagen.load_strategy(path, model)
+
+
+def test_no_help_is_of_use_against_a_strategy_from_everywhere() -> None:
+    model = ntagen.load(HELP)
+    strategy = model.synthesize("E<> control: A<> P.G && P.x < 1", verify=True)
+    assert (strategy.owner, strategy.start) == ("environment", "anywhere")
+    assert strategy.at({"P": "Open"}).decisions
+    assert strategy.verify().holds
+    assert strategy.play().state.locations == {"P": "Shut"}
+    assert model.synthesize("control: A<> P.Bad").start == "initial"

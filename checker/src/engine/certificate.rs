@@ -482,7 +482,7 @@ fn run_of(network: &Network, run: &Json) -> Option<Run> {
     })
 }
 
-fn part_of(network: &Network, part: &Json) -> Option<Part> {
+pub(super) fn part_of(network: &Network, part: &Json) -> Option<Part> {
     let name = part["process"].as_str()?;
     let process = network.processes.iter().position(|one| one.name == name)?;
     let number = |key: &str| u32::try_from(part[key].as_u64()?).ok();

@@ -12,14 +12,14 @@ use std::fmt::{Display, Write as _};
 use std::hash::Hash;
 
 use crate::game::Player;
-use crate::game::strategy::{Selection, Strategy};
+use crate::game::strategy::{Selection, Start, Strategy};
 use crate::ir::Network;
 use crate::network::Part;
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, minimal};
 
 use super::decision_table::{self, Entry, Rule};
-use super::{describe, timing};
+use super::{describe, strategy_text, timing};
 
 /// What does not depend on the strategy.
 const RUNTIME: &str = include_str!("controller_runtime.c");
@@ -319,6 +319,17 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
         "/* A strategy of {owner} for\n *     {}\n * ({which}), written by ntagen.\n *\n",
         comment(query)
     );
+    match &strategy.start {
+        Start::Initial => {}
+        Start::Anywhere => text.push_str(" * It begins in any state that can be reached.\n *\n"),
+        Start::After(way) => {
+            text.push_str(" * It begins after these steps of both players:\n");
+            for line in strategy_text::way_lines(network, way).lines() {
+                let _ = writeln!(text, " *     {}", comment(line));
+            }
+            text.push_str(" *\n");
+        }
+    }
     text.push_str(
         " * controller_decide(state, clocks) says what to do: an action, by its number (controller_texts has its edges), or\n\
          \x20*   CONTROLLER_WAIT  to make no move: for the time `wait` (for ever if that is negative), and at the moment itself\n\

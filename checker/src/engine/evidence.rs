@@ -166,7 +166,7 @@ impl From<Unscheduled> for Missing {
 }
 
 /// A run with the earliest times.
-fn timed(
+pub(super) fn timed(
     symbolic: &mut Symbolic<'_>,
     moves: &[Vec<Part>],
     stays: Option<Stays<'_>>,

@@ -139,6 +139,7 @@ pub(super) fn fastest(
                     if options.verify {
                         let asked = Asked {
                             objective: race.objective,
+                            is_cooperative: false,
                             time_optimal: Some((race.limit, race.rest)),
                         };
                         let verification = games::verified(network, asked, &strategy, options);

@@ -15,6 +15,7 @@ use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic, predi
 use crate::search::limits::{Counters, StopReason, Watch};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
+use super::cooperation;
 use super::limits::LimitWatch;
 use super::verification::{self, Asked, Played, Verification};
 use super::{Options, PlansWanted};
@@ -211,15 +212,17 @@ fn played(
         }
     };
     let is_recurring = matches!(objective, Objective::Buchi(..));
-    let is_strategy_wanted = (options.strategy || options.verify) && !is_cooperative;
+    let is_strategy_wanted = options.strategy || options.verify;
     let wanted = GameObjective {
         goal,
         keep,
         must_progress: seeker == Player::Controller,
         deadline: None,
-        // The most permissive strategy says what to do there too.
-        leaves_dead_ends: !is_recurring && (!is_strategy_wanted || seeker == Player::Controller),
+        // The most permissive strategy says what to do there too, and so does one that begins anywhere.
+        leaves_dead_ends: !is_recurring
+            && (!is_strategy_wanted || (seeker == Player::Controller && !is_cooperative)),
     };
+    let mut zones_for_ways = symbolic.another();
     let plain = |verdict, counters| (new_answer(verdict, Evidence::default(), counters), false);
     let graph = match nodes {
         Nodes::Automatic | Nodes::Symbolic => Graph::new(&mut symbolic, wanted),
@@ -236,6 +239,9 @@ fn played(
     let is_planned = options.plans != PlansWanted::No
         && matches!(objective, Objective::Reach(_) | Objective::Until(..))
         && !is_cooperative;
+    if is_cooperative && is_strategy_wanted {
+        solver.graph.leave_out_chains();
+    }
     let extent = match options.plans {
         PlansWanted::All(_) if is_planned => Extent::Everything,
         // A strategy that keeps out of what was not explored would not be the most permissive one.
@@ -274,29 +280,36 @@ fn played(
     if solver.graph.symbolic.ignores_priorities() {
         answer.message = Some(IGNORED_PRIORITIES.to_owned());
     }
-    if is_cooperative && (options.strategy || options.verify) {
-        let message = "E<> control: gives no strategy, since both sides have to help on the way: ask control: of a model that starts where the controller wins";
-        answer.message = Some(message.to_owned());
-    }
     if is_planned {
         add_plans(&mut answer, &mut solver, options);
     }
     if is_strategy_wanted {
-        match solver.explore_dead_ends(watch) {
-            Ok(None) => answer.counters = solver.counters(),
-            Ok(Some(reason)) => return plain(Verdict::Unknown(reason), solver.counters()),
-            Err(failure) => return plain(Verdict::Error(failure), solver.counters()),
-        }
-        let layered = solver.put_into_layers(watch);
-        let strategy = layered.and_then(|()| match winner {
-            Player::Environment if is_recurring => denial::extract(&mut solver, &rounds),
-            _ => strategy::extract(&mut solver),
-        });
+        let strategy = if is_cooperative {
+            let denied = is_recurring.then_some(&rounds[..]);
+            let zones = &mut zones_for_ways;
+            cooperation::strategy(&mut solver, (winner, denied), zones, options, watch)
+        } else {
+            match solver.explore_dead_ends(watch) {
+                Ok(None) => answer.counters = solver.counters(),
+                Ok(Some(reason)) => return plain(Verdict::Unknown(reason), solver.counters()),
+                Err(failure) => return plain(Verdict::Error(failure), solver.counters()),
+            }
+            let layered = solver.put_into_layers(watch);
+            let strategy = layered.and_then(|()| match winner {
+                Player::Environment if is_recurring => {
+                    denial::extract(&mut solver, &rounds, vec![0])
+                }
+                _ => strategy::extract(&mut solver),
+            });
+            strategy.map(Ok)
+        };
         match strategy {
-            Ok(strategy) => {
+            Ok(Err(reason)) => answer.message = Some(format!("no strategy: {reason}")),
+            Ok(Ok(strategy)) => {
                 if options.verify {
                     let asked = Asked {
                         objective,
+                        is_cooperative,
                         time_optimal: None,
                     };
                     let verification = verified(network, asked, &strategy, options);

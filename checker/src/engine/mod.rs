@@ -6,6 +6,7 @@
 pub mod answer;
 pub mod certificate;
 pub mod controller;
+mod cooperation;
 pub mod decision_table;
 pub mod describe;
 pub mod evidence;

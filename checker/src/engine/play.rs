@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde_json::{Map, Value as Json, json};
 
 use crate::game::closed_loop;
-use crate::game::strategy::{Selection, Strategy};
+use crate::game::strategy::{Selection, Start, Strategy};
 use crate::game::{Forced, Player, Priorities};
 use crate::ir::{Network, Query};
 use crate::verify::play::{self, Ending, Gap, Next, Situation, Timing, Window};
@@ -87,10 +87,23 @@ impl Follower {
             owner: self.strategy.owner,
             selection: self.strategy.selection,
             time_limit: self.strategy.time_limit,
+            start: Start::Initial,
             states: states
                 .map(|&index| self.strategy.states[index as usize].clone())
                 .collect(),
         }
+    }
+
+    /// Where play begins, as JSON: "initial", "anywhere", or the run that leads there; null if it is not possible.
+    pub fn start(&self, network: &Network, priorities: Priorities) -> Result<Json, verify::Error> {
+        Ok(match &self.strategy.start {
+            Start::Initial => json!("initial"),
+            Start::Anywhere => json!("anywhere"),
+            Start::After(way) => match verification::follow(network, way, priorities)? {
+                Some((run, states)) => json!({ "run": json::run(network, &run, &states) }),
+                None => Json::Null,
+            },
+        })
     }
 
     /// The entry of the strategy's file for the locations and variables of this JSON.
@@ -263,13 +276,15 @@ pub enum Done {
     Allowed(usize),
 }
 
-/// A play against a strategy, from the initial state.
+/// A play against a strategy, from where that begins.
 #[derive(Debug)]
 pub struct Play {
     follower: Arc<Follower>,
     query: Query,
     query_text: String,
     rules: (Forced, Priorities),
+    /// How many steps lead to where it begins.
+    start: usize,
     states: Vec<Timed>,
     /// Between the states: the wait in ticks of the state before, doubled, and the edges; none if it is a wait alone.
     steps: Vec<(i64, Vec<Part>)>,
@@ -295,31 +310,68 @@ impl LoadedModel {
                 text.text
             )));
         };
-        let (owner, time_limit) = (follower.strategy.owner, follower.strategy.time_limit);
-        match verification::is_for_time(self.network(), asked, owner, time_limit) {
+        let strategy = &follower.strategy;
+        let facts = (strategy.owner, &strategy.start, strategy.time_limit);
+        match verification::is_for(self.network(), asked, facts) {
             Ok(true) => {}
             Ok(false) => {
                 return Err(rejection(format!(
-                    "error: the strategy is for another limit of time than {}",
+                    "error: the strategy is for another start or limit of time than {}",
                     text.text
                 )));
             }
             Err(error) => return Ok(Err(error)),
         }
-        let network = timing::network_of(self.network(), &follower.strategy);
-        let initial = Semantics::new(&network, 1).initial();
-        Ok(initial.map(|state| Play {
+        let network = timing::network_of(self.network(), strategy);
+        let (states, steps) = match beginning(&network, &strategy.start, rules.1) {
+            Ok(Some(beginning)) => beginning,
+            Ok(None) => {
+                let message = "error: the way to where the strategy begins is not possible";
+                return Err(rejection(message.to_owned()));
+            }
+            Err(error) => return Ok(Err(error)),
+        };
+        Ok(Ok(Play {
+            start: steps.len(),
             follower,
             query,
             query_text: text.text,
             rules,
-            states: vec![Timed {
-                state,
-                ticks_per_unit: 1,
-            }],
-            steps: Vec::new(),
+            states,
+            steps,
         }))
     }
+}
+
+/// States, and the steps between them.
+type History = (Vec<Timed>, Vec<(i64, Vec<Part>)>);
+
+/// The states and steps with which a play begins; `None` if they are not possible.
+fn beginning(
+    network: &Network,
+    start: &Start,
+    priorities: Priorities,
+) -> Result<Option<History>, verify::Error> {
+    let Start::After(way) = start else {
+        let first = Timed {
+            state: Semantics::new(network, 1).initial()?,
+            ticks_per_unit: 1,
+        };
+        return Ok(Some((vec![first], Vec::new())));
+    };
+    let Some((run, states)) = verification::follow(network, way, priorities)? else {
+        return Ok(None);
+    };
+    let states = states.into_iter().map(|state| Timed {
+        state,
+        ticks_per_unit: way.ticks_per_unit,
+    });
+    let moves = run.steps.into_iter();
+    let mut steps: Vec<_> = moves.map(|step| (2 * step.wait, step.parts)).collect();
+    if way.wait > 0 {
+        steps.push((2 * way.wait, Vec::new()));
+    }
+    Ok(Some((states.collect(), steps)))
 }
 
 impl Play {
@@ -346,9 +398,9 @@ impl Play {
         play::look(&game.network, &decisions, &claim, timed)
     }
 
-    /// How many steps were made.
+    /// How many steps were made since it began.
     pub fn length(&self) -> usize {
-        self.steps.len()
+        self.steps.len() - self.start
     }
 
     /// The state as JSON, and how many of its ticks make a unit of time.
@@ -477,8 +529,8 @@ impl Play {
 
     /// Takes the last steps back until only so many are left.
     pub fn undo(&mut self, length: usize) {
-        self.steps.truncate(length);
-        self.states.truncate(length + 1);
+        self.steps.truncate(self.start + length);
+        self.states.truncate(self.start + length + 1);
     }
 
     /// The play so far as a trace that [`LoadedModel::verify_evidence`] checks; `None` if its times have no common resolution.

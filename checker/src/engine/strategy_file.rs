@@ -7,11 +7,12 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use crate::game::strategy::{Decision, Selection, Strategy, StrategyState};
+use crate::game::strategy::{Decision, Selection, Start, Strategy, StrategyState, Way};
 use crate::game::{Player, closed_loop};
 use crate::ir::{EdgeId, Network, Shape};
 use crate::network::Part;
 use crate::network::selects::{select_count, select_values};
+use crate::verify::timed::MOST_TICKS_PER_UNIT;
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
 
@@ -69,6 +70,22 @@ pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
     });
     if let Some(limit) = strategy.time_limit {
         file["time_limit"] = json!(limit);
+    }
+    match &strategy.start {
+        Start::Initial => {}
+        Start::Anywhere => file["start"] = json!({ "kind": "anywhere" }),
+        Start::After(way) => {
+            let moves = way
+                .moves
+                .iter()
+                .map(|(wait, parts)| json!({ "wait": wait, "edges": json::parts(network, parts) }));
+            file["start"] = json!({
+                "kind": "after",
+                "ticks_per_unit": way.ticks_per_unit,
+                "steps": moves.collect::<Vec<_>>(),
+                "wait": way.wait,
+            });
+        }
     }
     file
 }
@@ -146,12 +163,60 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
         owner,
         selection,
         time_limit,
+        start: start(network, &file)?,
         states: Vec::new(),
     };
     for state in whole.list("states")? {
         strategy.states.push(reader.state(&state)?);
     }
     Ok((query, strategy))
+}
+
+/// Where play begins.
+fn start(network: &Network, file: &Json) -> Result<Start, Mismatch> {
+    let at = match file.get("start") {
+        None | Some(Json::Null) => return Ok(Start::Initial),
+        Some(start) => At(start, "start".to_owned()),
+    };
+    match at.text("kind")?.as_str() {
+        "anywhere" => return Ok(Start::Anywhere),
+        "after" => {}
+        other => {
+            let message = format!("play does not begin {other}");
+            let help = "write \"after\" or \"anywhere\", or leave \"start\" out";
+            return Err(at.field("kind")?.wrong(message, help));
+        }
+    }
+    let ticks = |at: &At<'_>, name: &str| {
+        at.typed(name, "number of ticks", |value| {
+            value
+                .as_i64()
+                .filter(|ticks| (0..=i64::MAX / 8).contains(ticks))
+        })
+    };
+    let mut moves = Vec::new();
+    for step in at.list("steps")? {
+        let edges = step.list("edges")?;
+        let parts = edges.iter().map(|edge| {
+            let part = super::certificate::part_of(network, edge.0);
+            part.map(Part::from)
+                .ok_or_else(|| edge.wrong("the model has no such edge", OTHER_MODEL))
+        });
+        moves.push((
+            ticks(&step, "wait")?,
+            parts.collect::<Result<Vec<Part>, _>>()?,
+        ));
+    }
+    let ticks_per_unit = ticks(&at, "ticks_per_unit")?;
+    if !(1..=MOST_TICKS_PER_UNIT).contains(&ticks_per_unit) {
+        let message = format!("{ticks_per_unit} ticks cannot be a unit of time");
+        return Err(at.field("ticks_per_unit")?.wrong(message, SEE_FORMAT));
+    }
+    Ok(Start::After(Way {
+        ticks_per_unit,
+        moves,
+        wait: ticks(&at, "wait")?,
+    }))
 }
 
 /// A limit of time, which zones can compare a clock with; -1 is one that nobody keeps.

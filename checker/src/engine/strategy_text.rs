@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::game::Player;
-use crate::game::strategy::{Selection, Strategy};
+use crate::game::strategy::{Selection, Start, Strategy, Way};
 use crate::ir::Network;
 use crate::zones::{Federation, Zone};
 
@@ -23,6 +23,15 @@ pub fn write(network: &Network, strategy: &Strategy) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "Time limit: {} <= {limit}\n", timing::TIME);
     }
+    match &strategy.start {
+        Start::Initial => {}
+        Start::Anywhere => text.push_str("Start: any state that can be reached\n\n"),
+        Start::After(way) => {
+            text.push_str("Start: after\n");
+            text.push_str(&way_lines(network, way));
+            text.push('\n');
+        }
+    }
     text.push_str(match (strategy.owner, strategy.selection) {
         (Player::Environment, _) => "Strategy of the environment:\n",
         (Player::Controller, Selection::First) => "Strategy to win:\n",
@@ -39,6 +48,20 @@ pub fn write(network: &Network, strategy: &Strategy) -> String {
             text.push_str(&line(network, rule));
         }
     }
+    text
+}
+
+/// The steps of a way, as lines.
+pub(super) fn way_lines(network: &Network, way: &Way) -> String {
+    let mut text = String::new();
+    let wait = |ticks: i64| describe::fraction(ticks, way.ticks_per_unit);
+    for (ticks, parts) in &way.moves {
+        let parts = parts.iter().map(|&one| describe::part_text(network, one));
+        let parts = parts.collect::<Vec<_>>().join(" ");
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "wait {}, take transition {parts}", wait(*ticks));
+    }
+    let _ = writeln!(text, "wait {}", wait(way.wait));
     text
 }
 

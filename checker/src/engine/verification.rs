@@ -1,14 +1,17 @@
 //! From a strategy of the solver to the independent check, and from its outcome to words.
 
 use crate::game::closed_loop;
-use crate::game::strategy::{Decision, Selection, Strategy};
+use crate::game::strategy::{Decision, Selection, Start, Strategy, Way};
 use crate::game::{Forced, Player, Priorities};
 use crate::ir::{FunctionId, Network, Objective, Predicate, QueryKind};
 use crate::network::{Part, predicate};
+use crate::verify::replay::{self, End, Moment, Run};
 use crate::verify::strategy::{
-    self, Aim, Claim, Constraint, Coverage, Decisions, Defect, Forcing, Owner, Step, Violation,
+    self, Aim, Claim, Constraint, Coverage, Decisions, Defect, Forcing, Origin, Owner, Step,
+    Violation,
 };
-use crate::verify::{self, Semantics, regions};
+use crate::verify::timed::Timed;
+use crate::verify::{self, Semantics, State, regions};
 use crate::zones::{Bound, Federation, minimal};
 
 use super::{describe, timing};
@@ -24,6 +27,8 @@ pub type Verification = Result<strategy::Outcome, verify::Error>;
 pub struct Asked<'q> {
     /// The objective.
     pub objective: &'q Objective,
+    /// Whether it need be enforced only from some state that both players get to together.
+    pub is_cooperative: bool,
     /// The bounds u and g of `control_t*(u, g)`; `None` for plain `control`.
     pub time_optimal: Option<(Option<FunctionId>, Option<FunctionId>)>,
 }
@@ -34,11 +39,13 @@ impl<'q> Asked<'q> {
         match query {
             QueryKind::Control {
                 objective,
+                cooperative,
                 time_optimal,
                 observations: None,
                 ..
             } => Some(Asked {
                 objective,
+                is_cooperative: *cooperative,
                 time_optimal: *time_optimal,
             }),
             _ => None,
@@ -58,6 +65,8 @@ impl<'q> Asked<'q> {
 /// A strategy as it is checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Played<'s> {
+    /// Where play begins.
+    pub start: &'s Start,
     /// What it decides: see [`decisions`].
     pub decisions: &'s [Decisions],
     /// Who plays by it.
@@ -70,8 +79,9 @@ pub struct Played<'s> {
 
 impl<'s> Played<'s> {
     /// A strategy with these decisions.
-    pub fn new(strategy: &Strategy, decisions: &'s [Decisions]) -> Played<'s> {
+    pub fn new(strategy: &'s Strategy, decisions: &'s [Decisions]) -> Played<'s> {
         Played {
+            start: &strategy.start,
             decisions,
             owner: strategy.owner,
             selection: strategy.selection,
@@ -88,24 +98,110 @@ pub fn verify(
     rules: (Forced, Priorities),
     most_regions: u64,
 ) -> Verification {
-    if !is_for_time(network, asked, played.owner, played.time_limit)? {
+    let violated_at_once = |defect| {
         let violation = Violation {
-            defect: Defect::OtherTime,
+            defect,
             states: vec![Semantics::new(network, 1).initial()?],
             steps: Vec::new(),
             ticks_per_unit: 1,
         };
         let outcome = strategy::Outcome::Violated(Box::new(violation), Coverage::default());
-        return Ok(outcome);
+        Ok(outcome)
+    };
+    if !is_for(
+        network,
+        asked,
+        (played.owner, played.start, played.time_limit),
+    )? {
+        return violated_at_once(Defect::OtherGame);
     }
+    let start = match played.start {
+        Start::Initial => Origin::Initial,
+        Start::Anywhere => Origin::Anywhere,
+        Start::After(way) => match follow(network, way, rules.1)? {
+            Some((_, mut states)) => {
+                let state = states.pop().expect("a run has a state");
+                Origin::State(Timed {
+                    state,
+                    ticks_per_unit: way.ticks_per_unit,
+                })
+            }
+            None => return violated_at_once(Defect::ImpossibleWay),
+        },
+    };
     let game = asked.game(network, played.time_limit);
     let claim = claim(&game.objective, (played.owner, played.selection), rules);
-    strategy::verify(&game.network, played.decisions, &claim, most_regions)
+    strategy::verify(
+        &game.network,
+        played.decisions,
+        &claim,
+        &start,
+        most_regions,
+    )
+}
+
+/// The run that a way is, with its states in ticks: on entry of each, and after the last wait; `None` if it is not possible.
+pub(super) fn follow(
+    network: &Network,
+    way: &Way,
+    priorities: Priorities,
+) -> Result<Option<(Run, Vec<State>)>, verify::Error> {
+    let steps = way.moves.iter().map(|(wait, parts)| replay::Step {
+        wait: *wait,
+        parts: parts.iter().map(|&one| one.into()).collect(),
+    });
+    let run = Run {
+        ticks_per_unit: way.ticks_per_unit,
+        steps: steps.collect(),
+        end: End::After(way.wait),
+        from: Moment { state: 0, wait: 0 },
+    };
+    let equal;
+    let network = if network.features.priorities && priorities == Priorities::Ignored {
+        equal = without_priorities(network);
+        &equal
+    } else {
+        network
+    };
+    Ok(
+        match replay::replay(network, &run, &replay::Claim::Possible)? {
+            replay::Outcome::Replayed(states, _) => Some((run, states)),
+            replay::Outcome::Violated(_) => None,
+        },
+    )
+}
+
+/// The network with all channels and processes of the same priority.
+fn without_priorities(network: &Network) -> Network {
+    let mut equal = network.clone();
+    equal.features.priorities = false;
+    equal.features.default_priority = 0;
+    for channel in &mut equal.channels {
+        channel.priority = 0;
+    }
+    for process in &mut equal.processes {
+        process.priority = 0;
+    }
+    equal
+}
+
+/// Whether a strategy with this start and limit of time answers the query, if it wins.
+pub(super) fn is_for(
+    network: &Network,
+    asked: Asked<'_>,
+    (owner, start, time_limit): (Player, &Start, Option<i32>),
+) -> Result<bool, verify::Error> {
+    let has_start = match (asked.is_cooperative, owner) {
+        (false, _) => *start == Start::Initial,
+        (true, Player::Controller) => *start != Start::Anywhere,
+        (true, Player::Environment) => *start == Start::Anywhere,
+    };
+    Ok(has_start && is_for_time(network, asked, owner, time_limit)?)
 }
 
 /// Whether a strategy that wins with a limit of time answers the query: the controller is to need no more time than the query leaves it,
 /// the environment to hold out for as long.
-pub(super) fn is_for_time(
+fn is_for_time(
     network: &Network,
     asked: Asked<'_>,
     owner: Player,
@@ -263,7 +359,8 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
         Defect::Broken => "what must be kept does not hold here",
         Defect::GoalReached => "the goal of the controller holds here",
         Defect::Stuck => "it waits where time cannot pass and it may not",
-        Defect::OtherTime => "it is for another limit of time than the query",
+        Defect::OtherGame => "it is for another start or limit of time than the query",
+        Defect::ImpossibleWay => "the way to where it begins is not possible",
         Defect::Recurring => "the goal of the controller comes again and again",
         Defect::Endless => "the run goes on for ever without what the strategy is for",
     };

@@ -20,20 +20,26 @@ use super::graph::{Edge, Standing};
 use super::reach::{Solver, Win};
 use super::recurrence::{leave, to_federation};
 use super::strategy::{
-    Decision, Selection, Strategy, StrategyState, moves_of, walk, whole_or_part,
+    Decision, Selection, Start, Strategy, StrategyState, moves_of, walk, whole_or_part,
 };
 
-/// Reads the strategy of the environment, which wins, from the rounds of the solution.
-pub fn extract(solver: &mut Solver<'_, '_, '_>, rounds: &[Vec<Win>]) -> Result<Strategy, Failure> {
+/// Reads the strategy of the environment, which wins from these nodes, from the rounds of the solution.
+pub fn extract(
+    solver: &mut Solver<'_, '_, '_>,
+    rounds: &[Vec<Win>],
+    mut waiting: Vec<u32>,
+) -> Result<Strategy, Failure> {
     let mut strategy = Strategy {
         owner: Player::Environment,
         selection: Selection::First,
         time_limit: None,
+        start: Start::default(),
         states: Vec::new(),
     };
     let mut seen = vec![false; solver.graph.nodes.len()];
-    let mut waiting = vec![0_u32];
-    seen[0] = true;
+    for &node in &waiting {
+        seen[node as usize] = true;
+    }
     while let Some(node) = waiting.pop() {
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);

@@ -166,6 +166,8 @@ pub struct Graph<'s, 'a> {
     /// Whether there is one node for each discrete state.
     has_discrete_nodes: bool,
     pub(super) dead_ends: DeadEnds,
+    /// Moves in one chain, at most.
+    longest_chain: usize,
 }
 
 /// Where an edge starts.
@@ -213,6 +215,12 @@ impl<'s, 'a> Graph<'s, 'a> {
         Ok(graph)
     }
 
+    /// Makes a node of every state, instead of chains; before the first node is expanded.
+    pub fn leave_out_chains(&mut self) {
+        self.longest_chain = 1;
+        self.trails = Trails::new(false, &self.objective);
+    }
+
     fn without_nodes(symbolic: &'s mut Symbolic<'a>, objective: Objective<'s>) -> Graph<'s, 'a> {
         let network = symbolic.stepper.network();
         Graph {
@@ -241,6 +249,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             } else {
                 DeadEnds::default()
             },
+            longest_chain: LONGEST_CHAIN,
             objective,
             symbolic,
         }
@@ -558,7 +567,9 @@ impl<'s, 'a> Graph<'s, 'a> {
         mut zone: Zone,
         (mut length, mut may_delay): (u32, bool),
     ) -> Result<(), Failure> {
-        while (length as usize) < LONGEST_CHAIN && self.only_move(target, &mut zone, may_delay)? {
+        while (length as usize) < self.longest_chain
+            && self.only_move(target, &mut zone, may_delay)?
+        {
             push_step(&mut self.steps, may_delay, &self.effect);
             std::mem::swap(target, &mut self.spare);
             length += 1;

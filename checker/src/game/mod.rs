@@ -4,6 +4,7 @@
 //! environment is faster: where both can move at the same instant, it may.
 
 pub mod closed_loop;
+pub mod cooperation;
 mod dead_ends;
 pub mod denial;
 mod dives;

@@ -71,17 +71,52 @@ pub struct Strategy {
     /// Within which time the controller reaches the goal, or up to which the environment prevents it, if that is limited. Zones have
     /// a clock more then: the last one is 0 in the initial state and nothing sets it.
     pub time_limit: Option<i32>,
-    /// The states, the initial one first.
+    /// Where play begins.
+    pub start: Start,
+    /// The states; if play begins in one, that first.
     pub states: Vec<StrategyState>,
+}
+
+/// Where play by a strategy begins.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// In the initial state.
+    #[default]
+    Initial,
+    /// Where both players get to together.
+    After(Way),
+    /// In any state that can be reached.
+    Anywhere,
+}
+
+/// Moves of both players from the initial state, with their times.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Way {
+    /// How many ticks make one unit of time.
+    pub ticks_per_unit: i64,
+    /// The moves, each with the wait before it in ticks.
+    pub moves: Vec<(i64, Vec<Part>)>,
+    /// The wait after the last move, in ticks.
+    pub wait: i64,
 }
 
 /// Reads the strategy of the player who wins a solved game.
 pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
-    let (owner, is_seeking) = if solver.is_won() {
-        (solver.seeker, true)
+    let owner = if solver.is_won() {
+        solver.seeker
     } else {
-        (solver.seeker.opponent(), false)
+        solver.seeker.opponent()
     };
+    extract_from(solver, owner, vec![0])
+}
+
+/// Reads the strategy of a player who wins from these nodes of a solved game.
+pub fn extract_from(
+    solver: &mut Solver<'_, '_, '_>,
+    owner: Player,
+    mut waiting: Vec<u32>,
+) -> Result<Strategy, Failure> {
+    let is_seeking = owner == solver.seeker;
     let mut strategy = Strategy {
         owner,
         selection: match owner {
@@ -89,12 +124,14 @@ pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
             _ => Selection::First,
         },
         time_limit: None,
+        start: Start::default(),
         states: Vec::new(),
     };
     let mut steps_to_end = Vec::new();
     let mut seen = vec![false; solver.graph.nodes.len()];
-    let mut waiting = vec![0_u32];
-    seen[0] = true;
+    for &node in &waiting {
+        seen[node as usize] = true;
+    }
     while let Some(node) = waiting.pop() {
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);

@@ -106,6 +106,16 @@ impl Strategy {
         self.inner.strategy.selection == Selection::Any
     }
 
+    /// Where play begins, as JSON: "initial", "anywhere" or the run that leads there.
+    fn start_json(&self, priorities: &str) -> PyResult<String> {
+        let priorities = priority_rule(priorities)?;
+        self.model.get().with(|model| {
+            let start = self.inner.start(model.network(), priorities);
+            let start = start.map_err(|error| failed(model, error))?;
+            Ok(start.to_string())
+        })
+    }
+
     /// The limit of time that it is for; `None` without one.
     #[getter]
     fn time_limit(&self) -> Option<i32> {

@@ -25,6 +25,7 @@ use crate::ir::{Network, Predicate};
 
 use super::concrete::{Error, Move, Part, Semantics, State};
 use super::regions::Regions;
+use super::timed::{Timed, least_multiple};
 
 /// `left - right < bound`, or `<=` if not strict; clocks by index, 0 for the reference clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,8 +169,10 @@ pub enum Defect {
     Endless,
     /// The goal comes again and again, against the environment.
     Recurring,
-    /// The strategy is for another limit of time than what is asked.
-    OtherTime,
+    /// The strategy is for another start or limit of time than what is asked.
+    OtherGame,
+    /// The way to where it begins is not possible.
+    ImpossibleWay,
 }
 
 /// A step of a run.
@@ -181,7 +184,18 @@ pub enum Step {
     Move(Move),
 }
 
-/// A run that shows a defect: it begins in the initial state.
+/// Where play begins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// In the initial state.
+    Initial,
+    /// In this state.
+    State(Timed),
+    /// In every state that the model can get to: the strategy must win from each.
+    Anywhere,
+}
+
+/// A run that shows a defect: it begins where play does.
 #[derive(Clone, Debug)]
 pub struct Violation {
     /// What is wrong in the last state.
@@ -210,6 +224,7 @@ pub fn verify(
     network: &Network,
     strategy: &[Decisions],
     claim: &Claim<'_>,
+    start: &Origin,
     most_regions: u64,
 ) -> Result<Outcome, Error> {
     let all = strategy.iter().flat_map(|state| &state.decisions);
@@ -218,9 +233,28 @@ pub fn verify(
     let constant = constants.max().unwrap_or(0).max(claim.constant);
     let mut zones = zones;
     let has_differences = claim.has_differences || zones.any(|one| one.left != 0 && one.right != 0);
+    let mut ticks_per_unit = Regions::ticks_per_unit(network);
+    if let Origin::State(timed) = start {
+        ticks_per_unit = least_multiple(ticks_per_unit, timed.ticks_per_unit)
+            .ok_or(Error::Unsupported("times so fine"))?;
+    }
+    let rules = Rules::new(network, ticks_per_unit, strategy, claim);
+    let regions = Regions::new(network, constant, has_differences)?;
+    let regions = regions.with_ticks_per_unit(ticks_per_unit);
+    let mut first = match start {
+        Origin::Initial | Origin::Anywhere => rules.semantics.initial()?,
+        Origin::State(timed) => {
+            let timed = timed
+                .at_multiple_of(ticks_per_unit)
+                .filter(|timed| timed.ticks_per_unit == ticks_per_unit);
+            timed.ok_or(Error::Unsupported("times so fine"))?.state
+        }
+    };
+    regions.represent_state(&mut first);
     let mut play = Play {
-        rules: Rules::new(network, Regions::ticks_per_unit(network), strategy, claim),
-        regions: Regions::new(network, constant, has_differences)?,
+        rules,
+        regions,
+        start: first.clone(),
         seen: HashMap::new(),
         path: Vec::new(),
         followed: HashSet::new(),
@@ -228,7 +262,13 @@ pub fn verify(
         is_from_goal: false,
         coverage: Coverage::default(),
     };
-    play.run(most_regions)
+    if *start != Origin::Anywhere {
+        return play.run(vec![first], most_regions);
+    }
+    match play.reachable(first, most_regions)? {
+        Some(regions) => play.run(regions, most_regions),
+        None => Ok(Outcome::TooLarge(play.coverage)),
+    }
 }
 
 fn identity<'w>(network: &Network, words: &'w [i32]) -> &'w [i32] {
@@ -270,26 +310,58 @@ pub enum Rest {
 struct Play<'a> {
     rules: Rules<'a>,
     regions: Regions,
+    /// The region in which play begins, or from which those are reached in which it may.
+    start: State,
     seen: HashMap<State, Mark>,
     path: Vec<Frame>,
     /// The regions that the searches back from goals which must not recur have met.
     followed: HashSet<State>,
     /// Goals that are to recur and were met, with their successors.
     goals: Vec<(State, Vec<(Step, State)>)>,
-    /// Whether the path begins in a goal and not in the initial state.
+    /// Whether the path begins in a goal and not where play does.
     is_from_goal: bool,
     coverage: Coverage,
 }
 
 impl Play<'_> {
-    fn run(&mut self, most_regions: u64) -> Result<Outcome, Error> {
-        let mut initial = self.rules.semantics.initial()?;
-        self.regions.represent_state(&mut initial);
-        if let Some(defect) = self.enter(&initial)? {
-            return self.violated(defect);
+    /// The regions that the model can get to, the last one first; `None` if they are more than allowed.
+    fn reachable(&mut self, first: State, most: u64) -> Result<Option<Vec<State>>, Error> {
+        let mut found = HashSet::from([first.clone()]);
+        let mut all = vec![first];
+        let mut next = 0;
+        while let Some(state) = all.get(next).cloned() {
+            next += 1;
+            let moves = self.rules.semantics.moves(&state)?;
+            let possible = self.rules.possible(&state, &moves)?;
+            let mut targets: Vec<State> = possible.into_iter().map(|(_, target)| target).collect();
+            targets.extend(self.later(&state, &moves)?);
+            for mut target in targets {
+                self.regions.represent_state(&mut target);
+                if found.insert(target.clone()) {
+                    all.push(target);
+                }
+            }
+            if all.len() as u64 > most {
+                self.coverage.regions = all.len() as u64;
+                return Ok(None);
+            }
         }
+        all.reverse();
+        Ok(Some(all))
+    }
+
+    /// Follows play from these regions, the last one first.
+    fn run(&mut self, mut starts: Vec<State>, most_regions: u64) -> Result<Outcome, Error> {
         loop {
             let Some(frame) = self.path.last_mut() else {
+                if let Some(start) = starts.pop() {
+                    if !self.seen.contains_key(&start)
+                        && let Some(defect) = self.enter(&start)?
+                    {
+                        return self.violated(defect);
+                    }
+                    continue;
+                }
                 // From each goal that is to recur, play is followed anew.
                 let Some((goal, successors)) = self.goals.pop() else {
                     return Ok(Outcome::Verified(self.coverage));
@@ -398,13 +470,12 @@ impl Play<'_> {
         Ok(Outcome::Violated(Box::new(violation), self.coverage))
     }
 
-    /// A run of the closed loop from the initial state to a region that it reaches; the last state is left out.
+    /// A run of the closed loop from its start to a region that it reaches; the last state is left out.
     fn way_to(&mut self, end: &State) -> Result<(Vec<State>, Vec<Step>), Error> {
-        let mut initial = self.rules.semantics.initial()?;
-        self.regions.represent_state(&mut initial);
+        let start = self.start.clone();
         let mut origins: HashMap<State, Option<(State, Step)>> = HashMap::new();
-        let mut waiting = std::collections::VecDeque::from([initial.clone()]);
-        origins.insert(initial, None);
+        let mut waiting = std::collections::VecDeque::from([start.clone()]);
+        origins.insert(start, None);
         while let Some(state) = waiting.pop_front().filter(|state| state != end) {
             let Ok(successors) = self.successors(&state)? else {
                 continue;
@@ -530,22 +601,29 @@ impl Play<'_> {
             self.coverage.opponent_moves += (successors.len() - before) as u64;
         }
         if decisions.iter().any(|one| one.action.is_none()) {
-            let mut later = state.clone();
-            self.regions.pass(&mut later.clocks);
-            if !self.rules.semantics.is_time_stopped(state, &moves)
-                && !self.is_stopped_at_once(state, &later)?
-                && self.rules.semantics.invariants_hold(&later)?
-            {
+            if let Some(later) = self.later(state, &moves)? {
                 successors.push((Step::Time, later));
-            } else if !self.rules.may_rest(state, &later, &moves, &possible)? {
-                return Ok(Err(Defect::Stuck));
+            } else {
+                let mut later = state.clone();
+                self.regions.pass(&mut later.clocks);
+                if !self.rules.may_rest(state, &later, &moves, &possible)? {
+                    return Ok(Err(Defect::Stuck));
+                }
             }
         }
         Ok(Ok(successors))
     }
-}
 
-impl Play<'_> {
+    /// The region to which time passes; `None` if it cannot. `moves` are those whose guards hold.
+    fn later(&self, state: &State, moves: &[Move]) -> Result<Option<State>, Error> {
+        let mut later = state.clone();
+        self.regions.pass(&mut later.clocks);
+        let can_pass = !self.rules.semantics.is_time_stopped(state, moves)
+            && !self.is_stopped_at_once(state, &later)?
+            && self.rules.semantics.invariants_hold(&later)?;
+        Ok(can_pass.then_some(later))
+    }
+
     /// Whether an urgent synchronisation is possible at all moments that follow a region: there is no first one to which time
     /// could pass.
     fn is_stopped_at_once(&self, state: &State, later: &State) -> Result<bool, Error> {

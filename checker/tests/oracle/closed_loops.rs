@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use checker::engine::{NamedStrategy, Verdict, strategy_file};
 use checker::game::Player;
-use checker::game::strategy::{Decision, Selection, Strategy, StrategyState};
+use checker::game::strategy::{Decision, Selection, Start, Strategy, StrategyState};
 use checker::network::Part;
 use checker::verify::regions::Bounding;
 use checker::verify::{Regions, Semantics, State};
@@ -100,6 +100,7 @@ impl Random {
                 Selection::Any
             },
             time_limit: None,
+            start: Start::Initial,
             states: Vec::new(),
         };
         for (words, moves) in words {

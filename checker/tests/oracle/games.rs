@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict, strategy_file};
-use checker::game::strategy::Strategy;
+use checker::game::strategy::{Start, Strategy};
 use checker::game::{Forced, Nodes, Player, Priorities};
 use checker::search::extremum::Extreme;
-use proptest::prop_assert_eq;
 use proptest::test_runner::TestCaseError;
+use proptest::{prop_assert, prop_assert_eq};
 
 use crate::compare::{self, Tally};
 use crate::explicit::{Graph, Objective, Rule, recurring, winning};
@@ -102,8 +102,12 @@ fn compare(
                 compare::check_strategy(&model, &answer, tally, || {
                     format!("{text}{query}\n{forced:?} {nodes:?}")
                 })?;
+                if let Ok(answer) = &answer {
+                    check_file(&model, &query, answer, || format!("{text}{query}"))?;
+                }
                 let strategy = answer.ok().and_then(|answer| answer.evidence.strategy);
-                if let Some(strategy) = strategy {
+                // What holds after some way, or from everywhere, need not hold from the start.
+                if let Some(strategy) = strategy.filter(|one| one.start == Start::Initial) {
                     for enforced in enforced(kind, strategy.owner, (&goal_text, &keep_text)) {
                         let strategy = Arc::clone(&strategy);
                         let result = check_under(&mut model, strategy, &enforced, tally);
@@ -296,6 +300,8 @@ fn check_file(
     describe: impl Fn() -> String,
 ) -> Result<(), TestCaseError> {
     let Some(strategy) = &answer.evidence.strategy else {
+        let is_won = matches!(answer.verdict, Verdict::Satisfied | Verdict::NotSatisfied);
+        prop_assert!(!is_won, "{}\n{:?}", describe(), answer.message);
         return Ok(());
     };
     let file = strategy_file::write(model.network(), strategy, query);

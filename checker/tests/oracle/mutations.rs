@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use checker::engine::LoadedModel;
 use checker::engine::verification::{self, Played};
-use checker::game::strategy::{Selection, Strategy};
+use checker::game::strategy::{Selection, Start, Strategy};
 use checker::game::{Forced, Player, Priorities};
 use checker::syntax::ast::QueryText;
 use checker::verify::Part;
@@ -356,7 +356,7 @@ fn counter_strategy_that_gives_in_before_its_time_is_caught() {
     assert_eq!(defect_of(game(), 0, |_| {}), None);
     let mut longer = game();
     longer.query = longer.model.add_query("control_t*(3): A<> P.G");
-    assert_eq!(defect_of(longer, 0, |_| {}), Some(Defect::OtherTime));
+    assert_eq!(defect_of(longer, 0, |_| {}), Some(Defect::OtherGame));
 }
 
 #[test]
@@ -372,7 +372,7 @@ fn strategy_for_another_time_than_it_says_is_caught() {
     assert_eq!(with_limit("control_t*(3): A<> P.G", Some(3)), None);
     assert_eq!(
         with_limit("control_t*(2): A<> P.G", Some(3)),
-        Some(Defect::OtherTime)
+        Some(Defect::OtherGame)
     );
     assert_eq!(
         with_limit("control_t*: A<> P.G", Some(2)),
@@ -380,10 +380,85 @@ fn strategy_for_another_time_than_it_says_is_caught() {
     );
     assert_eq!(
         with_limit("control: A<> P.G", Some(3)),
-        Some(Defect::OtherTime)
+        Some(Defect::OtherGame)
     );
     assert_eq!(
         with_limit("control_t*: A<> P.G", None),
-        Some(Defect::OtherTime)
+        Some(Defect::OtherGame)
     );
+}
+
+/// The controller wins once the environment has opened, and not from the start.
+const HELP: &str = "
+process P() {
+  clock x;
+  state Shut, Open { x <= 5 }, G, Bad;
+  init Shut;
+  trans Shut -u-> Open { guard x >= 2; assign x = 0; },
+        Open -> G { guard x >= 1; },
+        Open -u-> Bad { guard x >= 3; };
+}
+system P;
+";
+
+#[test]
+fn strategy_after_a_way_is_caught_if_it_or_the_way_is_wrong() {
+    let game = || solved(HELP, "E<> control: A<> P.G");
+    let Start::After(way) = game().strategy.start.clone() else {
+        panic!("the controller wins after a way");
+    };
+    assert_eq!(way.moves.len(), 1);
+    assert_eq!(defect_of(game(), 1, |_| {}), None);
+    let widen = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
+    assert_eq!(defect_of(game(), 1, widen), Some(Defect::Stuck));
+    let from = |start: Start, query: &str| {
+        let mut game = game();
+        let mut other = (*game.strategy).clone();
+        other.start = start;
+        game.strategy = Arc::new(other);
+        game.query = game.model.add_query(query);
+        defect_of(game, 1, |_| {})
+    };
+    let query = "E<> control: A<> P.G";
+    let mut early = way.clone();
+    early.moves[0].0 = 0;
+    assert_eq!(
+        from(Start::After(early), query),
+        Some(Defect::ImpossibleWay)
+    );
+    // Where the environment may be faster the controller has no decision.
+    let mut late = way.clone();
+    late.wait = 4 * way.ticks_per_unit;
+    assert_eq!(from(Start::After(late), query), Some(Defect::NoDecision));
+    assert_eq!(from(Start::Anywhere, query), Some(Defect::OtherGame));
+    assert_eq!(
+        from(Start::After(way), "control: A<> P.G"),
+        Some(Defect::OtherGame)
+    );
+    assert_eq!(from(Start::Initial, query), Some(Defect::NoDecision));
+}
+
+#[test]
+fn counter_strategy_must_win_from_everywhere() {
+    // The environment need not open; but to deny help everywhere is more.
+    let mut lost = solved(HELP, "control: A<> P.G");
+    assert_eq!(lost.strategy.owner, Player::Environment);
+    let mut anywhere = (*lost.strategy).clone();
+    anywhere.start = Start::Anywhere;
+    lost.strategy = Arc::new(anywhere);
+    lost.query = lost.model.add_query("E<> control: A<> P.G");
+    let defect = defect_of(lost, 0, |_| {});
+    assert!(
+        matches!(defect, Some(Defect::NoDecision | Defect::GoalReached)),
+        "{defect:?}"
+    );
+    let game = || solved(HELP, "E<> control: A[] P.Bad and P.G");
+    assert_eq!(
+        (game().strategy.owner, &game().strategy.start),
+        (Player::Environment, &Start::Anywhere)
+    );
+    assert_eq!(defect_of(game(), 0, |_| {}), None);
+    let steady = || solved(HELP, "E<> control: A[] (P.Open && A<> P.Open && P.x > 1)");
+    assert_eq!(steady().strategy.start, Start::Anywhere);
+    assert_eq!(defect_of(steady(), 1, |_| {}), None);
 }

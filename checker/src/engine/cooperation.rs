@@ -1,0 +1,96 @@
+//! Strategies of `E<> control: …`: from where both players get to together if the controller wins from there, and of the environment
+//! from everywhere if it wins from nowhere.
+
+use crate::game::Player;
+use crate::game::cooperation::Winning;
+use crate::game::denial;
+use crate::game::reach::{Solver, Win};
+use crate::game::strategy::{self, Start, Strategy, Way};
+use crate::ir::Predicate;
+use crate::network::{Failure, Symbolic};
+use crate::search::limits::Watch;
+use crate::search::reach::{self, Outcome, Trace};
+use crate::search::schedule::Finish;
+use crate::verify::replay::{End, Run};
+use crate::zones::minimal;
+
+use super::certificate::stop_text;
+use super::evidence::Missing;
+use super::{Options, describe, evidence, verification};
+
+/// The strategy of the winner of a game that was solved with both players working together. `rounds` are those of a goal that is to
+/// recur, and `zones` fresh ones of the game. An error of the inner result says why there is none.
+pub(super) fn strategy(
+    solver: &mut Solver<'_, '_, '_>,
+    (winner, rounds): (Player, Option<&[Vec<Win>]>),
+    zones: &mut Symbolic<'_>,
+    options: &Options,
+    watch: &mut dyn Watch,
+) -> Result<Result<Strategy, String>, Failure> {
+    if winner == Player::Environment {
+        let nodes = (0..solver.graph.nodes.len() as u32).rev().collect();
+        let mut strategy = match rounds {
+            Some(rounds) => denial::extract(solver, rounds, nodes)?,
+            None => strategy::extract_from(solver, winner, nodes)?,
+        };
+        strategy.start = Start::Anywhere;
+        return Ok(Ok(strategy));
+    }
+    let mut winning = Winning::of(solver);
+    let report = reach::search(zones, &mut winning, options.order, watch);
+    let trace = match report.outcome {
+        Ok(Outcome::Found(trace)) => trace,
+        Ok(Outcome::Exhausted) => return Ok(Err("no way to where it begins is found".to_owned())),
+        Ok(Outcome::Stopped(reason)) => return Ok(Err(stop_text(reason).to_owned())),
+        Err((failure, _)) => return Err(failure),
+    };
+    let way = match way(zones, &winning, &trace) {
+        Ok(way) => way,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let network = zones.stepper.network();
+    let (_, states) = match verification::follow(network, &way, options.priorities) {
+        Ok(Some(followed)) => followed,
+        Ok(None) => return Ok(Err("the way to where it begins fails its replay".to_owned())),
+        Err(error) => return Ok(Err(describe::missing_text(Missing::NotCovered(error)))),
+    };
+    let last = states.last().expect("a run has a state");
+    let Some(node) = winning.node(&last.words, &last.clocks, way.ticks_per_unit) else {
+        return Ok(Err(
+            "the way does not end where the controller wins".to_owned()
+        ));
+    };
+    let mut strategy = strategy::extract_from(solver, winner, vec![node])?;
+    strategy.start = Start::After(way);
+    Ok(Ok(strategy))
+}
+
+/// A trace with times at whose end the controller wins.
+fn way(zones: &mut Symbolic<'_>, winning: &Winning, trace: &Trace) -> Result<Way, String> {
+    let last = trace.states.last();
+    let won = last.and_then(|(words, zone)| winning.zone_in(words, zone));
+    let won = won.ok_or("the trace does not end where the controller wins")?;
+    let mut constraints = Vec::new();
+    minimal::for_each_minimal(won.bounds(), won.dimension(), |one| constraints.push(one));
+    let always = Predicate::Constant(true);
+    let finish = Finish::Holds(&always, constraints);
+    let run =
+        evidence::timed(zones, &trace.moves, None, finish, None).map_err(describe::missing_text)?;
+    Ok(to_way(&run))
+}
+
+/// The moves and times of a run that ends.
+pub(super) fn to_way(run: &Run) -> Way {
+    let moves = run.steps.iter().map(|step| {
+        let parts = step.parts.iter().map(|&part| part.into());
+        (step.wait, parts.collect())
+    });
+    Way {
+        ticks_per_unit: run.ticks_per_unit,
+        moves: moves.collect(),
+        wait: match run.end {
+            End::After(wait) => wait,
+            End::Loop(_) | End::Waits(_) | End::Stuck(_) => 0,
+        },
+    }
+}
