@@ -18,6 +18,7 @@ from typing import Any, Literal, Protocol
 
 from ntagen import _checker
 from ntagen.errors import InputError, ModelError, UndecidedError
+from ntagen.files import write_files
 from ntagen.play import Play
 from ntagen.runs import Edge, Run, State, edge_of, runs_of
 
@@ -180,6 +181,15 @@ class Strategy:
         return map(_state, json.loads(self.json())["states"])
 
     @property
+    def under(self) -> Strategy | None:
+        """The strategy of the controller that the game is ``under``; ``None`` if it is under none.
+
+        The controller makes no move that this one forbids, and waits only where it may.
+        """
+        raw = self._raw.under()
+        return None if raw is None else Strategy(raw, self.forced, self.priorities)
+
+    @property
     def start(self) -> Literal["initial", "anywhere"] | Run:
         """Where play by it begins.
 
@@ -268,10 +278,12 @@ class Strategy:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes it to a file, which `ntagen.load_strategy` and ``loadStrategy`` read.
 
+        The file is written completely or not at all; a folder that is missing is made.
+
         Raises:
-            OSError: The file cannot be written.
+            InputError: The file cannot be written.
         """
-        Path(path).write_text(self.json() + "\n", encoding="utf-8", newline="\n")
+        write_files({Path(path): self.json() + "\n"})
 
     def keep(self, name: str) -> None:
         """Lets later queries of the model be asked under it: ``A<> Gate.Open under S``.

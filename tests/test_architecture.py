@@ -25,9 +25,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "render": BASE | {"cache"},
     "model": set(),
     "runs": set(),
+    "files": {"errors"},
     "machine": {"errors"},
     "play": {"errors", "runs", "_checker"},
-    "strategy": {"errors", "runs", "play", "_checker"},
+    "strategy": {"errors", "files", "runs", "play", "_checker"},
     "checker": {"errors", "machine", "model", "runs", "strategy", "_checker"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "strategy"},
@@ -38,7 +39,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "plot": BASE | {"needle", "plan", "drive"},
     "cli": BASE
     | {"needle", "nsl", "plan", "render", "model", "checker", "loading", "explanations"}
-    | {"drive", "campaign", "plot", "play", "runs", "strategy"},
+    | {"drive", "campaign", "plot", "play", "runs", "strategy", "files"},
     "__main__": {"cli"},
 }
 """By room: the rooms that it may import. Each may import itself."""

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli import INTERNAL_ERROR
-from ntagen.cli.files import write_files
+from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import load_model, pointing_to_explanations, show_warnings
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.quantities import SIZE, TIME
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError
+from ntagen.files import write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
@@ -204,9 +204,7 @@ class _Outputs:
     "ignores them; in all other queries they count."
 )
 @click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
-@click.option("--states", type=click.IntRange(1), help="Stop after so many stored states.")
-@click.option("--memory", metavar="SIZE", type=SIZE, help="Such as 4GiB.")
-@click.option("--timeout", metavar="TIME", type=TIME, help="Such as 60s.")
+@limit_options()
 def command(
     model_path: Path,
     asked: tuple[str, ...],
@@ -245,6 +243,8 @@ def command(
       ntagen check game.xml --query "control: A<> Main.Won" --verify --strategy -
       ntagen check game.xml --query "control: A[] not Main.Lost" --controller safe.c
       ntagen check game.xml --query "{Gate.Shut, x >= 2} control: A<> Main.Won" --strategy -
+      ntagen check game.xml --query "strategy Safe = control: A[] not Main.Lost" \\
+                            --query "control: A<> Main.Won under Safe" --strategy -
       ntagen check model.xml --query "bounds{Gate.Open}: x"
       ntagen check model.xml --query "E<> Gate.Open" --fastest --trace open.json
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
@@ -279,9 +279,7 @@ def command(
                     forced=forced,
                     priorities=priorities,
                     engine=engine,
-                    states=states,
-                    memory_bytes=None if memory is None else int(memory),
-                    timeout_s=timeout,
+                    **limits(states, memory, timeout),
                     plans="all" if plans else "none",
                     max_plans=max_plans,
                     strategy=strategy is not None or controller is not None,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ntagen.cli.files import write_files
+from ntagen.files import write_files
 
 
 @click.command(

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from ntagen.cli.files import write_files
 from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.files import write_files
 
 if TYPE_CHECKING:
     from rich.table import Table

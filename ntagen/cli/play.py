@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Final, ParamSpec
 
 import click
 
-from ntagen.cli.files import write_files
+from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.quantities import SIZE, TIME
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError, NtagenError
+from ntagen.files import write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Model
@@ -83,9 +83,7 @@ HELP: Final = """\
 )
 @forced_rule()
 @priority_rule("Whether priorities of channels and processes count.")
-@click.option("--states", type=click.IntRange(1), help="Of --query: stop after so many states.")
-@click.option("--memory", metavar="SIZE", type=SIZE, help="Of --query: such as 4GiB.")
-@click.option("--timeout", metavar="TIME", type=TIME, help="Of --query: such as 60s.")
+@limit_options("--query")
 def command(
     model_path: Path,
     strategy_path: Path | None,
@@ -138,9 +136,7 @@ def command(
                     query,
                     forced=forced,
                     priorities=priorities,
-                    states=states,
-                    memory_bytes=None if memory is None else int(memory),
-                    timeout_s=timeout,
+                    **limits(states, memory, timeout),
                     progress=report,
                 )
         session = _Session(strategy)

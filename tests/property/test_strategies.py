@@ -116,8 +116,8 @@ def test_strategies_of_the_corpus_win(path: Path, query: str) -> None:
         check_wins(strategy, seed)
 
 
-def random_model(chance: random.Random) -> str:
-    """Two processes with a clock each, that meet on two channels."""
+def random_model(chance: random.Random, channel: str = "chan") -> str:
+    """Two processes with a clock each, that meet on two channels, the first of this kind."""
     processes = []
     for name in "PQ":
         invariants = [chance.choice(["", f" {{ x <= {chance.randint(1, 3)} }}"]) for _ in range(3)]
@@ -140,7 +140,7 @@ def random_model(chance: random.Random) -> str:
             f"state L0{invariants[0]}, L1{invariants[1]}, L2{invariants[2]}; {committed}init L0; "
             f"trans {', '.join(edges)}; }}"
         )
-    return "clock y; chan a; broadcast chan b;\n" + "\n".join(processes) + "\nsystem P, Q;\n"
+    return f"clock y; {channel} a; broadcast chan b;\n" + "\n".join(processes) + "\nsystem P, Q;\n"
 
 
 QUERIES = [
@@ -157,11 +157,12 @@ QUERIES = [
 ]
 
 
-def test_strategies_of_random_games_win() -> None:
+@pytest.mark.parametrize("channel", ["chan", "urgent chan", "urgent broadcast chan"])
+def test_strategies_of_random_games_win(channel: str) -> None:
     won = {"controller": 0, "environment": 0}
     for seed in range(RANDOM_GAMES):
         chance = random.Random(seed)
-        text = random_model(chance)
+        text = random_model(chance, channel)
         query = chance.choice(QUERIES)
         model = ntagen.load(text)
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from fractions import Fraction
 from pathlib import Path
@@ -339,3 +340,111 @@ def test_no_help_is_of_use_against_a_strategy_from_everywhere() -> None:
     assert strategy.verify().holds
     assert strategy.play().state.locations == {"P": "Shut"}
     assert model.synthesize("control: A<> P.Bad").start == "initial"
+
+
+def test_saving_leaves_the_old_file_if_it_fails(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    strategy = ntagen.load(FEEDER).synthesize("control: A<> M.Full")
+    path = tmp_path / "feed.json"
+    path.write_text("old")
+
+    def fail(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", fail)
+        with pytest.raises(ntagen.InputError, match=r"feed\.json: no space left on device"):
+            strategy.save(path)
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {"feed.json": "old"}
+    strategy.save(path)
+    assert path.read_text() == strategy.json() + "\n"
+
+
+# The tank must not run over, and is to be filled: waiting and filling are both safe at first.
+TANK = """
+clock x;
+int[0,3] level;
+process P() {
+  state Off, On { x <= 2 }, Over;
+  init Off;
+  trans Off -> On { assign x = 0; },
+        On -> Off { guard x >= 1 && level < 3; assign level++; },
+        On -u-> Off { guard x >= 2 && level < 3; assign level++; },
+        On -u-> Over { guard level == 3; },
+        Off -u-> Off { guard level > 0; assign level--; };
+}
+system P;
+"""
+
+
+def test_games_under_a_strategy_stay_within_it(tmp_path: Path) -> None:
+    model = ntagen.load(TANK)
+    safe = model.synthesize("control: A[] not P.Over")
+    safe.keep("Safe")
+    query = "control: A<> level == 1 under Safe"
+    strategy = model.synthesize(query, verify=True)
+    assert strategy.winning
+    assert strategy.under is not None
+    assert (strategy.under.query, strategy.under.json()) == (safe.query, safe.json())
+    assert safe.under is None
+    strategy.keep("Fill")
+    assert model.check("A<> level == 1 under Fill").verdict == "satisfied"
+    # Without it the controller may be careless on the way; the strategy says that in its file.
+    path = tmp_path / "fill.json"
+    strategy.save(path)
+    again = ntagen.load_strategy(path, ntagen.load(TANK))
+    assert again.json() == strategy.json()
+    assert again.under is not None
+    assert again.verify().holds
+    assert ntagen.load(TANK).verify(path.read_text()).holds
+    raw = json.loads(path.read_text())
+    for state in raw["under"]["states"]:
+        for decision in state["decisions"]:
+            decision["action"] = None
+    path.write_text(json.dumps(raw))
+    forbidden = ntagen.load_strategy(path, model).verify()
+    assert forbidden.holds is False
+    assert forbidden.lines[0] == "strategy violated: its action is not possible here"
+    raw["under"]["owner"] = "environment"
+    path.write_text(json.dumps(raw))
+    with pytest.raises(ntagen.RejectedError, match="at under"):
+        ntagen.load_strategy(path, model)
+
+
+def test_the_user_keeps_to_the_strategy_that_a_game_is_under() -> None:
+    model = ntagen.load(TANK)
+    model.synthesize("control: A[] not P.On").keep("Idle")
+    lost = model.synthesize("control: A<> level == 1 under Idle", verify=True)
+    assert lost.owner == "environment"
+    situation = lost.play().situation()
+    assert (situation.replies, situation.winner) == ((), "environment")
+    model.synthesize("control_t*: A<> level == 1").keep("Soon")
+    with pytest.raises(ntagen.RejectedError, match="games under a strategy within a time are not"):
+        model.synthesize("control: A<> level == 2 under Soon")
+    lost.keep("Lost")
+    with pytest.raises(ntagen.RejectedError, match="under a strategy of the environment are not"):
+        model.synthesize("control: A<> level == 2 under Lost")
+    with pytest.raises(ntagen.RejectedError, match=r"control_t\* under a strategy are not"):
+        model.synthesize("control_t*: A<> level == 1 under Idle")
+
+
+def test_strategies_within_strategies_are_loaded_in_queries(tmp_path: Path) -> None:
+    path = tmp_path / "model.xta"
+    path.write_text(TANK)
+    model = ntagen.load(path)
+    for query, verdict in [
+        ("strategy Safe = control: A[] not P.Over", "satisfied"),
+        ('saveStrategy("safe.json", Safe)', "satisfied"),
+        ('strategy Again = loadStrategy("safe.json")', "satisfied"),
+        ("strategy Fill = control: A<> level == 1 under Again", "satisfied"),
+        ("A<> level == 1 under Fill", "satisfied"),
+        ("strategy More = control: A<> level == 1 && P.Off under Fill", "satisfied"),
+        ('saveStrategy("more.json", More)', "satisfied"),
+        ("A<> P.Off && level == 1 under More", "satisfied"),
+    ]:
+        assert model.check(query, verify=True).verdict == verdict, query
+    more = ntagen.load_strategy(tmp_path / "more.json", model)
+    assert more.under is not None
+    assert more.under.under is not None
+    assert more.verify().holds

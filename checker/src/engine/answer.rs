@@ -8,7 +8,7 @@ use crate::game::Priorities;
 use crate::game::closed_loop::ClosedLoop;
 use crate::game::observed::Machine;
 use crate::game::plans::Plan;
-use crate::game::strategy::Strategy;
+use crate::game::strategy::{Strategy, Under};
 use crate::ir::{ClockAtom, Network, Predicate, Query, QueryKind};
 use crate::network::bounds::is_difference;
 use crate::network::{
@@ -142,6 +142,8 @@ pub(super) struct Subject<'a> {
     pub(super) executor: &'a dyn Executor,
     /// The strategy that the controller follows.
     pub(super) under: Option<&'a ClosedLoop>,
+    /// The same for games, whose strategies are within it.
+    pub(super) within: Option<&'a Arc<Under>>,
     /// Whether priorities count under the strategy.
     pub(super) priorities: Priorities,
 }
@@ -225,7 +227,8 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
             ..
         } => {
             let asked = (objective, *cooperative);
-            games::game(network, executor, asked, options, &mut watch)
+            let under = subject.under.zip(subject.within);
+            games::game((network, under), executor, asked, options, &mut watch)
         }
         QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
             unreachable!("strategies are saved and loaded elsewhere")
@@ -318,6 +321,7 @@ pub(super) fn symbolic<'a>(
         executor,
         under,
         priorities,
+        ..
     } = subject;
     let mut atoms: Vec<ClockAtom> = predicates
         .iter()

@@ -132,6 +132,7 @@ impl LoadedModel {
             network: self.network(),
             executor: self.executor(),
             under: None,
+            within: None,
             priorities: options.priorities,
         };
         let wanted = Abstraction::LowerUpper;

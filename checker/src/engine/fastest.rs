@@ -75,14 +75,14 @@ pub(super) fn fastest(
             priorities: options.priorities,
             ..Options::default()
         };
-        let answer = games::game(network, executor, asked, &plain, watch);
+        let answer = games::game((network, None), executor, asked, &plain, watch);
         if answer.verdict == Verdict::NotSatisfied && is_strategy_wanted {
             let with_strategy = Options {
                 strategy: options.strategy,
                 verify: options.verify,
                 ..plain
             };
-            return games::game(network, executor, asked, &with_strategy, watch);
+            return games::game((network, None), executor, asked, &with_strategy, watch);
         }
         if answer.verdict != Verdict::Satisfied {
             return answer;

@@ -3,15 +3,18 @@
 use std::sync::Arc;
 
 use crate::exec::Executor;
+use crate::game::closed_loop::ClosedLoop;
 use crate::game::denial;
 use crate::game::graph::{Graph, Objective as GameObjective};
 use crate::game::plans::{NoPlans, Plan, Plans};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
 use crate::game::recurrence;
-use crate::game::strategy::{self, Strategy};
+use crate::game::strategy::{self, Strategy, Under};
 use crate::game::{Nodes, Player, Priorities};
 use crate::ir::{ClockAtom, Network, Objective, Predicate};
-use crate::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic, predicate};
+use crate::network::{
+    Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, predicate,
+};
 use crate::search::limits::{Counters, StopReason, Watch};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
@@ -74,18 +77,27 @@ impl Watch for Attempt<'_> {
     }
 }
 
+/// The strategy that a game is played under: as a restriction, and as a value.
+pub(super) type Allowed<'a> = (&'a ClosedLoop, &'a Arc<Under>);
+
 /// Answers a game query: with Extra-M+, or, where two clocks are compared, without abstraction first.
 pub(super) fn game(
-    network: &Network,
+    (network, under): (&Network, Option<Allowed<'_>>),
     executor: &dyn Executor,
     asked: (&Objective, bool),
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let atoms = objective_atoms(asked.0);
+    let mut atoms = objective_atoms(asked.0);
+    atoms.extend(under.iter().flat_map(|(closed, _)| closed.atoms()).cloned());
     let zones = |abstraction| {
         let bounds = ClockBounds::new(network, &atoms, abstraction);
-        zones_of(network, executor, bounds, options)
+        let restriction = under.map(|(closed, _)| closed as &dyn Restriction);
+        zones_of(network, executor, bounds, options).restricted(restriction)
+    };
+    let played = |zones, nodes, watch: &mut dyn Watch| {
+        let within = under.map(|(_, within)| within);
+        played(zones, (asked, within), options, nodes, watch)
     };
     if !has_differences(network, &atoms) {
         let in_discrete_states = |watch: &mut LimitWatch| {
@@ -96,15 +108,14 @@ pub(super) fn game(
                 is_given_up: false,
             };
             let zones = zones(Abstraction::Exact);
-            let (answer, _) = played(zones, asked, options, Nodes::Discrete, &mut attempt);
+            let (answer, _) = played(zones, Nodes::Discrete, &mut attempt);
             // A run-time error may lie in a state that no run reaches.
             let is_of_use = !attempt.is_given_up && !matches!(answer.verdict, Verdict::Error(_));
             (answer, is_of_use)
         };
-        let in_symbolic_states = |nodes, watch: &mut LimitWatch| {
-            played(zones(Abstraction::Maximum), asked, options, nodes, watch)
-        };
-        let nodes = if can_be_discrete(network, asked, options) {
+        let in_symbolic_states =
+            |nodes, watch: &mut LimitWatch| played(zones(Abstraction::Maximum), nodes, watch);
+        let nodes = if under.is_none() && can_be_discrete(network, asked, options) {
             options.nodes
         } else {
             Nodes::Symbolic
@@ -138,12 +149,12 @@ pub(super) fn game(
         is_given_up: false,
     };
     let exact = zones(Abstraction::Exact);
-    let (first, _) = played(exact, asked, options, Nodes::Symbolic, &mut attempt);
+    let (first, _) = played(exact, Nodes::Symbolic, &mut attempt);
     if !attempt.is_given_up {
         return first;
     }
     let cut = zones(Abstraction::Differences);
-    let (mut second, _) = played(cut, asked, options, Nodes::Symbolic, watch);
+    let (mut second, _) = played(cut, Nodes::Symbolic, watch);
     second.counters.explored += first.counters.explored;
     second
 }
@@ -194,7 +205,7 @@ pub(super) fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
 /// Plays the game of a query in these zones; also says whether it was given up for having many zones for each discrete state.
 fn played(
     mut symbolic: Symbolic<'_>,
-    (objective, is_cooperative): (&Objective, bool),
+    ((objective, is_cooperative), within): ((&Objective, bool), Option<&Arc<Under>>),
     options: &Options,
     nodes: Nodes,
     watch: &mut dyn Watch,
@@ -218,8 +229,10 @@ fn played(
         keep,
         must_progress: seeker == Player::Controller,
         deadline: None,
-        // The most permissive strategy says what to do there too, and so does one that begins anywhere.
+        // The most permissive strategy says what to do there too, and so does one that begins anywhere. Under a strategy the controller
+        // may be obliged to move there, and lose for having no move.
         leaves_dead_ends: !is_recurring
+            && within.is_none()
             && (!is_strategy_wanted || (seeker == Player::Controller && !is_cooperative)),
     };
     let mut zones_for_ways = symbolic.another();
@@ -238,7 +251,8 @@ fn played(
     }
     let is_planned = options.plans != PlansWanted::No
         && matches!(objective, Objective::Reach(_) | Objective::Until(..))
-        && !is_cooperative;
+        && !is_cooperative
+        && within.is_none();
     if is_cooperative && is_strategy_wanted {
         solver.graph.leave_out_chains();
     }
@@ -305,7 +319,8 @@ fn played(
         };
         match strategy {
             Ok(Err(reason)) => answer.message = Some(format!("no strategy: {reason}")),
-            Ok(Ok(strategy)) => {
+            Ok(Ok(mut strategy)) => {
+                strategy.under = within.cloned();
                 if options.verify {
                     let asked = Asked {
                         objective,

@@ -31,6 +31,7 @@ mod values;
 pub mod verification;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
@@ -53,7 +54,8 @@ pub use verification::Verification;
 use verification::{Asked, Played};
 
 use crate::game::closed_loop::ClosedLoop;
-use crate::game::{Forced, Nodes, Priorities};
+use crate::game::strategy::Under;
+use crate::game::{Forced, Nodes, Player, Priorities};
 pub use crate::search::reach::MOST_THREADS;
 use crate::search::reach::{Manner, Order};
 
@@ -341,11 +343,20 @@ impl LoadedModel {
         let under = under.transpose()?;
         let time_limit = under.as_ref().and_then(|strategy| strategy.time_limit);
         let network = timing::with_limit(&self.model.network, time_limit);
+        let within = under.as_ref().map(|strategy| {
+            let name = query.under.as_deref().unwrap_or_default();
+            let query = self.strategy(name).map(|one| one.query.clone());
+            Arc::new(Under {
+                query: query.unwrap_or_default(),
+                strategy: Arc::clone(strategy),
+            })
+        });
         let under = under.map(|strategy| ClosedLoop::new(&network, &strategy));
         let subject = answer::Subject {
             network: &network,
             executor: self.executor(),
             under: under.as_ref(),
+            within: within.as_ref(),
             priorities: options.priorities,
         };
         let Some(name) = &query.strategy else {
@@ -454,13 +465,38 @@ impl LoadedModel {
         })
     }
 
+    /// Names what makes a game under a strategy one that there is no algorithm for.
+    fn unsupported_under(&self, query: &crate::ir::Query) -> Option<&'static str> {
+        let QueryKind::Control {
+            cooperative,
+            time_optimal,
+            observations,
+            ..
+        } = &query.kind
+        else {
+            return None;
+        };
+        let named = self.strategy(query.under.as_deref()?)?;
+        let strategy = named.strategy.as_ref()?;
+        if *cooperative || time_optimal.is_some() {
+            Some("E<> control: and control_t* under a strategy")
+        } else if observations.is_some() {
+            Some("games under partial observation and a strategy")
+        } else if strategy.owner == Player::Environment {
+            Some("games under a strategy of the environment")
+        } else if strategy.time_limit.is_some() {
+            Some("games under a strategy within a time")
+        } else {
+            None
+        }
+    }
+
     /// Refuses, by name, what there is no algorithm for.
     fn refuse_unsupported(
         &self,
         query: &crate::ir::Query,
         priorities: Priorities,
     ) -> Result<(), Rejection> {
-        let is_game = matches!(query.kind, QueryKind::Control { .. });
         let is_under = query.under.is_some();
         let kind = match &query.kind {
             QueryKind::Reachable(_)
@@ -494,7 +530,7 @@ impl LoadedModel {
         let is_kept = query.strategy.is_some() && is_observed;
         let kind = kind.or(is_kept.then_some("observations and a named strategy"));
         let kind = kind.map(|kind| format!("queries with {kind}"));
-        let under = (is_under && is_game).then(|| "games under a strategy".to_owned());
+        let under = self.unsupported_under(query).map(str::to_owned);
         let construct = if is_under && features.stopwatches {
             Some("stopwatches in a query under a strategy")
         } else if is_observed {

@@ -87,6 +87,7 @@ impl Follower {
             owner: self.strategy.owner,
             selection: self.strategy.selection,
             time_limit: self.strategy.time_limit,
+            under: None,
             start: Start::Initial,
             states: states
                 .map(|&index| self.strategy.states[index as usize].clone())
@@ -280,6 +281,8 @@ pub enum Done {
 #[derive(Debug)]
 pub struct Play {
     follower: Arc<Follower>,
+    /// The strategy that the game is played under.
+    under: Option<Follower>,
     query: Query,
     query_text: String,
     rules: (Forced, Priorities),
@@ -331,8 +334,13 @@ impl LoadedModel {
             }
             Err(error) => return Ok(Err(error)),
         };
+        let under = strategy.under.as_ref().map(|under| {
+            let strategy = Arc::clone(&under.strategy);
+            Follower::new(self.network(), under.query.clone(), strategy)
+        });
         Ok(Ok(Play {
             start: steps.len(),
+            under,
             follower,
             query,
             query_text: text.text,
@@ -395,6 +403,17 @@ impl Play {
         let claim = verification::claim(&game.objective, played, self.rules);
         let part = self.follower.at(network, &timed.state.words);
         let decisions = verification::decisions(network, &part);
+        let mut claim = claim;
+        let allowed = self.under.as_ref().map(|under| {
+            let part = under.at(network, &timed.state.words);
+            (
+                verification::decisions(network, &part),
+                under.strategy.selection,
+            )
+        });
+        if let Some((allowed, selection)) = &allowed {
+            claim.under = Some((allowed, *selection == Selection::Any));
+        }
         play::look(&game.network, &decisions, &claim, timed)
     }
 

@@ -4,6 +4,8 @@
 //! out satisfied; to be asked under such a name is an error. Files lie relative to the folder that [`super::Options`] names, else
 //! to the folder of the model.
 
+use std::fs::File;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -32,6 +34,22 @@ pub fn unnamed(query: &str) -> &str {
         .filter(|rest| rest.starts_with(char::is_whitespace));
     let parts = named.and_then(|rest| rest.split_once('='));
     parts.map_or(query, |parts| parts.1.trim())
+}
+
+/// Writes a file completely or not at all: beside its place under another name, which it then loses.
+fn write_whole(path: &Path, text: &str) -> std::io::Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let part = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
+    let written = File::create(&part).and_then(|mut file| {
+        file.write_all(text.as_bytes())?;
+        file.sync_all()
+    });
+    let moved = written.and_then(|()| std::fs::rename(&part, path));
+    if moved.is_err() {
+        // What is left of it is of no use; that it cannot be removed says nothing new.
+        let _ = std::fs::remove_file(&part);
+    }
+    moved
 }
 
 impl LoadedModel {
@@ -80,7 +98,7 @@ impl LoadedModel {
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let text = strategy_file::write(self.network(), &strategy, query).to_string();
         let path = self.strategy_path(file, options);
-        std::fs::write(&path, text + "\n").map_err(|error| {
+        write_whole(&path, &(text + "\n")).map_err(|error| {
             let message = format!("{} cannot be written: {error}", path.display());
             self.refused(codes::STRATEGY_FILE, span, message, None)
         })?;

@@ -5,9 +5,11 @@
 //! `zones` where they apply. Reading looks names up in the model and refuses what is not in it, so a file fits
 //! every model with the same processes, locations, variables, clocks and edges.
 
+use std::sync::Arc;
+
 use serde_json::{Map, Value as Json, json};
 
-use crate::game::strategy::{Decision, Selection, Start, Strategy, StrategyState, Way};
+use crate::game::strategy::{Decision, Selection, Start, Strategy, StrategyState, Under, Way};
 use crate::game::{Player, closed_loop};
 use crate::ir::{EdgeId, Network, Shape};
 use crate::network::Part;
@@ -71,6 +73,10 @@ pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
     if let Some(limit) = strategy.time_limit {
         file["time_limit"] = json!(limit);
     }
+    if let Some(under) = &strategy.under {
+        file["query"] = json!(alone(query));
+        file["under"] = write(network, &under.strategy, &under.query);
+    }
     match &strategy.start {
         Start::Initial => {}
         Start::Anywhere => file["start"] = json!({ "kind": "anywhere" }),
@@ -88,6 +94,20 @@ pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
         }
     }
     file
+}
+
+/// The text of a query without the `under S` after it, if it has that.
+fn alone(query: &str) -> &str {
+    let Some((before, name)) = query.trim_end().rsplit_once(char::is_whitespace) else {
+        return query;
+    };
+    let is_name = name
+        .chars()
+        .all(|one| one == '_' || one.is_ascii_alphanumeric());
+    let asked = before.trim_end().strip_suffix("under");
+    let asked =
+        asked.filter(|asked| is_name && asked.ends_with(|one: char| !one.is_alphanumeric()));
+    asked.map_or(query, str::trim_end)
 }
 
 fn decision(network: &Network, decision: &Decision) -> Json {
@@ -119,7 +139,11 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
         message: format!("this is no JSON: {error}"),
         help: Some(SEE_FORMAT),
     })?;
-    let whole = At::whole(&file);
+    read_whole(network, &At::whole(&file))
+}
+
+fn read_whole(network: &Network, whole: &At<'_>) -> Result<(String, Strategy), Mismatch> {
+    let file = whole.0;
     let format = whole.text("format").unwrap_or_default();
     if format == super::machine_file::FORMAT {
         let message = "this is a machine that goes by observations, and no strategy over states";
@@ -163,13 +187,31 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
         owner,
         selection,
         time_limit,
-        start: start(network, &file)?,
+        under: under(network, whole)?,
+        start: start(network, file)?,
         states: Vec::new(),
     };
     for state in whole.list("states")? {
         strategy.states.push(reader.state(&state)?);
     }
     Ok((query, strategy))
+}
+
+/// The strategy under which the game is played.
+fn under(network: &Network, whole: &At<'_>) -> Result<Option<Arc<Under>>, Mismatch> {
+    if whole.0.get("under").is_none_or(Json::is_null) {
+        return Ok(None);
+    }
+    let at = whole.field("under")?;
+    let (query, strategy) = read_whole(network, &at)?;
+    if strategy.owner == Player::Environment || strategy.time_limit.is_some() {
+        let help = "a game is played under a strategy of the controller without a limit of time";
+        return Err(at.wrong("no game is played under this strategy", help));
+    }
+    Ok(Some(Arc::new(Under {
+        query,
+        strategy: Arc::new(strategy),
+    })))
 }
 
 /// Where play begins.

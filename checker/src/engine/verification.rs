@@ -1,7 +1,7 @@
 //! From a strategy of the solver to the independent check, and from its outcome to words.
 
 use crate::game::closed_loop;
-use crate::game::strategy::{Decision, Selection, Start, Strategy, Way};
+use crate::game::strategy::{Decision, Selection, Start, Strategy, Under, Way};
 use crate::game::{Forced, Player, Priorities};
 use crate::ir::{FunctionId, Network, Objective, Predicate, QueryKind};
 use crate::network::{Part, predicate};
@@ -75,6 +75,8 @@ pub struct Played<'s> {
     pub selection: Selection,
     /// The limit of time that it is for, if it is for one.
     pub time_limit: Option<i32>,
+    /// The strategy under which the game is played, if it is under one.
+    pub under: Option<&'s Under>,
 }
 
 impl<'s> Played<'s> {
@@ -86,6 +88,7 @@ impl<'s> Played<'s> {
             owner: strategy.owner,
             selection: strategy.selection,
             time_limit: strategy.time_limit,
+            under: strategy.under.as_deref(),
         }
     }
 }
@@ -130,7 +133,13 @@ pub fn verify(
         },
     };
     let game = asked.game(network, played.time_limit);
-    let claim = claim(&game.objective, (played.owner, played.selection), rules);
+    let mut claim = claim(&game.objective, (played.owner, played.selection), rules);
+    let allowed = played
+        .under
+        .map(|under| decisions(network, &under.strategy));
+    if let (Some(under), Some(allowed)) = (played.under, &allowed) {
+        claim.under = Some((allowed, under.strategy.selection == Selection::Any));
+    }
     strategy::verify(
         &game.network,
         played.decisions,
@@ -251,6 +260,7 @@ pub(super) fn claim(
             Forced::Product => Forcing::Network,
             Forced::Neutral => Forcing::Always,
         },
+        under: None,
         has_priorities: priorities == Priorities::Kept,
         constant,
         has_differences,

@@ -33,6 +33,7 @@ pub fn extract(
         owner: Player::Environment,
         selection: Selection::First,
         time_limit: None,
+        under: None,
         start: Start::default(),
         states: Vec::new(),
     };

@@ -103,10 +103,11 @@ fn allowed_waiting(
     let mut passing = safe.clone();
     let mut impassable = Federation::empty(safe.dimension());
     if let Some(urgent) = solver.graph.urgent(node) {
-        let standstill = urgent.standstill();
+        let mut standstill = urgent.standstill();
+        standstill.unite(&urgent.obliged);
         waiting.subtract(&standstill);
         passing.subtract(&standstill);
-        impassable.unite(&urgent.stops);
+        impassable.unite(&urgent.stops());
     }
     // What is safe may end in a limit that is not itself safe. Before such an end, the last valuations with a move must use it.
     let mut unsafe_ones = whole_or_part(solver, node, None);

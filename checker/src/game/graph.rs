@@ -186,7 +186,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         objective: Objective<'s>,
     ) -> Result<Graph<'s, 'a>, Failure> {
         let mut graph = Graph::without_nodes(symbolic, objective);
-        if graph.symbolic.has_guarded_urgency() {
+        if graph.symbolic.has_barriers() {
             graph.start_urgently()?;
             return Ok(graph);
         }
@@ -532,7 +532,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         moves: &Moves,
         target: &mut Vec<i32>,
     ) -> Result<(), Failure> {
-        if self.symbolic.has_guarded_urgency() {
+        if self.symbolic.has_barriers() {
             return self.follow_urgently(origin, moves, target);
         }
         if let Some(root) = root.filter(|_| !self.symbolic.splits())

@@ -9,6 +9,7 @@
 
 use crate::zones::{ClockSet, dbm};
 
+use super::Player;
 use super::graph::{Edge, NONE};
 use super::reach::{Solver, Win};
 
@@ -69,6 +70,7 @@ impl Solver<'_, '_, '_> {
     fn is_source_of_hope(&self, node: u32) -> bool {
         !matches!(self.win[node as usize], Win::Nothing)
             || !self.graph.nodes[node as usize].is_expanded && !self.is_decided(node)
+            || self.seeker == Player::Environment && self.is_obliged(node)
     }
 
     /// Whether time may come to a stop in an expanded node.

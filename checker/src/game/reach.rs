@@ -532,6 +532,10 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             let edge = &self.graph.edges[index];
             !matches!(self.win[edge.target as usize], Win::Everything)
         };
+        // Who is obliged to move and cannot has lost.
+        if self.seeker == Player::Environment && self.is_obliged(node) {
+            return None;
+        }
         // Without a winning move and without an evader that could be forced, there is nothing to gain.
         if self.graph.edges_of(node).all(wins_nothing) && (!has_evader || is_spoiled) {
             return Some(false);

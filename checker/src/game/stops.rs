@@ -36,18 +36,30 @@ impl Solver<'_, '_, '_> {
             }
             all.unite(stop);
         }
+        if let Some(urgent) = self.graph.urgent(node) {
+            all.subtract(&urgent.obliged);
+        }
         Ok(all)
     }
 
-    /// The valuations in which time stops, the controller has a move, and the environment has none: the controller must move.
+    /// The valuations in which the controller must move: where it is obliged to, and where time stops, it has a move, and the
+    /// environment has none.
     pub(super) fn forced_controller(&mut self, node: u32) -> Result<Federation, Failure> {
         let mut forced = self.enabled_moves(node, Player::Controller);
-        if forced.is_empty() {
-            return Ok(forced);
+        if !forced.is_empty() {
+            forced = forced.intersection(&self.standstill(node)?);
+            forced.subtract(&self.enabled_moves(node, Player::Environment));
         }
-        forced = forced.intersection(&self.standstill(node)?);
-        forced.subtract(&self.enabled_moves(node, Player::Environment));
+        if let Some(urgent) = self.graph.urgent(node) {
+            forced.unite(&urgent.obliged.intersection(&urgent.reached));
+        }
         Ok(forced)
+    }
+
+    /// Whether the controller is obliged to move somewhere in a node.
+    pub(super) fn is_obliged(&self, node: u32) -> bool {
+        let urgent = self.graph.urgent(node);
+        urgent.is_some_and(|urgent| !urgent.obliged.is_empty())
     }
 
     /// The valuations of a node in which time cannot pass.

@@ -20,6 +20,8 @@
 //!
 //! Source: Cassez et al., CONCUR 2005, section 5 (strategies from the order in which winning states were found).
 
+use std::sync::Arc;
+
 use crate::network::{ClockEffect, Failure, Moves, Part};
 use crate::zones::dbm::Constraint;
 use crate::zones::{ClockSet, Federation};
@@ -71,10 +73,21 @@ pub struct Strategy {
     /// Within which time the controller reaches the goal, or up to which the environment prevents it, if that is limited. Zones have
     /// a clock more then: the last one is 0 in the initial state and nothing sets it.
     pub time_limit: Option<i32>,
+    /// The strategy of the controller under which the game is played, if it is under one.
+    pub under: Option<Arc<Under>>,
     /// Where play begins.
     pub start: Start,
     /// The states; if play begins in one, that first.
     pub states: Vec<StrategyState>,
+}
+
+/// What the controller is allowed in a game.
+#[derive(Clone, Debug)]
+pub struct Under {
+    /// The query that the strategy answers.
+    pub query: String,
+    /// The strategy: where it says something, the controller makes no other moves and waits only where it does.
+    pub strategy: Arc<Strategy>,
 }
 
 /// Where play by a strategy begins.
@@ -124,6 +137,7 @@ pub fn extract_from(
             _ => Selection::First,
         },
         time_limit: None,
+        under: None,
         start: Start::default(),
         states: Vec::new(),
     };

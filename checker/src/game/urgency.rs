@@ -1,12 +1,16 @@
-//! Nodes in which synchronisations on urgent channels have clock guards.
+//! Nodes in which something stops time at some clock values only.
 //!
-//! Such a synchronisation stops time where it is enabled: see `network/passage.rs`. The zone of such a node contains its future as if
-//! nothing stopped time, so that it is one zone; which part of it is *reached* is kept beside it, and nothing outside of that part
-//! counts. Invariants:
+//! A synchronisation on an urgent channel with clock guards stops time where it is enabled: see `network/passage.rs`; and a strategy
+//! under which the game is played where it lets the controller not wait: there the controller is *obliged* to move. The zone of such
+//! a node contains its future as if nothing stopped time, so that it is one zone; which part of it is *reached* is kept beside it, and
+//! nothing outside of that part counts. Invariants:
 //! * The reached part contains its own future up to where time stops.
 //! * An edge leads from the reached part of its source, and whatever it leads to is in the reached part of a target.
 //!
 //! There are no chains then, and no clocks that stand still.
+//!
+//! Where an urgent synchronisation has no first moment, time stops before it. Where an obligation has none, the controller moves
+//! soon after: time gets to moments as soon as one likes.
 //!
 //! Zones are extrapolated on entry, before time passes: valuations that differ only above all constants are bisimilar, so each
 //! valuation that is added does, also while time passes, what one does that was there before.
@@ -21,17 +25,26 @@ use super::graph::{Graph, Origin, push_step};
 /// How time is stopped in a node.
 #[derive(Clone, Debug)]
 pub struct Urgent {
-    /// Where a synchronisation is enabled that stops time.
-    pub stops: Federation,
+    /// Where an urgent synchronisation is enabled.
+    pub channel: Federation,
+    /// Where the controller is obliged to move.
+    pub obliged: Federation,
     /// What time leads to.
     pub reached: Federation,
 }
 
 impl Urgent {
-    /// All valuations at which time cannot pass: those that stop it, and those that are followed by such at once.
+    /// All valuations that stop time.
+    pub(super) fn stops(&self) -> Federation {
+        let mut stops = self.channel.clone();
+        stops.unite(&self.obliged);
+        stops
+    }
+
+    /// All valuations at which time cannot pass for an urgent channel: where it stops time, and what is followed by that at once.
     pub(super) fn standstill(&self) -> Federation {
-        let mut all = instants::before(&self.stops, &ClockSet::EMPTY);
-        all.unite(&self.stops);
+        let mut all = instants::before(&self.channel, &ClockSet::EMPTY);
+        all.unite(&self.channel);
         all.intersection(&self.reached)
     }
 
@@ -44,7 +57,7 @@ impl Urgent {
         }
         let nothing = Federation::empty(dimension);
         let barriers = Barriers {
-            stops: self.stops.clone(),
+            stops: self.stops(),
             ..Barriers::none(dimension)
         };
         let reached = future::successors(&from, &nothing, &barriers).intersection(&self.reached);
@@ -55,18 +68,25 @@ impl Urgent {
     }
 
     /// The safe timed predecessors of `good` with respect to `bad` where time is stopped on the way: a valuation that stops time can
-    /// be the last one of a delay, and no other. So of those in `good` only the first moments are led to.
+    /// be the last one of a delay, and no other. So of those in `good` only the first moments are led to, and where an
+    /// obligation has none, those as soon as one likes.
     pub(super) fn predecessors(&self, good: &Federation, bad: &Federation) -> Federation {
+        let stops = self.stops();
         let mut now = good.clone();
         now.subtract(bad);
         let mut running = self.reached.clone();
-        running.subtract(&self.stops);
+        running.subtract(&stops);
         let first = instants::after(&running, &ClockSet::EMPTY);
-        let entered = now.intersection(&self.stops).intersection(&first);
+        let entered = now.intersection(&stops).intersection(&first);
+        let mut soon = now.intersection(&self.obliged);
+        soon.subtract(&self.channel);
+        let mut sooner = instants::before(&soon, &ClockSet::EMPTY).intersection(&running);
+        sooner.subtract(bad);
         let mut ends = now.clone();
-        ends.subtract(&self.stops);
+        ends.subtract(&stops);
         ends.unite(&entered);
-        let mut barred = self.stops.clone();
+        ends.unite(&sooner);
+        let mut barred = stops;
         barred.subtract(&entered);
         barred.unite(bad);
         let mut all = past::predecessors(&ends, &barred, &ClockSet::EMPTY);
@@ -76,7 +96,7 @@ impl Urgent {
 }
 
 impl Graph<'_, '_> {
-    /// How time is stopped in a node; `None` if no synchronisation with clock guards does it.
+    /// How time is stopped in a node; `None` if nothing does it at some clock values only.
     pub fn urgent(&self, node: u32) -> Option<&Urgent> {
         if self.urgent.is_empty() {
             return None;
@@ -177,16 +197,29 @@ impl Graph<'_, '_> {
             self.symbolic
                 .delay(words, may_delay, invariant, whole.bounds_mut())?;
             let mut urgent = None;
+            let obliged = self.symbolic.obliged_part(words, whole.bounds());
             if may_delay {
                 let barriers = self.symbolic.barriers(words, whole.bounds())?;
                 if !barriers.is_empty() {
+                    let channel = if self.symbolic.has_guarded_urgency() {
+                        self.symbolic.urgent_part(words, whole.bounds())?
+                    } else {
+                        Federation::empty(self.dimension())
+                    };
                     let mut reached = self.symbolic.within(&entry, &whole, &barriers);
                     reached.reduce();
                     urgent = Some(Urgent {
-                        stops: barriers.stops,
+                        channel,
+                        obliged,
                         reached,
                     });
                 }
+            } else if !obliged.is_empty() {
+                urgent = Some(Urgent {
+                    channel: Federation::empty(self.dimension()),
+                    obliged,
+                    reached: Federation::of_zone(self.dimension(), whole.bounds()),
+                });
             }
             futures.push((whole, urgent));
         }

@@ -111,7 +111,7 @@ impl Symbolic<'_> {
 
     /// Whether locations and the answers of guards decide which moves there are, and locations alone how time passes.
     pub fn is_fixed(&self) -> bool {
-        if self.has_priorities {
+        if self.has_priorities || self.restriction.is_some() {
             return false;
         }
         let network = self.stepper.network();

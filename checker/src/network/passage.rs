@@ -47,12 +47,27 @@ impl Symbolic<'_> {
     }
 
     /// Whether there may be barriers.
-    pub(super) fn has_barriers(&self) -> bool {
+    pub fn has_barriers(&self) -> bool {
         self.has_guarded_urgency || self.restriction.is_some()
     }
 
+    /// The part of the zone in which the restriction does not let its owner wait.
+    pub fn obliged_part(&self, words: &[i32], zone: &[Bound]) -> Federation {
+        let allowed = self.restriction.and_then(|one| one.allowed(words));
+        let Some(allowed) = allowed else {
+            return Federation::empty(self.dimension());
+        };
+        let mut obliged = allowed.barriers.stops.clone();
+        obliged.intersect_zone(zone);
+        obliged
+    }
+
     /// The part of the zone in which a clock-guarded urgent synchronisation is enabled.
-    fn urgent_part(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Federation, Failure> {
+    pub fn urgent_part(
+        &mut self,
+        words: &mut [i32],
+        zone: &[Bound],
+    ) -> Result<Federation, Failure> {
         let mut urgent = Federation::empty(self.dimension());
         let mut moves = std::mem::take(&mut self.inner_moves);
         let result = self
@@ -165,10 +180,14 @@ impl Symbolic<'_> {
         Ok(())
     }
 
-    /// As [`Symbolic::moves`] without a restriction, for whoever asks for the moves of the same state again.
+    /// As [`Symbolic::moves`], for whoever asks for the moves of the same state again.
     pub fn remembered_moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         self.stepper.moves(words, out)?;
-        self.apply_priorities(words, out)
+        self.apply_priorities(words, out)?;
+        if let Some(restriction) = self.restriction {
+            restriction::apply(restriction, words, out);
+        }
+        Ok(())
     }
 
     fn apply_priorities(&mut self, words: &[i32], moves: &mut Moves) -> Result<(), Failure> {

@@ -322,8 +322,8 @@ impl<'a> Symbolic<'a> {
 
     /// The same; `moves` are those of the state as [`Symbolic::remembered_moves`] gives them.
     pub fn may_delay_with(&mut self, words: &mut [i32], moves: &Moves) -> Result<bool, Failure> {
-        if self.has_priorities && self.has_urgent_channels {
-            // Priorities do not let time pass where a synchronisation of a lower level is urgent.
+        if (self.has_priorities || self.restriction.is_some()) && self.has_urgent_channels {
+            // Neither lets time pass where a synchronisation that it forbids is urgent.
             return self.may_delay(words);
         }
         Ok(self.stepper.may_delay(words, moves))

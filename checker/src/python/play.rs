@@ -106,6 +106,18 @@ impl Strategy {
         self.inner.strategy.selection == Selection::Any
     }
 
+    /// The strategy under which the game is played; `None` if it is under none.
+    fn under(&self, py: Python<'_>) -> Option<Strategy> {
+        let under = self.inner.strategy.under.as_ref()?;
+        let (query, strategy) = (under.query.clone(), Arc::clone(&under.strategy));
+        let model = self.model.get();
+        let follower = model.with(|model| Follower::new(model.network(), query, strategy));
+        Some(Strategy {
+            model: self.model.clone_ref(py),
+            inner: Arc::new(follower),
+        })
+    }
+
     /// Where play begins, as JSON: "initial", "anywhere" or the run that leads there.
     fn start_json(&self, priorities: &str) -> PyResult<String> {
         let priorities = priority_rule(priorities)?;

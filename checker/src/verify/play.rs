@@ -221,7 +221,8 @@ pub fn look(
     let state = doubled(&timed.state);
     let predicates: Vec<&Predicate> = claim.goal.into_iter().chain(claim.keep).collect();
     let mut moments = Moments::new(network, &predicates)?;
-    if let Some(decisions) = rules.decisions_of(&state) {
+    let deciding = [rules.decisions_of(&state), rules.allowed_of(&state)];
+    for decisions in deciding.into_iter().flatten() {
         moments = moments.with(&constants_of(network, decisions));
     }
     let is_stopped = rules.semantics.stopped(&state)?;
@@ -271,6 +272,7 @@ impl View<'_> {
             {
                 return self.rest(&before, &now);
             }
+            let is_time_stopped = is_time_stopped || self.rules.is_obliged(&now);
             let here = Passed {
                 now,
                 moves,

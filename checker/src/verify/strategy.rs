@@ -17,6 +17,9 @@
 //! * against one that has to keep something, every play ends in a region in which that is broken;
 //! * against one whose goal is to recur, no cycle of the graph has a goal in it, and no play stops at one.
 //!
+//! If the game is played under a strategy of the controller ([`Claim::under`]), the controller has no moves but those that this allows, and
+//! where it does not allow waiting no time passes: the controller must move, and has lost if it cannot.
+//!
 //! Cost: one look at each region and move of the closed loop; memory for each region.
 
 use std::collections::{HashMap, HashSet};
@@ -124,6 +127,9 @@ pub struct Claim<'a> {
     pub keep: Option<&'a Predicate>,
     /// When the environment must move.
     pub forcing: Forcing,
+    /// What the controller is allowed, by a strategy of its, and whether that allows every decision that applies; `None` is everything.
+    /// Where it decides nothing, everything is allowed.
+    pub under: Option<(&'a [Decisions], bool)>,
     /// Whether priorities count.
     pub has_priorities: bool,
     /// The greatest constant, in absolute value, of the clock comparisons of the two predicates.
@@ -227,7 +233,9 @@ pub fn verify(
     start: &Origin,
     most_regions: u64,
 ) -> Result<Outcome, Error> {
-    let all = strategy.iter().flat_map(|state| &state.decisions);
+    let under = claim.under.map_or(&[][..], |(under, _)| under);
+    let all = strategy.iter().chain(under);
+    let all = all.flat_map(|state| &state.decisions);
     let zones = all.flat_map(|decision| decision.zones.iter().flatten());
     let constants = zones.clone().map(|one| i64::from(one.bound).abs());
     let constant = constants.max().unwrap_or(0).max(claim.constant);
@@ -295,6 +303,7 @@ struct Frame {
 pub(super) struct Rules<'a> {
     pub(super) semantics: Semantics<'a>,
     strategy: HashMap<&'a [i32], &'a Decisions>,
+    under: HashMap<&'a [i32], &'a Decisions>,
     pub(super) claim: &'a Claim<'a>,
 }
 
@@ -540,12 +549,15 @@ impl<'a> Rules<'a> {
         strategy: &'a [Decisions],
         claim: &'a Claim<'a>,
     ) -> Rules<'a> {
-        let states = strategy.iter();
+        let by_words = |strategy: &'a [Decisions]| {
+            let states = strategy.iter();
+            let states = states.map(|state| (identity(network, &state.words), state));
+            states.collect::<HashMap<_, _>>()
+        };
         Rules {
             semantics: Semantics::new(network, ticks_per_unit),
-            strategy: states
-                .map(|state| (identity(network, &state.words), state))
-                .collect(),
+            strategy: by_words(strategy),
+            under: by_words(claim.under.map_or(&[], |(under, _)| under)),
             claim,
         }
     }
@@ -620,6 +632,7 @@ impl Play<'_> {
         self.regions.pass(&mut later.clocks);
         let can_pass = !self.rules.semantics.is_time_stopped(state, moves)
             && !self.is_stopped_at_once(state, &later)?
+            && !self.rules.is_obliged(state)
             && self.rules.semantics.invariants_hold(&later)?;
         Ok(can_pass.then_some(later))
     }
@@ -651,7 +664,41 @@ impl<'a> Rules<'a> {
             let highest = possible.iter().map(|(one, _)| one.level).max();
             possible.retain(|(one, _)| Some(one.level) == highest);
         }
+        let allowed = self.allowed(state);
+        if !allowed.is_empty() {
+            let is_allowed = |one: &Move| {
+                allowed
+                    .iter()
+                    .any(|decision| decision.action.as_ref() == Some(&one.parts))
+            };
+            possible.retain(|(one, _)| !one.controllable || is_allowed(one));
+        }
         Ok(possible)
+    }
+
+    /// The decisions that the controller is allowed; none is all.
+    fn allowed(&self, state: &State) -> Vec<&'a Decision> {
+        let words = identity(self.semantics.network(), &state.words);
+        let (Some(decisions), Some((_, is_permissive))) = (self.under.get(words), self.claim.under)
+        else {
+            return Vec::new();
+        };
+        let unit = self.semantics.ticks_per_unit();
+        let indices = decisions.indices_at(&state.clocks, unit, is_permissive);
+        let indices = indices.into_iter();
+        indices.map(|index| &decisions.decisions[index]).collect()
+    }
+
+    /// Whether the controller is not allowed to wait.
+    pub(super) fn is_obliged(&self, state: &State) -> bool {
+        let allowed = self.allowed(state);
+        !allowed.is_empty() && allowed.iter().all(|one| one.action.is_some())
+    }
+
+    /// All that the controller may be allowed in states with these words.
+    pub(super) fn allowed_of(&self, state: &State) -> Option<&'a Decisions> {
+        let words = identity(self.semantics.network(), &state.words);
+        self.under.get(words).copied()
     }
 
     /// Whether the owner of the strategy makes the move.
@@ -683,6 +730,9 @@ impl<'a> Rules<'a> {
         moves: &[Move],
         possible: &[(&Move, State)],
     ) -> Result<Rest, Error> {
+        if self.is_obliged(state) {
+            return Ok(Rest::Must(Owner::Controller));
+        }
         let has_own = possible.iter().any(|(one, _)| one.controllable);
         let has_other = possible.iter().any(|(one, _)| !one.controllable);
         // Where play stops at a goal that is to recur, nothing is owed.

@@ -18,6 +18,7 @@ use proptest::prop_assert_eq;
 use proptest::test_runner::TestCaseError;
 
 use crate::compare::{self, Tally};
+use crate::explicit::Graph;
 use crate::generate::{self, Formula, Network, Shape};
 
 const SHAPE: Shape = Shape {
@@ -33,17 +34,17 @@ const SHAPE: Shape = Shape {
 /// Regions that brute force explores before it gives a case up.
 const MOST_REGIONS: usize = 3_000;
 
-struct Random(u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    fn below(&mut self, limit: usize) -> usize {
+    pub(crate) fn below(&mut self, limit: usize) -> usize {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         (self.0 >> 20) as usize % limit
     }
 
-    fn chance(&mut self, percent: usize) -> bool {
+    pub(crate) fn chance(&mut self, percent: usize) -> bool {
         self.below(100) < percent
     }
 
@@ -86,7 +87,7 @@ impl Random {
     }
 
     /// Decisions for some of the given words, each with the moves that the owner has there.
-    fn strategy(
+    pub(crate) fn strategy(
         &mut self,
         owner: Player,
         words: &[(Vec<i32>, Vec<Vec<Part>>)],
@@ -100,6 +101,7 @@ impl Random {
                 Selection::Any
             },
             time_limit: None,
+            under: None,
             start: Start::Initial,
             states: Vec::new(),
         };
@@ -124,13 +126,13 @@ impl Random {
 }
 
 /// What the strategy says in a state: the decisions that count; `None` is nothing, so that everything is allowed.
-struct Said<'s>(Option<Vec<Counting<'s>>>);
+pub(crate) struct Said<'s>(Option<Vec<Counting<'s>>>);
 
 /// A decision by its index, with what it does.
 type Counting<'s> = (usize, &'s Option<Vec<Part>>);
 
 impl<'s> Said<'s> {
-    fn new(strategy: &'s Strategy, state: &State, ticks: i64) -> Said<'s> {
+    pub(crate) fn new(strategy: &'s Strategy, state: &State, ticks: i64) -> Said<'s> {
         let same = |one: &&StrategyState| one.words == state.words;
         let Some(known) = strategy.states.iter().find(same).filter(|one| !one.is_goal) else {
             return Said(None);
@@ -145,12 +147,12 @@ impl<'s> Said<'s> {
         Said((!counting.is_empty()).then_some(counting))
     }
 
-    fn allows_waiting(&self) -> bool {
+    pub(crate) fn allows_waiting(&self) -> bool {
         let mut counting = self.0.iter().flatten();
         self.0.is_none() || counting.any(|one| one.1.is_none())
     }
 
-    fn allows(&self, parts: &[Part]) -> bool {
+    pub(crate) fn allows(&self, parts: &[Part]) -> bool {
         let mut counting = self.0.iter().flatten();
         self.0.is_none() || counting.any(|one| one.1.as_deref() == Some(parts))
     }
@@ -329,6 +331,36 @@ impl Loop {
     }
 }
 
+/// The words of the nodes, each with the moves that a player may have there.
+pub(crate) fn own_moves(
+    semantics: &Semantics<'_>,
+    graph: &Graph,
+    owner: Player,
+) -> Vec<(Vec<i32>, Vec<Vec<Part>>)> {
+    let mut words: Vec<(Vec<i32>, Vec<Vec<Part>>)> = Vec::new();
+    for node in &graph.nodes {
+        let moves = semantics.moves(&node.state).unwrap_or_default();
+        let own = moves.iter().filter(|one| owner.owns(one.controllable));
+        let own = own.map(|one| {
+            one.parts
+                .iter()
+                .map(|&part| part.into())
+                .collect::<Vec<_>>()
+        });
+        let index = words.iter().position(|one| one.0 == node.state.words);
+        let index = index.unwrap_or_else(|| {
+            words.push((node.state.words.clone(), Vec::new()));
+            words.len() - 1
+        });
+        for parts in own {
+            if !words[index].1.contains(&parts) {
+                words[index].1.push(parts);
+            }
+        }
+    }
+    words
+}
+
 fn compare(
     (network, p, q, seed): &(Network, Formula, Formula, u64),
     tally: &Tally,
@@ -352,27 +384,7 @@ fn compare(
     } else {
         Player::Environment
     };
-    let mut words: Vec<(Vec<i32>, Vec<Vec<Part>>)> = Vec::new();
-    for node in &graph.nodes {
-        let moves = semantics.moves(&node.state).unwrap_or_default();
-        let own = moves.iter().filter(|one| owner.owns(one.controllable));
-        let own = own.map(|one| {
-            one.parts
-                .iter()
-                .map(|&part| part.into())
-                .collect::<Vec<_>>()
-        });
-        let index = words.iter().position(|one| one.0 == node.state.words);
-        let index = index.unwrap_or_else(|| {
-            words.push((node.state.words.clone(), Vec::new()));
-            words.len() - 1
-        });
-        for parts in own {
-            if !words[index].1.contains(&parts) {
-                words[index].1.push(parts);
-            }
-        }
-    }
+    let words = own_moves(&semantics, &graph, owner);
     let strategy = random.strategy(owner, &words, dimension);
     let regions = Regions::new(&ir, i64::from(SHAPE.constant), true);
     let regions = regions.expect("the networks have no stopwatches");

@@ -40,6 +40,14 @@ impl Tally {
         count(&self.compared);
     }
 
+    /// Counts a comparison of something that holds, or does not.
+    pub(crate) fn count(&self, holds: bool) {
+        count(&self.compared);
+        if holds {
+            count(&self.satisfied);
+        }
+    }
+
     /// Counts a query that the engine gave up.
     pub(crate) fn count_stopped(&self) {
         count(&self.stopped);

@@ -2,15 +2,21 @@
 
 use std::collections::HashMap;
 
-use checker::verify::{Error, Regions, Semantics, State};
+use checker::verify::{Error, Part, Regions, Semantics, State};
 
 /// A move, as far as games need it.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
     pub target: usize,
     pub controllable: bool,
-    pub processes: Vec<u32>,
+    pub parts: Vec<Part>,
     pub label: Label,
+}
+
+impl Step {
+    fn takes_part(&self, process: u32) -> bool {
+        self.parts.iter().any(|part| part.process == process)
+    }
 }
 
 /// What tells controllable moves apart under partial observation: the channel, else the edge with its select values.
@@ -38,6 +44,8 @@ pub(crate) struct Node {
     pub later: Option<usize>,
     /// What stops time, if it is stopped.
     pub stoppers: Vec<Stopper>,
+    /// Whether the controller is not allowed to wait.
+    pub is_obliged: bool,
 }
 
 /// All regions that can be reached; the first is the initial one.
@@ -125,7 +133,7 @@ fn successors(
         steps.push(Step {
             target: known.id(target),
             controllable: one.controllable,
-            processes: one.parts.iter().map(|part| part.process).collect(),
+            parts: one.parts.clone(),
             label: match (one.channel, one.parts[0]) {
                 (Some(channel), _) => Label::Channel(channel),
                 (None, part) => Label::Edge(part.process, part.edge, part.select),
@@ -154,6 +162,7 @@ fn successors(
         steps,
         later,
         stoppers,
+        is_obliged: false,
     })
 }
 
@@ -243,6 +252,9 @@ fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule
     if others.iter().any(|step| !win[step.target]) {
         return false;
     }
+    if node.is_obliged {
+        return own.iter().any(|step| win[step.target]);
+    }
     if own.iter().any(|step| win[step.target]) || node.later.is_some_and(|later| win[later]) {
         return true;
     }
@@ -262,7 +274,7 @@ pub(crate) fn is_forced(stoppers: &[Stopper], own: &[&Step], rule: Rule) -> bool
         (Rule::Neutral, _) => true,
         (Rule::Product, _) | (Rule::Tiga, Stopper::Channel) => own.is_empty(),
         (Rule::Tiga, Stopper::Process(process)) => {
-            own.iter().all(|step| !step.processes.contains(process))
+            own.iter().all(|step| !step.takes_part(*process))
         }
     })
 }

@@ -13,7 +13,7 @@ use crate::compare::{self, Tally};
 use crate::explicit::{Graph, Objective, Rule, recurring, winning};
 use crate::generate::{self, Formula, Network, Shape};
 
-const SHAPE: Shape = Shape {
+pub(crate) const SHAPE: Shape = Shape {
     clocks: 2,
     constant: 3,
     strict_invariants: false,
@@ -125,7 +125,7 @@ fn compare(
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+pub(crate) enum Kind {
     Reach,
     Until,
     Safe,
@@ -134,7 +134,7 @@ enum Kind {
 }
 
 /// By region: whether the controller wins.
-fn wins(
+pub(crate) fn wins(
     network: &Network,
     (goal, keep): (&Formula, &Formula),
     graph: &Graph,
@@ -201,7 +201,7 @@ fn check_under(
 }
 
 /// By region: whether the formula holds.
-fn labels(network: &Network, formula: &Formula, graph: &Graph) -> Vec<bool> {
+pub(crate) fn labels(network: &Network, formula: &Formula, graph: &Graph) -> Vec<bool> {
     let nodes = graph.nodes.iter();
     nodes
         .map(|node| {
@@ -293,7 +293,7 @@ fn compare_times(
 }
 
 /// A strategy must be the same after it was written and read again.
-fn check_file(
+pub(crate) fn check_file(
     model: &LoadedModel,
     query: &str,
     answer: &Answer,

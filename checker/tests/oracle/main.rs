@@ -13,4 +13,6 @@ mod games;
 mod generate;
 mod mutations;
 mod observed;
+mod random_mutations;
 mod reachability;
+mod under;

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ntagen import cli
-from ntagen.cli.files import write_files
+from ntagen.files import write_files
 from ntagen.nsl import load
 from ntagen.render import render, render_queries
 

@@ -51,5 +51,5 @@ def _naming(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise InputError(
-            f"cannot write {path}: {reason}\nhint: choose another folder with -o"
+            f"cannot write {path}: {reason}\nhint: choose another place for it"
         ) from error

@@ -1,0 +1,130 @@
+//! Games under a strategy of the controller: random strategies, and most permissive ones, against the graph of regions of which
+//! only what they allow is left.
+
+use std::sync::Arc;
+
+use checker::engine::{NamedStrategy, Options, strategy_file};
+use checker::game::strategy::Strategy;
+use checker::game::{Forced, Player, Priorities};
+use checker::network::Part;
+use checker::verify::{Regions, Semantics};
+use proptest::test_runner::TestCaseError;
+
+use crate::closed_loops::{Random, Said, own_moves};
+use crate::compare::{self, Tally};
+use crate::explicit::{Graph, Rule};
+use crate::games::{Kind, SHAPE, check_file, wins};
+use crate::generate::{self, Formula, Network};
+
+/// Leaves only what the strategy allows.
+fn restrict(graph: &mut Graph, strategy: &Strategy) {
+    let ticks = graph.ticks;
+    for node in &mut graph.nodes {
+        let said = Said::new(strategy, &node.state, ticks);
+        node.steps.retain(|step| {
+            let parts: Vec<Part> = step.parts.iter().map(|&part| part.into()).collect();
+            !step.controllable || said.allows(&parts)
+        });
+        node.is_obliged = !said.allows_waiting();
+    }
+}
+
+fn compare(
+    (network, goal, keep, seed): &(Network, Formula, Formula, u64),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let text = network.text();
+    let mut model = compare::load(&text);
+    let Ok(Some(mut graph)) = compare::regions(&model, i64::from(SHAPE.constant), true, tally)
+    else {
+        return Ok(());
+    };
+    let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
+    let mut random = Random(seed | 1);
+    let options = Options {
+        priorities: Priorities::Kept,
+        strategy: true,
+        ..compare::options()
+    };
+    let strategy = if random.chance(50) {
+        let ir = model.network().clone();
+        let semantics = Semantics::new(&ir, Regions::ticks_per_unit(&ir));
+        let words = own_moves(&semantics, &graph, Player::Controller);
+        random.strategy(Player::Controller, &words, ir.clocks.len().max(1))
+    } else {
+        let query = model.add_query(&format!("control: A[] {keep_text}"));
+        let answer = model.check(&query, &options);
+        let strategy = answer.ok().and_then(|answer| answer.evidence.strategy);
+        let Some(strategy) = strategy.filter(|one| one.owner == Player::Controller) else {
+            return Ok(());
+        };
+        // In the file, the decisions of states with the same words are together.
+        let file = strategy_file::write(model.network(), &strategy, "control: A[] true");
+        let read = strategy_file::read(model.network(), file.to_string().as_bytes());
+        read.expect("what is written is read").1
+    };
+    restrict(&mut graph, &strategy);
+    let description = strategy_file::write(model.network(), &strategy, "control: A[] true");
+    model.keep_strategy(NamedStrategy {
+        name: "S".to_owned(),
+        query: "control: A[] true".to_owned(),
+        strategy: Some(Arc::new(strategy)),
+    });
+    for (query, kind) in [
+        (format!("control: A<> {goal_text}"), Kind::Reach),
+        (
+            format!("control: A[ {keep_text} U {goal_text} ]"),
+            Kind::Until,
+        ),
+        (format!("control: A[] not ({goal_text})"), Kind::Safe),
+        (
+            format!("control: A[ {keep_text} W {goal_text} ]"),
+            Kind::WeakUntil,
+        ),
+        (
+            format!("control: A[] ({keep_text} && A<> {goal_text})"),
+            Kind::Recur,
+        ),
+    ] {
+        let has_rule = matches!(kind, Kind::Reach | Kind::Until | Kind::Recur);
+        let rules = [
+            (Rule::Tiga, Forced::Tiga),
+            (Rule::Product, Forced::Product),
+            (Rule::Neutral, Forced::Neutral),
+        ];
+        for (rule, forced) in rules.into_iter().take(if has_rule { 3 } else { 1 }) {
+            let expected = if kind == Kind::Safe {
+                let avoided = Formula::Not(Box::new(goal.clone()));
+                wins(network, (goal, &avoided), &graph, kind, rule)[0]
+            } else {
+                wins(network, (goal, keep), &graph, kind, rule)[0]
+            };
+            let query = format!("{query} under S");
+            let query_text = model.add_query(&query);
+            let options = Options {
+                forced,
+                verify: true,
+                ..options.clone()
+            };
+            let answer = model.check(&query_text, &options);
+            let describe = || format!("{text}{query}\n{forced:?}\n{description:#}");
+            compare::check(&answer, Ok(expected), tally, describe)?;
+            compare::check_strategy(&model, &answer, tally, describe)?;
+            if let Ok(answer) = &answer {
+                check_file(&model, &query, answer, describe)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn games_under_a_strategy_equal_brute_force() {
+    let strategy = (
+        generate::network(SHAPE),
+        generate::formula(SHAPE),
+        generate::formula(SHAPE),
+        proptest::num::u64::ANY,
+    );
+    compare::run("games under a strategy", 100, &strategy, compare);
+}
