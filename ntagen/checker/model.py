@@ -1,22 +1,20 @@
-"""The typed face of the engine: verdicts, traces, strategies and plans of UPPAAL models.
-
-The engine is the Rust crate in ``checker/``; this module only gives its answers Python types.
-"""
+"""Models that the engine has accepted, and what they can be asked."""
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from ntagen import _checker
+from ntagen.checker.answer import Answer
+from ntagen.checker.edges import EdgeEntry
+from ntagen.checker.errors import failing, rejecting
+from ntagen.checker.states import Simulation, SymbolicState, symbolic_states
 from ntagen.errors import InputError, LimitError, ModelError, NtagenError
-from ntagen.machine import Machine
 from ntagen.model.facts import (
     Channel,
     Clock,
@@ -29,32 +27,16 @@ from ntagen.model.facts import (
     Variable,
     queries_from,
 )
-from ntagen.runs import Choose, Run, runs_of, simulated
+from ntagen.runs import Choose, Run, simulated
 from ntagen.strategy import ForcedRule, PriorityRule, Strategy, Verification
 
-Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 SearchOrder = Literal["bfs", "dfs", "random"]
 CodeEngine = Literal["jit", "interpreter"]
 PlansWanted = Literal["none", "first", "all"]
 TraceWanted = Literal["any", "shortest", "fastest"]
 
-Extreme = int | Literal["inf"] | None
-"""A least or greatest value: ``"inf"`` if there is no greatest, ``None`` if no state counts."""
-
-Value = Extreme | list[Extreme] | list[list[Extreme] | None]
-"""What ``sup`` and ``inf`` found: of one item an `Extreme`, for ``bounds`` the pair of the least
-and the greatest; of several items a list of these."""
-
 Progress = Callable[[int, int, int, int], object]
 """Is shown explored, stored and waiting states, and bytes."""
-
-_ReachedEntry = tuple[
-    str,
-    list[str],
-    list[list[tuple[int, bool] | None]],
-    tuple[int, list[tuple[int, int, int, list[int]]]] | None,
-]
-"""A state as the engine gives it."""
 
 MAX_PLANS = 1_000_000
 """Plans that are listed at most, unless the caller says otherwise."""
@@ -64,232 +46,6 @@ _GAME = re.compile(r"\s*(strategy\s+\w+\s*=\s*)?(\{[^{}]*\}\s*)?(E\s*<>\s*)?cont
 
 _PROCESSES_SHOWN = 5
 """Processes that the short text of a model names."""
-
-
-class RejectedError(InputError):
-    """The engine does not accept a model or a query; `diagnostics` say what is wrong and where."""
-
-    def __init__(self, diagnostics: list[str]) -> None:
-        super().__init__("\n".join(text.rstrip() for text in diagnostics))
-        self.diagnostics = tuple(diagnostics)
-
-
-@dataclass(frozen=True, slots=True)
-class EngineEdge:
-    """An edge as it is taken in a plan.
-
-    Attributes:
-        process: The process, for example ``User``.
-        source: The location that it leaves.
-        target: The location that it enters.
-        sync: The synchronisation as written, for example ``do_push!``; empty for an internal edge.
-        select: The values of the select bindings.
-    """
-
-    process: str
-    source: str
-    target: str
-    sync: str
-    select: dict[str, int] = field(hash=False)
-
-
-@dataclass(frozen=True, slots=True)
-class EngineStep:
-    """A transition of a plan: the edges that are taken together, the sender's first."""
-
-    edges: tuple[EngineEdge, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class EnginePlan:
-    """A winning sequence: the transitions that leave a state without committed locations."""
-
-    steps: tuple[EngineStep, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class _EdgeEntry:
-    process: str
-    source: str
-    targets: list[str]
-    selects: list[str]
-    sync: str
-
-    def taken(self, branch: int, values: list[int]) -> EngineEdge:
-        select = dict(zip(self.selects, values, strict=True))
-        return EngineEdge(self.process, self.source, self.targets[branch], self.sync, select)
-
-
-@dataclass(frozen=True, slots=True)
-class SymbolicState:
-    """A reachable symbolic state: discrete values, and a convex set of clock values.
-
-    Attributes:
-        index: Its place among the states, from 0.
-        locations: The location of each process.
-        variables: The value of each variable; parts of arrays and structs by names such as
-            ``a[2].x``.
-        zone: The fewest constraints on the clocks, such as ``x-y == 2`` and ``x <= 3``, in units
-            of the model's time; the equalities first. That clocks are not negative is left out.
-        predecessor: The index of the state that was left for it; ``None`` for the initial one.
-        step: The transition that was taken there; ``None`` for the initial one.
-    """
-
-    index: int
-    locations: dict[str, str] = field(hash=False)
-    variables: dict[str, int | float] = field(hash=False)
-    zone: tuple[str, ...]
-    predecessor: int | None
-    step: EngineStep | None
-    _bounds: tuple[tuple[tuple[int, bool] | None, ...], ...] = field(repr=False)
-
-    def dbm(self) -> tuple[tuple[tuple[int, bool] | None, ...], ...]:
-        """The zone as a closed difference bound matrix.
-
-        Returns:
-            Rows; the entry in row i and column j is ``(bound, strict)``: clock i minus clock j is
-            at most `bound`, or less if `strict`; ``None`` without a bound. Bounds are in units
-            of the model's time. Clock 0 is the number 0, clock i is ``model.clocks[i - 1]``.
-        """
-        return self._bounds
-
-
-class Answer:
-    """The answer to a query.
-
-    Attributes:
-        query: The query as given.
-        verdict: ``satisfied``, ``not satisfied``, ``maybe`` (an over-approximation could not
-            decide), ``unknown`` (a limit came first: see `stop`) or ``error`` (the model failed:
-            see `message`).
-        value: What a query with ``sup``, ``inf`` or ``bounds`` found; ``None`` for other queries,
-            and if no state counts. Whether a clock reaches the value is in `message`.
-        message: A remark for the user, or what went wrong in the model.
-        warnings: What the user should know about the query, one text a warning.
-        stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
-        explored: States whose successors were computed.
-        stored: States that are stored at the end; one that a larger zone took the place of does
-            not count.
-        seconds: Seconds of the search alone.
-        load_seconds: Seconds of loading the model and compiling its code.
-        peak_bytes: The greatest number of bytes that states and tables took.
-        plan_count: How many plans were found; ``None`` if none were asked for, or if the
-            environment has choices, so that a strategy is no list of plans.
-        verified: Whether the strategy and the exact runs of the traces passed their independent
-            checks; ``None`` if there was none, or one came to no end.
-        verification: What these checks covered, or what is wrong, line by line.
-    """
-
-    def __init__(
-        self,
-        raw: _checker.Answer,
-        query: str,
-        edges: list[list[_EdgeEntry]],
-        rules: tuple[ForcedRule, PriorityRule],
-    ) -> None:
-        self._raw = raw
-        self._rules = rules
-        self._edges = edges
-        self.query = query
-        self.verdict: Verdict = raw.verdict
-        value = raw.value_json()
-        self.value: Value = None if value is None else json.loads(value)
-        self.message = raw.message
-        self.warnings = tuple(raw.warnings)
-        self.stop = raw.stop
-        self.explored = raw.explored
-        self.stored = raw.stored
-        self.seconds = raw.seconds
-        self.load_seconds = raw.load_seconds
-        self.peak_bytes = raw.peak_bytes
-        self.plan_count = raw.plan_count
-        self.has_more_plans = raw.has_more_plans
-        self.verified = raw.verified
-        self.verification = tuple(raw.verification())
-
-    @property
-    def plans(self) -> tuple[EnginePlan, ...]:
-        """The plans; empty if none were asked for or found."""
-        return tuple(self._plans())
-
-    def _plans(self) -> Iterator[EnginePlan]:
-        for plan in self._raw.plans():
-            yield EnginePlan(tuple(_step(self._edges, step) for step in plan))
-
-    def plans_json(self) -> str | None:
-        """The plans as JSON text with every edge in full; ``None`` without plans."""
-        return self._raw.plans_json()
-
-    @property
-    def runs(self) -> tuple[Run, ...]:
-        """The runs with exact times that the traces show: one, or for values one a value.
-
-        Empty without a trace, with ``trace=False``, and where no exact times were found (the end
-        of `trace_text` says why).
-        """
-        traces = self.trace_json()
-        return () if traces is None else runs_of(json.loads(traces))
-
-    @property
-    def trace(self) -> Run | None:
-        """The first of `runs`; ``None`` if there is none."""
-        return next(iter(self.runs), None)
-
-    def trace_text(self) -> str | None:
-        """The witness, counterexample or way to the failure as UPPAAL prints it, if any.
-
-        Below it stands the run with exact times: each state with its clock values, how long it is
-        waited there, and the edges that are taken then.
-        """
-        return self._raw.trace_text()
-
-    def trace_json(self) -> str | None:
-        """The same as JSON text."""
-        return self._raw.trace_json()
-
-    def certificate_text(self) -> str | None:
-        """The certificate as text of its file; ``None`` if none was asked for or there is none."""
-        return self._raw.certificate_text()
-
-    @property
-    def strategy(self) -> Strategy | None:
-        """The strategy of the player who wins; ``None`` if none was asked for or found."""
-        raw = _checker.Strategy.of_answer(self._raw)
-        return None if raw is None else Strategy(raw, *self._rules)
-
-    @property
-    def machine(self) -> Machine | None:
-        """How the controller wins a game with observations.
-
-        ``None`` if no strategy was asked for or found.
-        """
-        text = self._raw.strategy_json()
-        return None if text is None or self.strategy is not None else Machine.from_json(text)
-
-    def strategy_json(self) -> str | None:
-        """The strategy, or the machine of a game with observations, as JSON text.
-
-        ``None`` if none was asked for or found.
-        """
-        return self._raw.strategy_json()
-
-    def strategy_text(self) -> str | None:
-        """The strategy as text in the form of TIGA; ``None`` if none was asked for or found."""
-        return self._raw.strategy_text()
-
-    def controller_c(self) -> str | None:
-        """The strategy as a controller in C99; ``None`` if none was asked for or found.
-
-        The file depends on nothing but two standard headers; the comment at its start says how to
-        call it.
-
-        Raises:
-            RejectedError: The model has stopwatches.
-        """
-        try:
-            return self._raw.controller_c()
-        except _checker.RejectedError as error:
-            raise RejectedError(error.args[0]) from None
 
 
 class Model:
@@ -302,7 +58,7 @@ class Model:
 
     def __init__(self, raw: _checker.Model) -> None:
         self._raw = raw
-        self._edges: list[list[_EdgeEntry]] | None = None
+        self._edges: list[list[EdgeEntry]] | None = None
         self._facts: Facts | None = None
 
     def __repr__(self) -> str:
@@ -401,10 +157,8 @@ class Model:
             RejectedError: The file is no list of queries.
             OSError: The file cannot be read.
         """
-        try:
+        with rejecting():
             entries = self._raw.read_queries_json(str(path), path.read_bytes())
-        except _checker.RejectedError as error:
-            raise RejectedError(error.args[0]) from None
         return queries_from(json.loads(entries))
 
     def check(
@@ -489,7 +243,7 @@ class Model:
         if max_plans < 1:
             raise ValueError("max_plans is the number of plans to list, at least 1")
         wanted = {"none": None, "first": 1, "all": max_plans}[plans]
-        try:
+        with rejecting():
             raw = self._raw.check(
                 query,
                 search=search,
@@ -512,8 +266,6 @@ class Model:
                 folder=None if folder is None else str(folder),
                 progress=progress,
             )
-        except _checker.RejectedError as error:
-            raise RejectedError(error.args[0]) from None
         return Answer(raw, query, self._edge_table(), (forced, priorities))
 
     def synthesize(
@@ -618,10 +370,8 @@ class Model:
             OSError: The file cannot be read.
         """
         data = Path(path).read_bytes()
-        try:
+        with rejecting():
             raw = _checker.Strategy.read(self._raw, os.fspath(path), data)
-        except _checker.RejectedError as error:
-            raise RejectedError(error.args[0]) from None
         return Strategy(raw, forced, priorities)
 
     def verify(
@@ -645,10 +395,8 @@ class Model:
         Raises:
             RejectedError: It is none of them, or does not belong to this model.
         """
-        try:
+        with rejecting():
             holds, lines = self._raw.verify(path or "evidence", text, forced, priorities)
-        except _checker.RejectedError as error:
-            raise RejectedError(error.args[0]) from None
         return Verification(holds, tuple(lines))
 
     def simulate(self, steps: int = 100, seed: int = 0, choose: Choose | None = None) -> Run:
@@ -669,7 +417,7 @@ class Model:
             IndexError: `choose` gives what is not possible.
             ModelError: The model fails on the way.
         """
-        with _failing():
+        with failing():
             return simulated(self._raw.walk_exactly(), steps, seed, choose)
 
     def states(
@@ -701,7 +449,7 @@ class Model:
         """
         if any(one is not None and one < 0 for one in (limit, timeout_s, memory_bytes)):
             raise ValueError("a limit cannot be negative")
-        with _failing():
+        with failing():
             found, stop = self._raw.states(
                 engine, states=limit, memory_bytes=memory_bytes, timeout_s=timeout_s
             )
@@ -710,21 +458,7 @@ class Model:
                 f"the search was stopped by the limit of {stop}; "
                 "raise it, or ask for fewer states with `limit`"
             )
-        return self._symbolic_states(found)
-
-    def _symbolic_states(self, found: list[_ReachedEntry]) -> Iterator[SymbolicState]:
-        edges = self._edge_table()
-        for index, (discrete, zone, bounds, origin) in enumerate(found):
-            raw = json.loads(discrete)
-            yield SymbolicState(
-                index=index,
-                locations=raw["locations"],
-                variables=raw["variables"],
-                zone=tuple(zone),
-                predecessor=None if origin is None else origin[0],
-                step=None if origin is None else _step(edges, origin[1]),
-                _bounds=tuple(map(tuple, bounds)),
-            )
+        return symbolic_states(found, self._edge_table())
 
     def walk(self, engine: CodeEngine = "jit") -> Simulation:
         """Starts a symbolic walk through the model from its initial state.
@@ -735,82 +469,14 @@ class Model:
         Raises:
             ModelError: The initial state cannot be computed.
         """
-        with _failing():
+        with failing():
             return Simulation(self._raw.simulate(engine), self._edge_table())
 
-    def _edge_table(self) -> list[list[_EdgeEntry]]:
+    def _edge_table(self) -> list[list[EdgeEntry]]:
         if self._edges is None:
             processes = self._raw.edges()
-            self._edges = [[_EdgeEntry(*entry[:5]) for entry in process] for process in processes]
+            self._edges = [[EdgeEntry(*entry[:5]) for entry in process] for process in processes]
         return self._edges
-
-
-class Simulation:
-    """A walk through a model: a state, its moves, and the state after one of them.
-
-    States are symbolic: `zone` holds all clock values that the moves so far allow.
-    """
-
-    def __init__(self, raw: _checker.Simulation, edges: list[list[_EdgeEntry]]) -> None:
-        self._raw = raw
-        self._edges = edges
-
-    @property
-    def locations(self) -> dict[str, str]:
-        """The location of each process."""
-        return dict(self._raw.locations())
-
-    @property
-    def variables(self) -> dict[str, int | float]:
-        """The value of each variable; parts of arrays and structs by names such as ``a[2].x``."""
-        return dict(self._raw.variables())
-
-    @property
-    def zone(self) -> tuple[str, ...]:
-        """The constraints on the clocks, such as ``x <= 3``."""
-        return tuple(self._raw.zone())
-
-    def moves(self) -> tuple[EngineStep, ...]:
-        """The moves of the state, in a fixed order.
-
-        Raises:
-            ModelError: The model fails in computing one.
-        """
-        with _failing():
-            return tuple(_step(self._edges, step) for step in self._raw.moves())
-
-    def take(self, index: int) -> None:
-        """Takes the move with this index.
-
-        Raises:
-            IndexError: There is no such move.
-            ModelError: The model fails in computing one.
-        """
-        with _failing():
-            self._raw.take(index)
-
-    def settle(self) -> None:
-        """Follows moves as long as time cannot pass and there is exactly one.
-
-        Raises:
-            ModelError: The model fails on the way.
-        """
-        with _failing():
-            self._raw.settle()
-
-
-def _step(edges: list[list[_EdgeEntry]], step: list[tuple[int, int, int, list[int]]]) -> EngineStep:
-    taken = (edges[process][edge].taken(branch, values) for process, edge, branch, values in step)
-    return EngineStep(tuple(taken))
-
-
-@contextlib.contextmanager
-def _failing() -> Iterator[None]:
-    """Turns the engine's error about a failing model into ours."""
-    try:
-        yield
-    except _checker.FailedError as error:
-        raise ModelError(error.args[0]) from None
 
 
 def load(text: str, path: str = "") -> Model:
@@ -842,7 +508,5 @@ def diagnostic_pages() -> list[tuple[str, str, str, str]]:
 
 
 def _load(path: str, data: bytes) -> Model:
-    try:
+    with rejecting():
         return Model(_checker.load(path, data))
-    except _checker.RejectedError as error:
-        raise RejectedError(error.args[0]) from None

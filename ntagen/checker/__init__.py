@@ -1,0 +1,44 @@
+"""The typed face of the engine: verdicts, traces, strategies and plans of UPPAAL models.
+
+The engine is the Rust crate in ``checker/``; this package only gives its answers Python types.
+"""
+
+from ntagen.checker.answer import Answer, Extreme, Value, Verdict
+from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
+from ntagen.checker.errors import RejectedError
+from ntagen.checker.model import (
+    MAX_PLANS,
+    CodeEngine,
+    Model,
+    PlansWanted,
+    Progress,
+    SearchOrder,
+    TraceWanted,
+    diagnostic_pages,
+    load,
+    load_file,
+)
+from ntagen.checker.states import Simulation, SymbolicState
+
+__all__ = [
+    "MAX_PLANS",
+    "Answer",
+    "CodeEngine",
+    "EngineEdge",
+    "EnginePlan",
+    "EngineStep",
+    "Extreme",
+    "Model",
+    "PlansWanted",
+    "Progress",
+    "RejectedError",
+    "SearchOrder",
+    "Simulation",
+    "SymbolicState",
+    "TraceWanted",
+    "Value",
+    "Verdict",
+    "diagnostic_pages",
+    "load",
+    "load_file",
+]

@@ -1,0 +1,159 @@
+"""Answers of the engine to queries."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Literal
+
+from ntagen import _checker
+from ntagen.checker.edges import EdgeEntry, EnginePlan, step_of
+from ntagen.checker.errors import rejecting
+from ntagen.machine import Machine
+from ntagen.runs import Run, runs_of
+from ntagen.strategy import ForcedRule, PriorityRule, Strategy
+
+Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
+
+Extreme = int | Literal["inf"] | None
+"""A least or greatest value: ``"inf"`` if there is no greatest, ``None`` if no state counts."""
+
+Value = Extreme | list[Extreme] | list[list[Extreme] | None]
+"""What ``sup`` and ``inf`` found: of one item an `Extreme`, for ``bounds`` the pair of the least
+and the greatest; of several items a list of these."""
+
+
+class Answer:
+    """The answer to a query.
+
+    Attributes:
+        query: The query as given.
+        verdict: ``satisfied``, ``not satisfied``, ``maybe`` (an over-approximation could not
+            decide), ``unknown`` (a limit came first: see `stop`) or ``error`` (the model failed:
+            see `message`).
+        value: What a query with ``sup``, ``inf`` or ``bounds`` found; ``None`` for other queries,
+            and if no state counts. Whether a clock reaches the value is in `message`.
+        message: A remark for the user, or what went wrong in the model.
+        warnings: What the user should know about the query, one text a warning.
+        stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
+        explored: States whose successors were computed.
+        stored: States that are stored at the end; one that a larger zone took the place of does
+            not count.
+        seconds: Seconds of the search alone.
+        load_seconds: Seconds of loading the model and compiling its code.
+        peak_bytes: The greatest number of bytes that states and tables took.
+        plan_count: How many plans were found; ``None`` if none were asked for, or if the
+            environment has choices, so that a strategy is no list of plans.
+        verified: Whether the strategy and the exact runs of the traces passed their independent
+            checks; ``None`` if there was none, or one came to no end.
+        verification: What these checks covered, or what is wrong, line by line.
+    """
+
+    def __init__(
+        self,
+        raw: _checker.Answer,
+        query: str,
+        edges: list[list[EdgeEntry]],
+        rules: tuple[ForcedRule, PriorityRule],
+    ) -> None:
+        self._raw = raw
+        self._rules = rules
+        self._edges = edges
+        self.query = query
+        self.verdict: Verdict = raw.verdict
+        value = raw.value_json()
+        self.value: Value = None if value is None else json.loads(value)
+        self.message = raw.message
+        self.warnings = tuple(raw.warnings)
+        self.stop = raw.stop
+        self.explored = raw.explored
+        self.stored = raw.stored
+        self.seconds = raw.seconds
+        self.load_seconds = raw.load_seconds
+        self.peak_bytes = raw.peak_bytes
+        self.plan_count = raw.plan_count
+        self.has_more_plans = raw.has_more_plans
+        self.verified = raw.verified
+        self.verification = tuple(raw.verification())
+
+    @property
+    def plans(self) -> tuple[EnginePlan, ...]:
+        """The plans; empty if none were asked for or found."""
+        return tuple(self._plans())
+
+    def _plans(self) -> Iterator[EnginePlan]:
+        for plan in self._raw.plans():
+            yield EnginePlan(tuple(step_of(self._edges, step) for step in plan))
+
+    def plans_json(self) -> str | None:
+        """The plans as JSON text with every edge in full; ``None`` without plans."""
+        return self._raw.plans_json()
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """The runs with exact times that the traces show: one, or for values one a value.
+
+        Empty without a trace, with ``trace=False``, and where no exact times were found (the end
+        of `trace_text` says why).
+        """
+        traces = self.trace_json()
+        return () if traces is None else runs_of(json.loads(traces))
+
+    @property
+    def trace(self) -> Run | None:
+        """The first of `runs`; ``None`` if there is none."""
+        return next(iter(self.runs), None)
+
+    def trace_text(self) -> str | None:
+        """The witness, counterexample or way to the failure as UPPAAL prints it, if any.
+
+        Below it stands the run with exact times: each state with its clock values, how long it is
+        waited there, and the edges that are taken then.
+        """
+        return self._raw.trace_text()
+
+    def trace_json(self) -> str | None:
+        """The same as JSON text."""
+        return self._raw.trace_json()
+
+    def certificate_text(self) -> str | None:
+        """The certificate as text of its file; ``None`` if none was asked for or there is none."""
+        return self._raw.certificate_text()
+
+    @property
+    def strategy(self) -> Strategy | None:
+        """The strategy of the player who wins; ``None`` if none was asked for or found."""
+        raw = _checker.Strategy.of_answer(self._raw)
+        return None if raw is None else Strategy(raw, *self._rules)
+
+    @property
+    def machine(self) -> Machine | None:
+        """How the controller wins a game with observations.
+
+        ``None`` if no strategy was asked for or found.
+        """
+        text = self._raw.strategy_json()
+        return None if text is None or self.strategy is not None else Machine.from_json(text)
+
+    def strategy_json(self) -> str | None:
+        """The strategy, or the machine of a game with observations, as JSON text.
+
+        ``None`` if none was asked for or found.
+        """
+        return self._raw.strategy_json()
+
+    def strategy_text(self) -> str | None:
+        """The strategy as text in the form of TIGA; ``None`` if none was asked for or found."""
+        return self._raw.strategy_text()
+
+    def controller_c(self) -> str | None:
+        """The strategy as a controller in C99; ``None`` if none was asked for or found.
+
+        The file depends on nothing but two standard headers; the comment at its start says how to
+        call it.
+
+        Raises:
+            RejectedError: The model has stopwatches.
+        """
+        with rejecting():
+            return self._raw.controller_c()
