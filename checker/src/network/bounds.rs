@@ -8,18 +8,19 @@
 //! Source: G. Behrmann, P. Bouyer, E. Fleury, K. G. Larsen, "Static guard analysis in timed automata verification", TACAS 2003
 //! (the fixpoint over locations), and G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and upper bounds in
 //! zone-based abstractions of timed automata", STTT 8, 2006 (lower and upper bounds apart).
-//! Where we differ: a process does not see the resets of other processes, which only makes bounds greater; with
-//! assignments from clock to clock the bounds do not depend on locations.
+//! Where we differ: locations are taken apart by the values of variables on which comparisons hang ([`super::valuations`]), and
+//! what all partners of a synchronisation reset counts as reset ([`super::partners`]); with assignments from clock to clock the
+//! bounds do not depend on locations.
 //!
 //! Invariant: an assignment counts as a reset only if it is certain (among [`crate::ir::Update::fixed`]).
 
-use crate::ir::{
-    AssignedValue, ClockAssignment, ClockAtom, ClockRange, Edge, Network, Process, Update,
-};
+use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, ClockRange, Edge, Network, Process};
 use crate::zones::extrapolate::{Ceiling, Ceilings};
 use crate::zones::{Bound, Federation, extrapolate};
 
 use super::differences::Differences;
+use super::partners::{self, Partners};
+use super::valuations::{Analysis, Step, Tracked, Valuations};
 
 /// No comparison: the clock is inactive in this direction.
 const NONE: i32 = i32::MIN;
@@ -37,11 +38,13 @@ pub enum Abstraction {
     Differences,
 }
 
-/// The bounds of all locations.
+/// The bounds of all nodes: see [`super::valuations`].
 #[derive(Clone, Debug)]
 pub struct ClockBounds {
-    /// By process and location: the clocks that have bounds there.
+    /// By process and node: the clocks that have bounds there.
     ceilings: Vec<Vec<Vec<Ceiling>>>,
+    /// By process: the words whose values, with the location, make the number of a node.
+    tracked: Vec<Vec<Tracked>>,
     /// Bounds that hold everywhere: those of queries.
     everywhere: Ceilings,
     abstraction: Abstraction,
@@ -49,7 +52,7 @@ pub struct ClockBounds {
     greatest: i32,
 }
 
-/// Lower and upper bounds of all clocks in all locations of a process.
+/// Lower and upper bounds of all clocks in all nodes of a process.
 type Table = Vec<Vec<(i32, i32)>>;
 
 impl ClockBounds {
@@ -65,11 +68,15 @@ impl ClockBounds {
             (abstraction, Differences::default())
         };
         let reset = differences.greatest_reset;
-        let mut tables: Vec<Table> = network
-            .processes
-            .iter()
-            .map(|process| fixpoint(process, clock_count, reset))
-            .collect();
+        let partners = Partners::new(network);
+        let mut analysis = Analysis::new(network);
+        let (mut tables, mut tracked) = (Vec::new(), Vec::new());
+        for (index, process) in network.processes.iter().enumerate() {
+            let valuations = analysis.of(index);
+            let partners = partners.as_ref();
+            tables.push(fixpoint(process, &valuations, partners, clock_count, reset));
+            tracked.push(valuations.tracked);
+        }
         let mut everywhere = vec![(NONE, NONE); clock_count.max(1)];
         for atom in atoms {
             add_atom(&mut everywhere, atom, reset);
@@ -89,6 +96,7 @@ impl ClockBounds {
         let everywhere = to_ceilings(&everywhere);
         ClockBounds {
             ceilings,
+            tracked,
             everywhere,
             abstraction,
             differences,
@@ -123,8 +131,12 @@ impl ClockBounds {
     /// The ceilings of a state.
     fn ceilings_into(&self, words: &[i32], scratch: &mut Ceilings) {
         scratch.clone_from(&self.everywhere);
-        for (locations, &location) in self.ceilings.iter().zip(words) {
-            for ceiling in &locations[location as usize] {
+        for ((nodes, &location), tracked) in self.ceilings.iter().zip(words).zip(&self.tracked) {
+            let mut node = location as usize;
+            for one in tracked {
+                node += (words[one.word as usize] - one.low) as usize * one.stride;
+            }
+            for ceiling in &nodes[node] {
                 scratch.raise_one(ceiling);
             }
         }
@@ -165,30 +177,29 @@ fn to_ceilings(bounds: &[(i32, i32)]) -> Ceilings {
     Ceilings::lower_upper(&lower, &upper)
 }
 
-/// The least bounds of a process that satisfy: those of a location cover its invariant and the guards of its edges, and those
-/// of every target for the clocks that the edge does not certainly reset.
-fn fixpoint(process: &Process, clock_count: usize, reset: i32) -> Table {
-    let mut table: Table = vec![vec![(NONE, NONE); clock_count.max(1)]; process.locations.len()];
-    for (location, bounds) in process.locations.iter().zip(&mut table) {
-        location
-            .invariant
-            .atoms
-            .iter()
-            .for_each(|atom| add_atom(bounds, atom, reset));
-        for edge in &location.edges {
-            let guard = &process.edges[edge.0 as usize].guard;
-            guard
-                .atoms
-                .iter()
-                .for_each(|atom| add_atom(bounds, atom, reset));
+/// The least bounds of the nodes of a process that satisfy: those of a node cover its invariant and the guards of its edges,
+/// and those of every target for the clocks that are not certainly reset on the way.
+fn fixpoint(
+    process: &Process,
+    valuations: &Valuations,
+    partners: Option<&Partners>,
+    clock_count: usize,
+    reset: i32,
+) -> Table {
+    let mut table: Table = vec![vec![(NONE, NONE); clock_count.max(1)]; valuations.nodes];
+    for (node, bounds) in table.iter_mut().enumerate() {
+        let location = &process.locations[node % process.locations.len()];
+        for atom in &location.invariant.atoms {
+            add_atom(bounds, atom, reset);
         }
+    }
+    for (node, atom) in &valuations.atoms {
+        add_atom(&mut table[*node], atom, reset);
     }
     loop {
         let mut changed = false;
-        for edge in process.edges.iter().filter(|edge| !edge.guard.never_holds) {
-            for branch in 0..edge.branches.len() {
-                changed |= propagate(edge, branch, &mut table);
-            }
+        for step in &valuations.steps {
+            changed |= propagate(&process.edges[step.edge], *step, partners, &mut table);
         }
         if !changed {
             return table;
@@ -196,33 +207,24 @@ fn fixpoint(process: &Process, clock_count: usize, reset: i32) -> Table {
     }
 }
 
-/// Carries the bounds of a branch's target to the edge's source; returns whether they grew.
-fn propagate(edge: &Edge, branch: usize, table: &mut Table) -> bool {
-    let (source, target) = (
-        edge.source.0 as usize,
-        edge.branches[branch].target.0 as usize,
-    );
+/// Carries the bounds of a step's target to its source; returns whether they grew.
+fn propagate(edge: &Edge, step: Step, partners: Option<&Partners>, table: &mut Table) -> bool {
+    let branch = &edge.branches[step.branch];
     let is_reset = |clock: usize| {
-        is_certain(&edge.update, clock) || is_certain(&edge.branches[branch].update, clock)
+        partners::resets(edge, branch, clock)
+            || partners.is_some_and(|partners| partners.reset(edge, clock))
     };
     let mut changed = false;
-    for clock in 1..table[source].len() {
-        let (low, high) = table[target][clock];
-        let own = table[source][clock];
+    for clock in 1..table[step.source].len() {
+        let (low, high) = table[step.target][clock];
+        let own = table[step.source][clock];
         let joined = (own.0.max(low), own.1.max(high));
         if joined != own && !is_reset(clock) {
-            table[source][clock] = joined;
+            table[step.source][clock] = joined;
             changed = true;
         }
     }
     changed
-}
-
-fn is_certain(update: &Update, clock: usize) -> bool {
-    update
-        .fixed
-        .iter()
-        .any(|&(target, _)| target.0 as usize == clock)
 }
 
 /// `left - right ≺ b` is an upper bound b on left, and a lower bound -b on right. A difference of two clocks bounds both, and once

@@ -22,6 +22,7 @@ pub mod moves;
 mod offers;
 mod orbits;
 mod pairing;
+mod partners;
 mod passage;
 pub mod possibility;
 pub mod predicate;
@@ -35,6 +36,7 @@ pub mod stubborn;
 pub mod symbolic;
 pub mod symmetry;
 mod tables;
+mod valuations;
 mod watched;
 
 pub use bounds::{Abstraction, ClockBounds};
