@@ -10,7 +10,9 @@
 use checker::zones::clocks::{self, Assignment};
 use checker::zones::dbm::{self, Constraint};
 use checker::zones::extrapolate::{self, Ceilings};
-use checker::zones::{Bound, ClockSet, Federation, Relation, Zone, instants, minimal, past};
+use checker::zones::{
+    Bound, ClockSet, Federation, Relation, Zone, instants, minimal, past, simulation,
+};
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
 
@@ -317,6 +319,34 @@ fn is_simulated(zone: &Zone, point: &Point, lower: &Constants, upper: &Constants
     })
 }
 
+/// What a matrix becomes when each entry (left, right) with its lower bounds is replaced, closed.
+fn replaced(zone: &Zone, replacement: impl Fn(usize, usize) -> Bound) -> Zone {
+    let dimension = zone.dimension();
+    let mut result = zone.clone();
+    for left in 0..dimension {
+        for right in (0..dimension).filter(|right| *right != left) {
+            let limit = if left == 0 {
+                Bound::LE_ZERO
+            } else {
+                Bound::INFINITY
+            };
+            result.bounds_mut()[left * dimension + right] = replacement(left, right).min(limit);
+        }
+    }
+    dbm::close(result.bounds_mut(), dimension);
+    result
+}
+
+/// The constant of a clock; that of the reference clock is 0.
+fn constant(values: &Constants, clock: usize) -> Option<i32> {
+    if clock == 0 { Some(0) } else { values[clock] }
+}
+
+/// `< -U`, or no bound without U.
+fn forgotten_below(upper: Option<i32>) -> Bound {
+    upper.map_or(Bound::INFINITY, |upper| Bound::strict(-upper).unwrap())
+}
+
 /// The matrix of the definition of `Extra_LU` or, with `plus`, `Extra_LU+`, closed.
 fn extrapolated_by_definition(
     zone: &Zone,
@@ -324,41 +354,80 @@ fn extrapolated_by_definition(
     upper: &Constants,
     plus: bool,
 ) -> Zone {
-    let dimension = zone.dimension();
-    let constant =
-        |values: &Constants, clock: usize| if clock == 0 { Some(0) } else { values[clock] };
     let exceeds = |bound: Bound, limit: Option<i32>| {
         bound.is_finite() && limit.is_none_or(|limit| bound.value() > limit)
     };
     let is_below = |bound: Bound, limit: Option<i32>| {
         bound.is_finite() && limit.is_none_or(|limit| -bound.value() > limit)
     };
-    let mut result = zone.clone();
-    for left in 0..dimension {
-        for right in (0..dimension).filter(|right| *right != left) {
-            let (l, u) = (constant(lower, left), constant(upper, right));
-            let bound = zone.bound(left, right);
-            let forgotten_below = u.map_or(Bound::INFINITY, |u| Bound::strict(-u).unwrap());
-            let is_low = plus && is_below(zone.bound(0, left), l);
-            let is_high = is_below(if plus { zone.bound(0, right) } else { bound }, u);
-            let new = match (
-                exceeds(bound, l) || is_low || plus && is_high && left != 0,
-                is_high,
-            ) {
-                (true, _) => Bound::INFINITY,
-                (false, true) => forgotten_below,
-                (false, false) => bound,
-            };
-            let limit = if left == 0 {
-                Bound::LE_ZERO
-            } else {
-                Bound::INFINITY
-            };
-            result.bounds_mut()[left * dimension + right] = new.min(limit);
+    replaced(zone, |left, right| {
+        let (l, u) = (constant(lower, left), constant(upper, right));
+        let bound = zone.bound(left, right);
+        let is_low = plus && is_below(zone.bound(0, left), l);
+        let is_high = is_below(if plus { zone.bound(0, right) } else { bound }, u);
+        match (
+            exceeds(bound, l) || is_low || plus && is_high && left != 0,
+            is_high,
+        ) {
+            (true, _) => Bound::INFINITY,
+            (false, true) => forgotten_below(u),
+            (false, false) => bound,
+        }
+    })
+}
+
+/// The matrix without the entries that inclusion in `aLU` does not look at, closed: those of a clock without L, those
+/// against a clock above U, and those whose sum with `< -L` is not below the lower bound of the other clock.
+fn reduced_by_definition(zone: &Zone, lower: &Constants, upper: &Constants) -> Zone {
+    replaced(zone, |left, right| {
+        let (l, u) = (constant(lower, left), constant(upper, right));
+        let (bound, least) = (zone.bound(left, right), zone.bound(0, right));
+        let counts = u.is_some_and(|u| least >= Bound::weak(-u).unwrap());
+        let is_above = |l: i32| bound + Bound::strict(-l).unwrap() >= least;
+        match (left == 0, counts) {
+            (true, false) => forgotten_below(u),
+            (false, false) => Bound::INFINITY,
+            (false, true) if l.is_none_or(is_above) => Bound::INFINITY,
+            _ => bound,
+        }
+    })
+}
+
+/// `aLU` of a zone, exactly: for each way in which clocks can be simulated, the valuations v for which there is a w in
+/// the zone. A zone of both v and w, of which the part of v remains.
+fn all_simulated(zone: &Zone, lower: &Constants, upper: &Constants) -> Federation {
+    let dimension = zone.dimension();
+    let clocks = dimension - 1;
+    let other = |clock: usize| if clock == 0 { 0 } else { clocks + clock };
+    let mut simulated = Federation::empty(dimension);
+    for way in 0..3_usize.pow(u32::try_from(clocks).unwrap()) {
+        let mut both = Zone::universe(2 * clocks + 1);
+        let mut constrain = |left: usize, right: usize, bound: Bound| {
+            bound.is_infinite() || both.constrain(left, right, bound)
+        };
+        let mut is_possible = (0..dimension).all(|left| {
+            (0..dimension)
+                .all(|right| constrain(other(left), other(right), zone.bound(left, right)))
+        });
+        for clock in 1..dimension {
+            let (v, w) = (clock, other(clock));
+            let above =
+                |limit: Option<i32>| limit.map_or(Bound::LE_ZERO, |l| Bound::strict(-l).unwrap());
+            is_possible = is_possible
+                && match way / 3_usize.pow(u32::try_from(clock - 1).unwrap()) % 3 {
+                    0 => constrain(v, w, Bound::LE_ZERO) && constrain(w, v, Bound::LE_ZERO),
+                    1 => constrain(w, v, Bound::LT_ZERO) && constrain(0, w, above(lower[clock])),
+                    _ => constrain(v, w, Bound::LT_ZERO) && constrain(0, v, above(upper[clock])),
+                };
+        }
+        if is_possible {
+            let rows =
+                (0..dimension).flat_map(|left| (0..dimension).map(move |right| (left, right)));
+            let bounds: Vec<Bound> = rows.map(|(left, right)| both.bound(left, right)).collect();
+            simulated.push(&bounds);
         }
     }
-    dbm::close(result.bounds_mut(), dimension);
-    result
+    simulated
 }
 
 proptest! {
@@ -683,7 +752,10 @@ proptest! {
         let m_plus = abstracted(extrapolate::lu_plus, &maximal);
         let lu = abstracted(extrapolate::lu, &limits);
         let lu_plus = abstracted(extrapolate::lu_plus, &limits);
-        for (finer, coarser) in [(&zone, &m), (&m, &m_plus), (&m, &lu), (&m_plus, &lu_plus), (&lu, &lu_plus)] {
+        let published = extrapolated_by_definition(&zone, &lower, &upper, true);
+        for (finer, coarser) in [
+            (&zone, &m), (&m, &m_plus), (&m, &lu), (&m_plus, &lu_plus), (&lu, &published), (&published, &lu_plus),
+        ] {
             assert!(finer.is_subset(coarser), "{finer:?} is not a subset of {coarser:?}");
         }
         for (result, again, limits) in [
@@ -715,7 +787,45 @@ proptest! {
         check_closed(lu.bounds(), dimension);
         check_closed(lu_plus.bounds(), dimension);
         assert_eq!(lu, extrapolated_by_definition(&zone, &lower, &upper, false));
-        assert_eq!(lu_plus, extrapolated_by_definition(&zone, &lower, &upper, true));
+        assert_eq!(lu_plus, reduced_by_definition(&zone, &lower, &upper));
+    }
+
+    #[test]
+    fn inclusion_by_demands_equals_inclusion_in_all_that_is_simulated(
+        (zone, other, (lower, upper)) in dimensions().prop_flat_map(|dimension| {
+            (zones(dimension), zones(dimension), lower_and_upper(dimension))
+        }),
+    ) {
+        let dimension = zone.dimension();
+        let limits = Ceilings::lower_upper(&lower, &upper);
+        let reduced = |zone: &Zone| {
+            let mut reduced = zone.bounds().to_vec();
+            simulation::reduce(&mut reduced, dimension, &limits);
+            reduced
+        };
+        let demands = |zone: &Zone| {
+            let mut demands = zone.bounds().to_vec();
+            simulation::demands(&reduced(zone), dimension, limits.limits(), &mut demands);
+            demands
+        };
+        let extrapolated = |zone: &Zone| {
+            let mut result = zone.clone();
+            extrapolate::lu_plus(result.bounds_mut(), dimension, &limits);
+            result
+        };
+        for (zone, other) in [(&zone, &other), (&other, &zone), (&extrapolated(&zone), &other), (&zone, &extrapolated(&other))] {
+            let is_met = dbm::is_subset(&demands(zone), &demands(other));
+            assert_eq!(is_met, dbm::is_subset(&demands(zone), other.bounds()));
+            assert_eq!(is_met, dbm::is_subset(&demands(zone), &reduced(other)));
+            let simulated = all_simulated(other, &lower, &upper);
+            assert_eq!(is_met, simulated.includes_zone(zone.bounds()), "{zone:?} within {other:?}");
+        }
+        let mut restored = Zone::from_bounds(dimension, &reduced(&zone));
+        simulation::restore(restored.bounds_mut(), dimension, &limits);
+        check_closed(restored.bounds(), dimension);
+        assert_eq!(restored, extrapolated(&zone));
+        assert_eq!(reduced(&restored), reduced(&zone));
+        assert!(all_simulated(&zone, &lower, &upper).includes_zone(extrapolated(&zone).bounds()));
     }
 
     #[test]

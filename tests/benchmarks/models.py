@@ -192,6 +192,34 @@ system Station, Ring;
 """
 
 
+def corsso(users: int, shortest: int = 2, longest: int = 10) -> str:
+    """Users who collect certificates for one of two policies, in time, and then have access."""
+    return f"""
+const int N = {users};
+const int POLICIES = 2;
+const int NEEDED[POLICIES] = {{ 1, 2 }};
+const int MOST = 2;
+
+process User(const int[1, N] pid) {{
+    clock certifying, collecting;
+    int[0, MOST + 1] certificates;
+    int[0, MOST + 1] policy;
+    state authenticating, access;
+    init authenticating;
+    trans
+        authenticating -> authenticating {{ select p : int[1, POLICIES]; guard policy == 0;
+            assign policy = p, certificates = 0, certifying = 0, collecting = 0; }},
+        authenticating -> authenticating {{
+            guard policy > 0 && certifying > {shortest} && certificates < MOST;
+            assign certificates = certificates + 1, certifying = 0; }},
+        authenticating -> access {{ select p : int[1, POLICIES];
+            guard collecting < {longest} && policy == p && certificates >= NEEDED[p - 1]; }},
+        access -> authenticating {{ assign policy = 0; }};
+}}
+system User;
+"""
+
+
 def peterson(processes: int) -> str:
     """Peterson's algorithm for several processes, without clocks: each climbs a ladder."""
     return f"""

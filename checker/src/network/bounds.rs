@@ -84,6 +84,11 @@ impl ClockBounds {
         if network.features.clock_copies {
             spread_over_copies(network, &mut tables, &mut everywhere);
         }
+        if abstraction == Abstraction::Maximum {
+            let all = tables.iter_mut().flatten().flatten();
+            all.chain(&mut everywhere)
+                .for_each(|bound| *bound = (bound.0.max(bound.1), bound.0.max(bound.1)));
+        }
         let ceilings = tables
             .iter()
             .map(|table| {
@@ -128,8 +133,8 @@ impl ClockBounds {
         extrapolate::split_by_differences(zone, dimension, scratch, &differences, target);
     }
 
-    /// The ceilings of a state.
-    fn ceilings_into(&self, words: &[i32], scratch: &mut Ceilings) {
+    /// Overwrites ceilings by those of a state.
+    pub fn ceilings_into(&self, words: &[i32], scratch: &mut Ceilings) {
         scratch.clone_from(&self.everywhere);
         for ((nodes, &location), tracked) in self.ceilings.iter().zip(words).zip(&self.tracked) {
             let mut node = location as usize;
@@ -150,18 +155,18 @@ impl ClockBounds {
         dimension: usize,
         scratch: &mut Ceilings,
     ) {
-        if matches!(
+        if self.simulates() {
+            self.ceilings_into(words, scratch);
+            extrapolate::lu_plus(zone, dimension, scratch);
+        }
+    }
+
+    /// Whether what simulates a valuation (see [`crate::zones::simulation`]) can do all that matters of what it can do.
+    pub fn simulates(&self) -> bool {
+        matches!(
             self.abstraction,
-            Abstraction::Exact | Abstraction::Differences
-        ) {
-            return;
-        }
-        self.ceilings_into(words, scratch);
-        match self.abstraction {
-            Abstraction::Exact | Abstraction::Differences => {}
-            Abstraction::Maximum => extrapolate::lu_plus(zone, dimension, &scratch.to_maximal()),
-            Abstraction::LowerUpper => extrapolate::lu_plus(zone, dimension, scratch),
-        }
+            Abstraction::Maximum | Abstraction::LowerUpper
+        )
     }
 
     /// Bounds to start from: those that hold everywhere.

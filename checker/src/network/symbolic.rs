@@ -15,7 +15,7 @@ use crate::ir::ClockId;
 use crate::zones::clocks::{self, Assignment};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::extrapolate::Ceilings;
-use crate::zones::{Bound, ClockSet, Federation, Zone};
+use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
 
 use super::bounds::ClockBounds;
 use super::scope::Scope;
@@ -386,6 +386,25 @@ impl<'a> Symbolic<'a> {
         if self.dimension > 1 {
             self.bounds
                 .extrapolate(words, zone, self.dimension, &mut self.ceilings);
+        }
+    }
+
+    /// Replaces the zone of a state, extrapolated or not, by its reduced form (see [`simulation`]), and gives the limits of its
+    /// ceilings. Leaves it as it is, without limits, where only sets may be compared.
+    pub fn to_stored(&mut self, words: &[i32], zone: &mut [Bound]) -> &[Bound] {
+        if self.dimension == 1 || !self.bounds.simulates() {
+            return &[];
+        }
+        self.bounds.ceilings_into(words, &mut self.ceilings);
+        simulation::reduce(zone, self.dimension, &self.ceilings);
+        self.ceilings.limits()
+    }
+
+    /// Replaces what [`Symbolic::to_stored`] has made of a zone by the extrapolated zone.
+    pub fn from_stored(&mut self, words: &[i32], stored: &mut [Bound]) {
+        if self.dimension > 1 && self.bounds.simulates() {
+            self.bounds.ceilings_into(words, &mut self.ceilings);
+            simulation::restore(stored, self.dimension, &self.ceilings);
         }
     }
 

@@ -14,6 +14,7 @@ use crate::zones::{Bound, Zone};
 
 use super::goal::{Goal, Look, Visited};
 use super::limits::{Counters, StopReason, Watch};
+use super::packed_zones::Kept;
 use super::recent::RecentStates;
 use super::representatives::Representative;
 use super::retrace::Step;
@@ -24,14 +25,15 @@ const LONGEST_CHAIN: usize = 64;
 /// Committed states that are explored below one stored state without waiting.
 const MOST_AT_ONCE: u64 = 4096;
 
-/// Takes the states that exploration comes to. Ways begin at the state that is being explored.
+/// Takes the states that exploration comes to, with what is to be stored of their zones (see [`Symbolic::to_stored`]). Ways begin
+/// at the state that is being explored.
 pub(super) trait Sink {
     /// Stores a state and lets it wait, unless a stored one contains it. Returns whether it is known to wait now.
-    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool;
+    fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool;
 
     /// Stores a committed state that has a choice; returns whether it is to be explored at once, and not if a stored state
     /// contains it.
-    fn add_choice(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool;
+    fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool;
 
     /// The bytes of a state's words that decide identity.
     fn pack(&mut self, words: &[i32]) -> &[u8];
@@ -110,6 +112,8 @@ pub(super) struct Explorer {
     /// The moves from the stored state to the state at hand.
     way: Vec<Step>,
     entries: Vec<Zone>,
+    /// What is stored of a zone that is still needed.
+    stored: Vec<Bound>,
     /// What is stored instead of a state, where some states may be exchanged for others.
     representative: Representative,
     /// Whether some location is committed.
@@ -135,6 +139,7 @@ impl Explorer {
             depth: 0,
             way: Vec::new(),
             entries: Vec::new(),
+            stored: Vec::new(),
             representative: Representative::default(),
             has_committed: network.processes.iter().any(|process| {
                 let mut locations = process.locations.iter();
@@ -174,6 +179,7 @@ impl Explorer {
         }
         let frame = &mut self.frames[0];
         load(&mut frame.words, frame.zone.bounds_mut());
+        symbolic.from_stored(&frame.words, frame.zone.bounds_mut());
         self.explored += 1;
         open(symbolic, &mut self.stubborn, frame)
     }
@@ -248,15 +254,11 @@ impl Explorer {
         if frame.moves.len() < 2 {
             return true;
         }
-        let (words, zone) = (&*frame.words, frame.zone.bounds());
-        let is_new = match scene.symbolic.symmetry() {
-            None => scene.sink.add_choice(words, zone, &self.way),
-            Some(symmetry) => {
-                let representative = &mut self.representative;
-                let (words, zone, way) = representative.of(symmetry, (words, zone), &self.way);
-                scene.sink.add_choice(words, zone, way)
-            }
-        };
+        let mut zone = std::mem::take(&mut self.stored);
+        zone.clear();
+        zone.extend_from_slice(frame.zone.bounds());
+        let is_new = self.store(scene, &frame.words, &mut zone, S::add_choice);
+        self.stored = zone;
         self.explored -= u64::from(!is_new);
         is_new
     }
@@ -323,11 +325,14 @@ impl Explorer {
             Look::Found => return Ok(Taken::Found),
             Look::Stopped(reason) => Taken::Stopped(reason),
             Look::Continue => {
-                scene.symbolic.extrapolate(words, zone.bounds_mut());
-                if self.descends(scene.symbolic, words, depth) {
+                let descends = self.descends(scene.symbolic, words, depth);
+                if descends || scene.symbolic.symmetry().is_some() {
+                    scene.symbolic.extrapolate(words, zone.bounds_mut());
+                }
+                if descends {
                     return Ok(self.descend(scene.sink, words, zone.bounds()));
                 }
-                self.add_waiting(scene, words, zone.bounds());
+                self.store(scene, words, zone.bounds_mut(), S::add_waiting);
                 Taken::Nothing
             }
         };
@@ -361,27 +366,36 @@ impl Explorer {
             target.zone.bounds_mut().copy_from_slice(entry.bounds());
             return Ok(self.descend(scene.sink, &target.words, entry.bounds()));
         }
-        for entry in &*entries {
-            let waits = self.add_waiting(scene, &target.words, entry.bounds());
+        for entry in entries {
+            let waits = self.store(scene, &target.words, entry.bounds_mut(), S::add_waiting);
             self.leads_on &= waits;
         }
         self.way.pop();
         Ok(Taken::Nothing)
     }
 
-    /// Stores a state and lets it wait, unless a stored one contains it; returns whether it is known to wait.
-    fn add_waiting<S: Sink>(
+    /// Hands a state to the sink, or the one that stands for it. The zone, which is overwritten, must have been extrapolated if
+    /// states may be exchanged, so that it is the same for as many of them as possible, or if zones are cut.
+    fn store<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
         words: &[i32],
-        zone: &[Bound],
+        zone: &mut [Bound],
+        add: impl FnOnce(&mut S, &[i32], Kept<'_>, &[Step]) -> bool,
     ) -> bool {
-        let Some(symmetry) = scene.symbolic.symmetry() else {
-            return scene.sink.add_waiting(words, zone, &self.way);
+        let (words, zone, way) = match scene.symbolic.symmetry() {
+            None => (words, zone, &*self.way),
+            Some(symmetry) => {
+                let representative = &mut self.representative;
+                representative.of(symmetry, (words, zone), &self.way)
+            }
         };
-        let representative = &mut self.representative;
-        let (words, zone, way) = representative.of(symmetry, (words, zone), &self.way);
-        scene.sink.add_waiting(words, zone, way)
+        let limits = scene.symbolic.to_stored(words, zone);
+        let zone = Kept {
+            matrix: zone,
+            limits,
+        };
+        add(scene.sink, words, zone, way)
     }
 
     /// Whether a state is to be explored at once and not stored.
@@ -418,8 +432,13 @@ pub(super) fn start<S: Sink>(scene: &mut Scene<'_, '_, S>) -> Result<Look, Failu
         }
     }
     scene.symbolic.extrapolate_all(&words, &mut zones);
-    for zone in &zones {
-        scene.sink.add_waiting(&words, zone.bounds(), &[]);
+    for mut zone in zones {
+        let limits = scene.symbolic.to_stored(&words, zone.bounds_mut());
+        let zone = Kept {
+            matrix: zone.bounds(),
+            limits,
+        };
+        scene.sink.add_waiting(&words, zone, &[]);
     }
     Ok(Look::Continue)
 }

@@ -107,7 +107,11 @@ pub fn search<'a>(
                 Err(failure) => Err((failure, Trace::default())),
             },
             Ok(reach::Outcome::Found(trace)) => {
-                let mut zones = symbolic(&measuring.atoms(false));
+                let mut zones = symbolic(&measuring.atoms_without_ceiling());
+                if zones.splits() {
+                    // Cut zones forget both bounds of a clock by the same ceiling, and without one a pump would not show.
+                    zones = symbolic(&measuring.atoms(false));
+                }
                 match measuring.exceeded(&mut zones, &trace) {
                     Ok(()) => continue,
                     Err(failure) => Err((failure, trace)),
@@ -224,6 +228,17 @@ impl<'q> Measuring<'q> {
             }
         }
         atoms
+    }
+
+    /// The same for the greatest values, but without limit for the clock that exceeded its ceiling: no zone forgets how far it
+    /// has come.
+    fn atoms_without_ceiling(&self) -> Vec<ClockAtom> {
+        let mut items = self.items.clone();
+        if let Some(index) = self.exceeding {
+            items[index].high_ceiling = Bound::MAX_VALUE / 2;
+        }
+        let measuring = Measuring { items, ..*self };
+        measuring.atoms(false)
     }
 
     /// Takes a clock's bounds in a zone into account; false if its upper bound exceeds the ceiling.

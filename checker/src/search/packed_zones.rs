@@ -1,7 +1,8 @@
-//! Zones, each stored once, in as few bytes a bound as the widest one needs.
+//! Zones, each stored once, in as few bytes a bound as the widest one needs; reduced (see [`simulation`]), if zones are compared by
+//! what comparisons can tell.
 //!
 //! Invariants:
-//! * Two zones get the same [`ZoneId`] exactly if their closed matrices are equal, that is, if they are the same set.
+//! * Two zones get the same [`ZoneId`] exactly if their matrices are equal.
 //! * All matrices have entries of the same width: one byte until a bound does not fit, then two, then four. The order of
 //!   bounds is that of the entries, so inclusion is decided on the packed form.
 //! * A zone counts how often it is in use; after the last use its place is used again.
@@ -10,7 +11,8 @@
 
 use hashbrown::HashTable;
 
-use crate::zones::Bound;
+use crate::zones::simulation::{self, NO_DEMAND};
+use crate::zones::{Bound, dbm};
 
 use super::store::{hash_bytes, spread, table_bytes};
 use super::zone_table::ZoneId;
@@ -26,7 +28,28 @@ enum Width {
     Four,
 }
 
-/// A bound packed into `N` bytes; the greatest value stands for infinity.
+/// A zone as it is stored.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kept<'r> {
+    /// Its closed matrix, or its reduced form if there are limits.
+    pub(super) matrix: &'r [Bound],
+    /// The limits of its ceilings if zones count as contained in what simulates them. Whether there are any is the same for all
+    /// zones, and they are the same for zones that are compared.
+    pub(super) limits: &'r [Bound],
+}
+
+/// How the packed matrices of two zones lie to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Comparison {
+    /// No entry of the first exceeds its counterpart.
+    Within,
+    /// Only infinite entries do.
+    InfinitelyAbove,
+    /// Others do.
+    Above,
+}
+
+/// A bound packed into `N` bytes; the greatest value stands for infinity, the least for no demand.
 trait Entry<const N: usize>: Copy + Ord {
     const INFINITY: Self;
 
@@ -82,25 +105,24 @@ fn pack<T: Entry<N>, const N: usize>(zone: &[Bound], target: &mut [u8]) -> bool 
     let mut lost = 0;
     for (bytes, bound) in target.as_chunks_mut::<N>().0.iter_mut().zip(zone) {
         let raw = bound.raw();
-        let is_lost = raw < least || raw >= infinity && raw != i32::MAX;
-        lost |= i32::from(is_lost);
-        *bytes = T::truncated(raw.clamp(least, infinity)).to_bytes();
+        let is_no_demand = -i32::from(raw == NO_DEMAND.raw());
+        let is_lost = raw <= least || raw >= infinity && raw != i32::MAX;
+        lost |= i32::from(is_lost) & !is_no_demand;
+        let fitting = raw.clamp(least, infinity);
+        *bytes = T::truncated(fitting & !is_no_demand | least & is_no_demand).to_bytes();
     }
     lost == 0
 }
 
-/// The sums of every eighth bound. A bound counts from the negated greatest one on, and infinity for one more than that.
-fn sums<T: Entry<N>, const N: usize>(matrix: &[u8], greatest: i32) -> [i32; 8] {
+/// The sums of every eighth bound. A bound counts from the negated greatest one on, and up to one more than that.
+fn sums(matrix: &[Bound], greatest: i32) -> [i32; 8] {
     let mut sums = [0; 8];
-    let mut add = |entries: &[[u8; N]]| {
-        for (sum, bytes) in sums.iter_mut().zip(entries) {
-            let entry = T::of_bytes(*bytes);
-            let is_infinite = -i32::from(entry == T::INFINITY);
-            let counted = entry.raw().clamp(-greatest, greatest + 1);
-            *sum += counted & !is_infinite | (greatest + 1) & is_infinite;
+    let mut add = |bounds: &[Bound]| {
+        for (sum, bound) in sums.iter_mut().zip(bounds) {
+            *sum += bound.raw().clamp(-greatest, greatest + 1);
         }
     };
-    let (blocks, rest) = matrix.as_chunks::<N>().0.as_chunks::<8>();
+    let (blocks, rest) = matrix.as_chunks::<8>();
     for block in blocks {
         add(block);
     }
@@ -108,13 +130,12 @@ fn sums<T: Entry<N>, const N: usize>(matrix: &[u8], greatest: i32) -> [i32; 8] {
     sums
 }
 
-/// As [`sums`] for entries of one byte whose greatest sum is below 2^15, in as narrow lanes.
-fn sums_of_bytes(matrix: &[u8], greatest: i16) -> [i32; 8] {
+/// As [`sums`] for entries whose greatest sum is below 2^15, in as narrow lanes.
+fn narrow_sums(matrix: &[i16], greatest: i16) -> [i32; 8] {
     let mut sums = [0_i16; 8];
-    let mut add = |entries: &[u8]| {
-        for (sum, byte) in sums.iter_mut().zip(entries) {
-            // Infinity is greater than what it counts for.
-            *sum += i16::from(*byte as i8).clamp(-greatest, greatest + 1);
+    let mut add = |entries: &[i16]| {
+        for (sum, entry) in sums.iter_mut().zip(entries) {
+            *sum += (*entry).clamp(-greatest, greatest + 1);
         }
     };
     let (blocks, rest) = matrix.as_chunks::<8>();
@@ -125,38 +146,69 @@ fn sums_of_bytes(matrix: &[u8], greatest: i16) -> [i32; 8] {
     sums.map(i32::from)
 }
 
+/// The entries of a matrix packed into bytes, or its demands if there are limits, as far as [`narrow_sums`] tells them apart.
+fn widen_narrow(matrix: &[u8], limits: &[Bound], dimension: usize, target: &mut [i16]) {
+    const NONE: i16 = -1 << 14;
+    for (entry, byte) in target.iter_mut().zip(matrix) {
+        let byte = *byte as i8;
+        let is_infinite = -i16::from(byte == i8::MAX);
+        let is_no_demand = -i16::from(byte == i8::MIN);
+        let wide = i16::from(byte) & !is_infinite | i16::MAX & is_infinite;
+        *entry = wide & !is_no_demand | NONE & is_no_demand;
+    }
+    let (lower_bounds, others) = target.split_at_mut(dimension);
+    // Without limits there is nothing to do.
+    for (row, limit) in others
+        .chunks_exact_mut(dimension)
+        .zip(limits.iter().skip(1))
+    {
+        let limit = limit.raw().clamp(NONE.into(), -i32::from(NONE) - 1) as i16;
+        for (entry, lower) in row.iter_mut().zip(&*lower_bounds) {
+            *entry = (*entry).min((limit + lower) & !1);
+        }
+    }
+}
+
 fn unpack<T: Entry<N>, const N: usize>(bytes: &[u8], zone: &mut [Bound]) {
     for (bound, bytes) in zone.iter_mut().zip(bytes.as_chunks::<N>().0) {
         let entry = T::of_bytes(*bytes);
         *bound = if entry == T::INFINITY {
             Bound::INFINITY
+        } else if entry == T::LEAST {
+            NO_DEMAND
         } else {
             Bound::from_raw(entry.raw())
         };
     }
 }
 
-/// Whether no entry of the first matrix is greater than its counterpart.
-fn is_within<T: Entry<N>, const N: usize>(zone: &[u8], other: &[u8]) -> bool {
+fn compare<T: Entry<N>, const N: usize>(zone: &[u8], other: &[u8]) -> Comparison {
     // Blocks are compared without a branch; most comparisons end in the first one.
     const BLOCK_BYTES: usize = 32;
-    let exceeds = |block: &[u8], other: &[u8]| {
+    let mut is_above = 0;
+    let mut exceeds = |block: &[u8], other: &[u8]| {
         let entries = block.as_chunks::<N>().0.iter();
-        let pairs = entries.zip(other.as_chunks::<N>().0);
-        pairs.fold(0, |found, (entry, other)| {
-            found | u8::from(T::of_bytes(*entry) > T::of_bytes(*other))
-        }) != 0
+        let mut exceeds = 0;
+        for (entry, other) in entries.zip(other.as_chunks::<N>().0) {
+            let (entry, other) = (T::of_bytes(*entry), T::of_bytes(*other));
+            is_above |= u8::from(entry > other);
+            exceeds |= u8::from(entry > other) & u8::from(entry != T::INFINITY);
+        }
+        exceeds != 0
     };
     let (blocks, rest) = zone.as_chunks::<BLOCK_BYTES>();
     let (other_blocks, other_rest) = other.as_chunks::<BLOCK_BYTES>();
-    blocks
-        .iter()
-        .zip(other_blocks)
-        .all(|(block, other)| !exceeds(block, other))
-        && !exceeds(rest, other_rest)
+    let mut pairs = blocks.iter().zip(other_blocks);
+    if pairs.any(|(block, other)| exceeds(block, other)) || exceeds(rest, other_rest) {
+        Comparison::Above
+    } else if is_above == 0 {
+        Comparison::Within
+    } else {
+        Comparison::InfinitelyAbove
+    }
 }
 
-/// A digest of a zone that grows with it: eight numbers of seven bits.
+/// A digest of a zone, or of its demands if it is reduced, that grows with it: eight numbers of seven bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Signature([u32; 2]);
 
@@ -184,6 +236,12 @@ pub(super) struct PackedZones {
     bytes: Vec<u8>,
     /// The matrix that was proposed last.
     candidate: Vec<u8>,
+    /// The demands of a zone.
+    demands: Vec<Bound>,
+    /// What [`widen_narrow`] makes of the candidate.
+    narrow: Vec<i16>,
+    /// What demands are to be met by.
+    other: Vec<Bound>,
     /// By zone: how often it is in use.
     uses: Vec<u32>,
     free: Vec<u32>,
@@ -206,6 +264,9 @@ impl PackedZones {
             width: Width::One,
             bytes: Vec::new(),
             candidate: vec![0; dimension * dimension],
+            demands: vec![Bound::INFINITY; dimension * dimension],
+            narrow: vec![0; dimension * dimension],
+            other: vec![Bound::INFINITY; dimension * dimension],
             uses: Vec::new(),
             free: Vec::new(),
             table: HashTable::new(),
@@ -218,23 +279,27 @@ impl PackedZones {
         of(&self.bytes, self.candidate.len(), id)
     }
 
-    /// Makes a zone the candidate, which the following questions are about.
-    pub(super) fn propose(&mut self, zone: &[Bound]) {
-        while !self.pack(zone) {
+    /// Makes a zone the candidate, which the following questions are about; returns its signature.
+    pub(super) fn propose(&mut self, zone: Kept<'_>) -> Signature {
+        while !self.pack(zone.matrix) {
             self.widen();
         }
+        let (dimension, greatest) = (self.dimension, self.greatest);
+        let is_narrow =
+            self.width == Width::One && greatest < i8::MAX.into() && dimension <= NARROW;
+        let sums = if is_narrow {
+            widen_narrow(&self.candidate, zone.limits, dimension, &mut self.narrow);
+            narrow_sums(&self.narrow, greatest as i16)
+        } else if zone.limits.is_empty() {
+            sums(zone.matrix, greatest)
+        } else {
+            simulation::demands(zone.matrix, dimension, zone.limits, &mut self.demands);
+            sums(&self.demands, greatest)
+        };
+        self.signature_of(sums)
     }
 
-    /// The signature of the candidate.
-    pub(super) fn signature(&self) -> Signature {
-        let sums = match self.width {
-            Width::One if self.greatest < i8::MAX.into() && self.dimension <= NARROW => {
-                sums_of_bytes(&self.candidate, self.greatest as i16)
-            }
-            Width::One => sums::<i8, 1>(&self.candidate, self.greatest),
-            Width::Two => sums::<i16, 2>(&self.candidate, self.greatest),
-            Width::Four => sums::<i32, 4>(&self.candidate, self.greatest),
-        };
+    fn signature_of(&self, sums: [i32; 8]) -> Signature {
         let entries = self.dimension * self.dimension;
         let number = |lane: usize| {
             let least = -self.greatest * ((entries + 7 - lane) / 8) as i32;
@@ -253,22 +318,50 @@ impl PackedZones {
         }
     }
 
-    /// Whether a stored zone contains the candidate.
-    pub(super) fn contains_candidate(&self, id: ZoneId) -> bool {
-        self.is_within(&self.candidate, self.get(id.0))
-    }
-
-    /// Whether the candidate contains a stored zone.
-    pub(super) fn is_in_candidate(&self, id: ZoneId) -> bool {
-        self.is_within(self.get(id.0), &self.candidate)
-    }
-
-    fn is_within(&self, zone: &[u8], other: &[u8]) -> bool {
-        match self.width {
-            Width::One => is_within::<i8, 1>(zone, other),
-            Width::Two => is_within::<i16, 2>(zone, other),
-            Width::Four => is_within::<i32, 4>(zone, other),
+    /// Whether a stored zone contains the candidate, which has these limits.
+    pub(super) fn contains_candidate(&mut self, id: ZoneId, limits: &[Bound]) -> bool {
+        match self.compare(&self.candidate, self.get(id.0)) {
+            Comparison::Within => true,
+            Comparison::Above => false,
+            Comparison::InfinitelyAbove => {
+                self.is_within(|zones| [&zones.candidate, zones.get(id.0)], limits)
+            }
         }
+    }
+
+    /// Whether the candidate, which has these limits, contains a stored zone.
+    pub(super) fn is_in_candidate(&mut self, id: ZoneId, limits: &[Bound]) -> bool {
+        match self.compare(self.get(id.0), &self.candidate) {
+            Comparison::Within => true,
+            Comparison::Above => false,
+            Comparison::InfinitelyAbove => {
+                self.is_within(|zones| [zones.get(id.0), &zones.candidate], limits)
+            }
+        }
+    }
+
+    fn compare(&self, zone: &[u8], other: &[u8]) -> Comparison {
+        match self.width {
+            Width::One => compare::<i8, 1>(zone, other),
+            Width::Two => compare::<i16, 2>(zone, other),
+            Width::Four => compare::<i32, 4>(zone, other),
+        }
+    }
+
+    /// Whether the second of two packed zones contains the first, of which only infinite entries exceed their counterparts.
+    fn is_within(&mut self, of: impl Fn(&PackedZones) -> [&[u8]; 2], limits: &[Bound]) -> bool {
+        if limits.is_empty() {
+            return false;
+        }
+        let mut other = std::mem::take(&mut self.other);
+        let mut demands = std::mem::take(&mut self.demands);
+        let [first, second] = of(self);
+        unpack_as(self.width, first, &mut other);
+        simulation::demands(&other, self.dimension, limits, &mut demands);
+        unpack_as(self.width, second, &mut other);
+        let is_within = dbm::is_subset(&demands, &other);
+        (self.other, self.demands) = (other, demands);
+        is_within
     }
 
     /// Keeps the candidate, or counts one more use of it if it is stored.
@@ -311,12 +404,7 @@ impl PackedZones {
 
     /// Writes a stored zone.
     pub(super) fn load(&self, id: ZoneId, zone: &mut [Bound]) {
-        let bytes = self.get(id.0);
-        match self.width {
-            Width::One => unpack::<i8, 1>(bytes, zone),
-            Width::Two => unpack::<i16, 2>(bytes, zone),
-            Width::Four => unpack::<i32, 4>(bytes, zone),
-        }
+        unpack_as(self.width, self.get(id.0), zone);
     }
 
     /// The bytes that the zones and their table take.
@@ -344,6 +432,14 @@ impl PackedZones {
     }
 }
 
+fn unpack_as(width: Width, bytes: &[u8], zone: &mut [Bound]) {
+    match width {
+        Width::One => unpack::<i8, 1>(bytes, zone),
+        Width::Two => unpack::<i16, 2>(bytes, zone),
+        Width::Four => unpack::<i32, 4>(bytes, zone),
+    }
+}
+
 fn of(bytes: &[u8], size: usize, id: u32) -> &[u8] {
     &bytes[id as usize * size..][..size]
 }
@@ -358,6 +454,8 @@ fn widened<T: Entry<N>, W: Entry<M>, const N: usize, const M: usize>(bytes: &[u8
         let entry = T::of_bytes(*bytes);
         if entry == T::INFINITY {
             W::INFINITY.to_bytes()
+        } else if entry == T::LEAST {
+            W::LEAST.to_bytes()
         } else {
             W::truncated(entry.raw()).to_bytes()
         }
@@ -368,7 +466,8 @@ fn widened<T: Entry<N>, W: Entry<M>, const N: usize, const M: usize>(bytes: &[u8
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::zones::{Zone, dbm};
+    use crate::zones::Zone;
+    use crate::zones::extrapolate::Ceilings;
 
     /// Zones of three clocks with constants up to about `scale`, in a fixed order.
     fn zones(scale: i32) -> Vec<Zone> {
@@ -385,17 +484,75 @@ mod tests {
         zones
     }
 
-    type Kept = (ZoneId, Zone, Signature);
+    fn whole(matrix: &[Bound]) -> Kept<'_> {
+        Kept {
+            matrix,
+            limits: &[],
+        }
+    }
 
-    fn check_zones(packed: &mut PackedZones, zones: &[Zone], kept: &mut Vec<Kept>) {
+    #[test]
+    fn reduced_zones_are_compared_by_their_demands_in_every_width() {
+        let ceilings = Ceilings::lower_upper(
+            &[None, Some(40), None, Some(90)],
+            &[None, Some(9), Some(30), None],
+        );
+        let limits = ceilings.limits();
+        let mut packed = PackedZones::new(4, 9);
+        let mut kept: Vec<(ZoneId, Vec<Bound>, Vec<Bound>, Signature)> = Vec::new();
+        let mut beyond_entries = 0;
+        for scale in [9, 40, 62 * 7 / 6, 64 * 7 / 6, 400, 100_000] {
+            for (index, mut zone) in (0..).zip(zones(scale)) {
+                let least = Bound::weak(-(index % 5) * scale.min(60) / 10);
+                let least = least.expect("a constant within the range");
+                if !zone.constrain(0, index as usize % 3 + 1, least) {
+                    continue;
+                }
+                let mut matrix = zone.bounds().to_vec();
+                simulation::reduce(&mut matrix, 4, &ceilings);
+                let mut demands = matrix.clone();
+                simulation::demands(&matrix, 4, limits, &mut demands);
+                let own = packed.propose(Kept {
+                    matrix: &matrix,
+                    limits,
+                });
+                for (id, other, others, signature) in &kept {
+                    let is_within = dbm::is_subset(&demands, other);
+                    assert_eq!(packed.contains_candidate(*id, limits), is_within);
+                    let contains = dbm::is_subset(others, &matrix);
+                    assert_eq!(packed.is_in_candidate(*id, limits), contains);
+                    assert!(!is_within || own.may_be_within(*signature));
+                    assert!(!contains || signature.may_be_within(own));
+                    beyond_entries += i32::from(is_within && !dbm::is_subset(&matrix, other));
+                }
+                let id = packed.keep();
+                for (other_id, other, ..) in &kept {
+                    assert_eq!(*other_id == id, *other == matrix);
+                }
+                kept.push((id, matrix, demands, own));
+            }
+        }
+        assert!(
+            beyond_entries > 0,
+            "some inclusions show only in the demands"
+        );
+        for (id, matrix, ..) in &kept {
+            let mut loaded = vec![Bound::LE_ZERO; 16];
+            packed.load(*id, &mut loaded);
+            assert_eq!(&loaded, matrix);
+        }
+    }
+
+    type Known = (ZoneId, Zone, Signature);
+
+    fn check_zones(packed: &mut PackedZones, zones: &[Zone], kept: &mut Vec<Known>) {
         for zone in zones {
-            packed.propose(zone.bounds());
-            let own = packed.signature();
+            let own = packed.propose(whole(zone.bounds()));
             for (id, other, signature) in &*kept {
                 let is_within = dbm::is_subset(zone.bounds(), other.bounds());
-                assert_eq!(packed.contains_candidate(*id), is_within);
+                assert_eq!(packed.contains_candidate(*id, &[]), is_within);
                 let contains = dbm::is_subset(other.bounds(), zone.bounds());
-                assert_eq!(packed.is_in_candidate(*id), contains);
+                assert_eq!(packed.is_in_candidate(*id, &[]), contains);
                 assert!(!is_within || own.may_be_within(*signature));
                 assert!(!contains || signature.may_be_within(own));
             }
@@ -454,8 +611,7 @@ mod tests {
                 0,
                 Bound::weak(upper).expect("a constant within the range"),
             );
-            packed.propose(zone.bounds());
-            packed.signature()
+            packed.propose(whole(zone.bounds()))
         };
         assert!(signature(3).may_be_within(signature(9)));
         assert!(!signature(9).may_be_within(signature(3)));
@@ -464,7 +620,8 @@ mod tests {
     #[test]
     fn every_bound_near_the_end_of_a_width_is_told_from_infinity() {
         for raw in [
-            i32::MIN,
+            i32::MIN + 1,
+            NO_DEMAND.raw(),
             -32_769,
             -32_768,
             -129,
@@ -478,13 +635,13 @@ mod tests {
         ] {
             let mut packed = PackedZones::new(1, 9);
             let zone = [Bound::from_raw(raw)];
-            packed.propose(&zone);
+            packed.propose(whole(&zone));
             let id = packed.keep();
             let mut loaded = [Bound::LE_ZERO];
             packed.load(id, &mut loaded);
             assert_eq!(loaded, zone);
-            packed.propose(&[Bound::INFINITY]);
-            assert!(!packed.contains_candidate(id) && packed.is_in_candidate(id));
+            packed.propose(whole(&[Bound::INFINITY]));
+            assert!(!packed.contains_candidate(id, &[]) && packed.is_in_candidate(id, &[]));
         }
     }
 }

@@ -1,8 +1,9 @@
 //! The passed list: stored symbolic states, none of which contains another.
 //!
 //! Invariants:
-//! * Of two stored states with the same words neither zone contains the other. A state that a new one contains is
-//!   forgotten, and its node is covered from then on.
+//! * Of two stored states with the same words neither zone contains the other, as a set or, where zones are stored reduced, by
+//!   what simulates what (see [`crate::zones::simulation`]). A state that a new one contains is forgotten, and its node is
+//!   covered from then on.
 //! * Nodes are numbered in the order in which they were stored; a number is never used again.
 //!
 //! Source: G. Behrmann, J. Bengtsson, A. David, K. G. Larsen, P. Pettersson, W. Yi, "UPPAAL Implementation Secrets", 2002
@@ -14,7 +15,7 @@
 use crate::ir::Network;
 use crate::zones::Bound;
 
-use super::packed_zones::{PackedZones, Signature};
+use super::packed_zones::{Kept, PackedZones, Signature};
 use super::store::{DiscreteId, StateStore};
 use super::zone_table::ZoneId;
 
@@ -94,7 +95,7 @@ impl PassedList {
             .is_some_and(|bits| bits >> (node % 64) & 1 == 1)
     }
 
-    /// Writes a stored state that is not covered over another state of the same network.
+    /// Writes a stored state that is not covered, its zone as it is stored, over another state of the same network.
     pub(super) fn load(&self, stored: Stored, words: &mut [i32], zone: &mut [Bound]) {
         self.store.load(stored.discrete, words);
         if self.has_clocks {
@@ -108,7 +109,7 @@ impl PassedList {
     }
 
     /// Stores a state, unless a stored one contains it.
-    pub(super) fn add(&mut self, words: &[i32], zone: &[Bound]) -> Option<Stored> {
+    pub(super) fn add(&mut self, words: &[i32], zone: Kept<'_>) -> Option<Stored> {
         let hash = self.store.propose(words);
         self.add_proposed(hash, zone)
     }
@@ -129,7 +130,7 @@ impl PassedList {
     }
 
     /// As [`PassedList::add`], for the words that were proposed last, which have this hash.
-    pub(super) fn add_proposed(&mut self, hash: u32, zone: &[Bound]) -> Option<Stored> {
+    pub(super) fn add_proposed(&mut self, hash: u32, zone: Kept<'_>) -> Option<Stored> {
         let (discrete, is_new) = self.store.intern_proposed(hash);
         if !self.has_clocks {
             return is_new.then(|| self.stored(discrete, ZoneId(0)));
@@ -137,9 +138,8 @@ impl PassedList {
         if is_new {
             self.heads.push(NONE);
         }
-        self.zones.propose(zone);
-        let signature = self.zones.signature();
-        if !is_new && !self.make_room(discrete, signature) {
+        let signature = self.zones.propose(zone);
+        if !is_new && !self.make_room(discrete, signature, zone.limits) {
             return None;
         }
         let zone = self.zones.keep();
@@ -174,7 +174,7 @@ impl PassedList {
     }
 
     /// Forgets the zones that the proposed one contains; returns false, with nothing forgotten, if one contains it.
-    fn make_room(&mut self, discrete: DiscreteId, proposed: Signature) -> bool {
+    fn make_room(&mut self, discrete: DiscreteId, proposed: Signature, limits: &[Bound]) -> bool {
         let mut previous = NONE;
         let mut place = self.heads[discrete.0 as usize];
         while place != NONE {
@@ -184,10 +184,10 @@ impl PassedList {
                 node,
                 next,
             } = self.entries[place as usize];
-            if proposed.may_be_within(signature) && self.zones.contains_candidate(zone) {
+            if proposed.may_be_within(signature) && self.zones.contains_candidate(zone, limits) {
                 return false;
             }
-            if signature.may_be_within(proposed) && self.zones.is_in_candidate(zone) {
+            if signature.may_be_within(proposed) && self.zones.is_in_candidate(zone, limits) {
                 self.cover(node);
                 self.zones.release(zone);
                 match previous {

@@ -16,6 +16,7 @@ use crate::zones::{Bound, Zone};
 use super::explore::{self, Explorer, Scene, Sink, Visit};
 use super::goal::{Goal, Look, SharedGoal};
 use super::limits::{Counters, StopReason, Watch};
+use super::packed_zones::Kept;
 use super::parallel;
 use super::passed::Stored;
 use super::retrace::{self, Step};
@@ -128,13 +129,13 @@ struct Store {
 }
 
 impl Sink for Store {
-    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool {
+    fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
         let stored = self.tree.add(words, zone, self.current, way);
         self.waiting.extend(stored);
         stored.is_some()
     }
 
-    fn add_choice(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool {
+    fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
         self.tree.add(words, zone, self.current, way).is_some()
     }
 

@@ -30,7 +30,7 @@ impl Representative {
         symmetry: &Symmetry,
         (words, zone): (&[i32], &[Bound]),
         way: &[Step],
-    ) -> (&[i32], &[Bound], &[Step]) {
+    ) -> (&[i32], &mut [Bound], &[Step]) {
         self.words.clear();
         self.words.extend_from_slice(words);
         self.zone.clear();
@@ -46,7 +46,7 @@ impl Representative {
             });
             self.way.push(EXCHANGES | numbers);
         }
-        (&self.words, &self.zone, &self.way)
+        (&self.words, &mut self.zone, &self.way)
     }
 }
 

@@ -12,6 +12,7 @@ use crate::ir::Network;
 use crate::zones::Bound;
 
 use super::explore::Sink;
+use super::packed_zones::Kept;
 use super::passed::Stored;
 use super::retrace::Step;
 use super::tree::{Origin, Tree};
@@ -35,6 +36,8 @@ pub(super) struct Mail {
     heads: Vec<Head>,
     records: Vec<u8>,
     zones: Vec<Bound>,
+    /// The limits of each, or nothing.
+    limits: Vec<Bound>,
     steps: Vec<Step>,
     has_choices: bool,
 }
@@ -54,7 +57,7 @@ impl Mail {
     pub(super) fn bytes(&self) -> usize {
         self.heads.capacity() * size_of::<Head>()
             + self.records.capacity()
-            + self.zones.capacity() * size_of::<Bound>()
+            + (self.zones.capacity() + self.limits.capacity()) * size_of::<Bound>()
             + self.steps.capacity() * size_of::<Step>()
     }
 
@@ -62,6 +65,7 @@ impl Mail {
         self.heads.clear();
         self.records.clear();
         self.zones.clear();
+        self.limits.clear();
         self.steps.clear();
         self.has_choices = false;
     }
@@ -137,10 +141,14 @@ impl Shard {
         let count = mail.heads.len().max(1);
         let record_bytes = mail.records.len() / count;
         let zone_bounds = mail.zones.len() / count;
+        let limit_bounds = mail.limits.len() / count;
         let mut steps = mail.steps.as_slice();
         for (index, head) in mail.heads.iter().enumerate() {
             let record = &mail.records[index * record_bytes..][..record_bytes];
-            let zone = &mail.zones[index * zone_bounds..][..zone_bounds];
+            let zone = Kept {
+                matrix: &mail.zones[index * zone_bounds..][..zone_bounds],
+                limits: &mail.limits[index * limit_bounds..][..limit_bounds],
+            };
             let (way, rest) = steps.split_at((head.steps & !IS_CHOICE) as usize);
             steps = rest;
             let origin = Origin {
@@ -171,7 +179,7 @@ impl Shard {
     fn store_or_send(
         &mut self,
         words: &[i32],
-        zone: &[Bound],
+        zone: Kept<'_>,
         way: &[Step],
         is_choice: bool,
     ) -> Option<Stored> {
@@ -188,22 +196,24 @@ impl Shard {
         });
         let record = self.tree.passed.proposed();
         mail.records.extend_from_slice(record);
-        mail.zones.extend_from_slice(zone);
+        mail.zones.extend_from_slice(zone.matrix);
+        mail.limits.extend_from_slice(zone.limits);
         mail.steps.extend_from_slice(way);
         mail.has_choices |= is_choice;
-        self.sent_bytes += size_of::<Head>() + record.len() + size_of_val(zone) + size_of_val(way);
+        let zone_bytes = size_of_val(zone.matrix) + size_of_val(zone.limits);
+        self.sent_bytes += size_of::<Head>() + record.len() + zone_bytes + size_of_val(way);
         None
     }
 }
 
 impl Sink for Shard {
-    fn add_waiting(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool {
+    fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
         let stored = self.store_or_send(words, zone, way, false);
         self.next.extend(stored);
         stored.is_some()
     }
 
-    fn add_choice(&mut self, words: &[i32], zone: &[Bound], way: &[Step]) -> bool {
+    fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
         self.store_or_send(words, zone, way, true).is_some()
     }
 

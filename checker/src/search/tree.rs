@@ -6,8 +6,8 @@
 //! Cost: eight bytes a state; the moves of a way of more than one take four bytes each and four more.
 
 use crate::ir::Network;
-use crate::zones::Bound;
 
+use super::packed_zones::Kept;
 use super::passed::{PassedList, Stored};
 use super::paths;
 use super::retrace::Step;
@@ -78,7 +78,7 @@ impl Tree {
     pub(super) fn add(
         &mut self,
         words: &[i32],
-        zone: &[Bound],
+        zone: Kept<'_>,
         origin: Origin,
         path: &[Step],
     ) -> Option<Stored> {
@@ -91,7 +91,7 @@ impl Tree {
     pub(super) fn add_proposed(
         &mut self,
         hash: u32,
-        zone: &[Bound],
+        zone: Kept<'_>,
         origin: Origin,
         path: &[Step],
     ) -> Option<Stored> {

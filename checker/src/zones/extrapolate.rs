@@ -15,6 +15,10 @@
 //! in automata that compare single clocks with constants; the later ones are coarser. None is sound where guards
 //! compare two clocks; [`split_by_differences`] is the variant for those.
 //!
+//! [`lu_plus`] is coarser still: an entry (i, j) is infinite, for i other than 0, already if `low(j) + (i, j) > L(i)`, that is, if
+//! with the least j there is a clock i above L; and where `low(j)` is `> U(j)`, strictly, that counts as above U. It forgets
+//! all entries on which the abstraction `aLU` does not depend (see [`super::simulation`]), and so it stays within `aLU`.
+//!
 //! Source: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and Upper Bounds in Zone Based Abstractions of Timed
 //! Automata", TACAS 2004, definitions in section 4, closing after `Extra_LU+` (LU-Canonize) in section 5.
 //!
@@ -192,9 +196,27 @@ impl Ceilings {
     fn is_above_lower(&self, clock: usize, entry: Bound) -> bool {
         entry.0 < 1_i32.saturating_sub(self.rows[clock].0)
     }
+
+    /// `<= L` of each clock; below every bound if there is no L.
+    #[inline]
+    pub fn limits(&self) -> &[Bound] {
+        &self.rows
+    }
+
+    /// `< -U` of each clock; above every bound if there is no U.
+    #[inline]
+    pub(super) fn columns(&self) -> &[Bound] {
+        &self.columns
+    }
 }
 
-/// Extrapolates by `Extra_LU+`; by `Extra_M+` if the ceilings are [`Ceilings::maximal`].
+/// The least even bound on `y - x` that lets y be above L where x is least, from `<= L(y)` and the entry (0, x).
+#[inline]
+pub(super) fn forgotten_from(limit: Bound, lower: Bound) -> Bound {
+    Bound((limit.0 + lower.0) & !1)
+}
+
+/// Extrapolates further than `Extra_LU+`, within `aLU`; than `Extra_M+` if the ceilings are [`Ceilings::maximal`].
 ///
 /// The forgetting leaves only these ways from one clock to another: through clocks that are neither certainly above L
 /// (their rows are infinite) nor certainly above U (only the reference clock still bounds them), and through the
@@ -207,13 +229,25 @@ pub fn lu_plus(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
 #[inline(always)]
 fn forget_and_close(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
     let (weakened, between) = forget_plus(zone, ceilings, dimension);
+    close_again(zone, dimension, &weakened, &between);
+}
+
+/// Closes a matrix in which nothing is left that [`lu_plus`] forgets, given the clocks whose rows lost a bound, and those that
+/// are neither certainly above L nor certainly above U.
+#[inline(always)]
+pub(super) fn close_again(
+    zone: &mut [Bound],
+    dimension: usize,
+    weakened: &ClockSet,
+    between: &ClockSet,
+) {
     if weakened.is_empty() {
         return;
     }
-    for via in &between {
-        relax_rows(zone, dimension, &weakened, via);
+    for via in between {
+        relax_rows(zone, dimension, weakened, via);
     }
-    relax_rows(zone, dimension, &weakened, 0);
+    relax_rows(zone, dimension, weakened, 0);
 }
 
 /// Writes the matrix of `Extra_LU+`, not closed; returns the clocks whose rows lost a bound that closing may restore,
@@ -233,7 +267,7 @@ fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (Cl
             if forget_in_row(row, ceilings.rows[clock], lower_bounds, columns) {
                 weakened.insert(clock);
             }
-            if lower_bounds[clock] >= columns[clock] {
+            if lower_bounds[clock] > columns[clock] {
                 between.insert(clock);
             }
         }
@@ -259,8 +293,8 @@ fn forget_in_row(
 ) -> bool {
     let mut changes = 0;
     for ((bound, lower), column) in row.iter_mut().zip(lower_bounds).zip(columns) {
-        let is_above = -i32::from(*bound > limit);
-        let is_cut = -i32::from(*lower < *column);
+        let is_above = -i32::from(*bound >= forgotten_from(limit, *lower));
+        let is_cut = -i32::from(*lower <= *column);
         let is_forgotten = is_above | is_cut;
         let new = Bound(bound.0 & !is_forgotten | Bound::INFINITY.0 & is_forgotten);
         changes |= new.0 ^ bound.0;

@@ -11,6 +11,7 @@
 //! * [`zone`]: one zone that owns its matrix;
 //! * [`minimal`]: zones stored by their fewest constraints;
 //! * [`extrapolate`]: the abstractions that make the zone graph finite;
+//! * [`simulation`]: inclusion up to what comparisons can tell;
 //! * [`federation`]: finite unions of zones, with exact subtraction and inclusion;
 //! * [`past`]: the safe timed predecessors of timed games;
 //! * [`future`]: their mirror image, and delays that something stops;
@@ -32,6 +33,7 @@ pub mod zone;
 pub mod minimal;
 
 pub mod extrapolate;
+pub mod simulation;
 
 pub mod federation;
 pub mod future;
