@@ -356,13 +356,12 @@ impl<'a> Stepper<'a> {
         processes: Range<usize>,
         words: &mut [i32],
     ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
-        let network = self.network;
         self.constraints.clear();
         self.arguments.clear();
         for index in processes {
-            let location = words[index] as usize;
-            let invariant = &network.processes[index].locations[location].invariant;
-            if !invariant.is_trivial() && !self.guard(invariant, words)? {
+            if let Some(invariant) = self.tables[index][words[index] as usize].invariant
+                && !self.guard(invariant, words)?
+            {
                 return Ok(None);
             }
         }

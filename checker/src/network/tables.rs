@@ -1,6 +1,6 @@
 //! The edges of a network, sorted by what is asked of them in each state.
 
-use crate::ir::{Edge, Location, Network, Process, Urgency};
+use crate::ir::{Edge, Guard, Location, Network, Process, Urgency};
 
 use super::selects::select_count;
 
@@ -20,10 +20,12 @@ pub(super) struct LocationTable<'a> {
     pub(super) sends: Vec<EdgeEntry<'a>>,
     pub(super) receives: Vec<EdgeEntry<'a>>,
     pub(super) urgency: Urgency,
+    /// What must hold in it, if anything.
+    pub(super) invariant: Option<&'a Guard>,
 }
 
 impl<'a> LocationTable<'a> {
-    pub(super) fn new(process: &'a Process, location: &Location) -> LocationTable<'a> {
+    pub(super) fn new(process: &'a Process, location: &'a Location) -> LocationTable<'a> {
         let urgency = location.urgency;
         let (internal, sends, receives) = (Vec::new(), Vec::new(), Vec::new());
         let mut table = LocationTable {
@@ -31,6 +33,7 @@ impl<'a> LocationTable<'a> {
             sends,
             receives,
             urgency,
+            invariant: Some(&location.invariant).filter(|invariant| !invariant.is_trivial()),
         };
         for index in &location.edges {
             let edge = &process.edges[index.0 as usize];

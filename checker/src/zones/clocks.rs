@@ -21,6 +21,9 @@ use super::dbm::{Constraint, constrain, is_empty, least_sum, set_empty, upper_bo
 use super::rows::{for_small_dimension, rows, rows_mut};
 use super::{Bound, ClockSet};
 
+/// So few upper bounds are looked at one after the other for each clock, more as a row of bounds on all clocks.
+const FEW_BOUNDS: usize = 4;
+
 /// One step of an update of clocks; a list of them is carried out in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Assignment {
@@ -60,6 +63,16 @@ pub fn up(zone: &mut [Bound], dimension: usize) {
 /// Only upper bounds end a delay, and of the closed future within them only upper bounds are new: the least that a bound of
 /// another clock and the difference to it allow. Differences were possible before and stay so. Cost: O(n) for each upper bound.
 pub fn up_within(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) {
+    let is_upper = |one: &&Constraint| one.right == 0 && one.left != 0;
+    let count = constraints.iter().filter(is_upper).count();
+    if count <= FEW_BOUNDS {
+        for row in rows_mut(zone, dimension).skip(1) {
+            let upper = constraints.iter().filter(is_upper);
+            let sums = upper.map(|one| row[one.left].plus(one.bound));
+            row[0] = sums.fold(Bound::INFINITY, Bound::min);
+        }
+        return;
+    }
     let mut buffer = [Bound::INFINITY; ClockSet::CAPACITY];
     let upper_bounds = upper_bounds(constraints, &mut buffer[..dimension]);
     for_small_dimension!(dimension, delay_below(zone, upper_bounds));
