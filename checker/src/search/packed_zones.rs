@@ -17,8 +17,8 @@ use crate::zones::{Bound, dbm};
 use super::store::{hash_bytes, spread, table_bytes};
 use super::zone_table::ZoneId;
 
-/// The sum of every eighth of the bytes of a zone of at most this dimension is below 2^15.
-const NARROW: usize = 44;
+/// Sums of bytes with at most such a sum of weights are below 2^15.
+const NARROW: i32 = 255;
 
 /// How many bytes a bound takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,35 +114,42 @@ fn pack<T: Entry<N>, const N: usize>(zone: &[Bound], target: &mut [u8]) -> bool 
     lost == 0
 }
 
-/// The sums of every eighth bound. A bound counts from the negated greatest one on, and up to one more than that.
+/// The factor of the bounds of a block of eight in the sums of a signature.
+///
+/// Bounds on a difference and on its negative often lie in the same lane, and would cancel out where a difference is exact.
+fn weight(block: usize) -> i32 {
+    1 + (block & 3) as i32
+}
+
+/// The weighted sums of every eighth bound. A bound counts from the negated greatest one on, and up to one more than that.
 fn sums(matrix: &[Bound], greatest: i32) -> [i32; 8] {
     let mut sums = [0; 8];
-    let mut add = |bounds: &[Bound]| {
+    let mut add = |bounds: &[Bound], index| {
         for (sum, bound) in sums.iter_mut().zip(bounds) {
-            *sum += bound.raw().clamp(-greatest, greatest + 1);
+            *sum += weight(index) * bound.raw().clamp(-greatest, greatest + 1);
         }
     };
     let (blocks, rest) = matrix.as_chunks::<8>();
-    for block in blocks {
-        add(block);
+    for (index, block) in blocks.iter().enumerate() {
+        add(block, index);
     }
-    add(rest);
+    add(rest, blocks.len());
     sums
 }
 
 /// As [`sums`] for entries whose greatest sum is below 2^15, in as narrow lanes.
 fn narrow_sums(matrix: &[i16], greatest: i16) -> [i32; 8] {
     let mut sums = [0_i16; 8];
-    let mut add = |entries: &[i16]| {
+    let mut add = |entries: &[i16], index| {
         for (sum, entry) in sums.iter_mut().zip(entries) {
-            *sum += (*entry).clamp(-greatest, greatest + 1);
+            *sum += weight(index) as i16 * (*entry).clamp(-greatest, greatest + 1);
         }
     };
     let (blocks, rest) = matrix.as_chunks::<8>();
-    for block in blocks {
-        add(block);
+    for (index, block) in blocks.iter().enumerate() {
+        add(block, index);
     }
-    add(rest);
+    add(rest, blocks.len());
     sums.map(i32::from)
 }
 
@@ -208,22 +215,22 @@ fn compare<T: Entry<N>, const N: usize>(zone: &[u8], other: &[u8]) -> Comparison
     }
 }
 
-/// A digest of a zone, or of its demands if it is reduced, that grows with it: eight numbers of seven bits.
+/// A digest of a zone, or of its demands if it is reduced, that grows with it: eight numbers of fifteen bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Signature([u32; 2]);
+pub(super) struct Signature([u32; 4]);
 
 impl Signature {
     /// Whether a zone with this signature may be a subset of one with the other; false is certain.
     #[inline]
     pub(super) fn may_be_within(self, other: Signature) -> bool {
-        // No number borrows from its neighbour, and the eighth bit is left where it is not greater.
-        const EIGHTH_BITS: u64 = 0x8080_8080_8080_8080;
-        let difference = (other.bits() | EIGHTH_BITS) - self.bits();
-        difference & EIGHTH_BITS == EIGHTH_BITS
+        // No number borrows from its neighbour, and the sixteenth bit is left where it is not greater.
+        const SIXTEENTH_BITS: u64 = 0x8000_8000_8000_8000;
+        let left = |half: usize| (other.half(half) | SIXTEENTH_BITS) - self.half(half);
+        left(0) & left(1) & SIXTEENTH_BITS == SIXTEENTH_BITS
     }
 
-    fn bits(self) -> u64 {
-        u64::from(self.0[0]) | u64::from(self.0[1]) << 32
+    fn half(self, half: usize) -> u64 {
+        u64::from(self.0[2 * half]) | u64::from(self.0[2 * half + 1]) << 32
     }
 }
 
@@ -248,6 +255,8 @@ pub(super) struct PackedZones {
     table: HashTable<u32>,
     /// The greatest encoded bound that signatures tell from greater ones.
     greatest: i32,
+    /// By lane of a signature: the sum of the weights of its bounds.
+    weights: [i32; 8],
     /// The factor from sums of bounds to the numbers of a signature, over 2^32.
     scale: u64,
 }
@@ -255,10 +264,13 @@ pub(super) struct PackedZones {
 impl PackedZones {
     /// An empty table of zones of this dimension, most of whose constants are at most `greatest`; signatures are best then.
     pub(super) fn new(dimension: usize, greatest: i32) -> PackedZones {
-        let entries = (dimension * dimension).div_ceil(8) as i32;
+        let mut weights = [0; 8];
+        for entry in 0..dimension * dimension {
+            weights[entry % 8] += weight(entry / 8);
+        }
         // So that sums of so many bounds fit into a word.
-        let greatest = (2 * greatest.clamp(0, Bound::MAX_VALUE) + 1).min((1 << 29) / entries);
-        let most = i64::from(entries) * i64::from(2 * greatest + 1);
+        let greatest = (2 * greatest.clamp(0, Bound::MAX_VALUE) + 1).min((1 << 29) / weights[0]);
+        let most = i64::from(weights[0]) * i64::from(2 * greatest + 1);
         PackedZones {
             dimension,
             width: Width::One,
@@ -271,7 +283,8 @@ impl PackedZones {
             free: Vec::new(),
             table: HashTable::new(),
             greatest,
-            scale: (127 << 32) / most as u64,
+            weights,
+            scale: ((0x7fff << 32) / most as u64).min(1 << 32),
         }
     }
 
@@ -286,7 +299,7 @@ impl PackedZones {
         }
         let (dimension, greatest) = (self.dimension, self.greatest);
         let is_narrow =
-            self.width == Width::One && greatest < i8::MAX.into() && dimension <= NARROW;
+            self.width == Width::One && greatest < i8::MAX.into() && self.weights[0] <= NARROW;
         let sums = if is_narrow {
             widen_narrow(&self.candidate, zone.limits, dimension, &mut self.narrow);
             narrow_sums(&self.narrow, greatest as i16)
@@ -300,14 +313,13 @@ impl PackedZones {
     }
 
     fn signature_of(&self, sums: [i32; 8]) -> Signature {
-        let entries = self.dimension * self.dimension;
         let number = |lane: usize| {
-            let least = -self.greatest * ((entries + 7 - lane) / 8) as i32;
-            (((sums[lane] - least) as u64 * self.scale) >> 32) as u32
+            let above_least = sums[lane] + self.greatest * self.weights[lane];
+            ((above_least as u64 * self.scale) >> 32) as u32
         };
-        let half =
-            |first: usize| (0..4).fold(0, |bits, lane| bits | number(first + lane) << (8 * lane));
-        Signature([half(0), half(4)])
+        Signature(std::array::from_fn(|pair| {
+            number(2 * pair) | number(2 * pair + 1) << 16
+        }))
     }
 
     fn pack(&mut self, zone: &[Bound]) -> bool {

@@ -19,9 +19,6 @@ use super::packed_zones::{Kept, PackedZones, Signature};
 use super::store::{DiscreteId, StateStore};
 use super::zone_table::ZoneId;
 
-/// No entry.
-const NONE: u32 = u32::MAX;
-
 /// A stored state with its number.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stored {
@@ -37,8 +34,100 @@ struct Entry {
     signature: Signature,
     zone: ZoneId,
     node: u32,
-    /// The next one with the same words.
-    next: u32,
+}
+
+/// The zones of a discrete state: so many entries from `first` on. They lie side by side, since long lists are read again and again,
+/// in a place for as many as the next power of two.
+#[derive(Clone, Copy, Debug)]
+struct List {
+    first: u32,
+    len: u32,
+}
+
+/// Lists of entries.
+#[derive(Debug, Default)]
+struct Lists {
+    entries: Vec<Entry>,
+    /// By discrete state: its entries.
+    by_discrete: Vec<List>,
+    /// By exponent of their size: the places that are not in use.
+    free: Vec<Vec<u32>>,
+}
+
+impl Lists {
+    fn bytes(&self) -> usize {
+        let free = self.free.iter().map(|places| size_of_val(&**places));
+        size_of_val(&*self.entries) + size_of_val(&*self.by_discrete) + free.sum::<usize>()
+    }
+
+    fn get(&self, discrete: DiscreteId) -> &[Entry] {
+        let List { first, len } = self.by_discrete[discrete.0 as usize];
+        &self.entries[first as usize..][..len as usize]
+    }
+
+    /// Adds a discrete state without entries.
+    fn open(&mut self) {
+        self.by_discrete.push(List { first: 0, len: 0 });
+    }
+
+    fn push(&mut self, discrete: DiscreteId, entry: Entry) {
+        let List { first, len } = self.by_discrete[discrete.0 as usize];
+        let place = if len == 0 {
+            self.place(0, entry)
+        } else if len.is_power_of_two() {
+            let exponent = len.ilog2() as usize;
+            let place = self.place(exponent + 1, entry);
+            let old = first as usize..(first + len) as usize;
+            self.entries.copy_within(old, place as usize);
+            self.release(exponent, first);
+            place
+        } else {
+            first
+        };
+        self.entries[(place + len) as usize] = entry;
+        self.by_discrete[discrete.0 as usize] = List {
+            first: place,
+            len: len + 1,
+        };
+    }
+
+    /// Takes an entry out; the last one takes its place.
+    fn remove(&mut self, discrete: DiscreteId, index: usize) {
+        let List { first, len } = self.by_discrete[discrete.0 as usize];
+        let last = len - 1;
+        self.entries[first as usize + index] = self.entries[(first + last) as usize];
+        let mut place = first;
+        if last == 0 {
+            self.release(0, first);
+        } else if last.is_power_of_two() {
+            let exponent = last.ilog2() as usize;
+            place = self.place(exponent, self.entries[first as usize]);
+            let old = first as usize..(first + last) as usize;
+            self.entries.copy_within(old, place as usize);
+            self.release(exponent + 1, first);
+        }
+        self.by_discrete[discrete.0 as usize] = List {
+            first: place,
+            len: last,
+        };
+    }
+
+    /// A place for 2^exponent entries, which mean nothing if it is new.
+    fn place(&mut self, exponent: usize, filler: Entry) -> u32 {
+        let free = self.free.get_mut(exponent).and_then(Vec::pop);
+        free.unwrap_or_else(|| {
+            let first = self.entries.len();
+            self.entries.resize(first + (1 << exponent), filler);
+            first as u32
+        })
+    }
+
+    fn release(&mut self, exponent: usize, first: u32) {
+        if self.free.len() <= exponent {
+            self.free.resize_with(exponent + 1, Vec::new);
+        }
+        self.free[exponent].push(first);
+    }
 }
 
 /// Stored symbolic states.
@@ -46,11 +135,7 @@ struct Entry {
 pub(super) struct PassedList {
     store: StateStore,
     zones: PackedZones,
-    entries: Vec<Entry>,
-    /// The first of the entries that are not in use.
-    free: u32,
-    /// By discrete state: its first entry.
-    heads: Vec<u32>,
+    lists: Lists,
     /// By node: whether it is covered.
     covered: Vec<u64>,
     nodes: u32,
@@ -65,9 +150,7 @@ impl PassedList {
         PassedList {
             store: StateStore::new(network),
             zones: PackedZones::new(dimension, greatest),
-            entries: Vec::new(),
-            free: NONE,
-            heads: Vec::new(),
+            lists: Lists::default(),
             covered: Vec::new(),
             nodes: 0,
             covered_count: 0,
@@ -82,9 +165,8 @@ impl PassedList {
 
     /// The bytes that the list takes.
     pub(super) fn bytes(&self) -> usize {
-        let entries = self.entries.len() * size_of::<Entry>();
-        let words = self.heads.len() * size_of::<u32>() + self.covered.len() * size_of::<u64>();
-        self.store.bytes() + self.zones.bytes() + entries + words
+        let covered = self.covered.len() * size_of::<u64>();
+        self.store.bytes() + self.zones.bytes() + self.lists.bytes() + covered
     }
 
     /// Whether a state was contained by one that was stored later.
@@ -136,7 +218,7 @@ impl PassedList {
             return is_new.then(|| self.stored(discrete, ZoneId(0)));
         }
         if is_new {
-            self.heads.push(NONE);
+            self.lists.open();
         }
         let signature = self.zones.propose(zone);
         if !is_new && !self.make_room(discrete, signature, zone.limits) {
@@ -144,22 +226,12 @@ impl PassedList {
         }
         let zone = self.zones.keep();
         let stored = self.stored(discrete, zone);
-        let head = &mut self.heads[discrete.0 as usize];
         let entry = Entry {
             signature,
             zone,
             node: stored.node,
-            next: *head,
         };
-        if self.free == NONE {
-            *head = self.entries.len() as u32;
-            self.entries.push(entry);
-        } else {
-            *head = self.free;
-            let place = &mut self.entries[self.free as usize];
-            self.free = place.next;
-            *place = entry;
-        }
+        self.lists.push(discrete, entry);
         Some(stored)
     }
 
@@ -175,31 +247,21 @@ impl PassedList {
 
     /// Forgets the zones that the proposed one contains; returns false, with nothing forgotten, if one contains it.
     fn make_room(&mut self, discrete: DiscreteId, proposed: Signature, limits: &[Bound]) -> bool {
-        let mut previous = NONE;
-        let mut place = self.heads[discrete.0 as usize];
-        while place != NONE {
+        // The newest come first, and where one is taken out, one that was looked at takes its place.
+        for index in (0..self.lists.get(discrete).len()).rev() {
             let Entry {
                 signature,
                 zone,
                 node,
-                next,
-            } = self.entries[place as usize];
+            } = self.lists.get(discrete)[index];
             if proposed.may_be_within(signature) && self.zones.contains_candidate(zone, limits) {
                 return false;
             }
             if signature.may_be_within(proposed) && self.zones.is_in_candidate(zone, limits) {
                 self.cover(node);
                 self.zones.release(zone);
-                match previous {
-                    NONE => self.heads[discrete.0 as usize] = next,
-                    _ => self.entries[previous as usize].next = next,
-                }
-                self.entries[place as usize].next = self.free;
-                self.free = place;
-            } else {
-                previous = place;
+                self.lists.remove(discrete, index);
             }
-            place = next;
         }
         true
     }
