@@ -389,10 +389,15 @@ impl<'a> Symbolic<'a> {
         }
     }
 
+    /// Whether [`Symbolic::to_stored`] makes anything else of extrapolated zones.
+    pub fn stores_reduced(&self) -> bool {
+        self.dimension > 1 && self.bounds.compares_by_simulation()
+    }
+
     /// Replaces the zone of a state, extrapolated or not, by its reduced form (see [`simulation`]), and gives the limits of its
-    /// ceilings. Leaves it as it is, without limits, where only sets may be compared.
+    /// ceilings. Leaves it as it is, without limits, where zones are compared as sets; then it must have been extrapolated.
     pub fn to_stored(&mut self, words: &[i32], zone: &mut [Bound]) -> &[Bound] {
-        if self.dimension == 1 || !self.bounds.simulates() {
+        if !self.stores_reduced() {
             return &[];
         }
         self.bounds.ceilings_into(words, &mut self.ceilings);
@@ -402,7 +407,7 @@ impl<'a> Symbolic<'a> {
 
     /// Replaces what [`Symbolic::to_stored`] has made of a zone by the extrapolated zone.
     pub fn from_stored(&mut self, words: &[i32], stored: &mut [Bound]) {
-        if self.dimension > 1 && self.bounds.simulates() {
+        if self.stores_reduced() {
             self.bounds.ceilings_into(words, &mut self.ceilings);
             simulation::restore(stored, self.dimension, &self.ceilings);
         }

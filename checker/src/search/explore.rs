@@ -326,7 +326,9 @@ impl Explorer {
             Look::Stopped(reason) => Taken::Stopped(reason),
             Look::Continue => {
                 let descends = self.descends(scene.symbolic, words, depth);
-                if descends || scene.symbolic.symmetry().is_some() {
+                let symbolic = &*scene.symbolic;
+                let is_reduced = symbolic.stores_reduced() && symbolic.symmetry().is_none();
+                if descends || !is_reduced {
                     scene.symbolic.extrapolate(words, zone.bounds_mut());
                 }
                 if descends {
@@ -374,8 +376,8 @@ impl Explorer {
         Ok(Taken::Nothing)
     }
 
-    /// Hands a state to the sink, or the one that stands for it. The zone, which is overwritten, must have been extrapolated if
-    /// states may be exchanged, so that it is the same for as many of them as possible, or if zones are cut.
+    /// Hands a state to the sink, or the one that stands for it. The zone, which is overwritten, must have been extrapolated
+    /// unless it is stored reduced, and if states may be exchanged, so that it is the same for as many of them as possible.
     fn store<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
