@@ -31,16 +31,16 @@ system P, Q;
 """A model of 900 million states."""
 
 GAME = """
-int[0,30000] a, b; bool done;
+int[0,30000] a, b; bool c;
 process P() {
-  state S, T; init S;
-  trans S -> S { guard a < 30000; assign a = a + 1; },
+  state S; init S;
+  trans S -u-> S { guard a < 30000; assign a = a + 1; },
         S -u-> S { guard b < 30000; assign b = b + 1; },
-        S -> T { guard a == 30000 && b == 7; };
+        S -> S { assign c = true; };
 }
 system P;
 """
-"""A game with as many."""
+"""A game that is won only after a look at as many."""
 
 BUSY = """
 int[0,1000003] n;
@@ -117,7 +117,7 @@ class Terminal:
     ("text", "query", "options"),
     [
         (ENDLESS, "A[] a + b < 60000", ()),
-        (GAME, "control: A<> P.T", ()),
+        (GAME, "control: A[] !(a == 30000 && b == 30000 && c)", ()),
         (BUSY, "A[] n >= 0", ()),
         (BUSY, "A[] n >= 0", ("--engine", "interpreter")),
         (BUSY, "control: A[] n >= 0", ()),
