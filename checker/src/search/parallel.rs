@@ -43,8 +43,8 @@ const PULSE: Duration = Duration::from_millis(20);
 const FEWEST_MOVES: u64 = 1 << 10;
 /// at most so many.
 const MOST_MOVES: u64 = 1 << 15;
-/// A worker that has collected so many bytes for others ends its round.
-const MOST_MAIL_BYTES: usize = 1 << 20;
+/// A worker that has collected so many bytes for others ends its round: what they then look through should still be in a cache.
+const MOST_MAIL_BYTES: usize = 1 << 18;
 
 /// States of a round for each worker from which on threads are worth waking.
 const WORTH_WAKING: usize = 48;
