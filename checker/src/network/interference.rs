@@ -19,8 +19,23 @@ pub(super) struct Interference {
     /// By location: its process.
     owners: Vec<u32>,
     urgencies: Vec<Urgency>,
+    tables: Tables,
+}
+
+/// What is known of each of the ways in which time stands still.
+#[derive(Debug)]
+struct Tables {
     urgent: Table,
     committed: Table,
+}
+
+impl Tables {
+    fn of(&mut self, still: Still) -> &mut Table {
+        match still {
+            Still::Urgent => &mut self.urgent,
+            Still::Committed => &mut self.committed,
+        }
+    }
 }
 
 /// What is known of one of the ways in which time stands still.
@@ -58,8 +73,10 @@ impl Interference {
             footprints: Footprints::default(),
             first,
             owners,
-            urgent: Table::new(urgencies.len()),
-            committed: Table::new(urgencies.len()),
+            tables: Tables {
+                urgent: Table::new(urgencies.len()),
+                committed: Table::new(urgencies.len()),
+            },
             urgencies,
         }
     }
@@ -101,20 +118,13 @@ impl Interference {
     }
 
     fn sleepers(&mut self, ground: Ground<'_>, location: u32, still: Still) -> &[Sleeper] {
-        if self.table(still).sleepers[location as usize].is_none() {
+        if self.tables.of(still).sleepers[location as usize].is_none() {
             let found = self.future(ground, 2 * location, still).sleepers.clone();
-            self.table(still).sleepers[location as usize] = Some(found);
+            self.tables.of(still).sleepers[location as usize] = Some(found);
         }
-        self.table(still).sleepers[location as usize]
+        self.tables.of(still).sleepers[location as usize]
             .as_deref()
             .unwrap_or_default()
-    }
-
-    fn table(&mut self, still: Still) -> &mut Table {
-        match still {
-            Still::Urgent => &mut self.urgent,
-            Still::Committed => &mut self.committed,
-        }
     }
 
     /// Whether what a process in the situation `other` may do may get in the way of what one in the situation `member` can do now.
@@ -125,7 +135,7 @@ impl Interference {
         (member, other): (Situation, Situation),
         still: Still,
     ) -> bool {
-        let row = &self.table(still).meets[member as usize];
+        let row = &self.tables.of(still).meets[member as usize];
         match row.get(other as usize) {
             Some(&Some(known)) => known,
             _ => self.learn(ground, (member, other), still),
@@ -142,7 +152,7 @@ impl Interference {
         self.now(ground, member, still);
         self.future(ground, other, still);
         let situations = 2 * self.urgencies.len();
-        let table = self.table(still);
+        let table = self.tables.of(still);
         let now = &table.now[member as usize];
         let future = &table.future[other as usize];
         let meets = now
@@ -164,11 +174,7 @@ impl Interference {
     ) -> &Footprint {
         let (place, moment) = self.place(situation, still);
         let footprints = &mut self.footprints;
-        let table = match still {
-            Still::Urgent => &mut self.urgent,
-            Still::Committed => &mut self.committed,
-        };
-        table.now[situation as usize]
+        self.tables.of(still).now[situation as usize]
             .get_or_insert_with(|| Box::new(footprints.now(ground, place, moment)))
     }
 
@@ -181,11 +187,7 @@ impl Interference {
     ) -> &Footprint {
         let (place, moment) = self.place(situation, still);
         let footprints = &mut self.footprints;
-        let table = match still {
-            Still::Urgent => &mut self.urgent,
-            Still::Committed => &mut self.committed,
-        };
-        table.future[situation as usize]
+        self.tables.of(still).future[situation as usize]
             .get_or_insert_with(|| Box::new(footprints.future(ground, place, moment)))
     }
 
