@@ -1,7 +1,7 @@
 //! Certificates: those of the engine pass, and those that were made wrong on purpose are caught.
 
 use checker::engine::certificate::{Certificate, verify};
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options};
+use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};
 use checker::verify::certificate::States;
 
@@ -217,6 +217,14 @@ fn certificates_of_all_constructs_hold() {
              system P;",
             "A[] y <= 4",
         ),
+        (
+            "clock work, pause, t; int[0,1] n; meta int[0,5] last;
+             process P() { state Working { work <= 3 }, Paused { work' == 0 && pause <= 2 }, Done; init Working;
+               trans Working -> Paused { guard work > 0 && n == 0; assign pause = 0, n = 1, last = 5; },
+                     Paused -> Working { guard pause >= 1; }, Working -> Done { guard work >= 3; assign last = n; }; }
+             system P;",
+            "A[] P.Done imply t >= 3 && last < 5",
+        ),
     ];
     for (text, query) in models {
         let (mut model, answer) = certified(text, query);
@@ -227,4 +235,21 @@ fn certificates_of_all_constructs_hold() {
         let checked = verify(model.network(), &certificate.states, &avoided);
         assert_eq!(checked.holds, Some(true), "{query}: {:?}", checked.lines);
     }
+}
+
+/// Which of two states that differ in a `meta` variable is kept decides what is found; a certificate cannot take sides.
+#[test]
+fn certificate_that_hangs_on_meta_variables_is_refused() {
+    let text = "meta int[0,1] m;
+         process P() { state A, B, C; init A;
+           trans A -> B { }, A -> B { assign m = 1; }, B -> C { guard m == 1; }; }
+         system P;";
+    let (_, answer) = certified(text, "E<> P.C");
+    assert_eq!(answer.verdict, Verdict::NotSatisfied);
+    assert!(answer.evidence.certificate.is_none());
+    let message = answer.message.unwrap_or_default();
+    assert!(
+        message.contains("differ in meta variables alone"),
+        "{message}"
+    );
 }

@@ -218,7 +218,8 @@ class Model:
                 transitions (``shortest``) or to take the least time (``fastest``); either takes
                 a second search.
             certificate: Whether the reached set is wanted if ``E<>`` is not satisfied or ``A[]``
-                is; it takes a second search.
+                is; it takes a second search, in which states that differ in ``meta`` variables
+                alone are not the same.
             symmetry: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may take states
                 that differ only by exchanged members of scalar sets for one; verdicts, values
                 and traces do not depend on it, counts do.

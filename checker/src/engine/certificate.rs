@@ -46,7 +46,16 @@ pub(super) fn stop_text(reason: StopReason) -> &'static str {
     }
 }
 
-/// Searches again without short cuts for a state that satisfies the predicate, of which there is none; what was reached.
+/// The network with `meta` variables as ordinary ones: whether states that differ in them alone are the same decides which of them
+/// a search meets, but not what it claims of those that it meets.
+pub(super) fn with_all_words(network: &Network) -> Network {
+    let mut whole = network.clone();
+    whole.layout.identity_words = whole.layout.words;
+    whole
+}
+
+/// Searches again without short cuts for a state that satisfies the predicate, of which there is none; what was reached. `symbolic`
+/// is about a network [`with_all_words`].
 pub(super) fn reached(
     symbolic: &mut Symbolic<'_>,
     avoided: &Predicate,
@@ -54,9 +63,15 @@ pub(super) fn reached(
     watch: &mut dyn Watch,
 ) -> Result<Certificate, String> {
     let dimension = symbolic.dimension();
+    let variables = &symbolic.stepper.network().layout.variables;
+    let has_meta = variables.iter().any(|variable| variable.meta);
     let mut search = Search::new(symbolic, avoided, Measure::Moves, before);
     match search.run(watch) {
         Ok(Outcome::Exhausted) => {}
+        Ok(Outcome::Found(_)) if has_meta => {
+            let why = "a search for it, in which states that differ in meta variables alone are not the same, finds a state";
+            return Err(why.to_owned());
+        }
         Ok(Outcome::Found(_)) => return Err("a search without short cuts finds a state".to_owned()),
         Ok(Outcome::Stopped(reason)) => return Err(stop_text(reason).to_owned()),
         Err(_) => return Err("the model fails".to_owned()),

@@ -110,7 +110,13 @@ fn conclude(
             if options.certificate && subject.under.is_some() {
                 message = Some("no certificate: it would be about the model alone".to_owned());
             } else if options.certificate {
-                match certificate::reached(witnesses.symbolic, goal, counters, watch) {
+                let whole = certificate::with_all_words(subject.network);
+                let subject = Subject {
+                    network: &whole,
+                    ..subject
+                };
+                let mut zones = self::symbolic(subject, &[goal], &[], Abstraction::LowerUpper);
+                match certificate::reached(&mut zones, goal, counters, watch) {
                     Ok(reached) => certificate = Some(reached),
                     Err(reason) => message = Some(format!("no certificate: {reason}")),
                 }

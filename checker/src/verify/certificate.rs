@@ -11,6 +11,13 @@
 //! from zones ([`super::zone`]). That the zones are larger than what is reachable (extrapolation makes them so) does no harm as long as
 //! the four points hold.
 //!
+//! Where a clock stands still beside two that run, what a zone becomes in time is no zone. If the least zone around it lies in the
+//! zones of the same words, all is well; if not, that shows nothing, and the check has no result. So it has for deadlocks
+//! there, unless a move is possible at once.
+//!
+//! Words are all words, `meta` variables included, whether or not a search takes states that differ in them alone for the same. So what
+//! holds does so whichever of them are kept.
+//!
 //! Cost: for each zone and move, one zone minus all those of the words after it.
 
 use std::collections::HashMap;
@@ -21,7 +28,7 @@ use crate::ir::{ClockChoice, ClockId, Network, Predicate, Urgency};
 use super::code::{Code, Combination};
 use super::concrete::{Error, Part};
 use super::strategy::Constraint;
-use super::zone::{Comparison, Zone};
+use super::zone::{Comparison, Zone, is_exact};
 
 /// The states with some words.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -71,11 +78,9 @@ pub enum Outcome {
 
 /// Checks that the certificate shows that no reachable state satisfies the predicate. The network must hold its code.
 pub fn verify(network: &Network, states: &[States], avoided: &Predicate) -> Result<Outcome, Error> {
-    if network.features.stopwatches {
-        return Err(Error::Unsupported("stopwatches"));
-    }
-    if network.layout.identity_words != network.layout.words {
-        return Err(Error::Unsupported("meta variables"));
+    if network.features.stopwatches && network.features.clock_guarded_urgent {
+        let what = "stopwatches beside clock guards on urgent channels";
+        return Err(Error::Unsupported(what));
     }
     let clocks = network.clocks.len().max(1);
     let mut check = Check {
@@ -198,6 +203,7 @@ impl Check<'_> {
         let network = self.code.network();
         let is_urgent = (0..network.processes.len())
             .any(|process| self.code.urgency(process, words) != Urgency::Normal);
+        let stopped = self.code.stopped(words)?;
         let own: Vec<Zone> = self.of(words).to_vec();
         for zone in &own {
             let zone = zone.within(invariant.iter().copied());
@@ -205,10 +211,15 @@ impl Check<'_> {
                 continue;
             }
             if !is_urgent {
-                for later in futures(&zone, &barriers) {
+                for later in futures(&zone, &stopped, &barriers) {
                     let later = later.within(invariant.iter().copied());
                     if !later.is_covered(&own) {
-                        return Ok(Some(Defect::DelayLeaves));
+                        let what = "waits that may lead out of it, with a clock that stands still beside two that run,";
+                        return if is_exact(&stopped) {
+                            Ok(Some(Defect::DelayLeaves))
+                        } else {
+                            Err(Error::Unsupported(what))
+                        };
                     }
                 }
             }
@@ -218,6 +229,7 @@ impl Check<'_> {
                 possible: &possible,
                 invariant: &invariant,
                 may_wait: !is_urgent,
+                stopped: &stopped,
                 barriers: &barriers,
             };
             let met = self.part(avoided, &zone, &state)?;
@@ -371,6 +383,15 @@ impl Check<'_> {
         if !state.may_wait {
             return Ok(now(state.possible));
         }
+        if !is_exact(state.stopped) {
+            let alive = now(state.possible);
+            return if zone.is_covered(&alive) {
+                Ok(alive)
+            } else {
+                let what = "deadlocks with a clock that stands still beside two that run";
+                Err(Error::Unsupported(what))
+            };
+        }
         if !state.barriers.is_empty() {
             if !zone.is_covered(state.barriers) {
                 return Err(Error::Unsupported(
@@ -383,7 +404,8 @@ impl Check<'_> {
         let later = within_all(&Zone::universe(self.clocks), state.invariant);
         let (combinations, _) = self.combinations(state.words)?;
         let possible = self.possible(&combinations, state.words, &later)?;
-        Ok(now(&possible).iter().map(Zone::past).collect())
+        let enabled = now(&possible);
+        Ok(enabled.iter().map(|one| one.past(state.stopped)).collect())
     }
 
     fn clock(&self, choice: ClockChoice, words: &[i32]) -> Result<usize, Error> {
@@ -403,6 +425,7 @@ struct Looked<'l> {
     possible: &'l [Possible],
     invariant: &'l [Comparison],
     may_wait: bool,
+    stopped: &'l [bool],
     barriers: &'l [Zone],
 }
 
@@ -432,15 +455,15 @@ fn guarded(one: &Combination, zone: &Zone) -> Vec<Zone> {
 }
 
 /// What a zone becomes while time passes, up to the barriers: each stops time, so a wait ends before it begins or in its first
-/// moment, or starts after its end, or runs beside it.
-fn futures(zone: &Zone, barriers: &[Zone]) -> Vec<Zone> {
+/// moment, or starts after its end, or runs beside it. Clocks that stand still are not expected beside barriers.
+fn futures(zone: &Zone, stopped: &[bool], barriers: &[Zone]) -> Vec<Zone> {
     // Where a wait may start, and what holds at its end.
     let mut waits: Vec<(Zone, Vec<Comparison>)> = vec![(zone.clone(), Vec::new())];
     for barrier in barriers {
         let mut next = Vec::new();
         for (start, end) in &waits {
             for one in barrier.comparisons() {
-                if one.left == 0 {
+                if one.left == 0 && !stopped[one.right] {
                     let mut end = end.clone();
                     end.push(Comparison {
                         left: one.right,
@@ -461,6 +484,6 @@ fn futures(zone: &Zone, barriers: &[Zone]) -> Vec<Zone> {
     }
     let futures = waits
         .iter()
-        .map(|(start, end)| within_all(&start.future(), end));
+        .map(|(start, end)| within_all(&start.future(stopped), end));
     futures.collect()
 }

@@ -74,6 +74,21 @@ impl<'a> Code<'a> {
         self.network.processes[process].locations[words[process] as usize].urgency
     }
 
+    /// By clock, the reference included: whether its rate is 0.
+    pub(super) fn stopped(&self, words: &[i32]) -> Result<Vec<bool>, Error> {
+        let mut is_stopped = vec![false; self.network.clocks.len().max(1)];
+        for (process, &location) in self.network.processes.iter().zip(words) {
+            for &(clock, function) in &process.locations[location as usize].rates {
+                match self.value(function, words)? {
+                    0 => is_stopped[clock.0 as usize] = true,
+                    1 => {}
+                    _ => return Err(Error::Unsupported("a rate other than 0 and 1")),
+                }
+            }
+        }
+        Ok(is_stopped)
+    }
+
     /// What the invariant of one process asks of the clocks; `None` if the words break it.
     pub(super) fn invariant(
         &self,

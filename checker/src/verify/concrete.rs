@@ -146,28 +146,9 @@ impl<'a> Semantics<'a> {
             || moves.iter().any(|one| one.is_urgent)
     }
 
-    /// The clocks whose rate is 0.
-    pub fn stopped_clocks(&self, state: &State) -> Result<Vec<ClockId>, Error> {
-        let mut stopped = Vec::new();
-        for (process, &location) in self.network().processes.iter().zip(&state.words) {
-            for &(clock, function) in &process.locations[location as usize].rates {
-                match self.value(function, state)? {
-                    0 => stopped.push(clock),
-                    1 => {}
-                    _ => return Err(Error::Unsupported("a rate other than 0 and 1")),
-                }
-            }
-        }
-        Ok(stopped)
-    }
-
     /// By clock: whether its rate is 0.
     pub fn stopped(&self, state: &State) -> Result<Vec<bool>, Error> {
-        let mut is_stopped = vec![false; state.clocks.len()];
-        for ClockId(clock) in self.stopped_clocks(state)? {
-            is_stopped[clock as usize] = true;
-        }
-        Ok(is_stopped)
+        self.code.stopped(&state.words)
     }
 
     /// The state after so many ticks, whether or not so much time can pass.

@@ -84,6 +84,13 @@ impl From<&FixedConstraint> for Comparison {
     }
 }
 
+/// Whether what a zone becomes while time passes is a zone when the clocks of `stopped` keep their values: if none does, or if only
+/// one runs.
+pub(super) fn is_exact(stopped: &[bool]) -> bool {
+    let running = stopped.iter().skip(1).filter(|&&is_stopped| !is_stopped);
+    !stopped.contains(&true) || running.count() <= 1
+}
+
 /// A convex set of clock values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Zone {
@@ -212,21 +219,28 @@ impl Zone {
             .all(|part| part.is_covered(others))
     }
 
-    /// What it becomes while time passes.
-    pub(super) fn future(&self) -> Zone {
+    /// What it becomes while time passes and the clocks of `stopped` keep their values; where [`is_exact`] says so, and else the
+    /// least zone around it.
+    pub(super) fn future(&self, stopped: &[bool]) -> Zone {
         let mut later = self.clone();
-        for clock in 1..self.clocks {
-            *later.at(clock, 0) = NONE;
+        for clock in (1..self.clocks).filter(|&clock| !stopped[clock]) {
+            // Against what stands still, a clock that runs gets ever greater.
+            for still in (0..self.clocks).filter(|&still| still == 0 || stopped[still]) {
+                *later.at(clock, still) = NONE;
+            }
         }
         later.close();
         later
     }
 
-    /// What becomes it while time passes.
-    pub(super) fn past(&self) -> Zone {
+    /// What becomes it while time passes and the clocks of `stopped` keep their values; where [`is_exact`] says so.
+    pub(super) fn past(&self, stopped: &[bool]) -> Zone {
         let mut before = self.clone();
-        for clock in 1..self.clocks {
+        for clock in (1..self.clocks).filter(|&clock| !stopped[clock]) {
             *before.at(0, clock) = ZERO;
+            for still in (1..self.clocks).filter(|&still| stopped[still]) {
+                *before.at(still, clock) = NONE;
+            }
         }
         before.close();
         before
