@@ -57,19 +57,31 @@ const MOST_DISCRETE_STATES: u64 = 64 * STATES_BEFORE_CROWD;
 /// invariants allow can fall into many more pieces than those of what is reached.
 const MOST_BYTES_OF_DISCRETE_STATE: u64 = 64 << 10;
 
-/// Stops a search after a number of states, or when the average one takes too much memory, if nothing else does before.
+/// Looks at the limits that a discrete state may take, on average, for the same reason: they come with every operation on many zones.
+/// Where the pieces stay few there are some dozens, and where they do not, thousands soon.
+const MOST_LOOKS_AT_DISCRETE_STATE: u64 = 256;
+
+/// States that are counted beside those that are stored, for the bytes and the looks that an average one may take.
+const STATES_OF_GRACE: u64 = 256;
+
+/// Stops a search after a number of states, or when the average one takes too much memory or work, if nothing else does before.
 struct Attempt<'w> {
     watch: &'w mut dyn Watch,
     most: u64,
     most_bytes_each: u64,
+    most_looks_each: u64,
+    looks: u64,
     is_given_up: bool,
 }
 
 impl Watch for Attempt<'_> {
     fn look(&mut self, counters: &Counters) -> Option<StopReason> {
         let reason = self.watch.look(counters);
-        let most_bytes = (counters.stored + 256).saturating_mul(self.most_bytes_each);
-        if reason.is_none() && (counters.explored > self.most || counters.bytes > most_bytes) {
+        self.looks += 1;
+        let states = counters.stored + STATES_OF_GRACE;
+        let takes_too_much = counters.bytes > states.saturating_mul(self.most_bytes_each)
+            || self.looks > states.saturating_mul(self.most_looks_each);
+        if reason.is_none() && (counters.explored > self.most || takes_too_much) {
             self.is_given_up = true;
             return Some(StopReason::States);
         }
@@ -105,6 +117,8 @@ pub(super) fn game(
                 watch,
                 most: MOST_DISCRETE_STATES,
                 most_bytes_each: MOST_BYTES_OF_DISCRETE_STATE,
+                most_looks_each: MOST_LOOKS_AT_DISCRETE_STATE,
+                looks: 0,
                 is_given_up: false,
             };
             let zones = zones(Abstraction::Exact);
@@ -146,6 +160,8 @@ pub(super) fn game(
         watch,
         most: MOST_EXACT_STATES,
         most_bytes_each: u64::MAX,
+        most_looks_each: u64::MAX,
+        looks: 0,
         is_given_up: false,
     };
     let exact = zones(Abstraction::Exact);
