@@ -608,14 +608,16 @@ impl Checker<'_> {
     /// Checks that an expression changes nothing.
     pub(super) fn expect_pure(&mut self, expr: &Expr, what: &str) {
         if expr.has_effect() {
-            self.report(
-                Diagnostic::new(
-                    codes::SIDE_EFFECT,
-                    expr.span,
-                    format!("{what} must not change anything"),
-                )
-                .help("move the change into the update of an edge; pass arrays by const reference"),
-            );
+            // What someone meant who writes `x = 1` where a condition is wanted.
+            let assigns =
+                expr.any(&|e| matches!(e.kind, Kind::Assign(..) | Kind::AssignClock { .. }));
+            let help = if assigns {
+                "to compare, write `==`; to change it, do so in the update of an edge"
+            } else {
+                "move the change into the update of an edge; pass arrays by const reference"
+            };
+            let message = format!("{what} must not change anything");
+            self.report(Diagnostic::new(codes::SIDE_EFFECT, expr.span, message).help(help));
         }
     }
 }

@@ -328,7 +328,15 @@ impl Parser<'_> {
     pub(super) fn condition_list(&mut self) -> Expr {
         let start = self.here();
         let mut conditions = vec![self.expression()];
-        while self.dialect == Dialect::Old && self.eat(TokenKind::Comma) {
+        while self.at(TokenKind::Comma) {
+            if self.dialect == Dialect::New {
+                let message = "expected `&&` between two conditions, found `,`";
+                self.report(
+                    Diagnostic::new(codes::UNEXPECTED_TOKEN, self.here(), message)
+                        .help("write `&&`; only the old syntax knows lists of conditions"),
+                );
+            }
+            self.bump();
             conditions.push(self.expression());
         }
         let mut joined = match join_all(BinaryOp::And, conditions) {
