@@ -214,9 +214,10 @@ class Model:
             verify: Whether the strategy is to be checked against every move of the opponent.
             trace: Whether witnesses and counterexamples get exact times, which an independent
                 replay checks. For ``sup``, ``inf`` and ``bounds`` this takes a second search.
-            wanted_trace: For ``E<>`` and ``A[]``: whether the trace is to have the fewest
-                transitions (``shortest``) or to take the least time (``fastest``); either takes
-                a second search.
+            wanted_trace: Whether traces are to have the fewest transitions (``shortest``; of a
+                run that never ends, those of its loop once), or to take the least time
+                (``fastest``; not of ``E[]``, ``A<>`` and ``-->``, whose runs do not end); either
+                takes a second search.
             certificate: Whether the reached set is wanted if ``E<>`` is not satisfied or ``A[]``
                 is; it takes a second search, in which states that differ in ``meta`` variables
                 alone are not the same.

@@ -119,13 +119,15 @@ class _Outputs:
     "--shortest",
     "wanted_trace",
     flag_value="shortest",
-    help="Of E<> and A[]: the trace with the fewest transitions.",
+    help="Write the traces with the fewest transitions; of a run that never ends, with those of "
+    "its loop once.",
 )
 @click.option(
     "--fastest",
     "wanted_trace",
     flag_value="fastest",
-    help="Of E<> and A[]: the trace that takes the least time.",
+    help="Write the traces that take the least time; not of E[], A<> and -->, whose runs do not "
+    "end.",
 )
 @click.option(
     "--certificate",

@@ -15,21 +15,20 @@ use crate::network::{
     Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, Symmetry, predicate,
 };
 use crate::search::extremum::{Extremes, Question};
-use crate::search::leads_to::{self, Unanswered};
 use crate::search::limits::{Counters, StopReason};
-use crate::search::liveness::{self, Ending, Liveness};
-use crate::search::reach::{self, Outcome, Trace};
-use crate::search::schedule::Stays;
+use crate::search::liveness::Ending;
+use crate::search::reach::Trace;
 use crate::verify::strategy::Outcome as StrategyCheck;
 
 use super::certificate::Certificate;
-use super::evidence::{self, Kind, Proof, Shows, Witness};
+use super::endless::{always, leads_to};
+use super::evidence::{self, Kind, Proof, Shows, Takes, Witness};
 use super::fastest::{Race, fastest};
 use super::limits::LimitWatch;
 use super::reachable::reachable;
 use super::values::extremum;
 use super::verification::Verification;
-use super::{Options, TraceWanted, games, observed};
+use super::{Options, games, observed};
 
 /// What a query came out as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -240,15 +239,6 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
         let verdict = Verdict::Unknown(watch.stop());
         answer = new_answer(verdict, Evidence::default(), counters);
     }
-    let has_best = matches!(
-        query.kind,
-        QueryKind::Reachable(_) | QueryKind::Invariantly(_)
-    );
-    let has_trace = !answer.evidence.witnesses.is_empty();
-    if options.trace != TraceWanted::Any && has_trace && !has_best && answer.message.is_none() {
-        let message = "the trace is any one: shortest and fastest ones are found for E<> and A[]";
-        answer.message = Some(message.to_owned());
-    }
     answer.seconds = start.elapsed().as_secs_f64();
     answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
     answer
@@ -289,12 +279,12 @@ pub(super) fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counter
     }
 }
 
-fn negation(predicate: &Predicate) -> Predicate {
+pub(super) fn negation(predicate: &Predicate) -> Predicate {
     Predicate::Not(Box::new(predicate.clone()))
 }
 
 /// The answer to the negated query.
-fn negated(answer: Answer) -> Answer {
+pub(super) fn negated(answer: Answer) -> Answer {
     let verdict = match answer.verdict {
         Verdict::Satisfied => Verdict::NotSatisfied,
         Verdict::NotSatisfied => Verdict::Satisfied,
@@ -385,44 +375,12 @@ pub(super) fn found(is_approximate: bool) -> Verdict {
     }
 }
 
-/// Is there a run inside the predicate that never leaves it?
-fn always<'a>(
-    subject: Subject<'a>,
-    keep: &Predicate,
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Answer {
-    let mut run = |mut symbolic: Symbolic<'a>| {
-        let mut search = Liveness::new(&symbolic, keep);
-        let outcome = search.from_start(&mut symbolic, watch);
-        (symbolic, search, outcome)
-    };
-    let coarse = coarser(subject, &[keep]).map(&mut run);
-    let settled =
-        coarse.filter(|(.., outcome)| !matches!(outcome, Ok(liveness::Outcome::Found(_))));
-    let (mut symbolic, search, outcome) =
-        settled.unwrap_or_else(|| run(symbolic(subject, &[keep], &[], Abstraction::Maximum)));
-    let mut witnesses = Witnesses::new(&mut symbolic, options);
-    let verdict = match outcome {
-        Ok(liveness::Outcome::Found(run)) => {
-            let shows = Shows::Stays(Stays { from: None, keep });
-            witnesses.add(run.trace, Some(run.ending), shows);
-            found(witnesses.symbolic.is_approximate() || search.is_coarse())
-        }
-        Ok(liveness::Outcome::Exhausted) => Verdict::NotSatisfied,
-        Ok(liveness::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
-        Err((failure, trace)) => {
-            witnesses.add(trace, None, Shows::Possible);
-            Verdict::Error(failure)
-        }
-    };
-    new_answer(verdict, witnesses.into_evidence(), search.counters())
-}
-
 /// Collects what backs an answer.
 pub(super) struct Witnesses<'w, 'a> {
     pub(super) symbolic: &'w mut Symbolic<'a>,
     has_runs: bool,
+    /// Whether what was found is sure only if a run is replayed.
+    is_doubtful: bool,
     /// Whether the runs follow a strategy.
     is_restricted: bool,
     found: Vec<Witness>,
@@ -432,25 +390,44 @@ impl<'w, 'a> Witnesses<'w, 'a> {
     pub(super) fn new(symbolic: &'w mut Symbolic<'a>, options: &Options) -> Witnesses<'w, 'a> {
         Witnesses {
             has_runs: options.runs,
+            is_doubtful: symbolic.is_approximate(),
             is_restricted: symbolic.is_restricted(),
             symbolic,
             found: Vec::new(),
         }
     }
 
-    /// Adds a trace, with its run if runs are wanted; returns whether a run was replayed, which is tried also where zones are too
-    /// large, since then it alone makes sure.
-    pub(super) fn add(&mut self, trace: Trace, ending: Option<Ending>, shows: Shows<'_>) -> bool {
+    /// The same for what is sure only if a run is replayed, where there is a doubt beside zones that are too large.
+    pub(super) fn doubting(self, is_doubtful: bool) -> Witnesses<'w, 'a> {
+        Witnesses {
+            is_doubtful: self.is_doubtful || is_doubtful,
+            ..self
+        }
+    }
+
+    /// Whether what was found is sure only if a run is replayed.
+    pub(super) fn is_doubtful(&self) -> bool {
+        self.is_doubtful
+    }
+
+    /// Adds a trace, with its run if runs are wanted; returns the verdict on what it shows: a run is also looked for where there is a
+    /// doubt, since then it alone makes sure.
+    pub(super) fn add(
+        &mut self,
+        trace: Trace,
+        ending: Option<Ending>,
+        shows: Shows<'_>,
+    ) -> Verdict {
         let kind = match shows {
             Shows::Possible => Kind::Failure,
             Shows::Reaches(..) | Shows::Stays(_) => Kind::Predicate,
-            Shows::Takes(item, _, _, shown, _) => Kind::Value(item, shown),
+            Shows::Takes(takes) => Kind::Value(takes.item, takes.shown),
         };
         let mut witness = Witness::new(trace, ending, kind);
         // An initial state that cannot be entered is no run.
         // What is stuck under a strategy may go on in the model, which is what the replay knows, and priorities count in the model.
         let is_dead = match shows {
-            Shows::Reaches(predicate, _) | Shows::Takes(_, predicate, ..) => {
+            Shows::Reaches(predicate, _) | Shows::Takes(Takes { predicate, .. }) => {
                 predicate::has_deadlock(predicate)
             }
             Shows::Stays(_) => ending == Some(Ending::Stuck),
@@ -458,7 +435,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         };
         let is_comparable = !(self.is_restricted && is_dead || self.symbolic.ignores_priorities());
         let mut is_replayed = false;
-        let is_wanted = self.has_runs || self.symbolic.is_approximate();
+        let is_wanted = self.has_runs || self.is_doubtful;
         if is_wanted && is_comparable && !witness.trace.states.is_empty() {
             let network = self.symbolic.stepper.network();
             let proof = evidence::prove(self.symbolic, network, &witness.trace, ending, shows);
@@ -466,7 +443,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
             witness.run = self.has_runs.then_some(proof);
         }
         self.found.push(witness);
-        is_replayed
+        found(self.is_doubtful && !is_replayed)
     }
 
     pub(super) fn into_evidence(self) -> Evidence {
@@ -475,50 +452,4 @@ impl<'w, 'a> Witnesses<'w, 'a> {
             ..Evidence::default()
         }
     }
-}
-
-/// Does every state of `open` lead out of `keep`?
-fn leads_to<'a>(
-    subject: Subject<'a>,
-    (open, keep): (&Predicate, &Predicate),
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Answer {
-    let mut run = |mut symbolic: Symbolic<'a>| {
-        let mut goal = Unanswered::new(&symbolic, open, keep);
-        let report = reach::search(&mut symbolic, &mut goal, options.order, watch);
-        (symbolic, goal, report)
-    };
-    let coarse = coarser(subject, &[open, keep]).map(&mut run);
-    let settled = coarse.filter(|(.., report)| !matches!(report.outcome, Ok(Outcome::Found(_))));
-    let (mut symbolic, mut goal, report) =
-        settled.unwrap_or_else(|| run(symbolic(subject, &[open, keep], &[], Abstraction::Maximum)));
-    let mut witnesses = Witnesses::new(&mut symbolic, options);
-    let verdict = match report.outcome {
-        Ok(Outcome::Found(way)) => {
-            if let Some(run) = goal.run.take() {
-                let (trace, start) = leads_to::joined(way, run.trace);
-                let stays = Stays {
-                    from: Some((start, open)),
-                    keep,
-                };
-                let ending = run.ending.moved(start);
-                witnesses.add(trace, Some(ending), Shows::Stays(stays));
-            }
-            found(witnesses.symbolic.is_approximate() || goal.is_coarse())
-        }
-        Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
-        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
-        Err((failure, way)) => {
-            let below = goal.failed.take();
-            let way = match below {
-                None => way,
-                Some(run) => leads_to::joined(way, run).0,
-            };
-            witnesses.add(way, None, Shows::Possible);
-            Verdict::Error(failure)
-        }
-    };
-    let evidence = witnesses.into_evidence();
-    negated(new_answer(verdict, evidence, report.counters))
 }

@@ -65,7 +65,7 @@ pub(super) fn reached(
     let dimension = symbolic.dimension();
     let variables = &symbolic.stepper.network().layout.variables;
     let has_meta = variables.iter().any(|variable| variable.meta);
-    let mut search = Search::new(symbolic, avoided, Measure::Moves, before);
+    let mut search = Search::new(symbolic, &avoided, Measure::Moves, before);
     match search.run(watch) {
         Ok(Outcome::Exhausted) => {}
         Ok(Outcome::Found(_)) if has_meta => {

@@ -100,8 +100,25 @@ pub enum Shows<'q> {
     Reaches(&'q Predicate, Option<(i32, u32)>),
     /// A run that stays inside a predicate.
     Stays(Stays<'q>),
-    /// A state in which the predicate holds and the item with this index has a value; the constraints say so of the clocks.
-    Takes(usize, &'q Predicate, &'q Measure, Shown, &'q [Constraint]),
+    /// A state in which the predicate holds and an item has a value.
+    Takes(Takes<'q>),
+}
+
+/// What a trace to a value shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Takes<'q> {
+    /// The index of the item.
+    pub item: usize,
+    /// What is measured.
+    pub measure: &'q Measure,
+    /// What holds where it is.
+    pub predicate: &'q Predicate,
+    /// The value.
+    pub shown: Shown,
+    /// What the value asks of the clocks.
+    pub constraints: &'q [Constraint],
+    /// The time of the end at the latest: see [`Wanted::deadline`].
+    pub deadline: Option<(i32, u32)>,
 }
 
 /// Finds times for a trace and replays it.
@@ -129,9 +146,9 @@ pub fn prove(
             let finish = Finish::Holds(goal, Vec::new());
             timed(symbolic, &trace.moves, None, finish, deadline)
         }
-        (Shows::Takes(_, predicate, _, _, constraints), _) => {
-            let finish = Finish::Holds(predicate, constraints.to_vec());
-            timed(symbolic, &trace.moves, None, finish, None)
+        (Shows::Takes(takes), _) => {
+            let finish = Finish::Holds(takes.predicate, takes.constraints.to_vec());
+            timed(symbolic, &trace.moves, None, finish, takes.deadline)
         }
     };
     let run = match result {
@@ -146,7 +163,7 @@ pub fn prove(
         Shows::Stays(Stays { from, keep }) => {
             Claim::Stays(from.map_or(&always, |(_, open)| open), keep)
         }
-        Shows::Takes(_, predicate, measure, shown, _) => Claim::Takes(predicate, measure, shown),
+        Shows::Takes(takes) => Claim::Takes(takes.predicate, takes.measure, takes.shown),
     };
     match replay::replay(network, &run, &claim) {
         Ok(Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),

@@ -4,11 +4,13 @@
 //! is the one for the time limit and the measured seconds.
 
 pub mod answer;
+mod best;
 pub mod certificate;
 pub mod controller;
 mod cooperation;
 pub mod decision_table;
 pub mod describe;
+mod endless;
 pub mod evidence;
 pub mod explain;
 pub mod facts;

@@ -2,19 +2,16 @@
 
 use std::sync::Arc;
 
-use crate::ir::{ClockAtom, ClockId, ClockRange, Predicate};
-use crate::network::{Abstraction, Failure, PartialOrder, Symbolic, Symmetry, predicate};
-use crate::search::limits::Counters;
-use crate::search::plain;
+use crate::ir::Predicate;
+use crate::network::{Abstraction, PartialOrder, Symbolic, Symmetry, predicate};
 use crate::search::reach::{self, Outcome, Report, Trace};
-use crate::zones::Bound;
 
 use super::answer::Evidence;
-use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, found, new_answer, symbolic};
+use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, new_answer, symbolic};
+use super::best::{Sought, best, not_the_best};
 use super::certificate;
 use super::evidence::Shows;
 use super::limits::LimitWatch;
-use super::timing::with_time;
 use super::{Options, TraceWanted};
 
 /// Is there a state in which the goal holds?
@@ -95,16 +92,20 @@ fn conclude(
     let verdict = match report.outcome {
         Ok(Outcome::Found(trace)) => {
             let symbolic = &mut *witnesses.symbolic;
-            let (trace, deadline) = match best(subject, symbolic, goal, options, watch) {
+            let sought = Sought {
+                target: &mut &*goal,
+                predicate: goal,
+                atoms: Vec::new(),
+            };
+            let (trace, deadline) = match best(subject, symbolic, sought, options, watch) {
                 Ok(None) => (trace, None),
                 Ok(Some((best, deadline))) => (best, deadline),
                 Err(reason) => {
-                    message = Some(format!("the trace is not the one wanted: {reason}"));
+                    message = Some(not_the_best(&reason));
                     (trace, None)
                 }
             };
-            let is_sure = witnesses.add(trace, None, Shows::Reaches(goal, deadline));
-            found(witnesses.symbolic.is_approximate() && !is_sure)
+            witnesses.add(trace, None, Shows::Reaches(goal, deadline))
         }
         Ok(Outcome::Exhausted) => {
             if options.certificate && subject.under.is_some() {
@@ -137,66 +138,3 @@ fn conclude(
     answer.message = message;
     answer
 }
-
-/// The trace with the fewest moves or the least time, and its time; `None` if any trace will do.
-fn best(
-    subject: Subject<'_>,
-    symbolic: &mut Symbolic<'_>,
-    goal: &Predicate,
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Result<Option<(Trace, Option<plain::Cost>)>, String> {
-    let none = Counters::default();
-    let way = match options.trace {
-        TraceWanted::Any => return Ok(None),
-        TraceWanted::Shortest => {
-            plain::Search::new(symbolic, goal, plain::Measure::Moves, none).run(watch)
-        }
-        TraceWanted::Fastest if subject.under.is_some() => {
-            return Err("there is none for fastest traces under a strategy".to_owned());
-        }
-        TraceWanted::Fastest => {
-            let (timed, clock) = with_time(subject.network);
-            let subject = Subject {
-                network: &timed,
-                ..subject
-            };
-            let mut zones = self::symbolic(
-                subject,
-                &[goal],
-                &[time_atom(clock)],
-                Abstraction::LowerUpper,
-            );
-            plain::Search::new(&mut zones, goal, plain::Measure::Time(clock), none).run(watch)
-        }
-    };
-    match way {
-        Ok(plain::Outcome::Found(way)) => {
-            let deadline = (options.trace == TraceWanted::Fastest).then_some(way.cost);
-            Ok(Some((way.trace(symbolic, goal), deadline)))
-        }
-        Ok(plain::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
-        Ok(plain::Outcome::Stopped(reason)) => Err(certificate::stop_text(reason).to_owned()),
-        Err(Failure::Interrupted) => Err(certificate::stop_text(watch.stop()).to_owned()),
-        // The search for any trace did not come to the state that fails.
-        Err(_) => Err("the model fails in a state beside it".to_owned()),
-    }
-}
-
-/// A comparison that keeps the lower bounds of the clock apart.
-fn time_atom(clock: usize) -> ClockAtom {
-    let range = |clock: usize| ClockRange {
-        first: ClockId(clock as u32),
-        count: 1,
-    };
-    ClockAtom {
-        left: range(clock),
-        right: range(0),
-        low: LONGEST_TIME,
-        high: LONGEST_TIME,
-        strict: false,
-    }
-}
-
-/// Up to here times of traces are compared.
-const LONGEST_TIME: i32 = Bound::MAX_VALUE / 4;

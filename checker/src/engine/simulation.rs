@@ -84,7 +84,7 @@ impl LoadedModel {
         };
         let bounds = ClockBounds::new(network, &[], abstraction);
         let mut symbolic = Symbolic::new(Stepper::new(network, self.executor()), bounds);
-        let nothing = Predicate::Constant(false);
+        let nothing = &Predicate::Constant(false);
         let most = limits.states.map_or(usize::MAX, |most| most as usize);
         let mut watch = LimitWatch::new(limits);
         let armed = watch.arm(self.executor().alarm());

@@ -13,7 +13,8 @@ use super::Options;
 use super::answer::{
     Answer, Evidence, Subject, Values, Verdict, Witnesses, found, new_answer, symbolic,
 };
-use super::evidence::{Kind, Shows, Witness};
+use super::best::{Sought, best, not_the_best};
+use super::evidence::{Kind, Shows, Takes, Witness};
 use super::limits::LimitWatch;
 
 /// The least and greatest values.
@@ -55,29 +56,37 @@ pub(super) fn extremum(
             Verdict::Error(failure)
         }
     };
+    let mut message = values
+        .as_ref()
+        .and_then(|values| remark(values, question.items));
     if let Some(values) = &values
         && options.runs
         && verdict == Verdict::Satisfied
     {
-        evidence.witnesses = value_witnesses(question, values, &mut zones, options, watch);
+        let (witnesses, why_not_best) =
+            value_witnesses(subject, question, values, &mut zones, options, watch);
+        evidence.witnesses = witnesses;
+        let remarks: Vec<String> = message.into_iter().chain(why_not_best).collect();
+        message = (!remarks.is_empty()).then(|| remarks.join("; "));
     }
     let mut answer = new_answer(verdict, evidence, report.counters);
-    answer.message = values
-        .as_ref()
-        .and_then(|values| remark(values, question.items));
+    answer.message = message;
     answer.value = values;
     answer
 }
 
-/// A run to a state with each of the values; none for a clock without limit, and none beyond a limit of the search.
+/// A run to a state with each of the values, and why some are any ones where the best were wanted; none for a clock without limit, and
+/// none beyond a limit of the search.
 fn value_witnesses<'a>(
+    subject: Subject<'_>,
     question: Question<'_>,
     values: &Values,
     zones: &mut dyn FnMut(&[ClockAtom]) -> Symbolic<'a>,
     options: &Options,
     watch: &mut LimitWatch,
-) -> Vec<Witness> {
+) -> (Vec<Witness>, Option<String>) {
     let mut found = Vec::new();
+    let mut why_not_best = None;
     for (index, ((measure, text), item)) in question.items.iter().zip(&values.items).enumerate() {
         for (extreme, is_greatest) in [(item.least, false), (item.greatest, true)] {
             let Some(Extreme::Value { value, is_reached }) = extreme else {
@@ -93,19 +102,40 @@ fn value_witnesses<'a>(
             let mut symbolic = zones(&taking.atoms());
             let report = reach::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
             let Ok(Outcome::Found(trace)) = report.outcome else {
-                return found;
+                return (found, why_not_best);
+            };
+            let atoms = taking.atoms();
+            let sought = Sought {
+                target: &mut taking,
+                predicate: question.predicate,
+                atoms,
+            };
+            let (trace, deadline) = match best(subject, &mut symbolic, sought, options, watch) {
+                Ok(None) => (trace, None),
+                Ok(Some((best, deadline))) => (best, deadline),
+                Err(reason) => {
+                    why_not_best = Some(not_the_best(&reason));
+                    (trace, None)
+                }
             };
             let last = trace.states.last().map(|(words, _)| words.clone());
             let mut words = last.unwrap_or_default();
             let Ok(Some(constraints)) = taking.constraints(&mut symbolic, &mut words) else {
-                return found;
+                return (found, why_not_best);
             };
             let shown = Shown {
                 value: value.into(),
                 is_greatest,
                 is_reached,
             };
-            let shows = Shows::Takes(index, question.predicate, measure, shown, &constraints);
+            let shows = Shows::Takes(Takes {
+                item: index,
+                measure,
+                predicate: question.predicate,
+                shown,
+                constraints: &constraints,
+                deadline,
+            });
             let mut witnesses = Witnesses::new(&mut symbolic, options);
             witnesses.add(trace, None, shows);
             let which = if is_greatest { "greatest" } else { "least" };
@@ -121,7 +151,7 @@ fn value_witnesses<'a>(
             );
         }
     }
-    found
+    (found, why_not_best)
 }
 
 /// What the numbers alone do not say: that no state counts, or that a value is not reached.

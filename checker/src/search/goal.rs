@@ -2,7 +2,7 @@
 
 use crate::ir::Predicate;
 use crate::network::{Extent, Failure, Symbolic};
-use crate::zones::Zone;
+use crate::zones::{Federation, Zone};
 
 use super::limits::{Counters, StopReason, Watch};
 
@@ -70,6 +70,17 @@ pub trait SharedGoal: Goal + Send + Sized {
     fn join(&mut self, other: Self);
 }
 
+/// A goal that is a set of states.
+pub trait Target: Goal {
+    /// The valuations of a zone of a state with these words that are in the set.
+    fn part(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<Federation, Failure>;
+}
+
 /// A predicate is looked for: some valuation of the zone satisfies it.
 impl Goal for &Predicate {
     fn confirms(
@@ -80,6 +91,18 @@ impl Goal for &Predicate {
     ) -> Result<bool, Failure> {
         let extent = symbolic.extent(self, words, zone.bounds())?;
         Ok(!matches!(extent, Extent::Nowhere))
+    }
+}
+
+impl Target for &Predicate {
+    fn part(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<Federation, Failure> {
+        let extent = symbolic.extent(self, words, zone.bounds())?;
+        Ok(extent.to_federation(zone.bounds(), zone.dimension()))
     }
 }
 

@@ -5,8 +5,7 @@
 //! any wait that the invariants allow leads to a move or out of the predicate.
 //!
 //! The nodes of the search are words with a zone of valuations that lie inside the predicate and that some delay inside it reaches from
-//! the entry of the state. Where the predicate holds in a part of a zone only, that part is cut out exactly
-//! ([`crate::zones::future`]), so that a delay never crosses its outside. Every node is accepting, so one depth-first search is
+//! the entry of the state ([`super::staying`]). Every node is accepting, so one depth-first search is
 //! enough: there is a run with infinitely many moves exactly if the search comes back to a node on its stack, or to one that contains the zone of
 //! such a node (every valuation of that has a predecessor in itself, around and around, and the regions are finitely many). A
 //! node that was left without success starts no such run, nor does any that it contains.
@@ -20,13 +19,13 @@
 //! Where we differ: with stopped clocks the cut is left out and every doubt counts as a run, so that only the absence of one is certain.
 
 use crate::ir::Predicate;
-use crate::network::{Extent, Failure, Moves, Part, Symbolic};
-use crate::zones::dbm::{self, Constraint};
-use crate::zones::future::{self, Barriers};
-use crate::zones::{ClockSet, Federation, Zone};
+use crate::network::{Failure, Moves, Part, Symbolic};
+use crate::zones::Zone;
+use crate::zones::dbm;
 
 use super::limits::{Counters, StopReason, Watch};
 use super::reach::Trace;
+use super::staying::Inside;
 use super::store::{DiscreteId, StateStore};
 use super::zone_table::{ZoneId, ZoneTable};
 
@@ -116,14 +115,6 @@ pub struct Liveness<'p> {
     is_coarse: bool,
 }
 
-/// The part of a state that a run inside the predicate can reach.
-struct Inside {
-    /// Its zones before extrapolation; those in which a run can end, if one can.
-    zones: Vec<Zone>,
-    /// Whether a run can end in it.
-    ending: Option<Ending>,
-}
-
 impl<'p> Liveness<'p> {
     /// Searches in the network of `symbolic` for runs inside `keep`.
     pub fn new(symbolic: &Symbolic<'_>, keep: &'p Predicate) -> Liveness<'p> {
@@ -201,7 +192,9 @@ impl<'p> Liveness<'p> {
         let Some(invariant) = symbolic.invariant(words)? else {
             return Ok(Outcome::Exhausted);
         };
-        let mut inside = self.inside(symbolic, words, (zone, is_running), &invariant)?;
+        let entry = (zone, is_running);
+        let mut inside = Inside::of(symbolic, self.keep, words, entry, &invariant)?;
+        self.is_coarse |= inside.is_coarse;
         if let Some(ending) = inside.ending {
             let mut trace = Trace::default();
             push_state(&mut trace, words, &inside.zones);
@@ -274,7 +267,9 @@ impl<'p> Liveness<'p> {
         effect.entry_zones(frame.zone.bounds(), symbolic.dimension(), &mut entries);
         for entry in &entries {
             let entry = (entry, false);
-            let inside = self.inside(symbolic, &mut frame.target, entry, &effect.invariant)?;
+            let target = &mut frame.target;
+            let inside = Inside::of(symbolic, self.keep, target, entry, &effect.invariant)?;
+            self.is_coarse |= inside.is_coarse;
             frame.pending.extend(inside.zones);
             if inside.ending.is_some() {
                 return Ok(inside.ending);
@@ -405,46 +400,6 @@ impl<'p> Liveness<'p> {
         }
     }
 
-    /// What a run inside the predicate can reach by delay from a zone on entry of a state.
-    fn inside(
-        &mut self,
-        symbolic: &mut Symbolic<'_>,
-        words: &mut [i32],
-        (entry, is_running): (&Zone, bool),
-        invariant: &[Constraint],
-    ) -> Result<Inside, Failure> {
-        let dimension = symbolic.dimension();
-        let may_delay = symbolic.may_delay(words)?;
-        let mut whole = entry.clone();
-        symbolic.delay(words, may_delay, invariant, whole.bounds_mut())?;
-        let outside = match symbolic.extent(self.keep, words, whole.bounds())? {
-            Extent::Nowhere => {
-                return Ok(Inside {
-                    zones: Vec::new(),
-                    ending: None,
-                });
-            }
-            Extent::Everywhere => Federation::empty(dimension),
-            Extent::Part(part) => {
-                let mut outside = Federation::of_zone(dimension, whole.bounds());
-                outside.subtract(&part);
-                outside
-            }
-        };
-        let passage = Passage::new(symbolic, words, whole, outside)?;
-        self.is_coarse |= passage.is_coarse();
-        let mut inside = passage.reached(entry, is_running);
-        inside.reduce();
-        let end = passage.end(symbolic, words, &inside)?;
-        let (ending, part) = match end {
-            Some((ending, part)) => (Some(ending), part),
-            None => (None, inside),
-        };
-        let zones = part.zones().map(|zone| Zone::from_bounds(dimension, zone));
-        let zones = zones.collect();
-        Ok(Inside { zones, ending })
-    }
-
     /// The run on the stack, with the state in which it ends.
     fn found(&self, ending: Ending) -> Run {
         let mut trace = self.stack_trace();
@@ -467,154 +422,9 @@ impl<'p> Liveness<'p> {
     }
 }
 
-/// The valuations of a state inside the predicate from which time can pass without limit, and those from which no wait leads to a
-/// move or out of the predicate. `whole` is what the invariants allow.
-pub(super) fn endings(
-    symbolic: &mut Symbolic<'_>,
-    keep: &Predicate,
-    words: &mut [i32],
-    whole: Zone,
-) -> Result<(Federation, Federation), Failure> {
-    let dimension = whole.dimension();
-    let extent = symbolic.extent(keep, words, whole.bounds())?;
-    let inside = extent.to_federation(whole.bounds(), dimension);
-    let mut outside = Federation::of_zone(dimension, whole.bounds());
-    outside.subtract(&inside);
-    let passage = Passage::new(symbolic, words, whole, outside)?;
-    let stuck = passage.stuck(symbolic, words, &inside)?;
-    Ok((passage.waiting(&inside), stuck))
-}
-
-fn push_state(trace: &mut Trace, words: &[i32], zones: &[Zone]) {
+/// Adds a state of a trace: the words with the last of their zones.
+pub(super) fn push_state(trace: &mut Trace, words: &[i32], zones: &[Zone]) {
     if let Some(zone) = zones.last() {
         trace.states.push((words.to_vec(), zone.clone()));
-    }
-}
-
-/// How a run inside a predicate passes through a state.
-struct Passage {
-    /// All that delay within the invariants reaches.
-    whole: Zone,
-    /// The part of it in which the predicate does not hold.
-    outside: Federation,
-    /// The part of it in which an urgent synchronisation or a restriction stops time.
-    barriers: Barriers,
-    may_delay: bool,
-    stopped: ClockSet,
-}
-
-impl Passage {
-    fn new(
-        symbolic: &mut Symbolic<'_>,
-        words: &mut [i32],
-        whole: Zone,
-        outside: Federation,
-    ) -> Result<Passage, Failure> {
-        let may_delay = symbolic.may_delay(words)?;
-        Ok(Passage {
-            barriers: if may_delay {
-                symbolic.barriers(words, whole.bounds())?
-            } else {
-                Barriers::none(whole.dimension())
-            },
-            stopped: symbolic.stopped(words)?,
-            whole,
-            outside,
-            may_delay,
-        })
-    }
-
-    /// What delay inside the predicate reaches.
-    fn reached(&self, entry: &Zone, is_running: bool) -> Federation {
-        let dimension = self.whole.dimension();
-        let mut reached = Federation::of_zone(dimension, self.whole.bounds());
-        if !self.may_delay || !self.stopped.is_empty() {
-            reached.subtract(&self.outside);
-        } else if !self.outside.is_empty() || !self.barriers.is_empty() {
-            let from = Federation::of_zone(dimension, entry.bounds());
-            reached = future::successors(&from, &self.outside, &self.barriers);
-            if is_running {
-                let on = future::successors_inside(&from, &self.outside, &self.barriers);
-                reached.unite(&on);
-            }
-            reached.intersect_zone(self.whole.bounds());
-        }
-        reached
-    }
-
-    /// Whether the state is treated as if more runs stayed in it than do.
-    fn is_coarse(&self) -> bool {
-        self.may_delay && !self.stopped.is_empty()
-    }
-
-    /// Why a run may end in the part that is reached, and from which valuations of it.
-    fn end(
-        &self,
-        symbolic: &mut Symbolic<'_>,
-        words: &mut [i32],
-        inside: &Federation,
-    ) -> Result<Option<(Ending, Federation)>, Failure> {
-        if inside.is_empty() {
-            return Ok(None);
-        }
-        let waiting = self.waiting(inside);
-        if !waiting.is_empty() {
-            return Ok(Some((Ending::Waits, waiting)));
-        }
-        let stuck = self.stuck(symbolic, words, inside)?;
-        Ok((!stuck.is_empty()).then_some((Ending::Stuck, stuck)))
-    }
-
-    /// The valuations of the part that is reached from which time can pass without limit.
-    fn waiting(&self, inside: &Federation) -> Federation {
-        let dimension = self.whole.dimension();
-        let is_bounded = dbm::is_delay_bounded(self.whole.bounds(), dimension, &self.stopped);
-        if !self.may_delay || is_bounded {
-            return Federation::empty(dimension);
-        }
-        let mut waiting = inside.clone();
-        if self.stopped.is_empty() {
-            let mut leaving = self.outside.clone();
-            leaving.unite(&self.barriers.stops);
-            leaving.down(&ClockSet::EMPTY);
-            waiting.subtract(&leaving);
-        }
-        waiting
-    }
-
-    /// The valuations of the part that is reached from which no wait leads to a move or out of the predicate.
-    fn stuck(
-        &self,
-        symbolic: &mut Symbolic<'_>,
-        words: &mut [i32],
-        inside: &Federation,
-    ) -> Result<Federation, Failure> {
-        let dimension = self.whole.dimension();
-        let mut moves = Moves::default();
-        symbolic.moves_within(words, self.whole.bounds(), &mut moves)?;
-        let mut exits = self.outside.clone();
-        let mut target = words.to_vec();
-        for one in moves.iter() {
-            if !symbolic.is_enabled(one, self.whole.bounds())? {
-                continue;
-            }
-            target.copy_from_slice(words);
-            if let Some(effect) = symbolic.fire(one, &mut target)? {
-                exits.unite(&effect.enabled_part(self.whole.bounds(), dimension));
-                if inside.is_subset(&exits) {
-                    return Ok(Federation::empty(dimension));
-                }
-            }
-        }
-        let running = dimension - 1 - self.stopped.len();
-        if self.may_delay && self.barriers.is_empty() && (self.stopped.is_empty() || running <= 1) {
-            exits.down(&self.stopped);
-        } else if self.may_delay && self.stopped.is_empty() {
-            exits = future::predecessors_within(&exits, &self.barriers);
-        }
-        // Beside stopped clocks the past of a zone is in general not exact: then a wait counts as being stuck.
-        let mut stuck = inside.clone();
-        stuck.subtract(&exits);
-        Ok(stuck)
     }
 }

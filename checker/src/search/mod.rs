@@ -1,6 +1,7 @@
 //! Search over symbolic states: stores, orders, limits, reachability, liveness, extrema and traces.
 
 mod durations;
+pub mod endless;
 mod explore;
 pub mod extremum;
 pub mod goal;
@@ -18,6 +19,7 @@ mod representatives;
 mod retrace;
 pub mod schedule;
 mod shard;
+mod staying;
 pub mod store;
 pub mod taking;
 mod tree;

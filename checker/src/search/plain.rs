@@ -17,10 +17,10 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::ir::Predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::{Bound, Zone, dbm};
 
+use super::goal::{Goal, Target};
 use super::limits::{Counters, StopReason, Watch};
 use super::reach::Trace;
 use super::retrace::{self, Step};
@@ -54,16 +54,15 @@ pub struct Way {
 
 impl Way {
     /// The trace of the way. `symbolic` may be without the clock that measures time.
-    pub fn trace(&self, symbolic: &mut Symbolic<'_>, goal: &Predicate) -> Trace {
-        let mut goal = goal;
-        retrace::retrace(symbolic, &self.steps, Some(&mut goal))
+    pub fn trace(&self, symbolic: &mut Symbolic<'_>, goal: &mut dyn Goal) -> Trace {
+        retrace::retrace(symbolic, &self.steps, Some(goal))
     }
 }
 
 /// How a search ended.
 #[derive(Debug)]
 pub enum Outcome {
-    /// A way of least cost to a state in which the predicate holds.
+    /// A way of least cost to a state that was looked for.
     Found(Way),
     /// There is none.
     Exhausted,
@@ -93,13 +92,13 @@ struct Node {
     cost: Cost,
 }
 
-/// What waits: a node to be explored, or one in which the predicate was found.
+/// What waits: a node to be explored, or one that was looked for.
 type Waiting = Reverse<(Cost, bool, u32)>;
 
 /// A search for a state of least cost.
 pub struct Search<'s, 'a> {
     symbolic: &'s mut Symbolic<'a>,
-    goal: &'s Predicate,
+    goal: &'s dyn Target,
     measure: Measure,
     store: StateStore,
     nodes: Vec<Node>,
@@ -111,10 +110,10 @@ pub struct Search<'s, 'a> {
 }
 
 impl<'s, 'a> Search<'s, 'a> {
-    /// A search for the predicate. `before` is what was done outside this search, for the limits.
+    /// A search for the goal. `before` is what was done outside this search, for the limits.
     pub fn new(
         symbolic: &'s mut Symbolic<'a>,
-        goal: &'s Predicate,
+        goal: &'s dyn Target,
         measure: Measure,
         before: Counters,
     ) -> Search<'s, 'a> {
@@ -196,7 +195,7 @@ impl<'s, 'a> Search<'s, 'a> {
         Ok(())
     }
 
-    /// Stores the zones of a state that was come to, unless a stored one contains them, and looks for the predicate in them.
+    /// Stores the zones of a state that was come to, unless a stored one contains them, and looks for the goal in them.
     fn enter(
         &mut self,
         words: &mut [i32],
@@ -265,16 +264,15 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    /// The least cost of a valuation of the zone in which the predicate holds.
+    /// The least cost of a valuation of the zone that was looked for.
     fn goal_cost(
         &mut self,
         words: &mut [i32],
         zone: &Zone,
         parent: u32,
     ) -> Result<Option<Cost>, Failure> {
-        let extent = self.symbolic.extent(self.goal, words, zone.bounds())?;
         let dimension = zone.dimension();
-        let part = extent.to_federation(zone.bounds(), dimension);
+        let part = self.goal.part(self.symbolic, words, zone)?;
         let costs = part.zones().map(|bounds| match self.measure {
             Measure::Moves => self.moves_after(parent),
             Measure::Time(clock) => least_value(&Zone::from_bounds(dimension, bounds), clock),

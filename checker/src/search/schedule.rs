@@ -32,7 +32,7 @@ use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone, minimal};
 
 use super::durations::{Durations, LinearBound, TooHard};
-use super::liveness;
+use super::staying;
 
 /// Alternatives that are tried before a schedule is given up.
 const MOST_ATTEMPTS: usize = 100_000;
@@ -246,7 +246,7 @@ impl<'s, 'a> Plan<'s, 'a> {
                 let whole = self.whole()?;
                 let keep = self.keep.clone().unwrap_or(Predicate::Constant(true));
                 let (waits, stuck) =
-                    liveness::endings(self.symbolic, &keep, &mut self.words, whole)?;
+                    staying::endings(self.symbolic, &keep, &mut self.words, whole)?;
                 if let Finish::Waits = finish {
                     waits
                 } else {

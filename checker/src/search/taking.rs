@@ -3,9 +3,9 @@
 use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockRange, Measure, Predicate};
 use crate::network::{Failure, Symbolic};
 use crate::zones::dbm::Constraint;
-use crate::zones::{Bound, Zone};
+use crate::zones::{Bound, Federation, Zone};
 
-use super::goal::{Goal, SharedGoal};
+use super::goal::{Goal, SharedGoal, Target};
 
 /// A value of a measure that some state has, or comes near to.
 #[derive(Clone, Copy, Debug)]
@@ -93,13 +93,23 @@ impl Goal for Taking<'_> {
         words: &mut [i32],
         zone: &Zone,
     ) -> Result<bool, Failure> {
+        Ok(!self.part(symbolic, words, zone)?.is_empty())
+    }
+}
+
+impl Target for Taking<'_> {
+    fn part(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<Federation, Failure> {
         let Some(constraints) = self.constraints(symbolic, words)? else {
-            return Ok(false);
+            return Ok(Federation::empty(zone.dimension()));
         };
-        let extent = symbolic.extent(self.predicate, words, zone.bounds())?;
-        let mut counting = extent.to_federation(zone.bounds(), zone.dimension());
-        counting.constrain_all(&constraints);
-        Ok(!counting.is_empty())
+        let mut part = self.predicate.part(symbolic, words, zone)?;
+        part.constrain_all(&constraints);
+        Ok(part)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use checker::engine::evidence::Proof;
+use checker::engine::evidence::{Kind, Proof};
 use checker::engine::{Answer, LoadedModel, Options, TraceWanted, Verdict};
 use checker::search::extremum::{Extreme, Extremes};
 use checker::search::limits::StopReason;
@@ -12,6 +12,7 @@ use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
 use crate::compare::{self, Tally};
+use crate::endless::Endless;
 use crate::explicit::Graph;
 use crate::generate::{self, Formula, Network, Shape};
 
@@ -130,6 +131,21 @@ fn compare_liveness(
         let answer = model.check(&query_text, &compare::options());
         compare::check(&answer, expected, tally, || format!("{text}{query}"))?;
     }
+    let Ok(graph) = graph else {
+        return Ok(());
+    };
+    let p = labels(network, &graph, &formulas[0]);
+    let avoided = negated(&labels(network, &graph, &formulas[1]));
+    let wanted = [(None, &p), (None, &avoided), (Some(&p), &avoided)];
+    for (query, (open, keep)) in queries.iter().zip(wanted) {
+        let Some(answer) = answer(&mut model, query, TraceWanted::Shortest, tally)? else {
+            continue;
+        };
+        let found = answer.evidence.witnesses.first();
+        let found = found.map(|witness| witness.trace.moves.len());
+        let fewest = Endless::new(&graph, open.map(Vec::as_slice), keep).fewest_moves(found);
+        prop_assert_eq!(found, fewest, "{}{}", text, query);
+    }
     Ok(())
 }
 
@@ -174,6 +190,7 @@ fn compare_values(
         });
         let expected = Some((counting.clone().min(), counting.max()));
         prop_assert_eq!(found, expected, "{}{}", text, query);
+        check_best_values(network, (&condition, clock), (&graph, &wanted), tally)?;
     }
     let query = format!("E<> {condition}");
     let moves = |run: Run| run.steps.len();
@@ -186,6 +203,57 @@ fn compare_values(
         && let Some(run) = run(&answer)
     {
         check_time(&text, &condition, &run, tally)?;
+    }
+    Ok(())
+}
+
+/// The shortest run to a least or greatest value of a clock has as many moves as the way through the regions with the fewest, and the
+/// fastest takes the least time.
+fn check_best_values(
+    network: &Network,
+    (condition, clock): (&str, usize),
+    (graph, wanted): (&Graph, &[bool]),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let text = network.text();
+    let name = network.clock(clock);
+    let query = format!("bounds{{{condition}}}: {name}");
+    let mut model = compare::load(&text);
+    for trace in [TraceWanted::Shortest, TraceWanted::Fastest] {
+        let Some(answer) = answer(&mut model, &query, trace, tally)? else {
+            continue;
+        };
+        for witness in &answer.evidence.witnesses {
+            let (Kind::Value(_, shown), Some(Proof::Replayed(run, ..))) =
+                (witness.kind, &witness.run)
+            else {
+                return Err(TestCaseError::fail(format!("{text}{query}\n{witness:?}")));
+            };
+            if shown.value >= TOP {
+                continue;
+            }
+            if trace == TraceWanted::Fastest {
+                let value = shown.value;
+                let there = match (shown.is_reached, shown.is_greatest) {
+                    (true, _) => format!("{name} == {value}"),
+                    (false, true) => format!("{name} > {} && {name} < {value}", value - 1),
+                    (false, false) => format!("{name} > {value} && {name} < {}", value + 1),
+                };
+                check_time(&text, &format!("({condition}) && {there}"), run, tally)?;
+                continue;
+            }
+            let has_value = |node: usize| {
+                let ticks = graph.nodes[node].state.clocks[1 + clock];
+                let (whole, fraction) = (ticks / graph.ticks, ticks % graph.ticks);
+                let below = i64::from(shown.is_greatest && !shown.is_reached);
+                whole == shown.value - below && (fraction == 0) == shown.is_reached
+            };
+            let nodes: Vec<bool> = (0..wanted.len())
+                .map(|node| wanted[node] && has_value(node))
+                .collect();
+            let fewest = fewest_moves(graph, &nodes);
+            prop_assert_eq!(Some(run.steps.len()), fewest, "{}{}", text, query);
+        }
     }
     Ok(())
 }

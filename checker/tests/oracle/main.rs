@@ -7,6 +7,7 @@
 
 mod closed_loops;
 mod compare;
+mod endless;
 mod every_kind;
 mod explicit;
 mod games;

@@ -305,18 +305,47 @@ def test_members_of_scalar_sets_are_told_apart_only_if_asked(
     assert (answer["verdict"], answer["stored"]) == ("not satisfied", stored)
 
 
-@pytest.mark.parametrize("wanted", ["--shortest", "--fastest"])
-@pytest.mark.parametrize("query", ["E[] !P.Done", "sup: n"])
-def test_traces_that_are_neither_shortest_nor_fastest_say_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], wanted: str, query: str
+LOOP = """
+int[0,2] n; clock x;
+process P() {
+  state A { x <= 9 }, B { x <= 9 }, Done;
+  init A;
+  trans A -> A { guard x >= 2 && n < 2; assign x = 0, n++; }, A -> B { guard n == 0; },
+        B -> B { assign x = 0, n = 2; }, A -> Done { };
+}
+system P;
+"""
+
+
+@pytest.mark.parametrize(
+    ("query", "wanted", "moves"),
+    [
+        ("E[] !P.Done", "--shortest", 3),
+        ("sup{!P.Done}: n", "--shortest", 2),
+        ("sup{P.Done}: n", "--shortest", 3),
+        ("sup{!P.Done}: n", "--fastest", 2),
+        ("sup{P.Done}: n", "--fastest", 3),
+    ],
+)
+def test_shortest_and_fastest_traces_of_values_and_of_runs_without_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], query: str, wanted: str, moves: int
+) -> None:
+    model, trace = tmp_path / "loop.xta", tmp_path / "trace.json"
+    model.write_text(LOOP)
+    out, _ = check_run(capsys, 0, model, "--query", query, wanted, "--trace", str(trace), "--json")
+    assert json.loads(out)["message"] is None
+    document = json.loads(trace.read_text())
+    (only,) = document.get("traces", [document])
+    assert len(only["run"]["steps"]) == moves
+
+
+def test_runs_without_end_take_no_least_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = tmp_path / "loop.xta"
-    model.write_text(
-        "int[0,1] n; process P() { state A, Done; init A;"
-        " trans A -> A { assign n = 1 - n; }, A -> Done { }; } system P;"
-    )
-    out, _ = check_run(capsys, 0, model, "--query", query, wanted, "--json")
-    assert "shortest and fastest ones are found for E<> and A[]" in json.loads(out)["message"]
+    model.write_text(LOOP)
+    out, _ = check_run(capsys, 0, model, "--query", "E[] !P.Done", "--fastest", "--json")
+    assert "a run that never ends takes no least time" in json.loads(out)["message"]
 
 
 SIDE_BY_SIDE = """
