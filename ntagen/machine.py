@@ -41,7 +41,7 @@ class MachineState:
     next: dict[Observation, int]
     """The index of the next state, by what is observed next."""
     beliefs: tuple[Belief, ...]
-    """What is known of the state of the model on entry."""
+    """The states from which the machine goes on so, among them all that play may be in on entry."""
 
     def __str__(self) -> str:
         if self.channel is not None:

@@ -14,6 +14,7 @@ use checker::ir::QueryKind;
 use checker::verify::observed::{Action, MachineState};
 use checker::verify::strategy::Outcome;
 use proptest::collection::vec;
+use proptest::prelude::{Strategy, any};
 use proptest::test_runner::TestCaseError;
 
 use crate::compare::{self, Tally};
@@ -309,67 +310,96 @@ fn compare(
     let shown = shown.join(", ");
     let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
     let (goals, kept) = (labels(goal), labels(keep));
-    let never = vec![false; seen.len()];
-    let always = vec![true; seen.len()];
-    for (query, goal, keep, must_reach) in [
-        (format!("A<> {goal_text}"), &goals, &always, true),
-        (
-            format!("A[ {keep_text} U {goal_text} ]"),
-            &goals,
-            &kept,
-            true,
-        ),
-        (format!("A[] {keep_text}"), &never, &kept, false),
-        (
-            format!("A[ {keep_text} W {goal_text} ]"),
-            &goals,
-            &kept,
-            false,
-        ),
-    ] {
-        let objective = Objective {
-            goal,
-            keep,
-            must_reach,
-        };
-        for (rule, forced) in [
-            (Rule::Tiga, Forced::Tiga),
-            (Rule::Product, Forced::Product),
-            (Rule::Neutral, Forced::Neutral),
+    let asked = Asked {
+        graph: &graph,
+        seen: &seen,
+        text: &text,
+        observations: &shown,
+        goal: (&goal_text, &goals),
+        keep: (&keep_text, &kept),
+    };
+    asked.compare(&mut model, tally)
+}
+
+/// What is asked of one model.
+struct Asked<'a> {
+    graph: &'a Graph,
+    seen: &'a [Vec<bool>],
+    text: &'a str,
+    observations: &'a str,
+    /// As text, and region by region.
+    goal: (&'a str, &'a [bool]),
+    keep: (&'a str, &'a [bool]),
+}
+
+impl Asked<'_> {
+    /// Compares all objectives under all rules.
+    fn compare(&self, model: &mut LoadedModel, tally: &Tally) -> Result<(), TestCaseError> {
+        let Asked {
+            graph,
+            seen,
+            text,
+            observations,
+            ..
+        } = *self;
+        let ((goal_text, goals), (keep_text, kept)) = (self.goal, self.keep);
+        let never = vec![false; seen.len()];
+        let always = vec![true; seen.len()];
+        for (query, goal, keep, must_reach) in [
+            (format!("A<> {goal_text}"), goals, &always[..], true),
+            (format!("A[ {keep_text} U {goal_text} ]"), goals, kept, true),
+            (format!("A[] {keep_text}"), &never[..], kept, false),
+            (
+                format!("A[ {keep_text} W {goal_text} ]"),
+                goals,
+                kept,
+                false,
+            ),
         ] {
-            let game = Game {
-                graph: &graph,
-                seen: &seen,
-                objective: &objective,
-                rule,
+            let objective = Objective {
+                goal,
+                keep,
+                must_reach,
             };
-            let Some(expected) = game.is_won() else {
-                continue;
-            };
-            let query = format!("{{{shown}}} control: {query}");
-            let query_text = model.add_query(&query);
-            let options = checker::engine::Options {
-                forced,
-                verify: true,
-                ..compare::options()
-            };
-            let answer = model.check(&query_text, &options);
-            let describe = || format!("{text}{query}\n{forced:?}");
-            compare::check(&answer, Ok(expected), tally, describe)?;
-            compare::check_strategy(&model, &answer, tally, describe)?;
-            let machine = answer.as_ref().ok();
-            if let Some(machine) = machine.and_then(|one| one.evidence.machine.clone()) {
-                check_machine(&mut model, &query, (&game, forced), &machine)
-                    .map_err(|error| TestCaseError::fail(format!("{text}{error}")))?;
-            }
-            let is_won = answer.is_ok_and(|answer| answer.verdict == Verdict::Satisfied);
-            if is_won && !winning(&graph, &objective, rule)[0] {
-                let text = describe();
-                return Err(TestCaseError::fail(format!("{text}\nlost if all is seen")));
+            for (rule, forced) in [
+                (Rule::Tiga, Forced::Tiga),
+                (Rule::Product, Forced::Product),
+                (Rule::Neutral, Forced::Neutral),
+            ] {
+                let game = Game {
+                    graph,
+                    seen,
+                    objective: &objective,
+                    rule,
+                };
+                let Some(expected) = game.is_won() else {
+                    continue;
+                };
+                let query = format!("{{{observations}}} control: {query}");
+                let query_text = model.add_query(&query);
+                let options = checker::engine::Options {
+                    forced,
+                    verify: true,
+                    ..compare::options()
+                };
+                let answer = model.check(&query_text, &options);
+                let describe = || format!("{text}{query}\n{forced:?}");
+                compare::check(&answer, Ok(expected), tally, describe)?;
+                compare::check_strategy(model, &answer, tally, describe)?;
+                let machine = answer.as_ref().ok();
+                if let Some(machine) = machine.and_then(|one| one.evidence.machine.clone()) {
+                    check_machine(model, &query, (&game, forced), &machine)
+                        .map_err(|error| TestCaseError::fail(format!("{text}{error}")))?;
+                }
+                let is_won = answer.is_ok_and(|answer| answer.verdict == Verdict::Satisfied);
+                if is_won && !winning(graph, &objective, rule)[0] {
+                    let text = describe();
+                    return Err(TestCaseError::fail(format!("{text}\nlost if all is seen")));
+                }
             }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 #[test]
@@ -380,4 +410,121 @@ fn games_under_partial_observation_equal_the_subset_construction() {
         (generate::formula(SHAPE), generate::formula(SHAPE)),
     );
     compare::run("games under partial observation", 150, &strategy, compare);
+}
+
+/// A game in two rounds that follow each other, each with locations of its own: in each an action leads to some locations of the next
+/// round, of which the environment chooses one. Without clocks many knowledge sets contain others.
+#[derive(Clone, Debug)]
+struct Rounds {
+    /// By round, location and action: where it leads to.
+    targets: [Vec<[Vec<usize>; ACTIONS]>; 2],
+    /// By round and location: whether it looks different, is a goal, and is to be kept out of.
+    marks: [Vec<(bool, bool, bool)>; 2],
+}
+
+/// The actions of a game in rounds.
+const ACTIONS: usize = 3;
+
+fn rounds() -> impl Strategy<Value = Rounds> {
+    (3..=6_usize).prop_flat_map(|count| {
+        let led = || vec(vec(0..count, 0..=2), ACTIONS);
+        let led = move || led().prop_map(|led| led.try_into().expect("there are so many actions"));
+        let mark = || {
+            (any::<bool>(), 0..4_u8, 0..5_u8)
+                .prop_map(|(looks, goal, bad)| (looks, goal == 0, bad == 0))
+        };
+        let targets = [vec(led(), count), vec(led(), count)];
+        let marks = [vec(mark(), count), vec(mark(), count)];
+        (targets, marks).prop_map(|(targets, marks)| Rounds { targets, marks })
+    })
+}
+
+impl Rounds {
+    fn text(&self) -> String {
+        let count = self.marks[0].len();
+        let name = |round: usize, index: usize| format!("{}{index}", ["L", "M"][round]);
+        let names: Vec<String> = (0..2 * count)
+            .map(|one| name(one / count, one % count))
+            .collect();
+        let mut edges = Vec::new();
+        for (round, locations) in self.targets.iter().enumerate() {
+            for (index, actions) in locations.iter().enumerate() {
+                for (action, targets) in actions.iter().enumerate() {
+                    for &target in targets {
+                        let (from, to) = (name(round, index), name(1 - round, target));
+                        edges.push(format!("{from} -> {to} {{ sync c[{action}]?; }}"));
+                    }
+                }
+            }
+        }
+        let names = names.join(", ");
+        let edges = if edges.is_empty() {
+            String::new()
+        } else {
+            format!("trans {};", edges.join(", "))
+        };
+        format!(
+            "chan c[{ACTIONS}];\nprocess P() {{ state {names}; urgent {names}; init L0; {edges} }}\n\
+             process C() {{ state I; init I; trans I -> I {{ select a : int[0, {ACTIONS} - 1]; sync c[a]!; }}; }}\nsystem P, C;\n"
+        )
+    }
+
+    /// The locations with a mark as a predicate, and whether each has it.
+    fn marked(&self, is_marked: impl Fn(usize, (bool, bool, bool)) -> bool) -> (String, Vec<bool>) {
+        let count = self.marks[0].len();
+        let marks = self.marks.iter().enumerate();
+        let has: Vec<bool> = marks
+            .flat_map(|(round, marks)| marks.iter().map(move |&mark| (round, mark)))
+            .map(|(round, mark)| is_marked(round, mark))
+            .collect();
+        let names = (0..has.len()).filter(|&one| has[one]);
+        let names: Vec<String> = names
+            .map(|one| format!("P.{}{}", ["L", "M"][one / count], one % count))
+            .collect();
+        let text = if names.is_empty() {
+            "false".to_owned()
+        } else {
+            names.join(" || ")
+        };
+        (format!("({text})"), has)
+    }
+}
+
+fn compare_rounds(rounds: &Rounds, tally: &Tally) -> Result<(), TestCaseError> {
+    let text = rounds.text();
+    let mut model = compare::load(&text);
+    let Ok(Some(graph)) = compare::regions(&model, 0, false, tally) else {
+        return Ok(());
+    };
+    let at = |has: &[bool]| -> Vec<bool> {
+        let nodes = graph.nodes.iter();
+        nodes
+            .map(|node| has[node.state.words[0] as usize])
+            .collect()
+    };
+    let (second, is_second) = rounds.marked(|round, _| round == 1);
+    let (looks, is_different) = rounds.marked(|_, mark| mark.0);
+    let (goal_text, is_goal) = rounds.marked(|_, mark| mark.1);
+    let (keep_text, is_kept) = rounds.marked(|_, mark| !mark.2);
+    let (is_second, is_different) = (at(&is_second), at(&is_different));
+    let seen: Vec<Vec<bool>> = (0..graph.nodes.len())
+        .map(|node| vec![is_second[node], is_different[node]])
+        .collect();
+    let (goals, kept) = (at(&is_goal), at(&is_kept));
+    let observations = format!("{second}, {looks}");
+    let asked = Asked {
+        graph: &graph,
+        seen: &seen,
+        text: &text,
+        observations: &observations,
+        goal: (&goal_text, &goals),
+        keep: (&keep_text, &kept),
+    };
+    asked.compare(&mut model, tally)
+}
+
+#[test]
+fn games_whose_knowledge_sets_contain_each_other_equal_the_subset_construction() {
+    let name = "games in rounds under partial observation";
+    compare::run(name, 150, &rounds(), compare_rounds);
 }

@@ -66,6 +66,24 @@ impl Knowledge {
                 .all(|((words, zones), (others, more))| words == others && zones.is_same_set(more))
     }
 
+    /// Whether all states of this set are in another one, in which the same is observed.
+    pub(super) fn is_subset(&self, other: &Knowledge) -> bool {
+        self.states.len() <= other.states.len()
+            && self.states.iter().all(|(words, zones)| {
+                let others = other.states.get(words);
+                others.is_some_and(|others| zones.is_subset(others))
+            })
+    }
+
+    /// A bit for each of some classes of discrete states. A set has all bits of its subsets.
+    pub(super) fn signature(&self) -> u64 {
+        self.states.keys().fold(0, |bits, words| {
+            let mut hasher = rustc_hash::FxHasher::default();
+            words.hash(&mut hasher);
+            bits | 1 << (hasher.finish() >> 58)
+        })
+    }
+
     /// The number of zones.
     pub fn zone_count(&self) -> usize {
         self.states.values().map(Federation::zone_count).sum()

@@ -99,7 +99,7 @@ pub struct Machine {
 /// A state of the machine.
 #[derive(Clone, Debug)]
 pub struct MachineState {
-    /// What the controller knows on entry.
+    /// The states from which it goes on so, among them all in which play may be on entry.
     pub knowledge: Knowledge,
     /// What it proposes.
     pub action: Action,

@@ -5,9 +5,14 @@
 //! as soon as they are known. If everything that matters is explored, what is still open is lost if the goal must be reached,
 //! since play could go from one observation to the next for ever, and won if it is enough to keep.
 //!
-//! Sets are explored breadth first, and only where the answer can still hang on them. Equal sets are one.
+//! Sets are explored breadth first, and only where the answer can still hang on them. Equal sets are one. With what wins from a set the
+//! controller wins from its subsets, and if it loses from a set it loses from what contains it. So
+//! * in place of a set comes one that is won and contains it, or one that is lost and is contained in it;
+//! * a set is *covered* while it lies in an open one, if it is enough to keep, or contains an open one, if the goal must be reached: as long
+//!   as the other one is not lost, or not won, neither is it, and it is not explored. What covers is not covered itself.
 //!
-//! Source: X. Liu, S. Smolka, "Simple linear-time algorithms for minimal fixed points", ICALP 1998, in both directions.
+//! Sources: X. Liu, S. Smolka, "Simple linear-time algorithms for minimal fixed points", ICALP 1998, in both directions; M. De Wulf,
+//! L. Doyen, J.-F. Raskin, "A Lattice Theory for Solving Games of Imperfect Information", HSCC 2006 (antichains of knowledge sets).
 
 use std::collections::VecDeque;
 
@@ -19,7 +24,7 @@ use crate::zones::Federation;
 
 use super::class::{Explorer, Outcome};
 use super::place::Places;
-use super::{Action, Knowledge, Machine, MachineState, Question};
+use super::{Action, Knowledge, Machine, MachineState, Observation, Question};
 
 /// How often limits are looked at: after so many symbolic states inside an observation, and after each knowledge set.
 const STATES_BETWEEN_LOOKS: usize = 64;
@@ -45,8 +50,12 @@ enum Standing {
 
 struct Node {
     knowledge: Knowledge,
+    /// See [`Knowledge::signature`].
+    signature: u64,
     standing: Standing,
     is_expanded: bool,
+    /// Whether all of its choices are known.
+    is_complete: bool,
     /// Whether it is in the queue.
     is_waiting: bool,
     /// Its choices, in the order in which the controller prefers them.
@@ -55,6 +64,20 @@ struct Node {
     won_by: Option<usize>,
     /// The choices that lead to it.
     comes_from: Vec<usize>,
+    /// The node that covers it, or that it was decided with.
+    cover: Option<usize>,
+    /// The open nodes that it covers.
+    covered: Vec<usize>,
+}
+
+/// How a knowledge set relates to those that are there.
+enum Place {
+    /// This node has the same set, or one that decides who wins from it.
+    Of(usize),
+    /// This node covers it.
+    Under(usize),
+    /// It is to be explored.
+    New,
 }
 
 /// An action in a knowledge set.
@@ -74,6 +97,8 @@ pub struct Solver<'e, 'a, 'q> {
     choices: Vec<Choice>,
     /// By hash: the nodes.
     known: FxHashMap<u64, Vec<usize>>,
+    /// By observation: the nodes.
+    alike: FxHashMap<Observation, Vec<usize>>,
     waiting: VecDeque<usize>,
     bytes: usize,
     zones: u64,
@@ -92,6 +117,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
             nodes: Vec::new(),
             choices: Vec::new(),
             known: FxHashMap::default(),
+            alike: FxHashMap::default(),
             waiting: VecDeque::new(),
             bytes: 0,
             zones: 0,
@@ -165,7 +191,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         for zone in &zones {
             knowledge.add(&words, zone.bounds(), zone.dimension());
         }
-        self.node_of(knowledge);
+        let initial = self.node_of(knowledge);
+        self.wait_for(initial);
         Ok(Some(if is_broken {
             Standing::Lost
         } else {
@@ -175,42 +202,94 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
 
     fn node_of(&mut self, knowledge: Knowledge) -> usize {
         let hash = knowledge.hash();
-        let same = self.known.entry(hash).or_default();
-        let found = same
-            .iter()
-            .copied()
-            .find(|&node| self.nodes[node].knowledge.is_same(&knowledge));
-        if let Some(node) = found {
+        let mut same = self.known.get(&hash).into_iter().flatten().copied();
+        if let Some(node) = same.find(|&node| self.nodes[node].knowledge.is_same(&knowledge)) {
             return node;
         }
+        let signature = knowledge.signature();
+        let cover = match self.place_of(&knowledge, signature) {
+            Place::Of(node) => return node,
+            Place::Under(cover) => Some(cover),
+            Place::New => None,
+        };
         let node = self.nodes.len();
-        same.push(node);
+        self.known.entry(hash).or_default().push(node);
+        let alike = self.alike.entry(knowledge.observation.clone());
+        alike.or_default().push(node);
         self.zones += knowledge.zone_count() as u64;
-        self.bytes += 160 + knowledge.bytes();
+        self.bytes += 240 + knowledge.bytes();
         self.nodes.push(Node {
             knowledge,
+            signature,
             standing: Standing::Open,
             is_expanded: false,
-            is_waiting: true,
+            is_complete: false,
+            is_waiting: false,
             choices: Vec::new(),
             won_by: None,
             comes_from: Vec::new(),
+            cover,
+            covered: Vec::new(),
         });
-        self.waiting.push_back(node);
+        if let Some(cover) = cover {
+            self.nodes[cover].covered.push(node);
+        }
         node
     }
 
-    /// Whether the answer may hang on an open node: some choice of an open node that is not lost leads to it.
+    /// How a set that no node has relates to those of the nodes.
+    fn place_of(&self, knowledge: &Knowledge, signature: u64) -> Place {
+        let must_reach = self.explorer.question.must_reach;
+        let mut place = Place::New;
+        for &node in self.alike.get(&knowledge.observation).into_iter().flatten() {
+            let other = &self.nodes[node];
+            let is_smaller = match other.standing {
+                Standing::Won => false,
+                Standing::Lost => true,
+                Standing::Open if other.cover.is_none() && matches!(place, Place::New) => {
+                    must_reach
+                }
+                Standing::Open => continue,
+            };
+            let is_related = if is_smaller {
+                other.signature & !signature == 0 && other.knowledge.is_subset(knowledge)
+            } else {
+                signature & !other.signature == 0 && knowledge.is_subset(&other.knowledge)
+            };
+            if is_related && other.standing != Standing::Open {
+                return Place::Of(node);
+            }
+            if is_related {
+                place = Place::Under(node);
+            }
+        }
+        place
+    }
+
+    /// Puts an open node into the queue, or the one that covers it, unless it has been there.
+    fn wait_for(&mut self, node: usize) {
+        let node = self.nodes[node].cover.unwrap_or(node);
+        let one = &mut self.nodes[node];
+        if !one.is_expanded && !one.is_waiting && one.standing == Standing::Open {
+            one.is_waiting = true;
+            self.waiting.push_back(node);
+        }
+    }
+
+    /// Whether the answer may hang on an open node: some choice of an open node that is not lost leads to it, or to one that it covers.
     fn matters(&self, node: usize) -> bool {
         let one = &self.nodes[node];
         if one.is_expanded || one.standing != Standing::Open {
             return false;
         }
-        node == 0
-            || one.comes_from.iter().any(|&choice| {
+        let is_wanted = |node: usize| {
+            let mut choices = self.nodes[node].comes_from.iter();
+            choices.any(|&choice| {
                 let choice = &self.choices[choice];
                 !choice.is_lost && self.nodes[choice.source].standing == Standing::Open
             })
+        };
+        node == 0 || is_wanted(node) || one.covered.iter().any(|&node| is_wanted(node))
     }
 
     /// Computes the choices of a node.
@@ -255,7 +334,10 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
                 return Ok(None);
             }
         }
-        self.lose_if_hopeless(node);
+        self.nodes[node].is_complete = true;
+        if self.is_hopeless(node) {
+            self.spread(node, Standing::Lost);
+        }
         Ok(None)
     }
 
@@ -267,13 +349,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         let meets_lost = |&target: &usize| self.nodes[target].standing == Standing::Lost;
         let is_lost = is_lost || targets.iter().any(meets_lost);
         for &target in &targets {
-            let node = &mut self.nodes[target];
-            node.comes_from.push(choice);
-            let has_place = node.is_expanded || node.is_waiting;
-            if !has_place && node.standing == Standing::Open {
-                node.is_waiting = true;
-                self.waiting.push_back(target);
-            }
+            self.nodes[target].comes_from.push(choice);
+            self.wait_for(target);
         }
         self.bytes += 80 + 16 * targets.len();
         self.choices.push(Choice {
@@ -291,46 +368,81 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
 
     /// Spreads that the source of a choice is won.
     fn win(&mut self, choice: usize) {
-        let mut won = vec![choice];
-        while let Some(choice) = won.pop() {
-            let source = self.choices[choice].source;
-            let node = &mut self.nodes[source];
-            if node.standing != Standing::Open {
+        let source = self.choices[choice].source;
+        if self.nodes[source].standing == Standing::Open {
+            self.nodes[source].won_by = Some(choice);
+            self.spread(source, Standing::Won);
+        }
+    }
+
+    /// Whether none of the choices of an open node is left.
+    fn is_hopeless(&self, node: usize) -> bool {
+        let node = &self.nodes[node];
+        node.is_complete
+            && node.standing == Standing::Open
+            && node
+                .choices
+                .iter()
+                .all(|&choice| self.choices[choice].is_lost)
+    }
+
+    /// Spreads that an open node is won or lost.
+    fn spread(&mut self, node: usize, standing: Standing) {
+        let mut decided = vec![(node, standing)];
+        while let Some((node, standing)) = decided.pop() {
+            if self.nodes[node].standing != Standing::Open {
                 continue;
             }
-            node.standing = Standing::Won;
-            node.won_by = Some(choice);
-            for &before in &node.comes_from {
-                let before_choice = &mut self.choices[before];
-                before_choice.open -= 1;
-                if before_choice.open == 0 && !before_choice.is_lost {
-                    won.push(before);
+            self.nodes[node].standing = standing;
+            for index in 0..self.nodes[node].comes_from.len() {
+                let before = self.nodes[node].comes_from[index];
+                let choice = &mut self.choices[before];
+                let source = choice.source;
+                if standing == Standing::Lost {
+                    choice.is_lost = true;
+                    if self.is_hopeless(source) {
+                        decided.push((source, Standing::Lost));
+                    }
+                    continue;
+                }
+                choice.open -= 1;
+                if choice.open == 0
+                    && !choice.is_lost
+                    && self.nodes[source].standing == Standing::Open
+                {
+                    self.nodes[source].won_by.get_or_insert(before);
+                    decided.push((source, Standing::Won));
+                }
+            }
+            let covered = std::mem::take(&mut self.nodes[node].covered);
+            let is_decisive = (standing == Standing::Lost) == self.explorer.question.must_reach;
+            for one in covered {
+                if is_decisive {
+                    decided.push((one, standing));
+                } else if let Some(decision) = self.uncover(one) {
+                    decided.push(decision);
                 }
             }
         }
     }
 
-    /// Spreads that a node is lost, if none of its choices is left. All of them must be known.
-    fn lose_if_hopeless(&mut self, node: usize) {
-        let mut suspects = vec![node];
-        while let Some(suspect) = suspects.pop() {
-            let node = &self.nodes[suspect];
-            let is_hopeless = node.is_expanded
-                && node.standing == Standing::Open
-                && node
-                    .choices
-                    .iter()
-                    .all(|&choice| self.choices[choice].is_lost);
-            if !is_hopeless {
-                continue;
+    /// Looks anew for what covers or decides an open node, since what covered it does so no more.
+    fn uncover(&mut self, node: usize) -> Option<(usize, Standing)> {
+        // As long as it has a cover, it covers nothing, itself included.
+        let one = &self.nodes[node];
+        match self.place_of(&one.knowledge, one.signature) {
+            Place::Of(other) => {
+                self.nodes[node].cover = Some(other);
+                return Some((node, self.nodes[other].standing));
             }
-            self.nodes[suspect].standing = Standing::Lost;
-            for index in 0..self.nodes[suspect].comes_from.len() {
-                let choice = &mut self.choices[self.nodes[suspect].comes_from[index]];
-                choice.is_lost = true;
-                suspects.push(choice.source);
+            Place::Under(cover) => {
+                self.nodes[node].cover = Some(cover);
+                self.nodes[cover].covered.push(node);
             }
+            Place::New => self.nodes[node].cover = None,
         }
+        self.wait_for(node);
+        None
     }
 
     /// The strategy of the controller, who has won.
@@ -348,6 +460,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
             let choice = &self.choices[self.chosen(node)];
             let mut following = Vec::new();
             for &target in &choice.targets {
+                let target = self.played_as(target);
                 let number = *numbers.entry(target).or_insert_with(|| {
                     order.push(target);
                     order.len() - 1
@@ -364,7 +477,18 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         machine
     }
 
-    /// The choice of a node that is not lost: the one by which it was won, else the first that is not lost.
+    /// The node whose choices the controller follows in one that is not lost.
+    fn played_as(&self, node: usize) -> usize {
+        let mut node = node;
+        while self.nodes[node].won_by.is_none()
+            && let Some(cover) = self.nodes[node].cover
+        {
+            node = cover;
+        }
+        node
+    }
+
+    /// The choice of a node that is not lost, and that is played as itself: the one by which it was won, else the first that is not lost.
     fn chosen(&self, node: usize) -> usize {
         let node = &self.nodes[node];
         let is_left = |choice: &&usize| !self.choices[**choice].is_lost;
