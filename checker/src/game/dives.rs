@@ -11,6 +11,7 @@
 
 use crate::network::Failure;
 
+use super::choices::Reserve;
 use super::graph::{Edge, NONE, Standing};
 use super::reach::{Solver, Win};
 
@@ -34,6 +35,8 @@ pub(super) struct Frontier {
     is_impartial: bool,
     /// Whether the last expansion made no node to go on with.
     is_over: bool,
+    /// What the evader may move to and does not need, as far as known.
+    pub(super) reserve: Reserve,
 }
 
 impl Frontier {
@@ -45,11 +48,25 @@ impl Frontier {
     /// Makes room for one more node, which does not wait.
     pub(super) fn add_node(&mut self) {
         self.is_waiting.push(false);
+        self.reserve.add_node();
     }
 
     /// Forgets which nodes wait, so that all nodes are to be added again.
     pub(super) fn forget_nodes(&mut self) {
         self.is_waiting.clear();
+        self.reserve.forget_nodes();
+    }
+
+    /// Lets no node wait.
+    pub(super) fn clear(&mut self) {
+        for node in self.waiting.drain(..) {
+            self.is_waiting[node as usize] = false;
+        }
+    }
+
+    /// Lets a waiting node be expanded as soon as the dive is over.
+    pub(super) fn add_spoiler(&mut self, node: u32) {
+        self.spoilers.push(node);
     }
 
     fn add(&mut self, node: u32) {
@@ -127,6 +144,7 @@ impl Solver<'_, '_, '_> {
         let waiting = self.frontier.len();
         let edges = self.graph.edges_of(node);
         let first = edges.start + self.frontier.random.below(edges.len().max(1));
+        let has_reserve = self.begin_reserve(node);
         let turns: &[Option<bool>] = if self.frontier.is_impartial {
             &[None]
         } else {
@@ -139,9 +157,13 @@ impl Solver<'_, '_, '_> {
                     controllable,
                     ..
                 } = self.graph.edges[edge];
-                if turn.is_none_or(|is_own| self.seeker.owns(controllable) == is_own) {
+                let is_own = self.seeker.owns(controllable);
+                if (is_own || !has_reserve) && turn.is_none_or(|it| it == is_own) {
                     self.wait_for(target);
                 }
+            }
+            if has_reserve && *turn != Some(true) {
+                self.choose(node);
             }
         }
         let frontier = &mut self.frontier;
@@ -195,7 +217,7 @@ impl Solver<'_, '_, '_> {
             let Edge {
                 source, next_in, ..
             } = self.graph.edges[edge as usize];
-            let has_hope = self.has_hope.get(source as usize).is_none_or(|&it| it);
+            let has_hope = self.may_have_hope(source);
             if has_hope && !matches!(self.win[source as usize], Win::Everything) {
                 return true;
             }

@@ -47,6 +47,13 @@ impl Solver<'_, '_, '_> {
         self.record(node, Win::Part(won), Some(part));
     }
 
+    /// Records that a part of a node is won of which nothing was; the rest is not.
+    pub(super) fn gain_part(&mut self, node: u32, part: Federation, rest: Federation) {
+        self.gained_zones += (2 * part.zone_count() + rest.zone_count()) as u64;
+        self.rest.insert(node, rest);
+        self.record(node, Win::Part(part.clone()), Some(part));
+    }
+
     /// Records that all of a node is won.
     pub(super) fn gain_everything(&mut self, node: u32) {
         let rest = self.rest.remove(&node);

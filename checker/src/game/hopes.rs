@@ -1,9 +1,14 @@
 //! Where the seeker may still win, as far as the graph is explored.
 //!
 //! A node has *hope* if the seeker has won some of it, or if it is not expanded, or if a move of the seeker leads to a node with
-//! hope; a move of the evader only if time may stop in the node, since it need not move before. Nodes without hope are lost: the
-//! evader stays among them whatever the seeker does. So if the initial node has none, the game is over, however much of the graph
-//! waits; and what only nodes without hope lead to need not be explored. Clocks are not looked at, so a node with hope may be lost.
+//! hope. A move of the evader gives hope only if it may have to be made:
+//! * if time may stop in the node, since it need not move before,
+//! * if no other move leads the evader from everywhere in the node to one without hope, and
+//! * if the evader is the controller, unless the environment can move everywhere in the node: then it may leave it to that.
+//!
+//! Nodes without hope are lost: the evader stays among them whatever the seeker does. So if the initial node has none, the game is
+//! over, however much of the graph waits; and what only nodes without hope lead to need not be explored. Clocks are not looked at,
+//! so a node with hope may be lost.
 //!
 //! Nodes lose hope as the graph grows and never gain it again.
 
@@ -35,7 +40,8 @@ impl Solver<'_, '_, '_> {
                     ..
                 } = self.graph.edges[edge as usize];
                 edge = next_in;
-                let is_useful = self.seeker.owns(controllable) || self.may_stop(source);
+                let is_useful = self.seeker.owns(controllable)
+                    || self.may_stop(source) && !self.gets_away(source, &has_hope);
                 if is_useful
                     && !self.is_decided(source)
                     && !std::mem::replace(&mut has_hope[source as usize], true)
@@ -58,6 +64,11 @@ impl Solver<'_, '_, '_> {
         is_open
     }
 
+    /// Whether a node had hope when it was last looked at, or was not there yet.
+    pub(super) fn may_have_hope(&self, node: u32) -> bool {
+        self.has_hope.get(node as usize).is_none_or(|&it| it)
+    }
+
     /// Counts the nodes that were left unexpanded as won, once the evader has won: it has no need of them, and nobody knows more.
     pub(super) fn keep_out_of_unexpanded(&mut self) {
         for node in 0..self.win.len() {
@@ -65,6 +76,17 @@ impl Solver<'_, '_, '_> {
                 self.win[node] = Win::Everything;
             }
         }
+    }
+
+    /// Whether the evader has a move from everywhere in a node to one without hope, or may leave it to the environment to move.
+    fn gets_away(&self, node: u32, has_hope: &[bool]) -> bool {
+        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        edges.any(|edge| {
+            let is_own = self.seeker.owns(edge.controllable);
+            edge.is_total
+                && (is_own && self.seeker == Player::Environment
+                    || !is_own && !has_hope[edge.target as usize])
+        })
     }
 
     fn is_source_of_hope(&self, node: u32) -> bool {

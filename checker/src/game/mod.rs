@@ -3,6 +3,7 @@
 //! The controller owns a move if all participating edges are controllable; all other moves are the environment's. The
 //! environment is faster: where both can move at the same instant, it may.
 
+mod choices;
 pub mod closed_loop;
 pub mod cooperation;
 mod dead_ends;
@@ -19,6 +20,8 @@ mod predecessors;
 pub mod programs;
 pub mod reach;
 pub mod recurrence;
+mod repeats;
+mod sought;
 mod stops;
 pub mod strategy;
 mod trails;

@@ -27,8 +27,8 @@
 //! valuations of one stamp into those of smaller ones makes progress. Where the seeker wins nowhere any more, the evader has only
 //! to stay outside of what is won.
 //!
-//! Forward, the solver dives ([`super::dives`]). From time to time it is looked whether the seeker may still win at all
-//! ([`super::hopes`]), so that both answers can come early.
+//! Forward, the solver dives ([`super::dives`]), and explores only as many moves of the evader as it needs ([`super::choices`]). From
+//! time to time it is looked whether the seeker may still win at all ([`super::hopes`]), so that both answers can come early.
 //!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are. What
 //! takes zones is put off until the graph has grown by a part of itself, and goes round in turns: so a node meets what several of
@@ -48,6 +48,7 @@ use crate::zones::{Bound, Federation, Patience};
 
 use super::dives::Frontier;
 use super::graph::{Graph, Standing};
+use super::repeats::{Case, Repeats};
 use super::{Forced, Player};
 
 /// So many nodes for each discrete state are many.
@@ -59,6 +60,9 @@ const LOOK_EVERY: u64 = 64;
 /// Nodes whose winning valuations hang on clocks are computed when the explored states have grown by this part of them. Each time
 /// costs more than looking at words, and the more is known by then, the fewer are computed twice.
 const BETWEEN_COMPUTATIONS: u64 = 4;
+
+/// It is looked what is still in play when the explored states have grown by this part of them.
+const BETWEEN_PLAYS: u64 = 3;
 
 /// Updates by words between two looks at the limits, where no node is expanded.
 const UPDATES_BETWEEN_LOOKS: u32 = 1024;
@@ -142,14 +146,18 @@ pub struct Solver<'g, 's, 'a> {
     updates: VecDeque<u32>,
     /// Nodes whose winning valuations are to be computed with zones; some may be settled meanwhile.
     deferred: VecDeque<u32>,
-    pending: Vec<Pending>,
+    pub(super) pending: Vec<Pending>,
+    /// What was computed before.
+    pub(super) repeats: Repeats,
+    /// The words of some node.
+    pub(super) words: Vec<i32>,
     /// How many states may be explored before the deferred nodes are computed.
     next_computation: u64,
 }
 
 /// Whether a node is to be updated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Pending {
+pub(super) enum Pending {
     /// No.
     No,
     /// It waits to be looked at.
@@ -162,6 +170,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// A solver that has looked at the initial node only.
     pub fn new(graph: &'g mut Graph<'s, 'a>, seeker: Player, forced: Forced) -> Solver<'g, 's, 'a> {
         let mut solver = Solver {
+            words: graph.symbolic.stepper.network().initial.clone(),
+            repeats: Repeats::default(),
             graph,
             seeker,
             targets: None,
@@ -204,6 +214,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             stored: self.graph.nodes.len() as u64,
             waiting: self.frontier.len() as u64,
             bytes: self.graph.bytes()
+                + self.repeats.bytes() as u64
                 + (self.win.capacity() * (size_of::<Win>() + size_of::<Vec<Gain>>() + 2)) as u64
                 + self.gained_zones * self.zone_bytes(),
         }
@@ -216,10 +227,12 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// Solves the game.
     pub fn solve(&mut self, extent: Extent, watch: &mut dyn Watch) -> Result<Answer, Failure> {
         let mut next_look = LOOK_EVERY;
-        let mut next_hope = 1;
+        let (mut next_hope, mut next_crowd) = (1, 1);
+        self.frontier.reserve.is_kept = extent == Extent::Verdict;
         loop {
             let explored = self.graph.explored;
-            let reason = if self.frontier.len() == 0 || explored >= self.next_computation {
+            let is_dry = self.frontier.len() == 0;
+            let reason = if is_dry || explored >= self.next_computation {
                 self.next_computation = explored + explored / BETWEEN_COMPUTATIONS;
                 self.propagate(watch)?
             } else {
@@ -232,15 +245,32 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 if self.is_won() {
                     break;
                 }
-                if explored >= next_hope {
-                    next_hope = 2 * explored;
-                    if extent == Extent::Verdict && !self.has_hope() {
+                let has_reserve = self.frontier.reserve.is_used;
+                if explored >= next_hope && extent == Extent::Verdict {
+                    if !self.has_hope() {
                         break;
                     }
+                    next_hope = if has_reserve {
+                        self.wait_for_nodes_in_play();
+                        explored + explored / BETWEEN_PLAYS
+                    } else {
+                        2 * explored
+                    };
+                }
+                if explored >= next_crowd {
+                    next_crowd = 2 * explored;
                     if self.is_crowded() {
                         self.has_given_up = true;
                         return Ok(Answer::Stopped(StopReason::States));
                     }
+                }
+                if has_reserve && self.frontier.len() == 0 {
+                    let is_in_play = self.wait_for_nodes_in_play();
+                    if is_dry && self.frontier.len() == 0 {
+                        self.keep_in_play(&is_in_play);
+                        break;
+                    }
+                    continue;
                 }
             }
             let Some(node) = self.next_waiting() else {
@@ -309,7 +339,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             if is_settled || !self.graph.nodes[node as usize].is_expanded {
                 continue;
             }
-            match self.quick(node) {
+            let decision = self.quick(node);
+            if decision != Some(true) {
+                self.choose(node);
+            }
+            match decision {
                 Some(true) => self.gain_everything(node),
                 Some(false) => {}
                 None => {
@@ -394,88 +428,6 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 part.contains(&values, 1)
             }
         }
-    }
-
-    /// Gives nodes that were just made their place: what is sought is won from the start.
-    pub(super) fn adopt_new_nodes(&mut self) {
-        for node in self.win.len()..self.graph.nodes.len() {
-            let win = self.sought(node as u32);
-            if let Win::Part(part) = &win {
-                let mut rest = self.whole(node as u32);
-                rest.subtract(part);
-                self.gained_zones += (2 * part.zone_count() + rest.zone_count()) as u64;
-                self.rest.insert(node as u32, rest);
-            }
-            let gains = match &win {
-                Win::Nothing => Vec::new(),
-                Win::Everything => vec![Gain {
-                    stamp: 0,
-                    part: None,
-                }],
-                Win::Part(part) => vec![Gain {
-                    stamp: 0,
-                    part: Some(part.clone()),
-                }],
-            };
-            self.win.push(win);
-            self.gains.push(gains);
-            self.frontier.add_node();
-            self.pending.push(Pending::No);
-            if node == 0 {
-                self.wait_for(0);
-            }
-        }
-    }
-
-    /// The valuations of a node that the seeker wants to get to.
-    fn sought(&self, node: u32) -> Win {
-        if let Some(targets) = &self.targets {
-            return targets[node as usize].clone();
-        }
-        let part = match (self.graph.nodes[node as usize].standing, self.seeker) {
-            (Standing::Goal, Player::Controller) | (Standing::Broken, Player::Environment) => {
-                return Win::Everything;
-            }
-            (Standing::Mixed, Player::Controller) => self.goal(node),
-            (Standing::Mixed, Player::Environment) => self.broken(node),
-            _ => return Win::Nothing,
-        };
-        if part.is_empty() {
-            Win::Nothing
-        } else {
-            Win::Part(part)
-        }
-    }
-
-    /// Whether the words decide who has won in a node.
-    pub(super) fn is_decided(&self, node: u32) -> bool {
-        match self.graph.nodes[node as usize].standing {
-            Standing::Broken | Standing::Dead => true,
-            Standing::Goal => self.targets.is_none(),
-            Standing::Open | Standing::Mixed => false,
-        }
-    }
-
-    /// Where the goal holds, or what is sought lies, in a node that is neither a goal nor broken as a whole.
-    pub(super) fn goal(&self, node: u32) -> Federation {
-        let dimension = self.graph.dimension();
-        if let Some(targets) = &self.targets {
-            return match &targets[node as usize] {
-                Win::Nothing => Federation::empty(dimension),
-                Win::Everything => self.whole(node),
-                Win::Part(part) => part.clone(),
-            };
-        }
-        let none = || Federation::empty(dimension);
-        let parts = self.graph.parts(node);
-        parts.map_or_else(none, |parts| parts.goal.clone())
-    }
-
-    /// As [`Solver::goal`], where what must be kept does not hold, goals excepted.
-    pub(super) fn broken(&self, node: u32) -> Federation {
-        let none = || Federation::empty(self.graph.dimension());
-        let parts = self.graph.parts(node);
-        parts.map_or_else(none, |parts| parts.broken.clone())
     }
 
     /// The nodes that are to be updated, in order; none is any more.
@@ -564,6 +516,18 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
 
     /// Computes the winning valuations of a node anew.
     fn compute(&mut self, node: u32, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
+        let (known, is_case) = self.known_case(node)?;
+        if let Some(case) = known {
+            match case {
+                Case::Nothing => {}
+                Case::Everything => self.gain_everything(node),
+                Case::Part(part, rest) => self.gain_part(node, part, rest),
+            }
+            if !matches!(self.win[node as usize], Win::Everything) {
+                self.note_spoilers(node);
+            }
+            return Ok(None);
+        }
         let (result, reason) = self.patiently(watch, |solver, patience| {
             let won = solver.winnable(node, patience)?;
             if !patience.is_over() {
@@ -574,6 +538,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         result?;
         if reason.is_some() {
             return Ok(reason);
+        }
+        if is_case {
+            self.remember_case(node);
         }
         if !matches!(self.win[node as usize], Win::Everything) {
             self.note_spoilers(node);

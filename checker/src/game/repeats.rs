@@ -1,0 +1,134 @@
+//! Winning valuations that were computed before, for nodes that differ in nothing that they hang on.
+//!
+//! In models with much data, many nodes have the same zone, the same edges as far as clocks go, and the same successors won. What they
+//! win first is computed once. It hangs on nothing but what the key of such a case holds:
+//! * the zone of the node, whether time may pass, which clocks stand still, and where invariants stop time;
+//! * of each edge what it does to clocks, who owns it, the zone of its target, and whether all of the target is won or nothing.
+//!
+//! Other nodes are no such cases: those in which the goal or what must be kept hang on clocks, or time is cut short, those of which
+//! something is won or that lead to nodes of which a part is; and those in which it matters which processes move, because the
+//! environment may be forced to ([`super::stops`]).
+
+use rustc_hash::FxHashMap;
+
+use crate::network::Failure;
+use crate::zones::Federation;
+
+use super::Player;
+use super::graph::Standing;
+use super::reach::{Solver, Win};
+
+/// Cases that are remembered, at most.
+const MOST_CASES: usize = 1 << 14;
+/// After so many look-ups it is seen whether
+const TRIAL: u32 = 1 << 10;
+/// one in so many, at least, meets a case that is known; else no more are made.
+const WORTH: u32 = 4;
+
+/// What cases win.
+#[derive(Debug, Default)]
+pub(super) struct Repeats {
+    cases: FxHashMap<Box<[u32]>, Case>,
+    key: Vec<u32>,
+    lookups: u32,
+    hits: u32,
+}
+
+/// What a case wins.
+#[derive(Clone, Debug)]
+pub(super) enum Case {
+    Nothing,
+    Everything,
+    /// A part, and what is left.
+    Part(Federation, Federation),
+}
+
+impl Repeats {
+    /// The bytes that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        let keys: usize = self.cases.keys().map(|key| key.len() * 4).sum();
+        keys + self.cases.capacity() * size_of::<(Box<[u32]>, Case)>()
+    }
+}
+
+impl Solver<'_, '_, '_> {
+    /// What a node wins, if it is a case that was met before; also whether it is a case at all, whose key is kept then.
+    pub(super) fn known_case(&mut self, node: u32) -> Result<(Option<Case>, bool), Failure> {
+        let repeats = &self.repeats;
+        if repeats.lookups >= TRIAL && repeats.hits < repeats.lookups / WORTH || !self.is_case(node)
+        {
+            return Ok((None, false));
+        }
+        self.make_key(node)?;
+        let repeats = &mut self.repeats;
+        let known = repeats.cases.get(&repeats.key[..]).cloned();
+        repeats.lookups += 1;
+        repeats.hits += u32::from(known.is_some());
+        Ok((known, true))
+    }
+
+    /// Remembers what the case wins of which the key was made last: a node that has just been computed.
+    pub(super) fn remember_case(&mut self, node: u32) {
+        if self.repeats.cases.len() >= MOST_CASES {
+            return;
+        }
+        let case = match &self.win[node as usize] {
+            Win::Nothing => Case::Nothing,
+            Win::Everything => Case::Everything,
+            Win::Part(part) => Case::Part(part.clone(), self.rest[&node].clone()),
+        };
+        let key = self.repeats.key.clone().into_boxed_slice();
+        self.repeats.cases.insert(key, case);
+    }
+
+    fn is_case(&self, node: u32) -> bool {
+        if self.targets.is_some()
+            || self.graph.nodes[node as usize].standing != Standing::Open
+            || !matches!(self.win[node as usize], Win::Nothing)
+            || self.graph.urgent(node).is_some()
+        {
+            return false;
+        }
+        let mut has_part = false;
+        let mut movers = [false; 2];
+        for edge in &self.graph.edges[self.graph.edges_of(node)] {
+            has_part |= matches!(self.win[edge.target as usize], Win::Part(_));
+            movers[usize::from(edge.controllable)] = true;
+        }
+        !has_part && (self.seeker == Player::Environment || movers != [true; 2])
+    }
+
+    fn make_key(&mut self, node: u32) -> Result<(), Failure> {
+        let mut key = std::mem::take(&mut self.repeats.key);
+        key.clear();
+        let mut words = std::mem::take(&mut self.words);
+        self.graph.load(node, &mut words);
+        let symbolic = &mut *self.graph.symbolic;
+        let locations = symbolic.stepper.network().processes.iter().zip(&words);
+        let is_urgent = locations
+            .map(|(process, &location)| process.locations[location as usize].urgency)
+            .any(|urgency| urgency != crate::ir::Urgency::Normal);
+        let bounds = symbolic.upper_bounds(&mut words);
+        let stopped = symbolic.stopped(&words);
+        self.words = words;
+        let known = &self.graph.nodes[node as usize];
+        key.push(known.zone.0);
+        key.push(u32::from(known.delays) * 2 + u32::from(is_urgent));
+        for clock in &stopped? {
+            key.push(clock as u32);
+        }
+        key.push(u32::MAX);
+        for (_, bound) in bounds? {
+            key.extend([bound.left as u32, bound.bound.raw().cast_unsigned()]);
+        }
+        for edge in &self.graph.edges[self.graph.edges_of(node)] {
+            let is_won = matches!(self.win[edge.target as usize], Win::Everything);
+            let flags = [edge.controllable, edge.is_total, edge.length == 1, is_won];
+            let flags = flags.iter().fold(1, |all, one| all * 2 + u32::from(*one));
+            let target = self.graph.nodes[edge.target as usize].zone;
+            key.extend([edge.program.0, target.0, flags]);
+        }
+        self.repeats.key = key;
+        Ok(())
+    }
+}

@@ -1,0 +1,91 @@
+//! What the seeker wants to get to: the valuations of each node that are won from the start.
+
+use crate::zones::Federation;
+
+use super::Player;
+use super::graph::Standing;
+use super::reach::{Gain, Pending, Solver, Win};
+
+impl Solver<'_, '_, '_> {
+    /// Gives nodes that were just made their place: what is sought is won from the start.
+    pub(super) fn adopt_new_nodes(&mut self) {
+        for node in self.win.len()..self.graph.nodes.len() {
+            let win = self.sought(node as u32);
+            if let Win::Part(part) = &win {
+                let mut rest = self.whole(node as u32);
+                rest.subtract(part);
+                self.gained_zones += (2 * part.zone_count() + rest.zone_count()) as u64;
+                self.rest.insert(node as u32, rest);
+            }
+            let gains = match &win {
+                Win::Nothing => Vec::new(),
+                Win::Everything => vec![Gain {
+                    stamp: 0,
+                    part: None,
+                }],
+                Win::Part(part) => vec![Gain {
+                    stamp: 0,
+                    part: Some(part.clone()),
+                }],
+            };
+            self.win.push(win);
+            self.gains.push(gains);
+            self.frontier.add_node();
+            self.pending.push(Pending::No);
+            if node == 0 {
+                self.wait_for(0);
+            }
+        }
+    }
+
+    /// The valuations of a node that the seeker wants to get to.
+    fn sought(&self, node: u32) -> Win {
+        if let Some(targets) = &self.targets {
+            return targets[node as usize].clone();
+        }
+        let part = match (self.graph.nodes[node as usize].standing, self.seeker) {
+            (Standing::Goal, Player::Controller) | (Standing::Broken, Player::Environment) => {
+                return Win::Everything;
+            }
+            (Standing::Mixed, Player::Controller) => self.goal(node),
+            (Standing::Mixed, Player::Environment) => self.broken(node),
+            _ => return Win::Nothing,
+        };
+        if part.is_empty() {
+            Win::Nothing
+        } else {
+            Win::Part(part)
+        }
+    }
+
+    /// Whether the words decide who has won in a node.
+    pub(super) fn is_decided(&self, node: u32) -> bool {
+        match self.graph.nodes[node as usize].standing {
+            Standing::Broken | Standing::Dead => true,
+            Standing::Goal => self.targets.is_none(),
+            Standing::Open | Standing::Mixed => false,
+        }
+    }
+
+    /// Where the goal holds, or what is sought lies, in a node that is neither a goal nor broken as a whole.
+    pub(super) fn goal(&self, node: u32) -> Federation {
+        let dimension = self.graph.dimension();
+        if let Some(targets) = &self.targets {
+            return match &targets[node as usize] {
+                Win::Nothing => Federation::empty(dimension),
+                Win::Everything => self.whole(node),
+                Win::Part(part) => part.clone(),
+            };
+        }
+        let none = || Federation::empty(dimension);
+        let parts = self.graph.parts(node);
+        parts.map_or_else(none, |parts| parts.goal.clone())
+    }
+
+    /// As [`Solver::goal`], where what must be kept does not hold, goals excepted.
+    pub(super) fn broken(&self, node: u32) -> Federation {
+        let none = || Federation::empty(self.graph.dimension());
+        let parts = self.graph.parts(node);
+        parts.map_or_else(none, |parts| parts.broken.clone())
+    }
+}
