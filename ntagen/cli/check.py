@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from ntagen.cli import INTERNAL_ERROR
+from ntagen.cli.effects import idle_options, unwritten
 from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import load_model, pointing_to_explanations, show_warnings
 from ntagen.cli.progress import shown_progress
@@ -90,6 +91,18 @@ class _Outputs:
     controller: Path | None
     plans: Path | None
     ranking: str
+    written: set[str] = field(default_factory=set)
+    """The options whose output has been written."""
+
+    def wanted(self) -> dict[str, str | Path | None]:
+        """By option: where its output goes."""
+        return {
+            "--trace": self.trace,
+            "--certificate": self.certificate,
+            "--strategy": self.strategy,
+            "--controller": self.controller,
+            "--plans": self.plans,
+        }
 
 
 @click.command(
@@ -262,6 +275,7 @@ def command(
     """  # noqa: D301  click wants the control character
     if as_json and strategy == "-":
         raise click.UsageError("--json and --strategy - both write on standard output")
+    _check_ranking(ranking)
     outputs = _Outputs(trace, certificate, strategy, controller, plans, ranking)
     worst = 0
     with pointing_to_explanations(not as_json):
@@ -269,6 +283,7 @@ def command(
         shown_already = len(loaded.model.warnings)
         todo = _queries(loaded.model, asked, query_file)
         show_warnings(loaded.model.warnings[shown_already:])
+        _say_idle_options([query.text for query in todo], is_environment=loaded.scene is not None)
         if not as_json:
             _header(model_path, loaded.model)
         for query in todo:
@@ -305,7 +320,27 @@ def command(
             else:
                 _row(answer, query, notes, trace_is_written=trace is not None)
             worst = max(worst, _severity(answer), key=_SEVERITIES.index)
+    _say(unwritten(outputs.wanted(), outputs.written))
     return worst
+
+
+def _check_ranking(text: str) -> None:
+    from ntagen.plan.rank import parse_ranking
+
+    parse_ranking(text)
+
+
+def _say_idle_options(queries: Sequence[str], *, is_environment: bool) -> None:
+    """Says which options of the command line make no difference."""
+    context = click.get_current_context()
+    source = click.core.ParameterSource.COMMANDLINE
+    given = [name for name in context.params if context.get_parameter_source(name) is source]
+    _say(idle_options(given, context.params, queries, ranks=is_environment))
+
+
+def _say(notes: Sequence[str]) -> None:
+    for note in notes:
+        click.echo(f"note: {note}", err=True)
 
 
 _SEVERITIES: Final = (0, 1, STOPPED, MODEL_ERROR)
@@ -441,28 +476,30 @@ def _write_evidence(
 ) -> list[str]:
     """Writes what was asked for; returns a line for each thing that the user should hear of."""
     notes: list[str] = []
-    if outputs.trace:
-        notes += _write_trace(answer, query, outputs.trace)
+    if outputs.trace and (text := answer.trace_text()) is not None:
+        outputs.written.add("--trace")
+        notes += _write_trace(answer, query, outputs.trace, text)
     certificate = answer.certificate_text() if outputs.certificate else None
     if outputs.certificate and certificate is not None:
         write_files({outputs.certificate: certificate})
+        outputs.written.add("--certificate")
         states = certificate.count("\n") - 1
         notes.append(f"certificate of {states} states written to {outputs.certificate}")
-    if outputs.strategy:
-        notes += _write_strategy(answer, query, outputs.strategy)
+    if outputs.strategy and (text := answer.strategy_text()) is not None:
+        outputs.written.add("--strategy")
+        notes += _write_strategy(answer, query, outputs.strategy, text)
     controller = answer.controller_c() if outputs.controller else None
     if outputs.controller and controller is not None:
         write_files({outputs.controller: controller})
+        outputs.written.add("--controller")
         notes.append(f"controller written to {outputs.controller}")
     if outputs.plans and answer.plan_count is not None:
+        outputs.written.add("--plans")
         notes += _write_plans(answer, outputs.plans, outputs.ranking, scene)
     return notes
 
 
-def _write_trace(answer: Answer, query: _Asked, target: str) -> list[str]:
-    text = answer.trace_text()
-    if text is None:
-        return []
+def _write_trace(answer: Answer, query: _Asked, target: str, text: str) -> list[str]:
     if target == "-":
         click.echo(text)
         return []
@@ -472,10 +509,7 @@ def _write_trace(answer: Answer, query: _Asked, target: str) -> list[str]:
     return [f"trace written to {path}"]
 
 
-def _write_strategy(answer: Answer, query: _Asked, target: str) -> list[str]:
-    text = answer.strategy_text()
-    if text is None:
-        return []
+def _write_strategy(answer: Answer, query: _Asked, target: str, text: str) -> list[str]:
     if target == "-":
         click.echo(text, nl=False)
         return []

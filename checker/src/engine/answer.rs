@@ -28,7 +28,7 @@ use super::limits::LimitWatch;
 use super::reachable::reachable;
 use super::values::extremum;
 use super::verification::Verification;
-use super::{Options, games, observed};
+use super::{Options, PlansWanted, games, observed};
 
 /// What a query came out as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -238,6 +238,9 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
         let counters = answer.counters;
         let verdict = Verdict::Unknown(watch.stop());
         answer = new_answer(verdict, Evidence::default(), counters);
+    }
+    if options.plans != PlansWanted::No {
+        games::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());
     }
     answer.seconds = start.elapsed().as_secs_f64();
     answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);

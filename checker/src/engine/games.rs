@@ -11,7 +11,7 @@ use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
 use crate::game::recurrence;
 use crate::game::strategy::{self, Strategy, Under};
 use crate::game::{Nodes, Player, Priorities};
-use crate::ir::{ClockAtom, Network, Objective, Predicate};
+use crate::ir::{ClockAtom, Network, Objective, Predicate, QueryKind};
 use crate::network::{
     Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, predicate,
 };
@@ -25,6 +25,30 @@ use super::{Options, PlansWanted};
 /// What is said of a game whose model has priorities.
 pub(super) const IGNORED_PRIORITIES: &str =
     "games ignore the priorities of the model, unless they are told to keep them";
+
+/// What is said where plans are wanted of a game for which none are listed.
+const NO_PLANS: &str = "plans are listed for control: A<> and A[ U ] only, and not under a strategy; what to do is in the strategy";
+
+/// Says so if plans are wanted of a game that sees everything and for which none are listed, whoever wins.
+pub(super) fn note_missing_plans(answer: &mut Answer, query: &QueryKind, is_under: bool) {
+    let QueryKind::Control {
+        objective,
+        cooperative,
+        time_optimal,
+        observations: None,
+    } = query
+    else {
+        return;
+    };
+    let is_race = matches!(objective, Objective::Reach(_) | Objective::Until(..));
+    if is_race && !cooperative && time_optimal.is_none() && !is_under {
+        return;
+    }
+    answer.message = Some(match answer.message.take() {
+        Some(message) => format!("{message}; {NO_PLANS}"),
+        None => NO_PLANS.to_owned(),
+    });
+}
 
 /// Names the part of a game query that there is no algorithm for.
 pub(super) fn unsupported_game(

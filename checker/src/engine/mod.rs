@@ -544,13 +544,16 @@ impl LoadedModel {
         } else {
             None
         };
+        let is_for_under = kind.is_none() && !is_observed;
         let diagnostic = if let Some(kind) = kind.or(under) {
             Diagnostic::new(
                 codes::UNSUPPORTED_QUERY,
                 query.span,
                 format!("{kind} are not supported"),
             )
-            .help(if is_observed {
+            .help(if is_for_under {
+                "supported under a strategy are control: with every objective, and E<>, A[], E[], A<>, -->, sup, inf and bounds"
+            } else if is_observed {
                 "supported with observations is control: without a name, with A<>, A[], A[ U ] and A[ W ]; or ask without them, for a \
                  controller that sees everything"
             } else {

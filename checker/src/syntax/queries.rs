@@ -240,8 +240,16 @@ impl Parser<'_> {
             self.expression_list()
         };
         self.closing(TokenKind::RightBrace, "after the observations");
-        if !self.at_word("control") {
+        if self.at(TokenKind::Unknown) {
             self.expected("`control:` after the observations");
+        } else if !self.at_word("control") {
+            let message = format!(
+                "expected `control:` after the observations, found {}",
+                self.found()
+            );
+            let diagnostic = Diagnostic::new(codes::UNEXPECTED_TOKEN, self.here(), message)
+                .help("write {…} control: with A<> p, A[] p, A[ p U q ] or A[ p W q ]; other queries have no observations");
+            self.report(diagnostic);
         }
         self.control(false, Some(observations))
     }

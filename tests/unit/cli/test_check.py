@@ -445,3 +445,86 @@ def test_an_error_beyond_the_end_of_play_is_none(
     capsys: pytest.CaptureFixture[str], failing: Path
 ) -> None:
     check_run(capsys, 0, failing, "--query", "control: A<> n == 1")
+
+
+GAME = """
+process P() {
+  clock x;
+  state Here { x <= 3 }, There, Lost;
+  init Here;
+  trans Here -> There { guard x >= 1; }, Here -u-> Lost { guard x >= 2; };
+}
+system P;
+"""
+
+
+@pytest.mark.parametrize(
+    ("query", "options", "said"),
+    [
+        ("control: A<> P.There", ["--threads", "2"], "--threads has no effect here: games"),
+        ("control: A<> P.There", ["--symmetry", "off"], "--symmetry has no effect here: games"),
+        ("control: A<> P.There", ["--search", "dfs"], "--search has no effect here: games"),
+        ("control: A<> P.There", ["--shortest"], "--shortest and --fastest have no effect here"),
+        ("E<> P.There", ["--shortest"], "--shortest and --fastest have no effect without --trace"),
+        ("E<> P.There", ["--forced", "neutral"], "--forced has no effect here"),
+        ("E<> P.There", ["--priorities", "keep"], "--priorities has no effect here"),
+        ("E<> P.There", ["--seed", "3"], "--seed has no effect without --search random"),
+        ("control: A<> P.There", ["--max-plans", "3"], "--max-plans has no effect without"),
+        ("control: A<> P.There", ["--rank", "rolls"], "--rank has no effect without --plans"),
+    ],
+)
+def test_options_without_an_effect_are_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, query: str, options: list[str], said: str
+) -> None:
+    path = tmp_path / "game.xta"
+    path.write_text(GAME)
+    _, err = check_run(capsys, 0, path, "--query", query, *options)
+    assert f"note: {said}" in err
+    _, err = check_run(capsys, 0, path, "--query", query)
+    assert err == ""
+
+
+@pytest.mark.parametrize(
+    ("query", "option", "why"),
+    [
+        ("E<> P.There", "--strategy", "no answer has a strategy"),
+        ("E<> P.There", "--controller", "no answer has a strategy"),
+        ("control: A<> P.There", "--trace", "no answer has a trace"),
+        ("control: A<> P.There", "--certificate", "only an E<>"),
+        ("E<> P.There", "--plans", "plans are listed for control: A<>"),
+        ("control: A[] not P.Lost", "--plans", "plans are listed for control: A<>"),
+    ],
+)
+def test_files_that_are_not_written_are_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, query: str, option: str, why: str
+) -> None:
+    path = tmp_path / "game.xta"
+    path.write_text(GAME)
+    target = tmp_path / "target.json"
+    _, err = check_run(capsys, 0, path, "--query", query, option, target)
+    assert f"note: {option}: nothing was written: {why}" in err
+    assert not target.exists()
+    target.write_text("old")
+    _, err = check_run(capsys, 0, path, "--query", query, option, target)
+    assert f"nothing was written, {target} is as it was" in err
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "control: A[] not P.Lost",
+        "control: A[] (not P.Lost && A<> P.There)",
+        "control_t*: A<> P.There",
+        "E<> control: A<> P.There",
+        "control: A<> P.There under Safe",
+    ],
+)
+def test_games_without_plans_say_so(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, query: str
+) -> None:
+    path = tmp_path / "game.xta"
+    path.write_text(GAME)
+    safe = ["--query", "strategy Safe = control: A[] not P.Lost"] if "under" in query else []
+    plans = tmp_path / "plans.json"
+    out, _ = check_run(capsys, 0, path, *safe, "--query", query, "--json", "--plans", plans)
+    assert "not under a strategy" in json.loads(out.splitlines()[-1])["message"]

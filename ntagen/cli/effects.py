@@ -1,0 +1,85 @@
+"""What `ntagen check` was told in vain: idle options, and files that nobody wrote."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+_SYMBOLIC_ONLY: Final = {
+    "threads": "--threads has no effect here: games take one thread",
+    "symmetry": "--symmetry has no effect here: games tell all members of scalar sets apart",
+    "partial_order": "--partial-order has no effect here: games take moves in all orders",
+    "search": "--search has no effect here: games are explored in an order of their own",
+    "wanted_trace": "--shortest and --fastest have no effect here: they choose among the runs of "
+    "symbolic queries",
+}
+"""By parameter: what is said if all queries are games."""
+
+_GAMES_ONLY: Final = {
+    "forced": "--forced has no effect here: it is a rule of games, and no query is one",
+    "priorities": "--priorities has no effect here: only games and queries under a strategy may "
+    "ignore priorities; in others they count",
+}
+"""By parameter: what is said if no query is a game or under a strategy."""
+
+_NOTHING_WRITTEN: Final = {
+    "--trace": "no answer has a trace",
+    "--certificate": "only an E<> that is not satisfied and an A[] that is have a certificate",
+    "--strategy": "no answer has a strategy",
+    "--controller": "no answer has a strategy",
+    "--plans": "plans are listed for control: A<> and A[ U ] without `under`, if the environment "
+    "has no choices",
+}
+"""By option: why there may be nothing to write."""
+
+
+def is_game(query: str) -> bool:
+    """Whether a query asks who wins a game."""
+    return re.search(r"\bcontrol(_t\s*\*\s*(\([^:]*\))?)?\s*:", query) is not None
+
+
+def idle_options(
+    given: Collection[str], values: Mapping[str, object], queries: Sequence[str], *, ranks: bool
+) -> list[str]:
+    """A line for each option on the command line that makes no difference.
+
+    Args:
+        given: The names of the parameters that stand on the command line.
+        values: All parameters by name.
+        queries: The queries that are answered.
+        ranks: Whether plans would be ranked: those of environments are.
+    """
+    notes = []
+    if all(is_game(query) and not query.lstrip().startswith("E") for query in queries):
+        notes += [note for name, note in _SYMBOLIC_ONLY.items() if name in given]
+    elif values["wanted_trace"] and not (values["trace"] or values["verify"]):
+        notes.append("--shortest and --fastest have no effect without --trace")
+    if not any(is_game(query) or re.search(r"\bunder\b", query) for query in queries):
+        notes += [note for name, note in _GAMES_ONLY.items() if name in given]
+    if "seed" in given and values["search"] != "random":
+        notes.append("--seed has no effect without --search random")
+    if "max_plans" in given and not values["plans"]:
+        notes.append("--max-plans has no effect without --plans")
+    if "ranking" in given and not values["plans"]:
+        notes.append("--rank has no effect without --plans")
+    elif "ranking" in given and not ranks:
+        notes.append("--rank has no effect here: only plans of environments (.nsl) are ranked")
+    return notes
+
+
+def unwritten(wanted: Mapping[str, str | Path | None], written: Collection[str]) -> list[str]:
+    """A line for each output that was wanted and that no answer gave.
+
+    Args:
+        wanted: By option: where its output goes.
+        written: The options whose output was written.
+    """
+    notes = []
+    for option, target in wanted.items():
+        if target is None or option in written:
+            continue
+        old = "" if str(target) == "-" or not Path(target).exists() else f", {target} is as it was"
+        notes.append(f"{option}: nothing was written{old}: {_NOTHING_WRITTEN[option]}")
+    return notes
