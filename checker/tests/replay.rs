@@ -240,6 +240,36 @@ fn stopped_clocks_have_exact_times() {
     }
 }
 
+/// A loop closes where the clocks have the values again that they had; one that is never set, or counts only above a constant, does not
+/// keep it open.
+#[test]
+fn runs_without_end_and_values_are_sure_beside_stopped_clocks() {
+    let mut model = model(
+        "clock x, y, z, total;
+         process P() { state L { x < 3 && z' == 0 }, M { y <= 5 && x' == 0 }; init L;
+           trans L -> L { guard x > 1; assign x = 0, y = 1; }, L -> M { guard y > 2 && total > 2; }, M -> L { assign x = 0, y = 0; }; }
+         system P;",
+    );
+    let (yes, no) = (Verdict::Satisfied, Verdict::NotSatisfied);
+    for (query, verdict) in [
+        ("E[] y < 3", yes),
+        ("E[] P.L && y <= 2", no),
+        ("A<> P.M", no),
+        ("P.L --> P.M", no),
+        ("P.M --> P.L || y > 3", yes),
+        ("sup: y", yes),
+        ("inf{P.M}: total", Verdict::Maybe),
+        ("sup{z > 0}: y", yes),
+    ] {
+        let answer = answer(&mut model, query);
+        let (values, message) = (answer.value.as_ref(), &answer.message);
+        assert_eq!(answer.verdict, verdict, "{query}: {values:?} {message:?}");
+        if verdict != Verdict::Maybe && !answer.evidence.witnesses.is_empty() {
+            run_of(&answer);
+        }
+    }
+}
+
 /// The zones contain what no run reaches: that t is as large as the two clocks together, of which one stands still at a time.
 #[test]
 fn what_only_too_large_zones_have_stays_a_maybe() {

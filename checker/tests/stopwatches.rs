@@ -7,13 +7,15 @@
 //!
 //! `NETWORKS=20000 cargo test --release --test stopwatches` runs more of them than the usual number.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::fmt::Write as _;
+use std::time::Duration;
 
 use checker::engine::certificate::verify;
 use checker::engine::evidence::Proof;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};
+use checker::search::extremum::{Extreme, Extremes};
 use checker::verify::certificate::States;
 use checker::verify::{Semantics, State};
 
@@ -155,22 +157,51 @@ fn condition(random: &mut Random) -> String {
 }
 
 /// States that are met by moves and waits, not necessarily all.
-fn walk(semantics: &Semantics<'_>) -> Vec<State> {
-    let Ok(start) = semantics.initial() else {
-        return Vec::new();
-    };
-    let mut seen = HashSet::from([start.clone()]);
-    let mut met = vec![start];
-    let mut next_open = 0;
-    while next_open < met.len() && met.len() < LONGEST_WALK {
-        let state = met[next_open].clone();
-        next_open += 1;
+struct Walk<'s> {
+    semantics: &'s Semantics<'s>,
+    states: Vec<State>,
+    /// By state: where moves and waits lead, as far as the walk went on from there.
+    next: Vec<Vec<usize>>,
+}
+
+impl Walk<'_> {
+    fn holds(&self, predicate: &Predicate) -> Vec<bool> {
+        let holds = |state| self.semantics.holds(predicate, state);
+        let states = self.states.iter();
+        states
+            .map(|state| holds(state).expect("it can be evaluated"))
+            .collect()
+    }
+
+    /// The states from which a run of the walk stays in some for ever.
+    fn staying(&self, keep: &[bool]) -> Vec<bool> {
+        let mut staying = keep.to_vec();
+        loop {
+            let goes_on = |index: &usize| self.next[*index].iter().any(|&next| staying[next]);
+            let staying_on = |index| staying[index] && goes_on(&index);
+            let less: Vec<bool> = (0..keep.len()).map(staying_on).collect();
+            if less == staying {
+                return staying;
+            }
+            staying = less;
+        }
+    }
+}
+
+fn walk<'s>(semantics: &'s Semantics<'s>) -> Option<Walk<'s>> {
+    let start = semantics.initial().ok()?;
+    let mut index = HashMap::from([(start.clone(), 0)]);
+    let mut states = vec![start];
+    let mut arcs = Vec::new();
+    while arcs.len() < states.len() && states.len() < LONGEST_WALK {
+        let state = states[arcs.len()].clone();
         let moves = semantics.moves(&state).expect("guards do not fail");
         let successors = semantics.successors(&state).expect("updates do not fail");
         let mut next: Vec<State> = successors.into_iter().map(|(_, target)| target).collect();
         if !semantics.is_time_stopped(&state, &moves) {
             next.push(semantics.after(&state, 1).expect("rates are 0 or 1"));
         }
+        let mut targets = Vec::new();
         for state in next {
             let is_near = state
                 .clocks
@@ -179,12 +210,23 @@ fn walk(semantics: &Semantics<'_>) -> Vec<State> {
             let is_valid = semantics
                 .invariants_hold(&state)
                 .expect("invariants do not fail");
-            if is_near && is_valid && seen.insert(state.clone()) {
-                met.push(state);
+            if is_near && is_valid {
+                let count = states.len();
+                let target = *index.entry(state.clone()).or_insert(count);
+                targets.push(target);
+                if target == count {
+                    states.push(state);
+                }
             }
         }
+        arcs.push(targets);
     }
-    met
+    arcs.resize(states.len(), Vec::new());
+    Some(Walk {
+        semantics,
+        states,
+        next: arcs,
+    })
 }
 
 /// Whether a state lies in one of the zones of a certificate.
@@ -212,6 +254,8 @@ fn ask(model: &mut LoadedModel, text: &str, query: &str) -> Answer {
         code: CodeEngine::Interpreter,
         limits: Limits {
             states: Some(MOST_STATES),
+            // A greatest value beyond all constants is followed far.
+            timeout: Some(Duration::from_secs(1)),
             ..Limits::default()
         },
         runs: true,
@@ -223,10 +267,13 @@ fn ask(model: &mut LoadedModel, text: &str, query: &str) -> Answer {
         .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
 }
 
-fn compiled(model: &mut LoadedModel, query: &str) -> QueryKind {
+fn goal_of(model: &mut LoadedModel, query: &str) -> Predicate {
     let text = model.add_query(query);
     let (query, _) = model.compile(text.span).expect("the query is right");
-    query.kind
+    match query.kind {
+        QueryKind::Reachable(goal) => goal,
+        other => panic!("{other:?}"),
+    }
 }
 
 /// A certificate with something missing.
@@ -248,11 +295,23 @@ fn mutilated(random: &mut Random, states: &[States]) -> Vec<States> {
     states
 }
 
-/// How many certificates there were, and how many of them the check passed.
-#[derive(Default)]
-struct Certificates {
-    made: u64,
+/// What there was.
+#[derive(Debug, Default)]
+struct Tally {
+    certificates: u64,
     verified: u64,
+    sure: u64,
+    doubtful: u64,
+}
+
+impl Tally {
+    fn count(&mut self, verdict: Verdict) {
+        self.sure += u64::from(matches!(
+            verdict,
+            Verdict::Satisfied | Verdict::NotSatisfied
+        ));
+        self.doubtful += u64::from(verdict == Verdict::Maybe);
+    }
 }
 
 fn check_certificate(
@@ -260,16 +319,15 @@ fn check_certificate(
     (model, text): (&LoadedModel, &str),
     (query, goal): (&str, &Predicate),
     states: &[States],
-    met: &[State],
-) -> bool {
-    let network = model.network();
-    let semantics = Semantics::new(network, TICKS);
+    walk: &Walk<'_>,
+    tally: &mut Tally,
+) {
+    let is_met = walk.holds(goal);
     let check = |states: &[States]| {
-        let checked = verify(network, states, goal);
+        let checked = verify(model.network(), states, goal);
         if checked.holds == Some(true) {
-            for state in met {
+            for (state, is_met) in walk.states.iter().zip(&is_met) {
                 assert!(is_inside(states, state), "{query}: {state:?}\n{text}");
-                let is_met = semantics.holds(goal, state).expect("it can be evaluated");
                 assert!(!is_met, "{query}: {state:?}\n{text}");
             }
         }
@@ -285,45 +343,92 @@ fn check_certificate(
         "{query}: {:?}\n{text}",
         checked.lines
     );
-    checked.holds == Some(true)
+    tally.certificates += 1;
+    tally.verified += u64::from(checked.holds == Some(true));
 }
 
-fn check_network(random: &mut Random, certificates: &mut Certificates) {
+/// Values are at least as far out as those that were met.
+fn check_values(
+    (model, text): (&mut LoadedModel, &str),
+    walk: &Walk<'_>,
+    (p, counting): (&str, &[bool]),
+    clock: usize,
+    is_exact: bool,
+) -> Verdict {
+    let query = format!("bounds{{{p}}}: {}", CLOCKS[clock]);
+    let answer = ask(model, text, &query);
+    let Some(values) = answer.value else {
+        return answer.verdict;
+    };
+    let Extremes { least, greatest } = values.items[0];
+    let met = walk
+        .states
+        .iter()
+        .zip(counting)
+        .filter(|(_, counts)| **counts);
+    for (state, _) in met {
+        let value = state.clocks[1 + clock];
+        let is_within = |extreme: Option<Extreme>, is_least: bool| match extreme {
+            None => false,
+            Some(Extreme::Infinite) => true,
+            Some(Extreme::Value { value: limit, .. }) if is_least => {
+                i64::from(limit) * TICKS <= value
+            }
+            Some(Extreme::Value { value: limit, .. }) => value <= i64::from(limit) * TICKS,
+        };
+        assert!(
+            !is_exact || is_within(least, true) && is_within(greatest, false),
+            "{query}: {values:?}, met {state:?}\n{text}"
+        );
+    }
+    answer.verdict
+}
+
+fn check_network(random: &mut Random, tally: &mut Tally) {
     let text = network(random);
     let mut model = load(&text);
-    let met = walk(&Semantics::new(model.network(), TICKS));
-    if met.is_empty() {
+    let (p, q) = (condition(random), condition(random));
+    let predicates = [&p, &q].map(|one| goal_of(&mut model, &format!("E<> {one}")));
+    // Code of queries is part of the network.
+    let network = model.network().clone();
+    let semantics = Semantics::new(&network, TICKS);
+    let Some(walk) = walk(&semantics) else {
         return;
-    }
-    let has_meta = text.contains("meta");
-    let p = condition(random);
-    let query = format!("E<> {p}");
-    let answer = ask(&mut model, &text, &query);
-    let QueryKind::Reachable(goal) = compiled(&mut model, &query) else {
-        panic!("{query}");
     };
-    let semantics = Semantics::new(model.network(), TICKS);
-    let is_met = met
-        .iter()
-        .any(|state| semantics.holds(&goal, state).expect("it can be evaluated"));
-    match answer.verdict {
-        Verdict::NotSatisfied => assert!(!is_met || has_meta, "{query}\n{text}"),
-        Verdict::Satisfied => {
-            let run = &answer.evidence.witnesses[0].run;
-            assert!(
-                matches!(run, Some(Proof::Replayed(..))),
-                "{query}: {run:?}\n{text}"
-            );
+    let [holds_p, holds_q] = [0, 1].map(|index| walk.holds(&predicates[index]));
+    let avoiding: Vec<bool> = holds_q.iter().map(|holds| !holds).collect();
+    let avoiding = walk.staying(&avoiding);
+    let mut is_open = holds_p.iter().zip(&avoiding);
+    let (no, yes) = (Verdict::NotSatisfied, Verdict::Satisfied);
+    // Which of two states that differ in a `meta` variable is kept may decide.
+    let is_exact = !text.contains("meta");
+    for (query, is_met, contradiction) in [
+        (format!("E<> {p}"), holds_p.contains(&true), no),
+        (format!("E[] {p}"), walk.staying(&holds_p)[0], no),
+        (format!("A<> {q}"), avoiding[0], yes),
+        (
+            format!("{p} --> {q}"),
+            is_open.any(|(p, avoiding)| *p && *avoiding),
+            yes,
+        ),
+    ] {
+        let answer = ask(&mut model, &text, &query);
+        tally.count(answer.verdict);
+        let is_wrong = is_met && is_exact && answer.verdict == contradiction;
+        assert!(!is_wrong, "{query}: {:?}\n{text}", answer.verdict);
+        for witness in &answer.evidence.witnesses {
+            let is_right = !matches!(witness.run, Some(Proof::Violated(..) | Proof::Impossible));
+            assert!(is_right, "{query}: {:?}\n{text}", witness.run);
         }
-        _ => {}
+        if let Some(certificate) = &answer.evidence.certificate {
+            let subject = (&model, text.as_str());
+            let goal = (query.as_str(), &predicates[0]);
+            check_certificate(random, subject, goal, &certificate.states, &walk, tally);
+        }
     }
-    if let Some(certificate) = &answer.evidence.certificate {
-        certificates.made += 1;
-        let subject = (&model, text.as_str());
-        let verified =
-            check_certificate(random, subject, (&query, &goal), &certificate.states, &met);
-        certificates.verified += u64::from(verified);
-    }
+    let clock = random.below(CLOCKS.len());
+    let verdict = check_values((&mut model, &text), &walk, (&p, &holds_p), clock, is_exact);
+    tally.count(verdict);
 }
 
 #[test]
@@ -332,17 +437,11 @@ fn nothing_that_a_walk_meets_contradicts_an_answer() {
         number.parse().expect("a number of networks")
     });
     let mut random = Random(0x57_0b_3a_7c_11_e5);
-    let mut certificates = Certificates::default();
+    let mut tally = Tally::default();
     for _ in 0..networks {
-        check_network(&mut random, &mut certificates);
+        check_network(&mut random, &mut tally);
     }
-    let Certificates { made, verified } = certificates;
-    assert!(
-        made > networks / 10,
-        "{made} certificates of {networks} networks"
-    );
-    assert!(
-        verified > made * 9 / 10,
-        "{verified} of {made} certificates verified"
-    );
+    assert!(tally.certificates > networks / 10, "{tally:?}");
+    assert!(tally.verified > tally.certificates * 9 / 10, "{tally:?}");
+    assert!(tally.doubtful < tally.sure / 10, "{tally:?}");
 }

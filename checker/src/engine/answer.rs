@@ -441,7 +441,10 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         let is_wanted = self.has_runs || self.is_doubtful;
         if is_wanted && is_comparable && !witness.trace.states.is_empty() {
             let network = self.symbolic.stepper.network();
-            let proof = evidence::prove(self.symbolic, network, &witness.trace, ending, shows);
+            let is_doubtful = self.is_doubtful || self.symbolic.is_approximate();
+            let subject = (ending, shows);
+            let trace = &witness.trace;
+            let proof = evidence::prove(self.symbolic, network, trace, subject, is_doubtful);
             is_replayed = matches!(proof, Proof::Replayed(..));
             witness.run = self.has_runs.then_some(proof);
         }

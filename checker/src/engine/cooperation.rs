@@ -74,8 +74,8 @@ fn way(zones: &mut Symbolic<'_>, winning: &Winning, trace: &Trace) -> Result<Way
     minimal::for_each_minimal(won.bounds(), won.dimension(), |one| constraints.push(one));
     let always = Predicate::Constant(true);
     let finish = Finish::Holds(&always, constraints);
-    let run =
-        evidence::timed(zones, &trace.moves, None, finish, None).map_err(describe::missing_text)?;
+    let wanted = evidence::wanted(&trace.moves, finish);
+    let run = evidence::timed(zones, &wanted).map_err(describe::missing_text)?;
     Ok(to_way(&run))
 }
 

@@ -375,6 +375,7 @@ pub fn witness_text(network: &Network, witness: &Witness) -> String {
 pub fn missing_text(missing: Missing) -> String {
     match missing {
         Missing::Approximate => "the zones are too large, the moves may not be possible".to_owned(),
+        Missing::Meta => "states that differ in meta variables alone count as the same, but other moves may be possible in them".to_owned(),
         Missing::TooHard => "too many ways to choose between".to_owned(),
         Missing::OpenLoop => "the loop was not found to close exactly".to_owned(),
         Missing::Failed(_) => "the model fails on the way".to_owned(),

@@ -10,7 +10,7 @@ use crate::ir::{Measure, Network, Predicate};
 use crate::network::{Failure, Part, Symbolic};
 use crate::search::liveness::Ending;
 use crate::search::reach::Trace;
-use crate::search::schedule::{self, Finish, Schedule, Stays, Unscheduled, Wanted};
+use crate::search::schedule::{self, Closing, Finish, Schedule, Stays, Unscheduled, Wanted};
 use crate::verify::replay::{self, Claim, Coverage, End, Moment, Outcome, Run, Shown, Step};
 use crate::verify::{self, State, Violation};
 use crate::zones::dbm::Constraint;
@@ -81,6 +81,8 @@ pub enum Proof {
 pub enum Missing {
     /// The zones of the trace are too large, and its moves are not possible in this order.
     Approximate,
+    /// The moves are not possible with the values that `meta` variables have on this way.
+    Meta,
     /// Too many alternatives.
     TooHard,
     /// No two states on the loop were found that lie in the same region.
@@ -121,15 +123,18 @@ pub struct Takes<'q> {
     pub deadline: Option<(i32, u32)>,
 }
 
-/// Finds times for a trace and replays it.
+/// Finds times for a trace and replays it. If `is_doubtful`, there may be none.
 pub fn prove(
     symbolic: &mut Symbolic<'_>,
     network: &Network,
     trace: &Trace,
-    ending: Option<Ending>,
-    shows: Shows<'_>,
+    (ending, shows): (Option<Ending>, Shows<'_>),
+    is_doubtful: bool,
 ) -> Proof {
     let result = match (shows, ending) {
+        (Shows::Stays(stays), Some(Ending::Loop(start))) if network.features.stopwatches => {
+            closed(symbolic, network, trace, start, stays)
+        }
         (Shows::Stays(stays), Some(Ending::Loop(start))) => {
             looped(symbolic, network, trace, start, stays)
         }
@@ -139,21 +144,43 @@ pub fn prove(
             } else {
                 Finish::Stuck
             };
-            timed(symbolic, &trace.moves, Some(stays), finish, None)
+            timed(
+                symbolic,
+                &Wanted {
+                    stays: Some(stays),
+                    ..wanted(&trace.moves, finish)
+                },
+            )
         }
-        (Shows::Possible, _) => timed(symbolic, &trace.moves, None, Finish::Entry, None),
+        (Shows::Possible, _) => timed(symbolic, &wanted(&trace.moves, Finish::Entry)),
         (Shows::Reaches(goal, deadline), _) => {
             let finish = Finish::Holds(goal, Vec::new());
-            timed(symbolic, &trace.moves, None, finish, deadline)
+            timed(
+                symbolic,
+                &Wanted {
+                    deadline,
+                    ..wanted(&trace.moves, finish)
+                },
+            )
         }
         (Shows::Takes(takes), _) => {
             let finish = Finish::Holds(takes.predicate, takes.constraints.to_vec());
-            timed(symbolic, &trace.moves, None, finish, takes.deadline)
+            timed(
+                symbolic,
+                &Wanted {
+                    deadline: takes.deadline,
+                    ..wanted(&trace.moves, finish)
+                },
+            )
         }
     };
+    let has_meta = network.layout.variables.iter().any(|one| one.meta);
     let run = match result {
         Ok(run) => run,
-        Err(Missing::Approximate) if !symbolic.is_approximate() => return Proof::Impossible,
+        Err(Missing::Approximate) if !is_doubtful && has_meta => {
+            return Proof::Missing(Missing::Meta);
+        }
+        Err(Missing::Approximate) if !is_doubtful => return Proof::Impossible,
         Err(missing) => return Proof::Missing(missing),
     };
     let always = Predicate::Constant(true);
@@ -182,21 +209,20 @@ impl From<Unscheduled> for Missing {
     }
 }
 
-/// A run with the earliest times.
-pub(super) fn timed(
-    symbolic: &mut Symbolic<'_>,
-    moves: &[Vec<Part>],
-    stays: Option<Stays<'_>>,
-    finish: Finish<'_>,
-    deadline: Option<(i32, u32)>,
-) -> Result<Run, Missing> {
-    let wanted = Wanted {
+/// A run of these moves that ends so, and of which nothing else is wanted.
+pub(super) fn wanted<'t>(moves: &'t [Vec<Part>], finish: Finish<'t>) -> Wanted<'t> {
+    Wanted {
         moves,
-        stays,
+        stays: None,
         finish,
-        deadline,
-    };
-    let schedule = schedule::schedule(symbolic, &wanted)?;
+        deadline: None,
+        closing: None,
+    }
+}
+
+/// A run with the earliest times.
+pub(super) fn timed(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<Run, Missing> {
+    let schedule = schedule::schedule(symbolic, wanted)?;
     let Schedule {
         ticks_per_unit,
         moves: times,
@@ -204,14 +230,17 @@ pub(super) fn timed(
         end,
     } = schedule;
     let mut before = 0;
-    let steps = moves.iter().zip(&times).map(|(parts, &time)| Step {
+    let steps = wanted.moves.iter().zip(&times).map(|(parts, &time)| Step {
         wait: time - std::mem::replace(&mut before, time),
         parts: parts.iter().map(|&one| verify::Part::from(one)).collect(),
     });
     let steps = steps.collect();
     let entered = |state: usize| state.checked_sub(1).map_or(0, |last| times[last]);
     let last = end - entered(times.len());
-    let from_state = stays.and_then(|stays| stays.from).map_or(0, |from| from.0);
+    let from_state = wanted
+        .stays
+        .and_then(|stays| stays.from)
+        .map_or(0, |from| from.0);
     Ok(Run {
         ticks_per_unit,
         steps,
@@ -225,6 +254,52 @@ pub(super) fn timed(
             wait: from - entered(from_state),
         },
     })
+}
+
+/// Rounds of a loop, at most, before the one in which a run with stopwatches closes it.
+const MOST_EARLIER_ROUNDS: usize = 3;
+
+/// A run that ends in a loop of a network with stopwatches: after some rounds of the loop of the trace, one more comes back to the same
+/// values.
+fn closed(
+    symbolic: &mut Symbolic<'_>,
+    network: &Network,
+    trace: &Trace,
+    start: usize,
+    stays: Stays<'_>,
+) -> Result<Run, Missing> {
+    let (stem, cycle) = trace.moves.split_at(start);
+    let open = stays.from.map(|(_, open)| open);
+    let predicates: Vec<&Predicate> = open.into_iter().chain([stays.keep]).collect();
+    let above = replay::indifferent_above(network, &predicates);
+    let mut moves = [stem, cycle].concat();
+    for round in 0..=MOST_EARLIER_ROUNDS {
+        let head = start + round * cycle.len();
+        let closing = Some(Closing { head, above });
+        let run = timed(
+            symbolic,
+            &Wanted {
+                stays: Some(stays),
+                closing,
+                ..wanted(&moves, Finish::Entry)
+            },
+        );
+        match run {
+            Ok(mut run)
+                if run.from
+                    <= (Moment {
+                        state: head,
+                        wait: 0,
+                    }) =>
+            {
+                run.end = End::Loop(head);
+                return Ok(run);
+            }
+            Ok(_) | Err(Missing::Approximate) => moves.extend_from_slice(cycle),
+            Err(missing) => return Err(missing),
+        }
+    }
+    Err(Missing::OpenLoop)
 }
 
 /// A run that ends in a loop: the loop of the trace, taken as often as it needs to close.
@@ -244,7 +319,13 @@ fn looped(
         for _ in 0..rounds {
             moves.extend_from_slice(cycle);
         }
-        let mut run = timed(symbolic, &moves, Some(stays), Finish::Entry, None)?;
+        let mut run = timed(
+            symbolic,
+            &Wanted {
+                stays: Some(stays),
+                ..wanted(&moves, Finish::Entry)
+            },
+        )?;
         let replayed = replay::replay(network, &run, &Claim::Possible);
         let states = match replayed.map_err(Missing::NotCovered)? {
             Outcome::Replayed(states, _) => states,

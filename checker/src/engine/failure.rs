@@ -55,13 +55,9 @@ impl LoadedModel {
         if has_run && !is_timed && !witness.trace.states.is_empty() {
             let mut symbolic = self.symbolic();
             let network = self.network();
-            let run = evidence::prove(
-                &mut symbolic,
-                network,
-                &witness.trace,
-                None,
-                Shows::Possible,
-            );
+            let (trace, subject) = (&witness.trace, (None, Shows::Possible));
+            let is_doubtful = network.features.stopwatches;
+            let run = evidence::prove(&mut symbolic, network, trace, subject, is_doubtful);
             witness.run = Some(run);
         }
         witness

@@ -39,14 +39,14 @@ pub(super) fn extremum(
     );
     let mut evidence = Evidence::default();
     let mut values = None;
-    let verdict = match report.outcome {
+    let mut verdict = match report.outcome {
         Ok(extremum::Outcome::Found(items)) => {
             values = Some(Values {
                 least: question.least,
                 greatest: question.greatest,
                 items,
             });
-            found(report.is_approximate)
+            Verdict::Satisfied
         }
         Ok(extremum::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, trace)) => {
@@ -59,15 +59,25 @@ pub(super) fn extremum(
     let mut message = values
         .as_ref()
         .and_then(|values| remark(values, question.items));
+    // Zones that are too large have all that is there; a value is sure if a run has it, and so is that there is none.
     if let Some(values) = &values
-        && options.runs
-        && verdict == Verdict::Satisfied
+        && (options.runs || report.is_approximate)
     {
-        let (witnesses, why_not_best) =
-            value_witnesses(subject, question, values, &mut zones, options, watch);
-        evidence.witnesses = witnesses;
-        let remarks: Vec<String> = message.into_iter().chain(why_not_best).collect();
-        message = (!remarks.is_empty()).then(|| remarks.join("; "));
+        let mut runs = Runs {
+            subject,
+            question,
+            options,
+            witnesses: Vec::new(),
+            why_not_best: None,
+            are_sure: true,
+        };
+        runs.add_all(values, &mut zones, watch);
+        verdict = found(report.is_approximate && !runs.are_sure);
+        if options.runs {
+            evidence.witnesses = runs.witnesses;
+            let remarks: Vec<String> = message.into_iter().chain(runs.why_not_best).collect();
+            message = (!remarks.is_empty()).then(|| remarks.join("; "));
+        }
     }
     let mut answer = new_answer(verdict, evidence, report.counters);
     answer.message = message;
@@ -75,83 +85,106 @@ pub(super) fn extremum(
     answer
 }
 
-/// A run to a state with each of the values, and why some are any ones where the best were wanted; none for a clock without limit, and
-/// none beyond a limit of the search.
-fn value_witnesses<'a>(
-    subject: Subject<'_>,
-    question: Question<'_>,
-    values: &Values,
-    zones: &mut dyn FnMut(&[ClockAtom]) -> Symbolic<'a>,
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> (Vec<Witness>, Option<String>) {
-    let mut found = Vec::new();
-    let mut why_not_best = None;
-    for (index, ((measure, text), item)) in question.items.iter().zip(&values.items).enumerate() {
-        for (extreme, is_greatest) in [(item.least, false), (item.greatest, true)] {
-            let Some(Extreme::Value { value, is_reached }) = extreme else {
-                continue;
-            };
-            let mut taking = Taking {
-                predicate: question.predicate,
-                measure,
-                value,
-                is_greatest,
-                is_reached,
-            };
-            let mut symbolic = zones(&taking.atoms());
-            let report = reach::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
-            let Ok(Outcome::Found(trace)) = report.outcome else {
-                return (found, why_not_best);
-            };
-            let atoms = taking.atoms();
-            let sought = Sought {
-                target: &mut taking,
-                predicate: question.predicate,
-                atoms,
-            };
-            let (trace, deadline) = match best(subject, &mut symbolic, sought, options, watch) {
-                Ok(None) => (trace, None),
-                Ok(Some((best, deadline))) => (best, deadline),
-                Err(reason) => {
-                    why_not_best = Some(not_the_best(&reason));
-                    (trace, None)
+/// Runs to states with the values that were found.
+struct Runs<'q> {
+    subject: Subject<'q>,
+    question: Question<'q>,
+    options: &'q Options,
+    witnesses: Vec<Witness>,
+    /// Why some are any ones where the best were wanted.
+    why_not_best: Option<String>,
+    /// Whether each value is reached, by a run that was replayed.
+    are_sure: bool,
+}
+
+impl Runs<'_> {
+    /// Adds a run to a state with each of the values; none for a clock without limit, and none beyond a limit of the search.
+    fn add_all<'a>(
+        &mut self,
+        values: &Values,
+        zones: &mut dyn FnMut(&[ClockAtom]) -> Symbolic<'a>,
+        watch: &mut LimitWatch,
+    ) {
+        for (index, item) in values.items.iter().enumerate() {
+            for (extreme, is_greatest) in [(item.least, false), (item.greatest, true)] {
+                match extreme {
+                    None => {}
+                    Some(Extreme::Infinite) => self.are_sure = false,
+                    Some(Extreme::Value { value, is_reached }) => {
+                        let taking = Taking {
+                            predicate: self.question.predicate,
+                            measure: &self.question.items[index].0,
+                            value,
+                            is_greatest,
+                            is_reached,
+                        };
+                        let verdict = self.add(index, taking, zones(&taking.atoms()), watch);
+                        self.are_sure &= is_reached && verdict == Some(Verdict::Satisfied);
+                        if verdict.is_none() {
+                            return;
+                        }
+                    }
                 }
-            };
-            let last = trace.states.last().map(|(words, _)| words.clone());
-            let mut words = last.unwrap_or_default();
-            let Ok(Some(constraints)) = taking.constraints(&mut symbolic, &mut words) else {
-                return (found, why_not_best);
-            };
-            let shown = Shown {
-                value: value.into(),
-                is_greatest,
-                is_reached,
-            };
-            let shows = Shows::Takes(Takes {
-                item: index,
-                measure,
-                predicate: question.predicate,
-                shown,
-                constraints: &constraints,
-                deadline,
-            });
-            let mut witnesses = Witnesses::new(&mut symbolic, options);
-            witnesses.add(trace, None, shows);
-            let which = if is_greatest { "greatest" } else { "least" };
-            found.extend(
-                witnesses
-                    .into_evidence()
-                    .witnesses
-                    .into_iter()
-                    .map(|witness| Witness {
-                        title: Some(format!("{which} {text}")),
-                        ..witness
-                    }),
-            );
+            }
         }
     }
-    (found, why_not_best)
+
+    /// Adds a run to a state with a value; the verdict on it, or `None` beyond a limit.
+    fn add(
+        &mut self,
+        item: usize,
+        mut taking: Taking<'_>,
+        mut symbolic: Symbolic<'_>,
+        watch: &mut LimitWatch,
+    ) -> Option<Verdict> {
+        let options = self.options;
+        let report = reach::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
+        let Ok(Outcome::Found(trace)) = report.outcome else {
+            return None;
+        };
+        let atoms = taking.atoms();
+        let sought = Sought {
+            target: &mut taking,
+            predicate: self.question.predicate,
+            atoms,
+        };
+        let (trace, deadline) = match best(self.subject, &mut symbolic, sought, options, watch) {
+            Ok(None) => (trace, None),
+            Ok(Some((best, deadline))) => (best, deadline),
+            Err(reason) => {
+                self.why_not_best = Some(not_the_best(&reason));
+                (trace, None)
+            }
+        };
+        let mut words = trace.states.last()?.0.clone();
+        let constraints = taking.constraints(&mut symbolic, &mut words).ok()??;
+        let shows = Shows::Takes(Takes {
+            item,
+            measure: taking.measure,
+            predicate: taking.predicate,
+            shown: Shown {
+                value: taking.value.into(),
+                is_greatest: taking.is_greatest,
+                is_reached: taking.is_reached,
+            },
+            constraints: &constraints,
+            deadline,
+        });
+        let mut witnesses = Witnesses::new(&mut symbolic, options);
+        let verdict = witnesses.add(trace, None, shows);
+        let which = if taking.is_greatest {
+            "greatest"
+        } else {
+            "least"
+        };
+        let text = &self.question.items[item].1;
+        let found = witnesses.into_evidence().witnesses.into_iter();
+        self.witnesses.extend(found.map(|witness| Witness {
+            title: Some(format!("{which} {text}")),
+            ..witness
+        }));
+        Some(verdict)
+    }
 }
 
 /// What the numbers alone do not say: that no state counts, or that a value is not reached.

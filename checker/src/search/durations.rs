@@ -184,6 +184,11 @@ impl Durations {
 
     /// Whether the durations at hand satisfy a bound.
     pub(super) fn is_met(&self, bound: &LinearBound) -> Result<bool, TooHard> {
+        Ok(!self.left_side(bound)?.is_less(amount(bound.least))?)
+    }
+
+    /// The sum that a bound is about.
+    fn left_side(&self, bound: &LinearBound) -> Result<Amount, TooHard> {
         let mut sum = Amount::ZERO;
         for &wait in &bound.plus {
             sum = sum.plus(self.value[self.waits[wait]])?;
@@ -191,7 +196,7 @@ impl Durations {
         for &wait in &bound.minus {
             sum = sum.minus(self.value[self.waits[wait]])?;
         }
-        Ok(!sum.is_less(amount(bound.least))?)
+        Ok(sum)
     }
 
     /// Adds a bound and finds durations that satisfy all; returns false if there are none, and then they mean nothing until it is undone.
@@ -312,9 +317,10 @@ impl Durations {
         Ok(())
     }
 
-    /// The durations as whole numbers of ticks, and how many ticks make a unit.
-    pub(super) fn in_ticks(&self) -> Result<(Vec<i64>, i64), TooHard> {
-        let epsilon = self.epsilon()?;
+    /// The durations as whole numbers of ticks, and how many ticks make a unit. They satisfy what was required, and of the other bounds
+    /// those that the durations at hand do.
+    pub(super) fn in_ticks(&self, others: &[LinearBound]) -> Result<(Vec<i64>, i64), TooHard> {
+        let epsilon = self.epsilon(others)?;
         let mut durations = Vec::new();
         let mut ticks_per_unit = 1_i128;
         for &wait in &self.waits {
@@ -341,11 +347,16 @@ impl Durations {
         Ok((ticks, i64::try_from(ticks_per_unit).map_err(|_| TooHard)?))
     }
 
-    /// A number for the infinitesimal that keeps every variable at or above its least value.
-    fn epsilon(&self) -> Result<Fraction, TooHard> {
+    /// A number for the infinitesimal that keeps every variable at or above its least value, and the sums of other bounds above theirs.
+    fn epsilon(&self, others: &[LinearBound]) -> Result<Fraction, TooHard> {
         let mut epsilon = Fraction::ONE;
-        for (value, least) in self.value.iter().zip(&self.least) {
-            let Some(least) = *least else { continue };
+        let variables = self.value.iter().zip(&self.least);
+        let required = variables.filter_map(|(value, least)| Some(Ok((*value, (*least)?))));
+        let others = others
+            .iter()
+            .map(|bound| Ok((self.left_side(bound)?, amount(bound.least))));
+        for pair in required.chain(others) {
+            let (value, least) = pair?;
             let Amount(room, infinitesimals) = value.minus(least)?;
             if room.is_positive() && infinitesimals.over < 0 {
                 let most = room.times(infinitesimals.negated().inverse()?)?;
@@ -427,7 +438,7 @@ mod tests {
                 })
             };
             if is_possible {
-                let (ticks, per_unit) = durations.in_ticks().expect("numbers are small");
+                let (ticks, per_unit) = durations.in_ticks(&[]).expect("numbers are small");
                 assert!(ticks.iter().all(|&one| one >= 0), "{ticks:?}");
                 assert!(
                     is_met([ticks[0], ticks[1], ticks[2]], per_unit),
@@ -460,7 +471,7 @@ mod tests {
         assert_eq!(durations.require(&bound(&[wait], &[], (4, 0))), Ok(false));
         assert_eq!(durations.undo(mark), Ok(()));
         assert_eq!(durations.require(&bound(&[wait], &[], (2, 1))), Ok(true));
-        let (ticks, per_unit) = durations.in_ticks().expect("numbers are small");
+        let (ticks, per_unit) = durations.in_ticks(&[]).expect("numbers are small");
         assert!(ticks[0] > 2 * per_unit && ticks[0] <= 3 * per_unit);
     }
 }

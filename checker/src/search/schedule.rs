@@ -70,7 +70,21 @@ pub struct Wanted<'t> {
     pub finish: Finish<'t>,
     /// When it ends at the latest; with 1, before one unit has passed since then.
     pub deadline: Option<(i32, u32)>,
+    /// On entry of which state all clocks have the values that they have on entry of the last, if it goes back there.
+    pub closing: Option<Closing>,
 }
+
+/// How a run comes back to a state of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Closing {
+    /// The index of the state.
+    pub head: usize,
+    /// Two values of a clock that are both above this one count as the same.
+    pub above: Option<i64>,
+}
+
+/// How the value of a clock came about: what it was set to, and the waits in which it ran since.
+type Value = (i64, Vec<usize>);
 
 /// Exact times of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,8 +125,14 @@ impl From<Failure> for Unscheduled {
 /// The earliest times of a run; if clocks stand still on the way, any times.
 pub fn schedule(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<Schedule, Unscheduled> {
     let mut plan = Plan::new(symbolic, Solver::Times(Times::new()))?;
-    let written = plan.write(wanted);
-    if plan.meets_stopped {
+    // Whether two values of a clock are the same is no question of distances.
+    let is_closing = wanted.closing.is_some();
+    let written = if is_closing {
+        Ok(())
+    } else {
+        plan.write(wanted)
+    };
+    if plan.meets_stopped || is_closing {
         let mut plan = Plan::new(symbolic, Solver::Durations(Durations::default()))?;
         plan.write(wanted)?;
         return plan.solve();
@@ -193,7 +213,13 @@ impl<'s, 'a> Plan<'s, 'a> {
         if let Some(Stays { from: None, keep }) = wanted.stays {
             self.stay_from(0, keep)?;
         }
+        let mut head = None;
         for state in 0..=wanted.moves.len() {
+            if let Some(closing) = wanted.closing
+                && closing.head == state
+            {
+                head = Some((self.values(), closing.above));
+            }
             if let Some(Stays {
                 from: Some((first, open)),
                 keep,
@@ -211,6 +237,9 @@ impl<'s, 'a> Plan<'s, 'a> {
                 self.take(event, parts)?;
             }
         }
+        if let Some((values, above)) = head {
+            self.close(&values, above);
+        }
         self.finish(&wanted.finish)?;
         if let Some((time, is_open)) = wanted.deadline {
             let time = i64::from(time) + i64::from(is_open);
@@ -221,6 +250,42 @@ impl<'s, 'a> Plan<'s, 'a> {
             })?;
         }
         Ok(())
+    }
+
+    /// The values of the clocks on entry of the state at hand.
+    fn values(&self) -> Vec<Value> {
+        let values = self.set.iter().zip(&self.ran);
+        values.map(|(set, ran)| (set.1, ran.clone())).collect()
+    }
+
+    /// Each clock has the value that it had before, or both are greater than a number.
+    fn close(&mut self, before: &[Value], above: Option<i64>) {
+        for ((old, ran_before), (new, ran)) in before.iter().zip(self.values()).skip(1) {
+            // new + ran - old - ran_before >= 0
+            let bound = |plus: &[usize], minus: &[usize], least: i64, strict: i64| {
+                let only = |waits: &[usize], others: &[usize]| -> Vec<usize> {
+                    let waits = waits.iter().copied();
+                    waits.filter(|wait| !others.contains(wait)).collect()
+                };
+                Limit::Linear(LinearBound {
+                    plus: only(plus, minus),
+                    minus: only(minus, plus),
+                    least: (least, strict),
+                })
+            };
+            let same = vec![
+                bound(&ran, ran_before, old - new, 0),
+                bound(ran_before, &ran, new - old, 0),
+            ];
+            let beyond = above.map(|above| {
+                vec![
+                    bound(&ran, &[], above - new, 1),
+                    bound(ran_before, &[], above - old, 1),
+                ]
+            });
+            self.alternatives
+                .push([same].into_iter().chain(beyond).collect());
+        }
     }
 
     /// From this event in the state at hand on the predicate stays.
@@ -519,7 +584,7 @@ impl<'s, 'a> Plan<'s, 'a> {
 
     fn solve(mut self) -> Result<Schedule, Unscheduled> {
         self.choose()?;
-        let (times, ticks_per_unit) = self.solver.in_ticks()?;
+        let (times, ticks_per_unit) = self.solver.in_ticks(&self.alternatives)?;
         let ticks = |event: usize| times[event];
         Ok(Schedule {
             ticks_per_unit,
@@ -641,8 +706,9 @@ impl Solver {
         Ok(true)
     }
 
-    /// The times of the events in ticks, and how many make a unit.
-    fn in_ticks(&self) -> Result<(Vec<i64>, i64), TooHard> {
+    /// The times of the events in ticks, and how many make a unit. They satisfy what was required, and of the alternatives those that the
+    /// times at hand do.
+    fn in_ticks(&self, alternatives: &[Alternatives]) -> Result<(Vec<i64>, i64), TooHard> {
         match self {
             Solver::Times(Times { least, .. }) => {
                 let greatest = least.iter().map(|time| time.1).max().unwrap_or(0);
@@ -651,7 +717,13 @@ impl Solver {
                 Ok((ticks.collect(), ticks_per_unit))
             }
             Solver::Durations(durations) => {
-                let (waits, ticks_per_unit) = durations.in_ticks()?;
+                let mut met = Vec::new();
+                for way in alternatives.iter().flatten() {
+                    if self.are_met(way)? {
+                        met.extend(way.iter().map(linear));
+                    }
+                }
+                let (waits, ticks_per_unit) = durations.in_ticks(&met)?;
                 let mut times = vec![0];
                 for wait in waits {
                     let before = times.last().copied().unwrap_or(0);

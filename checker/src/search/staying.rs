@@ -1,13 +1,14 @@
 //! How a run stays inside a predicate in one state.
 //!
 //! Where the predicate holds in a part of a zone only, that part is cut out exactly ([`crate::zones::future`]), so that a delay never
-//! crosses its outside. With stopped clocks the cut is left out where it takes more than zones, and every doubt counts as a run.
+//! crosses its outside. With stopped clocks it may, and beside two clocks that run a wait from which something is possible later may
+//! count as being stuck: every doubt is taken for a run, so that there being none is certain.
 
 use crate::ir::Predicate;
 use crate::network::{Extent, Failure, Moves, Symbolic};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::future::{self, Barriers};
-use crate::zones::{ClockSet, Federation, Zone};
+use crate::zones::{Bound, ClockSet, Federation, Zone};
 
 use super::liveness::Ending;
 
@@ -50,7 +51,7 @@ impl Inside {
                 outside
             }
         };
-        let passage = Passage::new(symbolic, words, whole, outside)?;
+        let passage = Passage::new(symbolic, keep, words, whole, outside)?;
         let mut inside = passage.reached(entry, is_running);
         inside.reduce();
         let end = passage.end(symbolic, words, &inside)?;
@@ -68,7 +69,7 @@ impl Inside {
 }
 
 /// The valuations of a state inside the predicate from which time can pass without limit, and those from which no wait leads to a
-/// move or out of the predicate. `whole` is what the invariants allow.
+/// move or out of the predicate; where clocks stand still, only such. `whole` is what the invariants allow.
 pub(super) fn endings(
     symbolic: &mut Symbolic<'_>,
     keep: &Predicate,
@@ -80,7 +81,8 @@ pub(super) fn endings(
     let inside = extent.to_federation(whole.bounds(), dimension);
     let mut outside = Federation::of_zone(dimension, whole.bounds());
     outside.subtract(&inside);
-    let passage = Passage::new(symbolic, words, whole, outside)?;
+    let mut passage = Passage::new(symbolic, keep, words, whole, outside)?;
+    passage.counts_doubts = false;
     let stuck = passage.stuck(symbolic, words, &inside)?;
     Ok((passage.waiting(&inside), stuck))
 }
@@ -91,31 +93,70 @@ struct Passage {
     whole: Zone,
     /// The part of it in which the predicate does not hold.
     outside: Federation,
+    /// Where what time leads to is looked for: the same, or where a clock stands still beside two that run all that the invariants allow;
+    /// and its part in which the predicate does not hold. A set of which no comparison cuts corners has an exact past there.
+    frame: Zone,
+    left: Federation,
     /// The part of it in which an urgent synchronisation or a restriction stops time.
     barriers: Barriers,
     may_delay: bool,
     stopped: ClockSet,
+    /// Whether a doubt counts as staying; else as leaving.
+    counts_doubts: bool,
 }
 
 impl Passage {
     fn new(
         symbolic: &mut Symbolic<'_>,
+        keep: &Predicate,
         words: &mut [i32],
         whole: Zone,
         outside: Federation,
     ) -> Result<Passage, Failure> {
         let may_delay = symbolic.may_delay(words)?;
+        let dimension = whole.dimension();
+        let stopped = symbolic.stopped(words)?;
+        let (mut frame, mut left) = (whole.clone(), outside.clone());
+        if has_crooked_pasts(&stopped, dimension) {
+            frame = Zone::universe(dimension);
+            frame.constrain_all(&symbolic.invariant(words)?.unwrap_or_default());
+            let inside = symbolic.extent(keep, words, frame.bounds())?;
+            left = Federation::of_zone(dimension, frame.bounds());
+            left.subtract(&inside.to_federation(frame.bounds(), dimension));
+        }
         Ok(Passage {
             barriers: if may_delay {
                 symbolic.barriers(words, whole.bounds())?
             } else {
                 Barriers::none(whole.dimension())
             },
-            stopped: symbolic.stopped(words)?,
+            stopped,
             whole,
             outside,
+            frame,
+            left,
             may_delay,
+            counts_doubts: true,
         })
+    }
+
+    /// The valuations from which time leads into a part of the frame; where that cannot be told, those of the part alone if doubts count
+    /// as staying, and else more.
+    fn past(&self, part: &Federation) -> Federation {
+        let dimension = part.dimension();
+        let mut past = part.clone();
+        if !self.counts_doubts || !has_crooked_pasts(&self.stopped, dimension) {
+            past.down(&self.stopped);
+            return past;
+        }
+        for zone in part.zones() {
+            if is_straight(zone, dimension, &self.stopped) {
+                let mut one = Federation::of_zone(dimension, zone);
+                one.down(&self.stopped);
+                past.unite(&one);
+            }
+        }
+        past
     }
 
     /// What delay inside the predicate reaches.
@@ -138,7 +179,8 @@ impl Passage {
 
     /// Whether the state is treated as if more runs stayed in it than do.
     fn is_coarse(&self) -> bool {
-        self.may_delay && !self.stopped.is_empty()
+        let is_crossed = !self.stopped.is_empty() && !self.outside.is_empty();
+        self.may_delay && (is_crossed || has_crooked_pasts(&self.stopped, self.whole.dimension()))
     }
 
     /// Why a run may end in the part that is reached, and from which valuations of it.
@@ -167,12 +209,9 @@ impl Passage {
             return Federation::empty(dimension);
         }
         let mut waiting = inside.clone();
-        if self.stopped.is_empty() {
-            let mut leaving = self.outside.clone();
-            leaving.unite(&self.barriers.stops);
-            leaving.down(&ClockSet::EMPTY);
-            waiting.subtract(&leaving);
-        }
+        let mut leaving = self.left.clone();
+        leaving.unite(&self.barriers.stops);
+        waiting.subtract(&self.past(&leaving));
         waiting
     }
 
@@ -186,7 +225,7 @@ impl Passage {
         let dimension = self.whole.dimension();
         let mut moves = Moves::default();
         symbolic.moves_within(words, self.whole.bounds(), &mut moves)?;
-        let mut exits = self.outside.clone();
+        let mut exits = self.left.clone();
         let mut target = words.to_vec();
         for one in moves.iter() {
             if !symbolic.is_enabled(one, self.whole.bounds())? {
@@ -194,21 +233,38 @@ impl Passage {
             }
             target.copy_from_slice(words);
             if let Some(effect) = symbolic.fire(one, &mut target)? {
-                exits.unite(&effect.enabled_part(self.whole.bounds(), dimension));
+                exits.unite(&effect.enabled_part(self.frame.bounds(), dimension));
                 if inside.is_subset(&exits) {
                     return Ok(Federation::empty(dimension));
                 }
             }
         }
-        let running = dimension - 1 - self.stopped.len();
-        if self.may_delay && self.barriers.is_empty() && (self.stopped.is_empty() || running <= 1) {
-            exits.down(&self.stopped);
-        } else if self.may_delay && self.stopped.is_empty() {
+        if self.may_delay && self.barriers.is_empty() {
+            exits = self.past(&exits);
+        } else if self.may_delay {
             exits = future::predecessors_within(&exits, &self.barriers);
         }
-        // Beside stopped clocks the past of a zone is in general not exact: then a wait counts as being stuck.
         let mut stuck = inside.clone();
         stuck.subtract(&exits);
         Ok(stuck)
     }
+}
+
+/// Whether the past of a zone need not be a zone: a clock stands still beside two that run.
+fn has_crooked_pasts(stopped: &ClockSet, dimension: usize) -> bool {
+    !stopped.is_empty() && dimension - 1 > stopped.len() + 1
+}
+
+/// Whether the past of this zone is one: its bounds on differences between running and stopped clocks say no more than those on each.
+fn is_straight(zone: &[Bound], dimension: usize, stopped: &ClockSet) -> bool {
+    let implied = |left: usize, right: usize| {
+        zone[left * dimension + right] >= zone[left * dimension] + zone[right]
+    };
+    let mut running = (1..dimension).filter(|&clock| !stopped.contains(clock));
+    running.all(|runs| {
+        let mut stands = stopped
+            .iter()
+            .filter(|&clock| clock > 0 && clock < dimension);
+        stands.all(|stands| implied(runs, stands) && implied(stands, runs))
+    })
 }

@@ -37,6 +37,8 @@ pub enum Bounding {
 pub struct Regions {
     ticks_per_unit: i64,
     bounding: Bounding,
+    /// Whether different values are never equivalent, unless the bounding makes them so.
+    keeps_values: bool,
 }
 
 impl Regions {
@@ -51,6 +53,24 @@ impl Regions {
         if network.features.stopwatches {
             return Err(Error::Unsupported("stopwatches"));
         }
+        Ok(Regions::with_bounding(network, constant, has_differences))
+    }
+
+    /// Sets that stand for all with stopwatches too, of which there may be infinitely many: clocks have the same values, or both are above
+    /// the greatest constant if no two are compared. So they do after the same delays, and if they stand still.
+    pub fn of_values(network: &Network, constant: i64, has_differences: bool) -> Regions {
+        let regions = Regions::with_bounding(network, constant, has_differences);
+        Regions {
+            bounding: match regions.bounding {
+                Bounding::Gaps(_) => Bounding::Nothing,
+                other => other,
+            },
+            keeps_values: true,
+            ..regions
+        }
+    }
+
+    fn with_bounding(network: &Network, constant: i64, has_differences: bool) -> Regions {
         let constant = constants(network).max(constant);
         let (set, increment, decrement) = assigned(network);
         let bounding = if network.features.diagonals || has_differences {
@@ -64,10 +84,11 @@ impl Regions {
         } else {
             Bounding::Values(constant)
         };
-        Ok(Regions {
+        Regions {
             ticks_per_unit: Regions::ticks_per_unit(network),
             bounding,
-        })
+            keeps_values: false,
+        }
     }
 
     /// The same regions for another number of ticks in a unit, which must be more than twice the number of clocks.
@@ -93,6 +114,9 @@ impl Regions {
                     *clock = (constant + 1) * unit;
                 }
             }
+        }
+        if self.keeps_values {
+            return;
         }
         let mut fractions: Vec<i64> = clocks.iter().map(|clock| clock % unit).collect();
         fractions.push(0);

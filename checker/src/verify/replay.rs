@@ -5,8 +5,8 @@
 //!   comparisons, so they hold before), no location is urgent, and no synchronisation on an urgent channel becomes
 //!   enabled before the end of the wait;
 //! * every move is one of the possible moves of the state, of the highest priority;
-//! * it ends as it says: in a loop, if the last state and the one that it leads back to lie in the same region ([`super::regions`]),
-//!   so that the same moves are possible again and again; waiting for ever; or without any move, now or after any wait.
+//! * it ends as it says: in a loop, if the last state and the one that it leads back to lie in the same region ([`super::regions`]; with
+//!   stopwatches if they have the same values as far as they matter), so that the same moves are possible again and again; waiting for ever; or without any move, now or after any wait.
 //!
 //! What must hold during a wait is looked at at all moments at which something may change ([`super::moments`]).
 //!
@@ -18,7 +18,7 @@ use crate::ir::{ClockChoice, Measure, Network, Predicate};
 
 use super::concrete::{Error, Move, Part, Semantics, State};
 use super::moments::{self, Moments};
-use super::regions::Regions;
+use super::regions::{Bounding, Regions};
 
 /// A wait and the move after it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -466,18 +466,34 @@ fn never_ending(claim: &Claim<'_>) -> Result<(), Defect> {
     }
 }
 
+/// The regions that tell the predicates apart too.
+fn regions_for(network: &Network, predicates: &[&Predicate]) -> Result<Regions, Error> {
+    let (constant, has_differences) = moments::constants(predicates);
+    if network.features.stopwatches {
+        return Ok(Regions::of_values(network, constant, has_differences));
+    }
+    Regions::new(network, constant, has_differences)
+}
+
+/// A value above which [`repeated`] does not tell those of a clock apart, if there is one.
+pub fn indifferent_above(network: &Network, predicates: &[&Predicate]) -> Option<i64> {
+    match regions_for(network, predicates).ok()?.bounding() {
+        Bounding::Values(constant) => Some(constant),
+        Bounding::Gaps(_) | Bounding::Nothing => None,
+    }
+}
+
 /// The indices of two states that lie in the same region, a first one and one after it; `None` if all regions differ. The predicates are
-/// told apart by the regions too.
+/// told apart by the regions too. With stopwatches regions are single values.
 pub fn repeated(
     network: &Network,
     states: &[&State],
     ticks_per_unit: i64,
     predicates: &[&Predicate],
 ) -> Result<Option<(usize, usize)>, Error> {
-    let (constant, has_differences) = moments::constants(predicates);
     // As many ticks as the ranks of the fractions need.
     let scale = 1 + Regions::ticks_per_unit(network) / ticks_per_unit;
-    let regions = Regions::new(network, constant, has_differences)?;
+    let regions = regions_for(network, predicates)?;
     let regions = regions.with_ticks_per_unit(scale * ticks_per_unit);
     let identity = network.layout.identity_words as usize;
     let mut seen = HashMap::new();
