@@ -3,7 +3,7 @@
 //! Nothing here uses the moves, zones, search or games of the engine. [`concrete`] computes the moves of a state with exact clock
 //! values straight from the definitions, running code on the interpreter; [`regions`] makes the set of valuations finite;
 //! [`strategy`] closes the loop between a strategy and every move of the environment, [`observed`] that of one that goes by
-//! observations; [`replay`] follows a single run;
+//! observations, both by the rules of `rules`; [`replay`] follows a single run;
 //! [`certificate`] checks that a set of states is closed and avoids a predicate;
 //! [`choices`] says what can happen next in a state, for simulating runs; [`play`] the same for playing against a strategy.
 //!
@@ -19,6 +19,7 @@ pub mod observed;
 pub mod play;
 pub mod regions;
 pub mod replay;
+mod rules;
 pub mod strategy;
 pub mod timed;
 mod zone;

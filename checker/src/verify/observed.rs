@@ -19,7 +19,8 @@ use crate::ir::{Network, Predicate};
 
 use super::concrete::{Error, Move, State};
 use super::regions::Regions;
-use super::strategy::{Aim, Claim, Coverage, Defect, Outcome, Owner, Rest, Rules, Step, Violation};
+use super::rules::{Aim, Claim, Owner, Rest, Rules};
+use super::strategy::{Coverage, Defect, Outcome, Step, Violation};
 
 /// What the controller proposes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

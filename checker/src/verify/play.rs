@@ -10,7 +10,7 @@ use crate::ir::{Network, Predicate};
 
 use super::concrete::{Error, Part, Semantics, State};
 use super::moments::{Moments, Stretch};
-use super::strategy::{Aim, Claim, Decisions, Owner, Rest, Rules};
+use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules};
 use super::timed::Timed;
 
 /// What a strategy does in a state, as long as nothing else happens.

@@ -24,126 +24,14 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crate::ir::{Network, Predicate};
+use crate::ir::Network;
 
-use super::concrete::{Error, Move, Part, Semantics, State};
+use super::concrete::{Error, Move, State};
 use super::regions::Regions;
+use super::rules::Rules;
 use super::timed::{Timed, least_multiple};
 
-/// `left - right < bound`, or `<=` if not strict; clocks by index, 0 for the reference clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the formula says it")]
-pub struct Constraint {
-    pub left: usize,
-    pub right: usize,
-    pub bound: i32,
-    pub strict: bool,
-}
-
-/// What to do in some zones.
-#[derive(Clone, Debug)]
-pub struct Decision {
-    /// Where it applies: in one of these conjunctions.
-    pub zones: Vec<Vec<Constraint>>,
-    /// The move to take; `None` is to wait.
-    pub action: Option<Vec<Part>>,
-}
-
-/// The decisions of the states with some words, in order: the first whose zones contain the clock values applies.
-#[derive(Clone, Debug)]
-pub struct Decisions {
-    /// The words.
-    pub words: Vec<i32>,
-    /// The decisions.
-    pub decisions: Vec<Decision>,
-}
-
-impl Decisions {
-    /// The decisions that apply at clock values in ticks, by index; only the first of them unless the strategy is permissive.
-    pub(super) fn indices_at(
-        &self,
-        clocks: &[i64],
-        ticks_per_unit: i64,
-        is_permissive: bool,
-    ) -> Vec<usize> {
-        let holds = |one: &Constraint| {
-            let difference = clocks[one.left] - clocks[one.right];
-            let bound = i64::from(one.bound) * ticks_per_unit;
-            difference < bound || (!one.strict && difference == bound)
-        };
-        let applies =
-            |decision: &Decision| decision.zones.iter().any(|zone| zone.iter().all(holds));
-        let decisions = self.decisions.iter().enumerate();
-        let applying = decisions.filter(|(_, decision)| applies(decision));
-        let most = if is_permissive { usize::MAX } else { 1 };
-        applying.map(|(index, _)| index).take(most).collect()
-    }
-}
-
-/// When the environment must move at a point where time cannot pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Forcing {
-    /// If something stops time to which the controller has no move: a process by its location or invariant, or the network
-    /// by an urgent channel.
-    Component,
-    /// If the controller has no move at all.
-    Network,
-    /// Always.
-    Always,
-}
-
-/// Who plays by the strategy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Owner {
-    /// The controller.
-    Controller,
-    /// The environment.
-    Environment,
-}
-
-/// What the controller is asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Aim {
-    /// To reach the goal.
-    Reach,
-    /// To keep what must be kept for ever, or until the goal.
-    Keep,
-    /// To keep it for ever, and have the goal again and again.
-    Recur,
-}
-
-/// What is claimed: that the owner of the strategy wins, by getting the controller to its aim, or by keeping it from it.
-#[derive(Clone, Copy, Debug)]
-pub struct Claim<'a> {
-    /// Who plays by the strategy.
-    pub owner: Owner,
-    /// Whether every decision that applies is allowed; else the first counts.
-    pub is_permissive: bool,
-    /// What the controller is asked for.
-    pub aim: Aim,
-    /// Where play ends, for the controller, unless the goal is to recur; `None` without such an end.
-    pub goal: Option<&'a Predicate>,
-    /// What holds until then.
-    pub keep: Option<&'a Predicate>,
-    /// When the environment must move.
-    pub forcing: Forcing,
-    /// What the controller is allowed, by a strategy of its, and whether that allows every decision that applies; `None` is everything.
-    /// Where it decides nothing, everything is allowed.
-    pub under: Option<(&'a [Decisions], bool)>,
-    /// Whether priorities count.
-    pub has_priorities: bool,
-    /// The greatest constant, in absolute value, of the clock comparisons of the two predicates.
-    pub constant: i64,
-    /// Whether the predicates compare differences of clocks.
-    pub has_differences: bool,
-}
-
-impl Claim<'_> {
-    /// Whether plays that go on for ever, without the goal if that is to recur, are lost for the owner.
-    fn must_end(&self) -> bool {
-        (self.owner == Owner::Controller) == (self.aim != Aim::Keep)
-    }
-}
+pub use super::rules::{Aim, Claim, Constraint, Decision, Decisions, Forcing, Owner};
 
 /// What was looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -279,10 +167,6 @@ pub fn verify(
     }
 }
 
-fn identity<'w>(network: &Network, words: &'w [i32]) -> &'w [i32] {
-    &words[..network.layout.identity_words as usize]
-}
-
 /// Where a region stands in the depth-first search.
 #[derive(Clone, Copy, PartialEq)]
 enum Mark {
@@ -297,23 +181,6 @@ struct Frame {
     state: State,
     successors: Vec<(Step, State)>,
     taken: Option<Step>,
-}
-
-/// Who may do what in a state, and who has won.
-pub(super) struct Rules<'a> {
-    pub(super) semantics: Semantics<'a>,
-    strategy: HashMap<&'a [i32], &'a Decisions>,
-    under: HashMap<&'a [i32], &'a Decisions>,
-    pub(super) claim: &'a Claim<'a>,
-}
-
-/// What becomes of play where time cannot pass and nobody wants to move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rest {
-    /// This player has to move nevertheless.
-    Must(Owner),
-    /// Play stops, and this player has won.
-    Won(Owner),
 }
 
 struct Play<'a> {
@@ -539,49 +406,7 @@ impl Play<'_> {
             }
         }
     }
-}
 
-impl<'a> Rules<'a> {
-    /// The rules for a strategy and what is claimed of it, at this resolution of time.
-    pub(super) fn new(
-        network: &'a Network,
-        ticks_per_unit: i64,
-        strategy: &'a [Decisions],
-        claim: &'a Claim<'a>,
-    ) -> Rules<'a> {
-        let by_words = |strategy: &'a [Decisions]| {
-            let states = strategy.iter();
-            let states = states.map(|state| (identity(network, &state.words), state));
-            states.collect::<HashMap<_, _>>()
-        };
-        Rules {
-            semantics: Semantics::new(network, ticks_per_unit),
-            strategy: by_words(strategy),
-            under: by_words(claim.under.map_or(&[], |(under, _)| under)),
-            claim,
-        }
-    }
-
-    /// Who has won in a state; `None` if play goes on.
-    pub(super) fn winner(&self, state: &State) -> Result<Option<Owner>, Error> {
-        if self.claim.aim != Aim::Recur && self.is_goal(state)? {
-            return Ok(Some(Owner::Controller));
-        }
-        Ok(match self.claim.keep {
-            Some(keep) if !self.semantics.holds(keep, state)? => Some(Owner::Environment),
-            _ => None,
-        })
-    }
-
-    pub(super) fn is_goal(&self, state: &State) -> Result<bool, Error> {
-        match self.claim.goal {
-            Some(goal) => self.semantics.holds(goal, state),
-            None => Ok(false),
-        }
-    }
-}
-
-impl Play<'_> {
     /// Where play may go from a region under the strategy.
     fn successors(&mut self, state: &State) -> Result<Result<Vec<(Step, State)>, Defect>, Error> {
         let moves = self.rules.semantics.moves(state)?;
@@ -644,164 +469,5 @@ impl Play<'_> {
         Ok(semantics.network().features.clock_guarded_urgent
             && self.regions.opens(&state.clocks)
             && semantics.moves(later)?.iter().any(|one| one.is_urgent))
-    }
-}
-
-impl<'a> Rules<'a> {
-    /// The moves whose targets satisfy the invariants, with these; if priorities count, those of the highest among them.
-    pub(super) fn possible<'m>(
-        &self,
-        state: &State,
-        moves: &'m [Move],
-    ) -> Result<Vec<(&'m Move, State)>, Error> {
-        let mut possible = Vec::new();
-        for one in moves {
-            if let Some(target) = self.semantics.take(state, &one.parts)? {
-                possible.push((one, target));
-            }
-        }
-        if self.claim.has_priorities {
-            let highest = possible.iter().map(|(one, _)| one.level).max();
-            possible.retain(|(one, _)| Some(one.level) == highest);
-        }
-        let allowed = self.allowed(state);
-        if !allowed.is_empty() {
-            let is_allowed = |one: &Move| {
-                allowed
-                    .iter()
-                    .any(|decision| decision.action.as_ref() == Some(&one.parts))
-            };
-            possible.retain(|(one, _)| !one.controllable || is_allowed(one));
-        }
-        Ok(possible)
-    }
-
-    /// The decisions that the controller is allowed; none is all.
-    fn allowed(&self, state: &State) -> Vec<&'a Decision> {
-        let words = identity(self.semantics.network(), &state.words);
-        let (Some(decisions), Some((_, is_permissive))) = (self.under.get(words), self.claim.under)
-        else {
-            return Vec::new();
-        };
-        let unit = self.semantics.ticks_per_unit();
-        let indices = decisions.indices_at(&state.clocks, unit, is_permissive);
-        let indices = indices.into_iter();
-        indices.map(|index| &decisions.decisions[index]).collect()
-    }
-
-    /// Whether the controller is not allowed to wait.
-    pub(super) fn is_obliged(&self, state: &State) -> bool {
-        let allowed = self.allowed(state);
-        !allowed.is_empty() && allowed.iter().all(|one| one.action.is_some())
-    }
-
-    /// All that the controller may be allowed in states with these words.
-    pub(super) fn allowed_of(&self, state: &State) -> Option<&'a Decisions> {
-        let words = identity(self.semantics.network(), &state.words);
-        self.under.get(words).copied()
-    }
-
-    /// Whether the owner of the strategy makes the move.
-    pub(super) fn is_own(&self, one: &Move) -> bool {
-        one.controllable == (self.claim.owner == Owner::Controller)
-    }
-
-    /// Whether the owner may wait in a state in which time cannot pass.
-    fn may_rest(
-        &self,
-        state: &State,
-        later: &State,
-        moves: &[Move],
-        possible: &[(&Move, State)],
-    ) -> Result<bool, Error> {
-        let owner = self.claim.owner;
-        Ok(match self.rest(state, later, moves, possible)? {
-            Rest::Must(player) => player != owner,
-            Rest::Won(player) => player == owner,
-        })
-    }
-
-    /// What becomes of play in a state in which time cannot pass if nobody wants to move. `later` is the state a little later,
-    /// `moves` are those whose guards hold.
-    pub(super) fn rest(
-        &self,
-        state: &State,
-        later: &State,
-        moves: &[Move],
-        possible: &[(&Move, State)],
-    ) -> Result<Rest, Error> {
-        if self.is_obliged(state) {
-            return Ok(Rest::Must(Owner::Controller));
-        }
-        let has_own = possible.iter().any(|(one, _)| one.controllable);
-        let has_other = possible.iter().any(|(one, _)| !one.controllable);
-        // Where play stops at a goal that is to recur, nothing is owed.
-        let aim = match self.claim.aim {
-            Aim::Recur if self.is_goal(state)? => Aim::Keep,
-            other => other,
-        };
-        Ok(match aim {
-            Aim::Keep if has_own && !has_other => Rest::Must(Owner::Controller),
-            Aim::Keep => Rest::Won(Owner::Controller),
-            Aim::Reach | Aim::Recur => {
-                if has_other && self.is_forced(state, later, moves, possible)? {
-                    Rest::Must(Owner::Environment)
-                } else {
-                    Rest::Won(Owner::Environment)
-                }
-            }
-        })
-    }
-
-    /// The decisions that apply.
-    pub(super) fn decisions(&self, state: &State) -> Vec<&'a Decision> {
-        let Some(decisions) = self.decisions_of(state) else {
-            return Vec::new();
-        };
-        let unit = self.semantics.ticks_per_unit();
-        let indices = decisions.indices_at(&state.clocks, unit, self.claim.is_permissive);
-        let indices = indices.into_iter();
-        indices.map(|index| &decisions.decisions[index]).collect()
-    }
-
-    /// All decisions for the words of a state.
-    pub(super) fn decisions_of(&self, state: &State) -> Option<&'a Decisions> {
-        let words = identity(self.semantics.network(), &state.words);
-        self.strategy.get(words).copied()
-    }
-
-    /// Whether the environment must move in a state in which time cannot pass.
-    fn is_forced(
-        &self,
-        state: &State,
-        later: &State,
-        moves: &[Move],
-        possible: &[(&Move, State)],
-    ) -> Result<bool, Error> {
-        let mut own = possible.iter().filter(|(one, _)| one.controllable);
-        match self.claim.forcing {
-            Forcing::Always => return Ok(true),
-            Forcing::Network => return Ok(own.next().is_none()),
-            Forcing::Component => {}
-        }
-        // An urgent synchronisation with clock guards may stop time before it is possible.
-        let may_be_channel = self.semantics.network().features.clock_guarded_urgent
-            || moves.iter().any(|one| one.is_urgent);
-        if own.clone().next().is_none() && may_be_channel {
-            return Ok(true);
-        }
-        for process in 0..self.semantics.network().processes.len() {
-            let stops = self.semantics.is_urgent(process, state)
-                || !self.semantics.invariant_holds(process, later)?;
-            let takes_part = |one: &Move| {
-                one.parts
-                    .iter()
-                    .any(|part| part.process as usize == process)
-            };
-            if stops && !own.clone().any(|(one, _)| takes_part(one)) {
-                return Ok(true);
-            }
-        }
-        Ok(false)
     }
 }
