@@ -1,14 +1,18 @@
 //! Strategies of random games, made wrong at random: the check in closed loop must come to what a fixpoint over the graph of regions
-//! comes to, and those that lose by it are caught.
+//! comes to, and those that lose by it are caught. Those of `E<> control:` have to win after a way, or from everywhere; those of
+//! `control_t*` are about a graph with a clock of its own that nothing resets.
 
 use checker::engine::verification::{self, Played};
 use checker::engine::{LoadedModel, Options};
-use checker::game::strategy::Selection;
+use checker::game::strategy::{Selection, Start, Way};
 use checker::game::{Forced, Player, Priorities};
+use checker::ir;
 use checker::syntax::ast::QueryText;
 use checker::verify::strategy::{Constraint, Decision, Decisions, Outcome};
-use proptest::prop_assert_eq;
+use checker::verify::timed::Timed;
+use checker::verify::{Regions, Semantics};
 use proptest::test_runner::TestCaseError;
+use proptest::{prop_assert, prop_assert_eq};
 
 use crate::closed_loops::Random;
 use crate::compare::{self, Tally};
@@ -113,8 +117,8 @@ impl Closed<'_> {
         controller == must_move
     }
 
-    /// Whether the owner wins from the start.
-    fn wins(&self) -> bool {
+    /// By region: whether the owner wins from it.
+    fn wins(&self) -> Vec<bool> {
         let says: Vec<Said> = (0..self.graph.nodes.len())
             .map(|one| self.says(one))
             .collect();
@@ -144,14 +148,14 @@ impl Closed<'_> {
         let controller = self.owner == Player::Controller;
         if self.kind != Kind::Recur {
             let has_to_reach = matches!(self.kind, Kind::Reach | Kind::Until);
-            return fixpoint(controller != has_to_reach, &[])[0];
+            return fixpoint(controller != has_to_reach, &[]);
         }
         // The controller gets from every goal to another one; the environment sees only finitely many.
         let mut outer = vec![controller; says.len()];
         loop {
             let next = fixpoint(!controller, &outer);
             if next == outer {
-                return outer[0];
+                return outer;
             }
             outer = next;
         }
@@ -199,11 +203,51 @@ fn mutate(decisions: &mut [Decisions], random: &mut Random) {
     }
 }
 
-/// Compares the check of the strategy of a query, as it is and made wrong, with the fixpoint.
-fn compare_query(
+/// The region that a way leads to.
+fn end_of(network: &ir::Network, graph: &Graph, constant: i64, way: &Way) -> Option<usize> {
+    let semantics = Semantics::new(network, way.ticks_per_unit);
+    let mut state = semantics.initial().ok()?;
+    for (wait, parts) in &way.moves {
+        let parts: Vec<_> = parts.iter().map(|&part| part.into()).collect();
+        state = semantics.after(&state, *wait).ok()?;
+        state = semantics.take(&state, &parts).ok()??;
+    }
+    let end = Timed {
+        state: semantics.after(&state, way.wait).ok()?,
+        ticks_per_unit: way.ticks_per_unit,
+    };
+    let Timed {
+        mut state,
+        ticks_per_unit,
+    } = end.at_multiple_of(graph.ticks)?;
+    let regions = Regions::new(network, constant, true).ok()?;
+    let regions = regions.with_ticks_per_unit(ticks_per_unit);
+    regions.represent_state(&mut state);
+    graph.nodes.iter().position(|node| {
+        let mut one = node.state.clone();
+        for clock in &mut one.clocks {
+            *clock *= ticks_per_unit / graph.ticks;
+        }
+        regions.represent_state(&mut one);
+        one == state
+    })
+}
+
+/// A graph of regions with what is asked of it.
+struct Game<'a> {
+    graph: &'a Graph,
+    /// Values of clocks that its regions tell apart.
+    constant: i64,
+    kind: Kind,
+    goal: Vec<bool>,
+    keep: Vec<bool>,
+}
+
+/// Compares the check of the strategy of a query, as it is and made wrong, with the fixpoint on the game that fits its limit of time.
+fn compare_query<'g>(
     model: &mut LoadedModel,
-    (query, forced): (&QueryText, Forced),
-    closed: &Closed<'_>,
+    (query, (rule, forced)): (&QueryText, (Rule, Forced)),
+    game: impl Fn(Option<i32>) -> Option<Game<'g>>,
     random: &mut Random,
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
@@ -217,18 +261,38 @@ fn compare_query(
     let Some(strategy) = answer.ok().and_then(|answer| answer.evidence.strategy) else {
         return Ok(());
     };
+    let Some(game) = game(strategy.time_limit) else {
+        return Ok(());
+    };
+    let start = match &strategy.start {
+        Start::Initial => Some(0),
+        Start::Anywhere => None,
+        Start::After(way) => {
+            let end = end_of(model.network(), game.graph, game.constant, way);
+            prop_assert!(end.is_some(), "{}: the way is not possible", query.text);
+            end
+        }
+    };
     for round in 0..4 {
         let mut decisions = verification::decisions(model.network(), &strategy);
         if round > 0 {
             mutate(&mut decisions, random);
         }
         let closed = Closed {
+            graph: game.graph,
             decisions: &decisions,
             owner: strategy.owner,
             is_permissive: strategy.selection == Selection::Any,
-            ..*closed
+            kind: game.kind,
+            goal: &game.goal,
+            keep: &game.keep,
+            rule,
         };
-        let expected = closed.wins();
+        let wins = closed.wins();
+        let expected = match start {
+            Some(start) => wins[start],
+            None => !wins.contains(&false),
+        };
         let played = Played::new(&strategy, &decisions);
         let rules = (forced, Priorities::Kept);
         let result = model.verify_strategy(query, played, rules, 100_000);
@@ -241,15 +305,25 @@ fn compare_query(
         prop_assert_eq!(
             holds,
             expected,
-            "{} {:?} {:?}\n{:#?}",
+            "{} {:?} {:?} {:?}\n{:#?}",
             query.text,
             forced,
             strategy.owner,
+            strategy.start,
             decisions
         );
     }
     Ok(())
 }
+
+const RULES: [(Rule, Forced); 3] = [
+    (Rule::Tiga, Forced::Tiga),
+    (Rule::Product, Forced::Product),
+    (Rule::Neutral, Forced::Neutral),
+];
+
+/// The constant of the regions: mutations move bounds by one.
+const CONSTANT: i64 = SHAPE.constant as i64 + 1;
 
 fn compare(
     (network, goal, keep, seed): &(Network, Formula, Formula, u64),
@@ -257,9 +331,7 @@ fn compare(
 ) -> Result<(), TestCaseError> {
     let text = network.text();
     let mut model = compare::load(&text);
-    // Mutations move bounds by one.
-    let Ok(Some(graph)) = compare::regions(&model, i64::from(SHAPE.constant) + 1, true, tally)
-    else {
+    let Ok(Some(graph)) = compare::regions(&model, CONSTANT, true, tally) else {
         return Ok(());
     };
     let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
@@ -268,55 +340,99 @@ fn compare(
     let none = vec![false; graph.nodes.len()];
     let (goals, kept) = (labels(network, goal, &graph), labels(network, keep, &graph));
     for (query, kind, goal, keep) in [
+        (format!("A<> {goal_text}"), Kind::Reach, &goals, &all),
+        (format!("A[] {keep_text}"), Kind::Safe, &none, &kept),
         (
-            format!("control: A<> {goal_text}"),
-            Kind::Reach,
-            &goals,
-            &all,
-        ),
-        (
-            format!("control: A[] {keep_text}"),
-            Kind::Safe,
-            &none,
-            &kept,
-        ),
-        (
-            format!("control: A[ {keep_text} U {goal_text} ]"),
+            format!("A[ {keep_text} U {goal_text} ]"),
             Kind::Until,
             &goals,
             &kept,
         ),
         (
-            format!("control: A[ {keep_text} W {goal_text} ]"),
+            format!("A[ {keep_text} W {goal_text} ]"),
             Kind::WeakUntil,
             &goals,
             &kept,
         ),
         (
-            format!("control: A[] ({keep_text} && A<> {goal_text})"),
+            format!("A[] ({keep_text} && A<> {goal_text})"),
             Kind::Recur,
             &goals,
             &kept,
         ),
     ] {
-        let rules = [
-            (Rule::Tiga, Forced::Tiga),
-            (Rule::Product, Forced::Product),
-            (Rule::Neutral, Forced::Neutral),
-        ];
-        let (rule, forced) = rules[random.below(3)];
-        let query = model.add_query(&query);
-        let closed = Closed {
-            graph: &graph,
-            decisions: &[],
-            owner: Player::Controller,
-            is_permissive: false,
-            kind,
-            goal,
-            keep,
-            rule,
+        let rules = RULES[random.below(3)];
+        for prefix in ["", "E<> "] {
+            let query = model.add_query(&format!("{prefix}control: {query}"));
+            let game = |_: Option<i32>| {
+                Some(Game {
+                    graph: &graph,
+                    constant: CONSTANT,
+                    kind,
+                    goal: goal.clone(),
+                    keep: keep.clone(),
+                })
+            };
+            compare_query(&mut model, (&query, rules), game, &mut random, tally)
+                .map_err(|error| TestCaseError::fail(format!("{text}{error}")))?;
+        }
+    }
+    Ok(())
+}
+
+/// Limits of time that are compared; more takes too many regions.
+const MOST_TIME: i32 = 4;
+
+fn compare_times(
+    (network, goal, keep, seed): &(Network, Formula, Formula, u64),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let text = network.text();
+    let mut model = compare::load(&text);
+    // The clock of time is the last one.
+    let Some(place) = text.rfind("clock x").map(|last| last + "clock x0;\n".len()) else {
+        return Ok(());
+    };
+    let timed = compare::load(&format!("{}clock t;\n{}", &text[..place], &text[place..]));
+    let constant = i64::from(MOST_TIME) + 1;
+    let graph = compare::regions(&model, CONSTANT, true, tally);
+    let graph_of_time = compare::regions(&timed, constant, true, tally);
+    let (Ok(Some(graph)), Ok(Some(graph_of_time))) = (graph, graph_of_time) else {
+        return Ok(());
+    };
+    let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
+    let mut random = Random(seed | 1);
+    let game = |limit: Option<i32>| {
+        let Some(limit) = limit else {
+            return Some(Game {
+                graph: &graph,
+                constant: CONSTANT,
+                kind: Kind::Until,
+                goal: labels(network, goal, &graph),
+                keep: labels(network, keep, &graph),
+            });
         };
-        compare_query(&mut model, (&query, forced), &closed, &mut random, tally)
+        let within = |formula: &Formula| {
+            let holds = labels(network, formula, &graph_of_time).into_iter();
+            let nodes = holds.zip(&graph_of_time.nodes);
+            let most = i64::from(limit) * graph_of_time.ticks;
+            let holds = nodes
+                .map(|(holds, node)| holds && node.state.clocks.last().is_some_and(|&t| t <= most));
+            holds.collect()
+        };
+        (limit <= MOST_TIME).then(|| Game {
+            graph: &graph_of_time,
+            constant,
+            kind: Kind::Until,
+            goal: within(goal),
+            keep: within(keep),
+        })
+    };
+    for limit in ["", "(3)", "(1)"] {
+        let rules = RULES[random.below(3)];
+        let query = format!("control_t*{limit}: A[ {keep_text} U {goal_text} ]");
+        let query = model.add_query(&query);
+        compare_query(&mut model, (&query, rules), game, &mut random, tally)
             .map_err(|error| TestCaseError::fail(format!("{text}{error}")))?;
     }
     Ok(())
@@ -331,4 +447,16 @@ fn checks_of_mutated_strategies_equal_brute_force() {
         proptest::num::u64::ANY,
     );
     compare::run("mutated strategies", 120, &strategy, compare);
+}
+
+#[test]
+fn checks_of_mutated_strategies_within_a_time_equal_brute_force() {
+    let strategy = (
+        generate::network(SHAPE),
+        generate::formula(SHAPE),
+        generate::formula(SHAPE),
+        proptest::num::u64::ANY,
+    );
+    let name = "mutated strategies within a time";
+    compare::run(name, 60, &strategy, compare_times);
 }
