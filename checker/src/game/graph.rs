@@ -23,8 +23,8 @@
 use crate::ir::{FunctionId, Predicate};
 use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
 use crate::search::store::{DiscreteId, StateStore};
-use crate::search::zone_table::{ZoneId, ZoneTable};
 use crate::zones::dbm::{self, Constraint};
+use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Federation, Zone, clocks};
 
 use super::dead_ends::DeadEnds;

@@ -6,8 +6,8 @@
 use rustc_hash::FxHashMap;
 
 use crate::network::ClockEffect;
-use crate::search::zone_table::ZoneId;
 use crate::zones::dbm::Constraint;
+use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, ClockSet, Federation, Zone};
 
 /// The index of a program.

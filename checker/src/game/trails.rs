@@ -14,8 +14,8 @@ use rustc_hash::FxHashMap;
 
 use crate::ir::Predicate;
 use crate::network::{Extent, Failure, FixedMove, Moves, OfferId, VectorId};
-use crate::search::zone_table::ZoneId;
 use crate::zones::Zone;
+use crate::zones::zone_table::ZoneId;
 
 use super::graph::{Graph, LONGEST_CHAIN, Objective, Origin, delay_after, push_step};
 use super::programs::{ProgramId, ProgramStep};

@@ -575,6 +575,18 @@ pub enum Predicate {
     Or(Vec<Predicate>),
 }
 
+impl Predicate {
+    /// Whether the words of a state alone decide it.
+    pub fn is_of_words(&self) -> bool {
+        match self {
+            Predicate::Data(_) | Predicate::Constant(_) | Predicate::Location(..) => true,
+            Predicate::Clock(_) | Predicate::Deadlock => false,
+            Predicate::Not(one) => one.is_of_words(),
+            Predicate::And(all) | Predicate::Or(all) => all.iter().all(Predicate::is_of_words),
+        }
+    }
+}
+
 /// `left - right ≺ bound` in a query, for a relation ≺ out of `<` and `<=` (the others are written with `Not` and `And`).
 #[derive(Clone, Debug)]
 pub struct ClockPredicate {

@@ -18,6 +18,8 @@ use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, ClockRange, Edge, Net
 use crate::zones::extrapolate::{Ceiling, Ceilings};
 use crate::zones::{Bound, Federation, extrapolate};
 
+use rustc_hash::FxHashMap;
+
 use super::differences::Differences;
 use super::partners::{self, Partners};
 use super::valuations::{Analysis, Step, Tracked, Valuations};
@@ -43,6 +45,8 @@ pub enum Abstraction {
 pub struct ClockBounds {
     /// By process and node: the clocks that have bounds there.
     ceilings: Vec<Vec<Vec<Ceiling>>>,
+    /// The processes that are not the same everywhere.
+    classes: Vec<Classes>,
     /// By process: the words whose values, with the location, make the number of a node.
     tracked: Vec<Vec<Tracked>>,
     /// Bounds that hold everywhere: those of queries.
@@ -51,6 +55,39 @@ pub struct ClockBounds {
     differences: Differences,
     greatest: i32,
     has_opposed_clocks: bool,
+}
+
+/// The node of a process in a state.
+fn node(words: &[i32], location: i32, tracked: &[Tracked]) -> usize {
+    let offset = |one: &Tracked| (words[one.word as usize] - one.low) as usize * one.stride;
+    location as usize + tracked.iter().map(offset).sum::<usize>()
+}
+
+/// The nodes of a process by their ceilings.
+#[derive(Clone, Debug)]
+struct Classes {
+    process: usize,
+    tracked: Vec<Tracked>,
+    /// By node: the number of its class.
+    of_nodes: Vec<u32>,
+}
+
+impl Classes {
+    /// `None` if all nodes have the same ceilings.
+    fn new(process: usize, nodes: &[Vec<Ceiling>], tracked: &[Tracked]) -> Option<Classes> {
+        let mut numbers: FxHashMap<&[Ceiling], u32> = FxHashMap::default();
+        let of_nodes = nodes.iter().map(|ceilings| {
+            let next = numbers.len() as u32;
+            *numbers.entry(ceilings).or_insert(next)
+        });
+        let of_nodes = of_nodes.collect();
+        let tracked = tracked.to_vec();
+        (numbers.len() > 1).then_some(Classes {
+            process,
+            tracked,
+            of_nodes,
+        })
+    }
 }
 
 /// Lower and upper bounds of all clocks in all nodes of a process.
@@ -91,17 +128,21 @@ impl ClockBounds {
                 .for_each(|bound| *bound = (bound.0.max(bound.1), bound.0.max(bound.1)));
         }
         let has_opposed_clocks = tables.iter().flatten().any(|bounds| are_opposed(bounds));
-        let ceilings = tables
+        let ceilings: Vec<Vec<Vec<Ceiling>>> = tables
             .iter()
             .map(|table| {
                 let tables = table.iter();
                 tables.map(|bounds| to_ceilings(bounds).each()).collect()
             })
             .collect();
+        let classes = ceilings.iter().zip(&tracked).enumerate();
+        let classes =
+            classes.filter_map(|(process, (nodes, tracked))| Classes::new(process, nodes, tracked));
         let all = tables.iter().flatten().flatten().chain(&everywhere);
         let greatest = all.map(|bound| bound.0.max(bound.1)).max().unwrap_or(0);
         let everywhere = to_ceilings(&everywhere);
         ClockBounds {
+            classes: classes.collect(),
             ceilings,
             tracked,
             everywhere,
@@ -140,14 +181,25 @@ impl ClockBounds {
     pub fn ceilings_into(&self, words: &[i32], scratch: &mut Ceilings) {
         scratch.clone_from(&self.everywhere);
         for ((nodes, &location), tracked) in self.ceilings.iter().zip(words).zip(&self.tracked) {
-            let mut node = location as usize;
-            for one in tracked {
-                node += (words[one.word as usize] - one.low) as usize * one.stride;
-            }
-            for ceiling in &nodes[node] {
+            for ceiling in &nodes[node(words, location, tracked)] {
                 scratch.raise_one(ceiling);
             }
         }
+    }
+
+    /// Adds numbers which decide what [`Symbolic::extrapolate`](super::Symbolic::extrapolate) makes of the zones of a state.
+    pub(super) fn classes_into(&self, words: &[i32], numbers: &mut Vec<u32>) {
+        if self.simulates() {
+            for one in &self.classes {
+                let node = node(words, words[one.process], &one.tracked);
+                numbers.push(one.of_nodes[node]);
+            }
+        }
+    }
+
+    /// Whether these numbers hang on locations alone.
+    pub(super) fn follow_locations(&self) -> bool {
+        self.classes.iter().all(|one| one.tracked.is_empty())
     }
 
     /// Applies the abstraction to the zone of a state with these words; `scratch` is overwritten.

@@ -38,6 +38,7 @@ pub mod symmetry;
 mod tables;
 mod valuations;
 mod watched;
+mod zone_memo;
 
 pub use bounds::{Abstraction, ClockBounds};
 pub use failure::Failure;
@@ -52,3 +53,4 @@ pub use stubborn::PartialOrder;
 pub(crate) use stubborn::{Agenda, StubbornSets};
 pub use symbolic::{ClockEffect, Symbolic};
 pub use symmetry::{Permutation, Symmetry};
+pub use zone_memo::{KeptZone, KnownZone, MemoLimits};

@@ -3,6 +3,8 @@
 use crate::exec::EmittedConstraint;
 use crate::ir::ChannelId;
 
+use super::offers::OfferId;
+
 /// One process's share in a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Part {
@@ -56,6 +58,8 @@ pub struct Moves {
     constraints: Vec<EmittedConstraint>,
     /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast receivers that abstain.
     excluded: Vec<(u32, u32)>,
+    /// The offer that they are, if they are remembered.
+    pub(super) offer: Option<OfferId>,
 }
 
 /// One move of [`Moves`].
@@ -72,6 +76,8 @@ pub struct MoveRef<'a> {
     /// The place of the move among all that the locations and variables of the state allow, whatever the zone.
     pub rank: u64,
     pub(super) label: Label,
+    /// Of remembered moves: the offer and the place in it.
+    pub(super) offered: Option<(OfferId, u32)>,
     moves: &'a Moves,
     excluded: (u32, u32),
 }
@@ -98,6 +104,7 @@ impl Moves {
         self.parts.clear();
         self.constraints.clear();
         self.excluded.clear();
+        self.offer = None;
     }
 
     /// The bytes that the moves take.
@@ -114,6 +121,7 @@ impl Moves {
         self.parts.clone_from(&other.parts);
         self.constraints.clone_from(&other.constraints);
         self.excluded.clone_from(&other.excluded);
+        self.offer = other.offer;
     }
 
     /// How many moves there are.
@@ -137,6 +145,7 @@ impl Moves {
             controllable: header.label.controllable,
             rank: header.label.rank,
             label: header.label,
+            offered: self.offer.map(|offer| (offer, index as u32)),
             moves: self,
             excluded: header.excluded,
         }

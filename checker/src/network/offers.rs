@@ -243,12 +243,12 @@ impl Offers {
         &self.moves[offer.0 as usize]
     }
 
-    /// Remembers moves with the questions that led to them; `None` if the location vector is unsuited.
+    /// Remembers moves with the questions that led to them, and tells them so; `None` if the location vector is unsuited.
     pub(super) fn remember(
         &mut self,
         vector: VectorId,
         record: Record,
-        moves: &Moves,
+        moves: &mut Moves,
     ) -> Option<OfferId> {
         let (root, count) = match self.known[vector.0 as usize] {
             Knowledge::Met => (None, 0),
@@ -261,6 +261,7 @@ impl Offers {
         }
         let offer = OfferId(self.moves.len() as u32);
         self.bytes += moves.bytes() + size_of::<Moves>();
+        moves.offer = Some(offer);
         self.moves.push(moves.clone());
         let root = self.graft(root, record, Point::Offer(offer));
         self.known[vector.0 as usize] = Knowledge::Tree(root, count + 1);

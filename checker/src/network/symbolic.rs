@@ -19,6 +19,7 @@ use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
 
 use super::bounds::ClockBounds;
 use super::scope::Scope;
+use super::zone_memo::ZoneMemo;
 use super::{Failure, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, Symmetry};
 
 /// Zones on top of the moves of a network. One per thread.
@@ -26,8 +27,8 @@ use super::{Failure, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, S
 pub struct Symbolic<'a> {
     /// Moves and their effects on words.
     pub stepper: Stepper<'a>,
-    dimension: usize,
-    bounds: ClockBounds,
+    pub(super) dimension: usize,
+    pub(super) bounds: ClockBounds,
     has_rates: bool,
     has_urgent_channels: bool,
     pub(super) has_guarded_urgency: bool,
@@ -36,10 +37,11 @@ pub struct Symbolic<'a> {
     symmetry: Option<Arc<Symmetry>>,
     order: Option<Arc<PartialOrder>>,
     is_approximate: bool,
-    ceilings: Ceilings,
+    pub(super) ceilings: Ceilings,
+    pub(super) memo: ZoneMemo,
     pub(super) inner_moves: Moves,
     /// The invariants of the state that [`Symbolic::take`] entered last.
-    invariant: Vec<Constraint>,
+    pub(super) invariant: Vec<Constraint>,
 }
 
 /// What a move does to clocks, from the source's zone to the zone on entry.
@@ -75,6 +77,7 @@ impl<'a> Symbolic<'a> {
             order: None,
             is_approximate: false,
             ceilings: bounds.everywhere().clone(),
+            memo: ZoneMemo::new(network),
             bounds,
             inner_moves: Moves::default(),
             invariant: Vec::new(),
@@ -92,6 +95,7 @@ impl<'a> Symbolic<'a> {
             order: self.order.clone(),
             ..Symbolic::new(self.stepper.another(), self.bounds.clone())
         }
+        .remembering(self.memo.limits)
     }
 
     /// Takes over what is known of the zones that another thread has made.
@@ -145,6 +149,11 @@ impl<'a> Symbolic<'a> {
     /// Whether it is under a restriction.
     pub fn is_restricted(&self) -> bool {
         self.restriction.is_some()
+    }
+
+    /// The bytes that remembered moves and zones take, about.
+    pub fn bytes(&self) -> usize {
+        self.stepper.bytes() + self.memo.bytes()
     }
 
     /// The number of clocks, the reference clock included.
@@ -531,7 +540,7 @@ impl ClockEffect {
     }
 }
 
-fn check_limit(value: i32) -> Result<(), Failure> {
+pub(super) fn check_limit(value: i32) -> Result<(), Failure> {
     if Bound::is_allowed(value) {
         Ok(())
     } else {
@@ -578,7 +587,7 @@ pub(super) fn add_constraints(
     Ok(true)
 }
 
-fn to_assignment(one: &EmittedAssignment) -> Result<Assignment, Failure> {
+pub(super) fn to_assignment(one: &EmittedAssignment) -> Result<Assignment, Failure> {
     check_limit(one.value)?;
     let clock = one.target.0 as usize;
     if one.source == ClockId(0) {

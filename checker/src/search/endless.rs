@@ -16,6 +16,7 @@ use std::collections::HashMap;
 use crate::ir::Predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::dbm::{self, Constraint};
+use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Zone};
 
 use super::limits::{Counters, StopReason, Watch};
@@ -23,7 +24,6 @@ use super::liveness::{Ending, Run, push_state};
 use super::reach::Trace;
 use super::staying::Inside;
 use super::store::{DiscreteId, StateStore};
-use super::zone_table::{ZoneId, ZoneTable};
 
 /// Steps between two looks at the limits.
 const LOOK_EVERY: u64 = 256;

@@ -8,7 +8,7 @@
 //! Where states are stored, and when they are explored, the [`Sink`] decides.
 
 use crate::ir::Urgency;
-use crate::network::{Agenda, Failure, Moves, StubbornSets, Symbolic};
+use crate::network::{Agenda, Failure, KeptZone, KnownZone, Moves, StubbornSets, Symbolic};
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Zone};
 
@@ -94,6 +94,8 @@ enum Taken {
 struct Frame {
     words: Vec<i32>,
     zone: Zone,
+    /// By what moves from the zone may be looked up.
+    known: Option<KnownZone>,
     moves: Moves,
     /// In which order moves are taken, and whether all are.
     agenda: Agenda,
@@ -128,7 +130,8 @@ pub(super) struct Explorer {
 }
 
 impl Explorer {
-    pub(super) fn new(symbolic: &Symbolic<'_>) -> Explorer {
+    pub(super) fn new(symbolic: &mut Symbolic<'_>, goal: &dyn Goal) -> Explorer {
+        symbolic.need_entered(goal.looks_at_zones());
         let network = symbolic.stepper.network();
         let order = symbolic.order().cloned();
         Explorer {
@@ -179,6 +182,7 @@ impl Explorer {
         }
         let frame = &mut self.frames[0];
         load(&mut frame.words, frame.zone.bounds_mut());
+        frame.known = None;
         symbolic.from_stored(&frame.words, frame.zone.bounds_mut());
         self.explored += 1;
         open(symbolic, &mut self.stubborn, frame)
@@ -280,14 +284,25 @@ impl Explorer {
             if !symbolic.may_satisfy(one, source.zone.bounds())? {
                 return Ok(Taken::Nothing);
             }
-            target.words.copy_from_slice(&source.words);
-            let zone = target.zone.bounds_mut();
-            zone.copy_from_slice(source.zone.bounds());
-            if !symbolic.take(one, &mut target.words, zone)? {
-                return Ok(Taken::Nothing);
-            }
+            let Frame { words, zone, .. } = target;
+            words.copy_from_slice(&source.words);
+            let zone = zone.bounds_mut();
+            let kept = if let Some(known) = source.known.filter(|&one| symbolic.is_known(one)) {
+                let from = (known, source.zone.bounds());
+                let Some(kept) = symbolic.enter_known(one, words, from, zone)? else {
+                    return Ok(Taken::Nothing);
+                };
+                Some(kept)
+            } else {
+                zone.copy_from_slice(source.zone.bounds());
+                if !symbolic.take(one, words, zone)? {
+                    return Ok(Taken::Nothing);
+                }
+                symbolic.pass_time(words, zone)?;
+                None
+            };
             self.way.push(one.rank);
-            return self.enter_whole(scene, target, depth);
+            return self.enter_whole(scene, target, kept, depth);
         }
         if !symbolic.is_enabled(one, source.zone.bounds())? {
             return Ok(Taken::Nothing);
@@ -307,29 +322,49 @@ impl Explorer {
             }
         }
         self.way.push(one.rank);
+        target.known = None;
         let taken = self.enter(scene, &effect.invariant, &mut entries, target, depth);
         self.entries = entries;
         taken
     }
 
-    /// Looks at the target of a move, whose words and zone are in `target`, and stores it or leaves it there.
+    /// Looks at the target of a move, whose words and zone with time passed are in `target`, and stores it or leaves it there.
     fn enter_whole<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
         target: &mut Frame,
+        kept: Option<KeptZone>,
         depth: usize,
     ) -> Result<Taken, Failure> {
-        let Frame { words, zone, .. } = target;
-        scene.symbolic.pass_time(words, zone.bounds_mut())?;
+        let Frame {
+            words, zone, known, ..
+        } = target;
         let taken = match scene.look(words, zone)? {
             Look::Found => return Ok(Taken::Found),
             Look::Stopped(reason) => Taken::Stopped(reason),
             Look::Continue => {
                 let descends = self.descends(scene.symbolic, words, depth);
-                let symbolic = &*scene.symbolic;
-                let is_reduced = symbolic.stores_reduced() && symbolic.symmetry().is_none();
-                if descends || !is_reduced {
-                    scene.symbolic.extrapolate(words, zone.bounds_mut());
+                let symbolic = &mut *scene.symbolic;
+                let is_reduced = symbolic.keeps_reduced();
+                *known = None;
+                match kept {
+                    Some(kept) if !descends && symbolic.symmetry().is_none() => {
+                        let (matrix, limits) = symbolic.kept(kept);
+                        let zone = Kept {
+                            matrix,
+                            limits,
+                            known: Some(kept),
+                        };
+                        scene.sink.add_waiting(words, zone, &self.way);
+                        self.way.pop();
+                        return Ok(Taken::Nothing);
+                    }
+                    Some(kept) if !is_reduced => {
+                        zone.bounds_mut().copy_from_slice(symbolic.kept(kept).0);
+                        *known = symbolic.known_kept(kept);
+                    }
+                    _ if descends || !is_reduced => symbolic.extrapolate(words, zone.bounds_mut()),
+                    _ => {}
                 }
                 if descends {
                     return Ok(self.descend(scene.sink, words, zone.bounds()));
@@ -396,6 +431,7 @@ impl Explorer {
         let zone = Kept {
             matrix: zone,
             limits,
+            known: None,
         };
         add(scene.sink, words, zone, way)
     }
@@ -439,6 +475,7 @@ pub(super) fn start<S: Sink>(scene: &mut Scene<'_, '_, S>) -> Result<Look, Failu
         let zone = Kept {
             matrix: zone.bounds(),
             limits,
+            known: None,
         };
         scene.sink.add_waiting(&words, zone, &[]);
     }
@@ -449,6 +486,7 @@ fn new_frame(symbolic: &Symbolic<'_>) -> Frame {
     Frame {
         words: symbolic.stepper.network().initial.clone(),
         zone: Zone::zero(symbolic.dimension()),
+        known: None,
         moves: Moves::default(),
         agenda: Agenda::default(),
         next: 0,
@@ -465,10 +503,14 @@ fn open(
     let Frame {
         words,
         zone,
+        known,
         moves,
         agenda,
         ..
     } = frame;
+    if known.is_none() {
+        *known = symbolic.know(zone.bounds());
+    }
     symbolic.moves_within(words, zone.bounds(), moves)?;
     if let Some(stubborn) = stubborn {
         let network = symbolic.stepper.network();

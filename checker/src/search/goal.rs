@@ -53,6 +53,11 @@ pub trait Goal {
         zone: &Zone,
     ) -> Result<bool, Failure>;
 
+    /// Whether it depends on zones what looking comes to; else the goal may be shown any zone.
+    fn looks_at_zones(&self) -> bool {
+        true
+    }
+
     /// What looking has cost beyond the search itself.
     fn counters(&self) -> Counters {
         Counters::default()
@@ -91,6 +96,10 @@ impl Goal for &Predicate {
     ) -> Result<bool, Failure> {
         let extent = symbolic.extent(self, words, zone.bounds())?;
         Ok(!matches!(extent, Extent::Nowhere))
+    }
+
+    fn looks_at_zones(&self) -> bool {
+        !self.is_of_words()
     }
 }
 

@@ -22,12 +22,12 @@ use crate::ir::Predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::Zone;
 use crate::zones::dbm;
+use crate::zones::zone_table::{ZoneId, ZoneTable};
 
 use super::limits::{Counters, StopReason, Watch};
 use super::reach::Trace;
 use super::staying::Inside;
 use super::store::{DiscreteId, StateStore};
-use super::zone_table::{ZoneId, ZoneTable};
 
 /// States between two looks at the limits.
 const LOOK_EVERY: u64 = 256;

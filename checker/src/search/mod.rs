@@ -23,7 +23,6 @@ mod staying;
 pub mod store;
 pub mod taking;
 mod tree;
-pub mod zone_table;
 
 pub use limits::{Counters, StopReason, Watch};
 pub use store::{DiscreteId, StateStore};

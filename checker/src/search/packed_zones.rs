@@ -11,11 +11,12 @@
 
 use hashbrown::HashTable;
 
+use crate::network::KeptZone;
 use crate::zones::simulation::{self, NO_DEMAND};
+use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, dbm};
 
 use super::store::{hash_bytes, spread, table_bytes};
-use super::zone_table::ZoneId;
 
 /// Sums of bytes with at most such a sum of weights are below 2^15.
 const NARROW: i32 = 255;
@@ -36,6 +37,8 @@ pub(super) struct Kept<'r> {
     /// The limits of its ceilings if zones count as contained in what simulates them. Whether there are any is the same for all
     /// zones, and they are the same for zones that are compared.
     pub(super) limits: &'r [Bound],
+    /// By what it is known, if it is.
+    pub(super) known: Option<KeptZone>,
 }
 
 /// How the packed matrices of two zones lie to each other.
@@ -234,6 +237,48 @@ impl Signature {
     }
 }
 
+/// The packed matrices and signatures of zones by what they are known by.
+#[derive(Debug, Default)]
+struct Known {
+    age: u32,
+    matrices: Vec<u8>,
+    signatures: Vec<Option<Signature>>,
+}
+
+impl Known {
+    fn bytes(&self) -> usize {
+        self.matrices.len() + size_of_val(&*self.signatures)
+    }
+
+    /// Writes the matrix of a zone and gives its signature, if it was added.
+    fn copy_into(&self, known: KeptZone, candidate: &mut [u8]) -> Option<Signature> {
+        let index = known.zone.0 as usize;
+        let signature = *self.signatures.get(index)?;
+        let size = candidate.len();
+        if known.age == self.age && signature.is_some() {
+            candidate.copy_from_slice(&self.matrices[index * size..][..size]);
+            return signature;
+        }
+        None
+    }
+
+    fn add(&mut self, known: KeptZone, matrix: &[u8], signature: Signature) {
+        if known.age != self.age {
+            *self = Known {
+                age: known.age,
+                ..Known::default()
+            };
+        }
+        let (index, size) = (known.zone.0 as usize, matrix.len());
+        if self.signatures.len() <= index {
+            self.signatures.resize(index + 1, None);
+            self.matrices.resize((index + 1) * size, 0);
+        }
+        self.signatures[index] = Some(signature);
+        self.matrices[index * size..][..size].copy_from_slice(matrix);
+    }
+}
+
 /// Stored zones of one dimension.
 #[derive(Debug)]
 pub(super) struct PackedZones {
@@ -243,6 +288,7 @@ pub(super) struct PackedZones {
     bytes: Vec<u8>,
     /// The matrix that was proposed last.
     candidate: Vec<u8>,
+    known: Known,
     /// The demands of a zone.
     demands: Vec<Bound>,
     /// What [`widen_narrow`] makes of the candidate.
@@ -276,6 +322,7 @@ impl PackedZones {
             width: Width::One,
             bytes: Vec::new(),
             candidate: vec![0; dimension * dimension],
+            known: Known::default(),
             demands: vec![Bound::INFINITY; dimension * dimension],
             narrow: vec![0; dimension * dimension],
             other: vec![Bound::INFINITY; dimension * dimension],
@@ -294,6 +341,11 @@ impl PackedZones {
 
     /// Makes a zone the candidate, which the following questions are about; returns its signature.
     pub(super) fn propose(&mut self, zone: Kept<'_>) -> Signature {
+        if let Some(known) = zone.known
+            && let Some(signature) = self.known.copy_into(known, &mut self.candidate)
+        {
+            return signature;
+        }
         while !self.pack(zone.matrix) {
             self.widen();
         }
@@ -309,7 +361,11 @@ impl PackedZones {
             simulation::demands(zone.matrix, dimension, zone.limits, &mut self.demands);
             sums(&self.demands, greatest)
         };
-        self.signature_of(sums)
+        let signature = self.signature_of(sums);
+        if let Some(known) = zone.known {
+            self.known.add(known, &self.candidate, signature);
+        }
+        signature
     }
 
     fn signature_of(&self, sums: [i32; 8]) -> Signature {
@@ -422,7 +478,7 @@ impl PackedZones {
     /// The bytes that the zones and their table take.
     pub(super) fn bytes(&self) -> usize {
         let ids = (self.uses.len() + self.free.capacity()) * size_of::<u32>();
-        self.bytes.len() + ids + table_bytes::<u32>(self.table.capacity())
+        self.bytes.len() + ids + table_bytes::<u32>(self.table.capacity()) + self.known.bytes()
     }
 
     /// Gives all matrices entries of twice as many bytes.
@@ -433,6 +489,7 @@ impl PackedZones {
             Width::Four => unreachable!("every bound fits into four bytes"),
         };
         self.candidate.resize(2 * self.candidate.len(), 0);
+        self.known = Known::default();
         let ids: Vec<u32> = self.table.drain().collect();
         let (bytes, size) = (&self.bytes, self.candidate.len());
         for id in ids {
@@ -500,6 +557,7 @@ mod tests {
         Kept {
             matrix,
             limits: &[],
+            known: None,
         }
     }
 
@@ -527,6 +585,7 @@ mod tests {
                 let own = packed.propose(Kept {
                     matrix: &matrix,
                     limits,
+                    known: None,
                 });
                 for (id, other, others, signature) in &kept {
                     let is_within = dbm::is_subset(&demands, other);

@@ -127,7 +127,7 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         let network = symbolic.stepper.network();
         let (dimension, greatest) = (symbolic.dimension(), symbolic.greatest_constant());
         Worker {
-            explorer: Explorer::new(symbolic),
+            explorer: Explorer::new(symbolic, goal),
             shard: Shard::new(network, dimension, greatest, (index, count)),
             incoming: (0..count).map(|_| Mail::default()).collect(),
             symbolic,
@@ -221,7 +221,7 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         let mail = self.incoming.iter();
         let bytes = self.shard.bytes()
             + self.explorer.bytes()
-            + self.symbolic.stepper.bytes()
+            + self.symbolic.bytes()
             + mail.map(Mail::bytes).sum::<usize>();
         let (now, next) = self.shard.waiting();
         let own = Counters {

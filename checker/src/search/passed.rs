@@ -14,10 +14,10 @@
 
 use crate::ir::Network;
 use crate::zones::Bound;
+use crate::zones::zone_table::ZoneId;
 
 use super::packed_zones::{Kept, PackedZones, Signature};
 use super::store::{DiscreteId, StateStore};
-use super::zone_table::ZoneId;
 
 /// A stored state with its number.
 #[derive(Clone, Copy, Debug)]

@@ -157,7 +157,7 @@ impl<'s, 'a> Search<'s, 'a> {
     ) -> Search<'s, 'a> {
         let network = symbolic.stepper.network();
         Search {
-            explorer: Explorer::new(symbolic),
+            explorer: Explorer::new(symbolic, goal),
             store: Store {
                 tree: Tree::new(network, symbolic.dimension(), symbolic.greatest_constant()),
                 waiting: VecDeque::new(),
@@ -183,7 +183,7 @@ impl<'s, 'a> Search<'s, 'a> {
         let Store { tree, waiting, .. } = &self.store;
         let bytes = tree.bytes()
             + self.explorer.bytes()
-            + self.symbolic.stepper.bytes()
+            + self.symbolic.bytes()
             + waiting.capacity() * size_of::<Stored>();
         Counters {
             explored: self.explorer.explored(),

@@ -148,6 +148,7 @@ impl Shard {
             let zone = Kept {
                 matrix: &mail.zones[index * zone_bounds..][..zone_bounds],
                 limits: &mail.limits[index * limit_bounds..][..limit_bounds],
+                known: None,
             };
             let (way, rest) = steps.split_at((head.steps & !IS_CHOICE) as usize);
             steps = rest;

@@ -325,6 +325,23 @@ fn exceeds(zone: &[Bound], other: &[Bound]) -> bool {
         .fold(false, |found, (bound, other)| found | (bound > other))
 }
 
+/// Whether two zones are the same set.
+#[inline]
+pub fn is_equal(zone: &[Bound], other: &[Bound]) -> bool {
+    // Blocks of sixteen are compared without a branch, as vectors.
+    let differ = |zone: &[Bound], other: &[Bound]| {
+        let pairs = zone.iter().zip(other);
+        pairs.fold(0, |found, (bound, other)| found | (bound.0 ^ other.0)) != 0
+    };
+    let (blocks, rest) = zone.as_chunks::<16>();
+    let (other_blocks, other_rest) = other.as_chunks::<16>();
+    blocks
+        .iter()
+        .zip(other_blocks)
+        .all(|(block, other)| !differ(block, other))
+        && !differ(rest, other_rest)
+}
+
 /// How the zones lie to each other.
 pub fn relation(zone: &[Bound], other: &[Bound]) -> Relation {
     match (is_subset(zone, other), is_subset(other, zone)) {

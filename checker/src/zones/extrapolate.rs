@@ -64,7 +64,7 @@ impl Clone for Ceilings {
 }
 
 /// What one clock is compared with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Ceiling {
     clock: usize,
     row: Bound,

@@ -9,6 +9,7 @@
 //! * [`dbm`]: zones on slices, so that callers keep them in arenas; the contract of a zone stands at its top;
 //! * [`clocks`]: what moves clocks: delay, reset, assignment, freeing, and the way back of an update;
 //! * [`zone`]: one zone that owns its matrix;
+//! * [`zone_table`]: zones, each stored once;
 //! * [`minimal`]: zones stored by their fewest constraints;
 //! * [`extrapolate`]: the abstractions that make the zone graph finite;
 //! * [`simulation`]: inclusion up to what comparisons can tell;
@@ -29,6 +30,7 @@ pub mod dbm;
 
 pub mod clocks;
 pub mod zone;
+pub mod zone_table;
 
 pub mod minimal;
 

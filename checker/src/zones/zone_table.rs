@@ -4,7 +4,7 @@
 
 use hashbrown::HashTable;
 
-use crate::zones::{Bound, dbm};
+use super::{Bound, dbm};
 
 /// The index of a stored zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -22,8 +22,13 @@ pub struct ZoneTable {
 impl ZoneTable {
     /// An empty table of zones of this dimension.
     pub fn new(dimension: usize) -> ZoneTable {
+        ZoneTable::of_size(dimension * dimension)
+    }
+
+    /// An empty table of zones with what belongs to them, so many bounds together.
+    pub fn of_size(size: usize) -> ZoneTable {
         ZoneTable {
-            size: dimension * dimension,
+            size,
             bounds: Vec::new(),
             table: HashTable::new(),
             count: 0,
@@ -40,7 +45,7 @@ impl ZoneTable {
         let (bounds, size) = (&self.bounds, self.size);
         let of = |id: u32| &bounds[id as usize * size..][..size];
         let hash = dbm::hash(zone);
-        if let Some(&id) = self.table.find(hash, |&id| of(id) == zone) {
+        if let Some(&id) = self.table.find(hash, |&id| dbm::is_equal(of(id), zone)) {
             return ZoneId(id);
         }
         let id = self.count;
@@ -48,6 +53,23 @@ impl ZoneTable {
         self.table.insert_unique(hash, id, |&id| dbm::hash(of(id)));
         self.bounds.extend_from_slice(zone);
         ZoneId(id)
+    }
+
+    /// How many zones there are.
+    pub fn len(&self) -> usize {
+        self.count as usize
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Forgets all zones and keeps the memory.
+    pub fn clear(&mut self) {
+        self.bounds.clear();
+        self.table.clear();
+        self.count = 0;
     }
 
     /// The bytes that the table takes.

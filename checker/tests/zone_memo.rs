@@ -1,0 +1,145 @@
+//! What is remembered of zones changes nothing: searches come to the same end with whatever limits, by the same steps.
+
+use checker::engine::LoadedModel;
+use checker::exec::Interpreter;
+use checker::network::{Abstraction, ClockBounds, Failure, MemoLimits, Stepper, Symbolic};
+use checker::search::goal::{Goal, SharedGoal};
+use checker::search::limits::Unlimited;
+use checker::search::reach::{self, Manner, Order, Outcome};
+use checker::zones::{Bound, Zone};
+
+/// Workers who take turns at a machine, some with flags that updates set and guards ask for.
+const WORKSHOP: &str = "
+const int N = 3;
+chan take[N], give[N];
+int[0, N] waiting;
+bool is_warm;
+
+process Worker(const int[0, N - 1] pid) {
+    clock x, y;
+    state resting { x <= 7 }, asking { x <= 5 }, working { x <= 4 }, leaving;
+    commit leaving;
+    init resting;
+    trans
+        resting -> asking { guard x >= 2 && y >= 1; assign x = 0, waiting = waiting + 1; },
+        asking -> working { guard is_warm || x >= 3; sync take[pid]!; assign x = 0, waiting = waiting - 1; },
+        asking -> asking { guard x == 5 && waiting > 1; assign x = 0; },
+        working -> leaving { guard x >= 1; sync give[pid]!; assign x = 0, y = 0; },
+        leaving -> resting { assign is_warm = waiting > 0; };
+}
+
+process Machine() {
+    clock z;
+    state free, busy { z <= 9 };
+    init free;
+    trans
+        free -> busy { select i : int[0, N - 1]; sync take[i]?; assign z = 0; },
+        busy -> free { select i : int[0, N - 1]; sync give[i]?; };
+}
+system Worker, Machine;
+";
+
+/// Looks for a state in which processes are in locations, and a clock can be at least so great, if one is named.
+#[derive(Clone)]
+struct Wanted {
+    locations: Vec<(usize, i32)>,
+    clock: Option<(usize, i32)>,
+}
+
+impl Goal for Wanted {
+    fn confirms(
+        &mut self,
+        _: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<bool, Failure> {
+        let is_there = |&(process, location): &(usize, i32)| words[process] == location;
+        let least = |value| Bound::weak(value).expect("a constant within the range");
+        let clock = self.clock;
+        let may_be_so_great =
+            clock.is_none_or(|(clock, value)| zone.bound(clock, 0) >= least(value));
+        Ok(self.locations.iter().all(is_there) && may_be_so_great)
+    }
+
+    fn looks_at_zones(&self) -> bool {
+        self.clock.is_some()
+    }
+}
+
+impl SharedGoal for Wanted {
+    fn fork(&self) -> Wanted {
+        self.clone()
+    }
+
+    fn join(&mut self, _: Wanted) {}
+}
+
+/// Whether a state was found, how many were explored and stored, and how many moves lead there.
+type End = (bool, u64, u64, usize);
+
+fn end(wanted: &Wanted, abstraction: Abstraction, threads: usize, limits: MemoLimits) -> End {
+    let model = LoadedModel::load("workshop.xta", WORKSHOP.as_bytes())
+        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    let network = model.network();
+    let interpreter = Interpreter::new(&network.functions, &network.constants);
+    let bounds = ClockBounds::new(network, &[], abstraction);
+    let symbolic = Symbolic::new(Stepper::new(network, &interpreter), bounds);
+    let mut symbolic = symbolic.remembering(limits);
+    let manner = Manner {
+        order: Order::BreadthFirst,
+        threads,
+    };
+    let mut wanted = wanted.clone();
+    let report = reach::search_shared(&mut symbolic, &mut wanted, manner, &mut Unlimited);
+    let (explored, stored) = (report.counters.explored, report.counters.stored);
+    match report.outcome.expect("nothing fails") {
+        Outcome::Found(trace) => (true, explored, stored, trace.moves.len()),
+        Outcome::Exhausted => (false, explored, stored, 0),
+        Outcome::Stopped(reason) => panic!("there are no limits: {reason:?}"),
+    }
+}
+
+#[test]
+fn limits_of_memory_change_nothing() {
+    let wanted = |locations: &[(usize, i32)], clock| Wanted {
+        locations: locations.to_vec(),
+        clock,
+    };
+    let goals = [
+        // Two at one machine are never there; the clock z is less than 10 at work, and x of the third at most 5 where it asks.
+        (false, wanted(&[(0, 2), (1, 2)], None)),
+        (false, wanted(&[(3, 1)], Some((7, 10)))),
+        (true, wanted(&[(2, 1)], Some((5, 5)))),
+        (true, wanted(&[(0, 1), (1, 1), (2, 2)], None)),
+    ];
+    let limits = [
+        // Everything is forgotten with each state, or now and then.
+        (0, u32::MAX, 1),
+        (1 << 14, u32::MAX, 1),
+        // It is given up again and again.
+        (usize::MAX, 8, 4),
+    ];
+    for (is_found, goal) in &goals {
+        for abstraction in [Abstraction::LowerUpper, Abstraction::Maximum] {
+            for threads in 1..=2 {
+                // It is given up with the first pair that is not found.
+                let hardly = MemoLimits {
+                    bytes: usize::MAX,
+                    misses: 0,
+                    pause: u32::MAX,
+                };
+                let expected = end(goal, abstraction, threads, hardly);
+                assert_eq!(expected.0, *is_found);
+                let limits = limits.map(|(bytes, misses, pause)| MemoLimits {
+                    bytes,
+                    misses,
+                    pause,
+                });
+                for limits in limits.into_iter().chain([MemoLimits::default()]) {
+                    let found = end(goal, abstraction, threads, limits);
+                    assert_eq!(found, expected, "{limits:?}");
+                }
+            }
+        }
+    }
+}
