@@ -65,6 +65,11 @@ impl Lists {
         &self.entries[first as usize..][..len as usize]
     }
 
+    fn get_mut(&mut self, discrete: DiscreteId) -> &mut [Entry] {
+        let List { first, len } = self.by_discrete[discrete.0 as usize];
+        &mut self.entries[first as usize..][..len as usize]
+    }
+
     /// Adds a discrete state without entries.
     fn open(&mut self) {
         self.by_discrete.push(List { first: 0, len: 0 });
@@ -221,8 +226,12 @@ impl PassedList {
             self.lists.open();
         }
         let signature = self.zones.propose(zone);
-        if !is_new && !self.make_room(discrete, signature, zone.limits) {
-            return None;
+        if !is_new {
+            // None of the stored ones lies within another, so that what one contains contains none of them.
+            if self.is_contained(discrete, signature, zone.limits) {
+                return None;
+            }
+            self.forget_within(discrete, signature, zone.limits);
         }
         let zone = self.zones.keep();
         let stored = self.stored(discrete, zone);
@@ -245,25 +254,41 @@ impl PassedList {
         }
     }
 
-    /// Forgets the zones that the proposed one contains; returns false, with nothing forgotten, if one contains it.
-    fn make_room(&mut self, discrete: DiscreteId, proposed: Signature, limits: &[Bound]) -> bool {
-        // The newest come first, and where one is taken out, one that was looked at takes its place.
+    /// Whether a stored zone of a discrete state contains the proposed one.
+    fn is_contained(
+        &mut self,
+        discrete: DiscreteId,
+        proposed: Signature,
+        limits: &[Bound],
+    ) -> bool {
+        let entries = self.lists.get_mut(discrete);
+        // The last ones come first.
+        let container = entries.iter().rposition(|entry| {
+            proposed.may_be_within(entry.signature)
+                && self.zones.contains_candidate(entry.zone, limits)
+        });
+        // What contains one zone often contains the next one.
+        let last = entries.len().saturating_sub(1);
+        container
+            .inspect(|&place| entries.swap(place, last))
+            .is_some()
+    }
+
+    /// Forgets the zones of a discrete state that the proposed one contains.
+    fn forget_within(&mut self, discrete: DiscreteId, proposed: Signature, limits: &[Bound]) {
+        // Where one is taken out, one that was looked at takes its place.
         for index in (0..self.lists.get(discrete).len()).rev() {
             let Entry {
                 signature,
                 zone,
                 node,
             } = self.lists.get(discrete)[index];
-            if proposed.may_be_within(signature) && self.zones.contains_candidate(zone, limits) {
-                return false;
-            }
             if signature.may_be_within(proposed) && self.zones.is_in_candidate(zone, limits) {
                 self.cover(node);
                 self.zones.release(zone);
                 self.lists.remove(discrete, index);
             }
         }
-        true
     }
 
     fn cover(&mut self, node: u32) {
