@@ -12,6 +12,7 @@ mod packed_zones;
 mod parallel;
 mod passed;
 mod paths;
+mod pieced_table;
 pub mod plain;
 pub mod reach;
 mod recent;

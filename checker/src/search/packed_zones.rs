@@ -9,14 +9,13 @@
 //!
 //! Cost: packing and comparing touch each bound once, a vector of them at a time.
 
-use hashbrown::HashTable;
-
 use crate::network::KeptZone;
 use crate::zones::simulation::{self, NO_DEMAND};
 use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, dbm};
 
-use super::store::{hash_bytes, spread, table_bytes};
+use super::pieced_table::PiecedTable;
+use super::store::{hash_bytes, spread};
 
 /// Sums of bytes with at most such a sum of weights are below 2^15.
 const NARROW: i32 = 255;
@@ -298,7 +297,7 @@ pub(super) struct PackedZones {
     /// By zone: how often it is in use.
     uses: Vec<u32>,
     free: Vec<u32>,
-    table: HashTable<u32>,
+    table: PiecedTable<u32>,
     /// The greatest encoded bound that signatures tell from greater ones.
     greatest: i32,
     /// By lane of a signature: the sum of the weights of its bounds.
@@ -328,7 +327,7 @@ impl PackedZones {
             other: vec![Bound::INFINITY; dimension * dimension],
             uses: Vec::new(),
             free: Vec::new(),
-            table: HashTable::new(),
+            table: PiecedTable::new(),
             greatest,
             weights,
             scale: ((0x7fff << 32) / most as u64).min(1 << 32),
@@ -478,7 +477,7 @@ impl PackedZones {
     /// The bytes that the zones and their table take.
     pub(super) fn bytes(&self) -> usize {
         let ids = (self.uses.len() + self.free.capacity()) * size_of::<u32>();
-        self.bytes.len() + ids + table_bytes::<u32>(self.table.capacity()) + self.known.bytes()
+        self.bytes.len() + ids + self.table.bytes() + self.known.bytes()
     }
 
     /// Gives all matrices entries of twice as many bytes.
@@ -667,7 +666,7 @@ mod tests {
         for (id, ..) in kept.drain(..) {
             packed.release(id);
         }
-        assert!(packed.table.is_empty());
+        assert!(packed.table.len() == 0);
         check_zones(&mut packed, &zones(10), &mut kept);
         assert!(packed.uses.len() <= places.max(packed.table.len()));
     }

@@ -12,9 +12,9 @@
 //! Cost: a state takes its written words; records lie in blocks that are never moved. A look-up hashes the bytes once and
 //! compares them once, on a match of 32 bits of the hash.
 
-use hashbrown::HashTable;
-
 use crate::ir::{Network, Shape};
+
+use super::pieced_table::PiecedTable;
 
 /// The index of a stored discrete state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -177,7 +177,7 @@ pub struct StateStore {
     /// Records in a block, as a power of two.
     block_bits: u32,
     blocks: Vec<Vec<u8>>,
-    table: HashTable<Entry>,
+    table: PiecedTable<Entry>,
     scratch: Vec<u8>,
     count: u32,
 }
@@ -199,7 +199,7 @@ impl StateStore {
             stride,
             block_bits,
             blocks: Vec::new(),
-            table: HashTable::new(),
+            table: PiecedTable::new(),
             scratch: vec![0; stride],
             count: 0,
         }
@@ -218,7 +218,7 @@ impl StateStore {
     /// The bytes that the store takes.
     pub fn bytes(&self) -> usize {
         let block = self.stride << self.block_bits;
-        self.blocks.len() * block + table_bytes::<Entry>(self.table.capacity())
+        self.blocks.len() * block + self.table.bytes()
     }
 
     /// The bytes of the state that decide identity, valid until the next call.
@@ -318,11 +318,6 @@ fn pack(groups: &[Group], words: &[i32], bytes: &mut [u8]) -> bool {
         rest = others;
     }
     fits
-}
-
-/// The bytes of a table that has room for this many entries before it grows.
-pub(super) fn table_bytes<T>(capacity: usize) -> usize {
-    capacity * (size_of::<T>() + 1) * 8 / 7
 }
 
 fn record(blocks: &[Vec<u8>], stride: usize, bits: u32, id: u32) -> &[u8] {
