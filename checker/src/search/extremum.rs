@@ -6,10 +6,11 @@
 //! grows twofold and the search begins anew.
 //!
 //! A supremum beyond the ceiling may be infinite. It is if time can pass without limit on the way to the state, or if the way holds
-//! a *pump*: two states of it with the same words between which the clock is not set and is above every constant of the
-//! model, such that the later zone contains the earlier one with the clock moved up by one. Above all constants nothing
-//! depends on the clock any more, so the way from the one to the other can be taken again and again. If the clock grows
-//! without limit, the zones without it are finitely many, and so the ways that exceed great ceilings have a pump.
+//! a *pump*: two states of it with the same words, such that the later zone contains the earlier one with some clocks moved up by the
+//! same number. These clocks are above every constant of the model, and each has at the end of the pump the value of one of them, with
+//! what was added: they are not set, or copied among each other. Above all constants nothing depends on how far they are, and their
+//! differences do not change; so the way from the one state to the other can be taken again and again. If the clock that is measured
+//! grows without limit, the zones without such clocks are finitely many, and so the ways that exceed great ceilings have a pump.
 //!
 //! Source of the exactness of a ceiling: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and upper bounds in zone-based
 //! abstractions of timed automata", STTT 8, 2006; the pump is derived here.
@@ -436,10 +437,14 @@ fn doubled(ceiling: i32) -> Result<i32, Failure> {
     Ok(doubled)
 }
 
+/// By clock: the clock that its value comes from, if it does not come from a constant.
+type Origins = Vec<Option<usize>>;
+
 /// A part of a run that can be repeated, each time with a clock that is greater by at least one.
 struct Pump<'p> {
+    /// The clock at the end of the run.
     clock: usize,
-    /// Above this value nothing depends on the clock.
+    /// Above this value nothing depends on a clock.
     above: i32,
     /// What must hold at the end of the run.
     predicate: &'p Predicate,
@@ -467,97 +472,155 @@ impl Pump<'_> {
         trace: &Trace,
         start: usize,
     ) -> Result<Attempt, Failure> {
-        let (first_words, zone) = &trace.states[start];
-        let mut zone = zone.clone();
-        let above = Bound::strict(-self.above).unwrap_or(Bound::LT_ZERO);
-        if !zone.constrain(0, self.clock, above) {
-            return Ok(Attempt::Nothing);
+        let (first_words, first_zone) = &trace.states[start];
+        let mut zone = first_zone.clone();
+        if !zone.constrain(0, self.clock, self.beyond()) {
+            // It may get its value from another clock later.
+            zone.clone_from(first_zone);
         }
-        let mut shifted = self.shifted(symbolic, first_words, &zone);
+        let unmoved: Origins = (0..zone.dimension()).map(Some).collect();
+        let mut since_start = unmoved.clone();
+        // The state when it had these words last, and the origins of clocks since then.
+        let (mut before, mut since) = (zone.clone(), unmoved.clone());
+        // For each pump that was found, which clocks are moved by it in the state at hand.
+        let mut pumped: Vec<Vec<bool>> = Vec::new();
         let mut words = first_words.clone();
-        let mut is_pump = false;
         for parts in &trace.moves[start..] {
-            match self.take(symbolic, &mut words, &zone, parts)? {
-                Taken::Zone(next) => zone = next,
-                Taken::Set => return Ok(Attempt::IsSet),
-                Taken::Nothing => return Ok(Attempt::Nothing),
+            let Some((next, assignments)) = take(symbolic, &mut words, &zone, parts)? else {
+                return Ok(Attempt::Nothing);
+            };
+            zone = next;
+            for origins in [&mut since_start, &mut since] {
+                assign(origins, &assignments, None);
+            }
+            for moved in &mut pumped {
+                assign(moved, &assignments, false);
             }
             if &words == first_words {
-                let mut later = vec![zone.clone()];
-                symbolic.extrapolate_all(&words, &mut later);
-                let is_contained = |one: &Zone| later.iter().any(|later| one.is_subset(later));
-                is_pump |= shifted.iter().all(is_contained);
                 // What the start was cut to may take a round to wear off, so that each round is compared with the one before.
-                shifted = self.shifted(symbolic, first_words, &zone);
+                for moved in self.movable(&before, &since) {
+                    if self.grows(symbolic, &words, (&before, &zone), &moved) {
+                        pumped.push(moved);
+                    }
+                }
+                (before, since) = (zone.clone(), unmoved.clone());
             }
         }
         let extent = symbolic.extent(self.predicate, &mut words, zone.bounds())?;
-        Ok(if is_pump && extent.is_somewhere() {
-            Attempt::Pump
-        } else {
-            Attempt::Nothing
-        })
+        Ok(
+            if pumped.iter().any(|moved| moved[self.clock]) && extent.is_somewhere() {
+                Attempt::Pump
+            } else if since_start[self.clock].is_none() {
+                Attempt::IsSet
+            } else {
+                Attempt::Nothing
+            },
+        )
     }
 
-    /// The zone, extrapolated, with the clock moved up by one.
-    fn shifted(&self, symbolic: &mut Symbolic<'_>, words: &[i32], zone: &Zone) -> Vec<Zone> {
-        let mut zones = vec![zone.clone()];
-        symbolic.extrapolate_all(words, &mut zones);
-        let dimension = symbolic.dimension();
-        for zone in &mut zones {
-            clocks::shift(zone.bounds_mut(), dimension, self.clock, 1);
-        }
-        zones
+    /// What a clock that nothing depends on is greater than, as a bound on its negative value.
+    fn beyond(&self) -> Bound {
+        Bound::strict(-self.above).unwrap_or(Bound::LT_ZERO)
     }
 
-    /// Takes a move of the trace from a zone.
-    fn take(
+    /// Sets of clocks that may have moved together since a zone: all of which nothing depends on, and the one that is measured.
+    fn movable(&self, before: &Zone, since: &Origins) -> Vec<Vec<bool>> {
+        let is_beyond = |clock: usize| clock > 0 && before.bound(0, clock) <= self.beyond();
+        let all: Vec<bool> = (0..since.len()).map(is_beyond).collect();
+        let only = |clock| all[clock] && clock == self.clock;
+        let alone: Vec<bool> = (0..since.len()).map(only).collect();
+        let mut sets: Vec<_> = [all, alone].map(|one| carried(one, since)).into();
+        sets.dedup();
+        sets.into_iter().flatten().collect()
+    }
+
+    /// Whether the later zone contains the earlier one with these clocks moved up: by one, or by as much as a bound of the clock that is
+    /// measured did.
+    fn grows(
         &self,
         symbolic: &mut Symbolic<'_>,
-        words: &mut [i32],
-        zone: &Zone,
-        parts: &[Part],
-    ) -> Result<Taken, Failure> {
-        let mut moves = Moves::default();
-        symbolic.moves_of(words, parts, &mut moves)?;
-        let Some(one) = moves.iter().find(|one| one.parts == parts) else {
-            return Ok(Taken::Nothing);
-        };
-        let Some(effect) = symbolic.fire(one, words)? else {
-            return Ok(Taken::Nothing);
-        };
-        let sets = |assignment: &Assignment| match *assignment {
-            // A clock that is set to itself or to more goes on as it was.
+        words: &[i32],
+        (before, later): (&Zone, &Zone),
+        moved: &[bool],
+    ) -> bool {
+        let dimension = symbolic.dimension();
+        let (mut earlier, mut found) = (vec![before.clone()], vec![later.clone()]);
+        symbolic.extrapolate_all(words, &mut earlier);
+        symbolic.extrapolate_all(words, &mut found);
+        let bounds = |zone: &Zone| dbm::clock_bounds(zone.bounds(), dimension, self.clock);
+        let (old, new) = (bounds(before), bounds(later));
+        let mut steps = vec![1, old.0.value() - new.0.value()];
+        if !new.1.is_infinite() && !old.1.is_infinite() {
+            steps.push(new.1.value() - old.1.value());
+        }
+        steps.dedup();
+        steps.into_iter().filter(|&step| step > 0).any(|step| {
+            earlier.iter().all(|one| {
+                let mut shifted = one.clone();
+                for clock in (0..dimension).filter(|&clock| moved[clock]) {
+                    clocks::shift(shifted.bounds_mut(), dimension, clock, step);
+                }
+                found.iter().any(|found| shifted.is_subset(found))
+            })
+        })
+    }
+}
+
+/// Takes a move of the trace from a zone; the zone that it leads to, and what it does to clocks.
+fn take(
+    symbolic: &mut Symbolic<'_>,
+    words: &mut [i32],
+    zone: &Zone,
+    parts: &[Part],
+) -> Result<Option<(Zone, Vec<Assignment>)>, Failure> {
+    let mut moves = Moves::default();
+    symbolic.moves_of(words, parts, &mut moves)?;
+    let Some(one) = moves.iter().find(|one| one.parts == parts) else {
+        return Ok(None);
+    };
+    let Some(effect) = symbolic.fire(one, words)? else {
+        return Ok(None);
+    };
+    let mut zones = Vec::new();
+    effect.entry_zones(zone.bounds(), symbolic.dimension(), &mut zones);
+    symbolic.let_time_pass(words, &effect.invariant, &mut zones)?;
+    // Of several zones one is followed: what it shows is shown.
+    let next = zones.into_iter().next();
+    Ok(next.map(|zone| (zone, effect.assignments)))
+}
+
+/// Moves what is known of each clock along with its value; what becomes less, or comes from a constant, is `lost`.
+fn assign<T: Copy>(known: &mut [T], assignments: &[Assignment], lost: T) {
+    for assignment in assignments {
+        match *assignment {
             Assignment::Copy {
                 clock,
                 source,
                 increment,
-            } => clock == self.clock && (source != clock || increment < 0),
-            Assignment::Value { clock, .. } | Assignment::Free { clock } => clock == self.clock,
-        };
-        if effect.assignments.iter().any(sets) {
-            return Ok(Taken::Set);
+            } => known[clock] = if increment < 0 { lost } else { known[source] },
+            Assignment::Value { clock, .. } | Assignment::Free { clock } => known[clock] = lost,
         }
-        let mut zones = Vec::new();
-        effect.entry_zones(zone.bounds(), symbolic.dimension(), &mut zones);
-        symbolic.let_time_pass(words, &effect.invariant, &mut zones)?;
-        // Of several zones one is followed: what it shows is shown.
-        Ok(zones.into_iter().next().map_or(Taken::Nothing, Taken::Zone))
+    }
+}
+
+/// The greatest part of a set of clocks of which each has its value from one of them; `None` if it is empty, or another clock has too.
+fn carried(mut set: Vec<bool>, origins: &Origins) -> Option<Vec<bool>> {
+    loop {
+        let has_origin = |origin: &Option<usize>| origin.is_some_and(|origin| set[origin]);
+        let carrying: Vec<bool> = origins.iter().map(has_origin).collect();
+        let both = set.iter().zip(&carrying).map(|(one, other)| *one && *other);
+        let less: Vec<bool> = both.collect();
+        if less == set {
+            return (carrying == set && set.contains(&true)).then_some(set);
+        }
+        set = less;
     }
 }
 
 /// What became of the search for a pump from a state.
 enum Attempt {
     Pump,
-    /// The clock is set later on the way: no pump begins here or earlier.
+    /// The clock has its value from a constant that is met later on the way: no pump begins here or earlier.
     IsSet,
-    Nothing,
-}
-
-/// What became of a move.
-enum Taken {
-    Zone(Zone),
-    /// It sets the clock.
-    Set,
     Nothing,
 }

@@ -183,12 +183,7 @@ fn compare_values(
             let least = least.map(|extreme| doubled(extreme, true));
             (least, greatest.map(|extreme| doubled(extreme, false)))
         });
-        let counting = (0..wanted.len()).filter(|&node| wanted[node]).map(|node| {
-            let ticks = graph.nodes[node].state.clocks[1 + clock];
-            let (whole, fraction) = (ticks / graph.ticks, ticks % graph.ticks);
-            (2 * whole + i64::from(fraction > 0)).min(2 * TOP + 1)
-        });
-        let expected = Some((counting.clone().min(), counting.max()));
+        let expected = Some(extremes(&graph, &wanted, clock));
         prop_assert_eq!(found, expected, "{}{}", text, query);
         check_best_values(network, (&condition, clock), (&graph, &wanted), tally)?;
     }
@@ -204,6 +199,43 @@ fn compare_values(
     {
         check_time(&text, &condition, &run, tally)?;
     }
+    Ok(())
+}
+
+/// The extremes over the regions of a clock's value where something holds, doubled as in [`doubled`].
+fn extremes(graph: &Graph, wanted: &[bool], clock: usize) -> (Option<i64>, Option<i64>) {
+    let counting = (0..wanted.len()).filter(|&node| wanted[node]).map(|node| {
+        let ticks = graph.nodes[node].state.clocks[1 + clock];
+        let (whole, fraction) = (ticks / graph.ticks, ticks % graph.ticks);
+        (2 * whole + i64::from(fraction > 0)).min(2 * TOP + 1)
+    });
+    (counting.clone().min(), counting.max())
+}
+
+/// Two clocks that nothing sets stay in step, whatever is compared with their difference.
+fn compare_clocks_in_step(
+    (network, formulas): &(Network, Vec<Formula>),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let text = network.text();
+    let text = text.replacen("chan a;", "clock total, twin;\nchan a;", 1);
+    let mut model = compare::load(&text);
+    let Some(Ok(graph)) = compare::regions_for(&model, (formulas, TOP as i32), tally) else {
+        return Ok(());
+    };
+    let wanted = labels(network, &graph, &formulas[0]);
+    let condition = network.formula(&formulas[0]);
+    let query = format!("bounds{{({condition}) && total - twin < 1}}: total");
+    let Some(answer) = answer(&mut model, &query, TraceWanted::Any, tally)? else {
+        return Ok(());
+    };
+    let found = answer.value.map(|value| {
+        let Extremes { least, greatest } = value.items[0];
+        let least = least.map(|extreme| doubled(extreme, true));
+        (least, greatest.map(|extreme| doubled(extreme, false)))
+    });
+    let expected = Some(extremes(&graph, &wanted, network.clocks));
+    prop_assert_eq!(found, expected, "{}{}", text, query);
     Ok(())
 }
 
@@ -311,6 +343,7 @@ fn answer(
     let answer = answer.map_err(|rejection| TestCaseError::fail(rejection.rendered.join("\n")))?;
     if let Verdict::Unknown(StopReason::States | StopReason::Time) = answer.verdict {
         tally.count_stopped();
+
         return Ok(None);
     }
     tally.count_compared();
@@ -330,4 +363,11 @@ fn values_and_best_traces_equal_brute_force() {
     let formulas = vec(generate::formula(VALUES), 1..=1);
     let strategy = (generate::network(VALUES), formulas);
     compare::run("values", 300, &strategy, compare_values);
+}
+
+#[test]
+fn values_of_clocks_in_step_equal_brute_force() {
+    let formulas = vec(generate::formula(VALUES), 1..=1);
+    let strategy = (generate::network(VALUES), formulas);
+    compare::run("in step", 200, &strategy, compare_clocks_in_step);
 }
