@@ -73,6 +73,7 @@ class Model:
         certificate: bool,
         symmetry: bool,
         partial_order: bool,
+        live_variables: bool,
         folder: str | None,
         progress: Callable[[int, int, int, int], object] | None,
     ) -> Answer: ...

@@ -306,7 +306,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, partial_order, folder, progress))]
+    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, partial_order, live_variables, folder, progress))]
     #[expect(
         clippy::too_many_arguments,
         clippy::fn_params_excessive_bools,
@@ -332,6 +332,7 @@ impl Model {
         certificate: bool,
         symmetry: bool,
         partial_order: bool,
+        live_variables: bool,
         folder: Option<PathBuf>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
@@ -371,6 +372,7 @@ impl Model {
             certificate,
             symmetry,
             partial_order,
+            live_variables,
             folder,
         };
         let model = slf.get();

@@ -25,6 +25,8 @@ fn answer_in((order, threads): (Order, usize), text: &str, query: &str, symmetry
         code: CodeEngine::Interpreter,
         runs: true,
         symmetry,
+        // Where states are counted, symmetry alone is to be seen; the other searches do both.
+        live_variables: (order, threads) != (Order::BreadthFirst, 1),
         ..Options::default()
     };
     let answer = model
@@ -372,6 +374,7 @@ fn answer_with_limit(text: &str, query: &str) -> Answer {
     let mut options = Options {
         code: CodeEngine::Interpreter,
         symmetry: false,
+        live_variables: false,
         ..Options::default()
     };
     options.limits.states = Some(800);

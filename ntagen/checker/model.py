@@ -183,6 +183,7 @@ class Model:
         certificate: bool = False,
         symmetry: bool = True,
         partial_order: bool = True,
+        live_variables: bool = True,
         folder: Path | None = None,
         progress: Progress | None = None,
     ) -> Answer:
@@ -226,6 +227,9 @@ class Model:
                 and traces do not depend on it, counts do.
             partial_order: Whether ``E<>`` and ``A[]`` may leave out orders of independent moves
                 while time stands still; verdicts do not depend on it, counts do.
+            live_variables: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may take
+                states for one that differ only in variables whose values nothing reads before
+                they are written; verdicts, values and traces do not depend on it, counts do.
             folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
                 folder of the model.
             progress: Is called some twenty times a second with the numbers of explored,
@@ -265,6 +269,7 @@ class Model:
                 certificate=certificate,
                 symmetry=symmetry,
                 partial_order=partial_order,
+                live_variables=live_variables,
                 folder=None if folder is None else str(folder),
                 progress=progress,
             )

@@ -213,6 +213,13 @@ class _Outputs:
     help="Whether independent moves are taken in one order only where urgent or committed "
     "locations keep time from passing (E<>, A[]).",
 )
+@click.option(
+    "--live-variables",
+    type=click.Choice(["on", "off"]),
+    default="on",
+    help="Whether states are one that differ only in variables which are written before they are "
+    "read again (E<>, A[], sup, inf, bounds).",
+)
 @forced_rule()
 @priority_rule(
     "Whether priorities of channels and processes count in games and under strategies. TIGA "
@@ -238,6 +245,7 @@ def command(
     threads: int,
     symmetry: str,
     partial_order: str,
+    live_variables: str,
     seed: int,
     forced: Any,  # noqa: ANN401
     priorities: Any,  # noqa: ANN401
@@ -306,6 +314,7 @@ def command(
                     certificate=certificate is not None,
                     symmetry=symmetry == "on",
                     partial_order=partial_order == "on",
+                    live_variables=live_variables == "on",
                     folder=query.folder,
                     progress=report,
                 )

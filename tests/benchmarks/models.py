@@ -286,6 +286,37 @@ system Beat, Sensor;
 """
 
 
+def samplers(controllers: int) -> str:
+    """Controllers that read four inputs each, one after the other, and work out their next step."""
+    return f"""
+const int N = {controllers};
+
+process Controller(const int[0, N - 1] me) {{
+    clock x;
+    bool warm, bright, loud, near;
+    int[0, 3] level;
+    int[0, 3] next() {{
+        if (warm && bright || loud)
+            return (level + 1) % 4;
+        if (near && level > 0)
+            return level - 1;
+        return level;
+    }}
+    state working {{ x <= 3 + me }}, feeling, looking, hearing, ranging, deciding;
+    commit feeling, looking, hearing, ranging, deciding;
+    init working;
+    trans
+        working -> feeling {{ guard x >= 2 + me; }},
+        feeling -> looking {{ select input : int[0, 1]; assign warm = input; }},
+        looking -> hearing {{ select input : int[0, 1]; assign bright = input; }},
+        hearing -> ranging {{ select input : int[0, 1]; assign loud = input; }},
+        ranging -> deciding {{ select input : int[0, 1]; assign near = input; }},
+        deciding -> working {{ assign level = next(), x = 0; }};
+}}
+system Controller;
+"""
+
+
 def entangled(processes: int) -> str:
     """Urgent processes of which each reads what all write: no order may be left out."""
     return f"""

@@ -9,10 +9,11 @@ use crate::game::closed_loop::ClosedLoop;
 use crate::game::observed::Machine;
 use crate::game::plans::Plan;
 use crate::game::strategy::{Strategy, Under};
-use crate::ir::{ClockAtom, Network, Predicate, Query, QueryKind};
+use crate::ir::{ClockAtom, FunctionId, Network, Predicate, Query, QueryKind};
 use crate::network::bounds::is_difference;
 use crate::network::{
-    Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, Symmetry, predicate,
+    Abstraction, ClockBounds, Failure, LiveVariables, Restriction, Stepper, Symbolic, Symmetry,
+    predicate,
 };
 use crate::search::extremum::{Extremes, Question};
 use crate::search::limits::{Counters, StopReason};
@@ -266,6 +267,22 @@ fn reduced(
         }
         _ => first,
     }
+}
+
+/// The variables that a search whose question reads words by `functions` may forget where they are not live. What a strategy
+/// allows hangs on all of them.
+pub(super) fn live_variables(
+    subject: Subject<'_>,
+    functions: impl IntoIterator<Item = FunctionId>,
+    options: &Options,
+    symmetry: Option<&Arc<Symmetry>>,
+) -> Option<Arc<LiveVariables>> {
+    if !options.live_variables || subject.under.is_some() {
+        return None;
+    }
+    // An initial value is the same member for all, so that states would no longer be each other's images.
+    let keeps_scalars = symmetry.is_some();
+    LiveVariables::new(subject.network, functions, keeps_scalars).map(Arc::new)
 }
 
 pub(super) fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counters) -> Answer {

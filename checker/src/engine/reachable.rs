@@ -7,7 +7,9 @@ use crate::network::{Abstraction, PartialOrder, Symbolic, Symmetry, predicate};
 use crate::search::reach::{self, Outcome, Report, Trace};
 
 use super::answer::Evidence;
-use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, new_answer, symbolic};
+use super::answer::{
+    Answer, Subject, Verdict, Witnesses, coarser, live_variables, new_answer, symbolic,
+};
 use super::best::{Sought, best, not_the_best};
 use super::certificate;
 use super::evidence::Shows;
@@ -27,9 +29,10 @@ pub(super) fn reachable<'a>(
     let order = is_ordered
         .then(|| PartialOrder::new(subject.network, goal))
         .flatten();
+    let live = live_variables(subject, predicate::functions(goal), options, symmetry);
     let reduced = |symbolic: Symbolic<'a>| {
         let symbolic = symbolic.reduced_by(symmetry.cloned());
-        symbolic.ordered_by(order.clone())
+        symbolic.ordered_by(order.clone()).forgetting(live.clone())
     };
     if let Some((mut symbolic, report)) = reach_coarsely(subject, goal, options, reduced, watch) {
         return conclude(subject, &mut symbolic, goal, report, options, watch);

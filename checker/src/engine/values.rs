@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::ir::{ClockAtom, Measure};
-use crate::network::{Abstraction, Symbolic, Symmetry};
+use crate::network::{Abstraction, Symbolic, Symmetry, predicate};
 use crate::search::extremum::{self, Extreme, Extremes, Question};
 use crate::search::reach::{self, Outcome};
 use crate::search::taking::Taking;
@@ -11,7 +11,8 @@ use crate::verify::replay::Shown;
 
 use super::Options;
 use super::answer::{
-    Answer, Evidence, Subject, Values, Verdict, Witnesses, found, new_answer, symbolic,
+    Answer, Evidence, Subject, Values, Verdict, Witnesses, found, live_variables, new_answer,
+    symbolic,
 };
 use super::best::{Sought, best, not_the_best};
 use super::evidence::{Kind, Shows, Takes, Witness};
@@ -25,10 +26,17 @@ pub(super) fn extremum(
     symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Answer {
+    let read = predicate::functions(question.predicate).into_iter();
+    let read = read.chain(question.items.iter().filter_map(|(item, _)| match *item {
+        Measure::Integer(function) => Some(function),
+        Measure::Clock(clock) => predicate::chooser(clock),
+    }));
+    let live = live_variables(subject, read, options, symmetry);
     let mut zones = |further: &[ClockAtom]| {
         let predicates = [question.predicate];
         symbolic(subject, &predicates, further, Abstraction::LowerUpper)
             .reduced_by(symmetry.cloned())
+            .forgetting(live.clone())
     };
     let report = extremum::search(
         question,

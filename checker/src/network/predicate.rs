@@ -3,7 +3,9 @@
 //! The extent of a predicate in a state is the part of the zone in which it holds. Predicates without clocks hold in all of it
 //! or in none, and cost no zone operation.
 
-use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, Network, Predicate};
+use crate::ir::{
+    ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, FunctionId, Network, Predicate,
+};
 use crate::zones::future::{self, Barriers};
 use crate::zones::{Bound, Federation, Zone};
 
@@ -316,6 +318,29 @@ fn clock_range(choice: ClockChoice) -> ClockRange {
             count: 1,
         },
         ClockChoice::Indexed(range, _) => range,
+    }
+}
+
+/// The code that decides a predicate, which reads words only.
+pub fn functions(predicate: &Predicate) -> Vec<FunctionId> {
+    match predicate {
+        Predicate::Constant(_) | Predicate::Location(..) | Predicate::Deadlock => Vec::new(),
+        Predicate::Data(function) => vec![*function],
+        Predicate::Clock(clock) => {
+            let sides = [clock.left, clock.right].into_iter();
+            let chosen = sides.filter_map(chooser);
+            std::iter::once(clock.bound).chain(chosen).collect()
+        }
+        Predicate::Not(inner) => functions(inner),
+        Predicate::And(parts) | Predicate::Or(parts) => parts.iter().flat_map(functions).collect(),
+    }
+}
+
+/// The code that chooses a clock.
+pub fn chooser(clock: ClockChoice) -> Option<FunctionId> {
+    match clock {
+        ClockChoice::Fixed(_) => None,
+        ClockChoice::Indexed(_, function) => Some(function),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Which words of a state a function may read, as far as its code shows it without being run.
 
+use std::ops::Range;
+
 use crate::exec::target;
 use crate::ir::{Address, Base, Function, FunctionId, Instruction, Network, Register};
 
@@ -45,21 +47,32 @@ pub(super) fn read_words(
 }
 
 fn add(code: &Function, address: Address, count: u32, most: usize, words: &mut Vec<u32>) -> bool {
+    let touched = state_words(code, address, count, most);
+    let is_known = touched.is_some();
+    words.extend(touched.into_iter().flatten());
+    is_known
+}
+
+/// The words of the state that an access to so many words may touch; `None` if that is not known, or its place is one of more
+/// than `most`.
+pub(super) fn state_words(
+    code: &Function,
+    address: Address,
+    count: u32,
+    most: usize,
+) -> Option<Range<u32>> {
     match address.base {
-        Base::Constants | Base::Frame => return true,
+        Base::Constants | Base::Frame => return Some(0..0),
         // What the register holds the address of is not followed.
-        Base::Register(_) => return false,
+        Base::Register(_) => return None,
         Base::State => {}
     }
     let greatest = match address.index {
-        None => Some(0),
-        Some(index) => greatest_index(code, index, MOST_STEPS),
+        None => 0,
+        Some(index) => greatest_index(code, index, MOST_STEPS)?,
     };
-    let Some(greatest) = greatest.filter(|&greatest| (greatest as usize) < most) else {
-        return false;
-    };
-    words.extend(address.offset..address.offset + greatest + count);
-    true
+    let is_small = (greatest as usize) < most;
+    is_small.then(|| address.offset..address.offset + greatest + count)
 }
 
 /// How many instructions back the value of an index is followed.

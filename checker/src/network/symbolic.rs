@@ -20,7 +20,9 @@ use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
 use super::bounds::ClockBounds;
 use super::scope::Scope;
 use super::zone_memo::ZoneMemo;
-use super::{Failure, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, Symmetry};
+use super::{
+    Failure, LiveVariables, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, Symmetry,
+};
 
 /// Zones on top of the moves of a network. One per thread.
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
@@ -36,6 +38,7 @@ pub struct Symbolic<'a> {
     pub(super) restriction: Option<&'a dyn Restriction>,
     symmetry: Option<Arc<Symmetry>>,
     order: Option<Arc<PartialOrder>>,
+    live: Option<Arc<LiveVariables>>,
     is_approximate: bool,
     pub(super) ceilings: Ceilings,
     pub(super) memo: ZoneMemo,
@@ -75,6 +78,7 @@ impl<'a> Symbolic<'a> {
             restriction: None,
             symmetry: None,
             order: None,
+            live: None,
             is_approximate: false,
             ceilings: bounds.everywhere().clone(),
             memo: ZoneMemo::new(network),
@@ -93,6 +97,7 @@ impl<'a> Symbolic<'a> {
             restriction: self.restriction,
             symmetry: self.symmetry.clone(),
             order: self.order.clone(),
+            live: self.live.clone(),
             ..Symbolic::new(self.stepper.another(), self.bounds.clone())
         }
         .remembering(self.memo.limits)
@@ -144,6 +149,20 @@ impl<'a> Symbolic<'a> {
     /// What decides which orders of independent moves a search need not take.
     pub fn order(&self) -> Option<&Arc<PartialOrder>> {
         self.order.as_ref()
+    }
+
+    /// The same, of states in which variables that are not live have no value.
+    #[must_use]
+    pub fn forgetting(mut self, live: Option<Arc<LiveVariables>>) -> Symbolic<'a> {
+        self.live = live;
+        self
+    }
+
+    /// Sets the variables of a state that are not live to their initial values, if they may be.
+    pub fn forget(&self, words: &mut [i32]) {
+        if let Some(live) = &self.live {
+            live.forget(words);
+        }
     }
 
     /// Whether it is under a restriction.

@@ -277,7 +277,7 @@ impl<'a> Symbolic<'a> {
         known.age == self.memo.age
     }
 
-    /// As [`Symbolic::take`] and [`Symbolic::pass_time`], for a move from a zone that is known and that each of its guards leaves
+    /// As [`Symbolic::take`], [`Symbolic::forget`] and [`Symbolic::pass_time`], for a move from a zone that is known and that each of its guards leaves
     /// something of; `zone`, of the same dimension, is overwritten. `None` if the move is not possible.
     pub fn enter_known(
         &mut self,
@@ -291,6 +291,7 @@ impl<'a> Symbolic<'a> {
             && let Some(outcome) = self.memo.find(known.zone, fixed.effect)
         {
             self.stepper.take(&fixed.one, words)?;
+            self.forget(words);
             self.memo.balance.note(true);
             return Ok(self.memo.result(outcome, zone));
         }
@@ -317,6 +318,7 @@ impl<'a> Symbolic<'a> {
             None => return Ok(None),
         }
         effects.end(INVARIANT);
+        self.forget(words);
         let may_delay = match self.may_delay(words) {
             Ok(may_delay) => may_delay,
             // Where nothing of the zone is left nobody asks whether time may pass.

@@ -298,6 +298,7 @@ impl Explorer {
                 if !symbolic.take(one, words, zone)? {
                     return Ok(Taken::Nothing);
                 }
+                symbolic.forget(words);
                 symbolic.pass_time(words, zone)?;
                 None
             };
@@ -386,6 +387,7 @@ impl Explorer {
         target: &mut Frame,
         depth: usize,
     ) -> Result<Taken, Failure> {
+        scene.symbolic.forget(&mut target.words);
         scene
             .symbolic
             .let_time_pass(&mut target.words, invariant, entries)?;

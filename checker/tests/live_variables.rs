@@ -1,0 +1,431 @@
+//! Searches that forget variables where nothing reads them any more, against searches that keep all values.
+//!
+//! Models in which a value is passed on and not needed again show what is gained; models in which it is needed on a hidden way
+//! show what must be kept; random networks that pass values in all ways show that verdicts and values stay what they are. Every run
+//! that is found must pass its replay, which knows nothing of the reduction.
+//!
+//! `NETWORKS=50000 cargo test --release --test live_variables` runs more of them than the usual number.
+
+use std::fmt::Write as _;
+
+use checker::engine::evidence::Proof;
+use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+use checker::search::reach::Order;
+
+/// Networks without the environment variable `NETWORKS`.
+const NETWORKS: u64 = 60;
+
+/// Larger networks are left out.
+const MOST_STATES: u64 = 4000;
+
+fn answer(text: &str, query: &str, live_variables: bool, manner: (Order, usize)) -> Answer {
+    let mut model = LoadedModel::load("live.xta", text.as_bytes())
+        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
+    let query_text = model.add_query(query);
+    let mut options = Options {
+        order: manner.0,
+        threads: manner.1,
+        code: CodeEngine::Interpreter,
+        runs: true,
+        live_variables,
+        ..Options::default()
+    };
+    options.limits.states = Some(MOST_STATES);
+    let answer = model
+        .check(&query_text, &options)
+        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
+    for witness in &answer.evidence.witnesses {
+        // The replay runs every move that is possible on the way, and some of those may fail.
+        let is_cut = |run: &Option<Proof>| format!("{run:?}").contains("NotCovered(RunTime(");
+        assert!(
+            matches!(witness.run, Some(Proof::Replayed(..))) || is_cut(&witness.run),
+            "{query}: {:#?}\n{text}",
+            witness.run
+        );
+    }
+    answer
+}
+
+/// How many states are stored without and with the reduction, which must agree in any manner of search.
+fn stored(text: &str, query: &str) -> (u64, u64) {
+    let one = (Order::BreadthFirst, 1);
+    let full = answer(text, query, false, one);
+    let manners = [
+        one,
+        (Order::DepthFirst, 1),
+        (Order::Random(7), 1),
+        (Order::BreadthFirst, 2),
+    ];
+    let reduced = manners.map(|manner| {
+        let reduced = answer(text, query, true, manner);
+        let is_cut = |answer: &Answer| matches!(answer.verdict, Verdict::Unknown(_));
+        // Where a failure can be met and what is looked for can be found, either may come first in another manner.
+        let is_end = |answer: &Answer| !answer.evidence.witnesses.is_empty();
+        let agree = full.verdict == reduced.verdict
+            && format!("{:?}", full.value) == format!("{:?}", reduced.value);
+        assert!(
+            agree
+                || is_cut(&full)
+                || is_cut(&reduced)
+                || manner != one && is_end(&full) && is_end(&reduced),
+            "{:?} {:?} with all values, {:?} {:?} without, {manner:?}: {query}\n{text}",
+            full.verdict,
+            full.value,
+            reduced.verdict,
+            reduced.value,
+        );
+        reduced.counters.stored
+    });
+    (full.counters.stored, reduced[0])
+}
+
+/// A sender passes one of sixteen values by a variable in common; the receiver takes it over, looks at it once, and waits again.
+const PASSING: &str = "
+    chan pass; int[0,15] message; int[0,15] rounds;
+    process Sender() { state Idle, Busy; init Idle; trans
+        Idle -> Busy { select k : int[0,15]; sync pass!; assign message = k; }, Busy -> Idle { }; }
+    process Receiver() { int[0,15] value; int[0,15] copy[2];
+        void take() { int i; value = message; for (i = 0; i < 2; i++) copy[i] = value; }
+        state Waiting, Reading, Odd; init Waiting; trans
+        Waiting -> Reading { sync pass?; assign take(); },
+        Reading -> Odd { guard value % 2 == 1; }, Reading -> Waiting { guard value % 2 == 0; },
+        Odd -> Waiting { }; }
+    system Sender, Receiver;";
+
+#[test]
+fn a_value_that_was_passed_on_is_forgotten() {
+    // The value counts only where it is read: sixteen states there, one in each of the two other places, each with the sender in two.
+    assert_eq!(stored(PASSING, "E<> false"), (80, 36));
+    assert_eq!(
+        stored(PASSING, "sup: Receiver.value"),
+        (80, 80),
+        "the query reads the value"
+    );
+}
+
+/// In each of these a value is read on a way on which a careless analysis does not see it: edges of a process, those of another one,
+/// and what can be reached only with the value.
+#[test]
+fn values_that_are_read_are_kept() {
+    let cases = [
+        // After a loop through places that do not read it,
+        (
+            "a -> b { assign v = 2; }, b -> c { }, c -> a { guard v == 2; assign w = 1; };",
+            "",
+            "w == 1",
+        ),
+        // where it is written on one way only,
+        (
+            "a -> b { assign v = 2; }, b -> c { assign w > 0 ? v = 1 : 0; }, c -> a { guard v == 2; assign w = 1; };",
+            "",
+            "w == 1",
+        ),
+        // where it is written after it is read,
+        (
+            "a -> b { assign v = 2; }, b -> c { assign w = v, v = 0; };",
+            "",
+            "w == 2",
+        ),
+        (
+            "a -> b { assign v = 2; }, b -> c { assign w = v--; };",
+            "",
+            "w == 2",
+        ),
+        // where code reads it that is called,
+        (
+            "a -> b { assign v = 2; }, b -> c { assign w = value(); };",
+            "",
+            "w == 2",
+        ),
+        (
+            "a -> b { assign v = 2; }, b -> c { assign take(v); };",
+            "",
+            "w == 2",
+        ),
+        // or that returns before it writes,
+        (
+            "a -> b { assign v = 2; }, b -> c { assign early(); }, c -> a { guard v == 2; assign w = 1; };",
+            "",
+            "w == 1",
+        ),
+        // or writes in one branch only,
+        (
+            "a -> b { assign v = 2; }, b -> c { assign unless_two(2); }, c -> a { guard v == 2; assign w = 1; };",
+            "",
+            "w == 1",
+        ),
+        // where another part of an array is written,
+        (
+            "a -> b { assign f[1] = 2; }, b -> c { assign f[0] = 0; }, c -> a { assign w = f[1]; };",
+            "",
+            "w == 2",
+        ),
+        (
+            "a -> b { select k : int[0,1]; assign f[k] = 2; }, b -> c { select k : int[0,1]; assign f[k] = 0; }, c -> a { assign w = f[0]; };",
+            "",
+            "w == 2",
+        ),
+        // where an invariant or the index of a channel reads it,
+        (
+            "a -> b { assign v = 1; }, b -> i { }, b -> c { };",
+            "",
+            "P.c && !P.i",
+        ),
+        (
+            "a -> b { assign v = 1; }, b -> c { sync d[v]!; };",
+            "x -> y { sync d[1]?; };",
+            "Q.y",
+        ),
+        // where another process reads it, then or later,
+        (
+            "a -> b { assign v = 2; }, b -> c { sync d[0]!; };",
+            "x -> y { sync d[0]?; }, y -> z { guard v == 2; };",
+            "Q.z",
+        ),
+        (
+            "a -> b { assign v = 2; }, b -> c { sync e!; };",
+            "x -> y { sync e?; assign w = v; };",
+            "w == 2",
+        ),
+        (
+            "a -> b { assign v = 2; }, b -> c { sync e!; assign v = 1; };",
+            "x -> y { guard v == 2; sync e?; };",
+            "Q.y",
+        ),
+        // where it is written only by one of two senders,
+        (
+            "a -> b { assign v = 2; }, b -> c { sync e!; }, b -> a { sync e!; assign v = 0; };",
+            "x -> y { sync e?; assign w = v; };",
+            "w == 2",
+        ),
+        // by a sender on only one of two channels,
+        (
+            "a -> b { assign v = 2; }, b -> c { sync d[0]!; }, b -> a { sync d[1]!; assign v = 0; };",
+            "x -> y { select k : int[0,1]; sync d[k]?; assign w = v; };",
+            "w == 2",
+        ),
+        // in one of two branches,
+        (
+            "a -> b { assign v = 2; }, b -> h { sync e!; }, h -> c { probability 1; }, h -> a { assign v = 0; probability 1; };",
+            "x -> y { sync e?; assign w = v; };",
+            "w == 2",
+        ),
+        // by one who need not be there,
+        (
+            "a -> b { assign v = 2; }, b -> c { sync n!; }, c -> a { guard v == 2; assign w = 1; };",
+            "x -> y { }, y -> x { sync n?; assign v = 0; };",
+            "w == 1",
+        ),
+        // or by one of two receivers.
+        (
+            "a -> b { assign v = 2; }, b -> c { sync e!; }, c -> a { guard v == 2; assign w = 1; };",
+            "x -> y { sync e?; }, x -> z { sync e?; assign v = 0; };",
+            "w == 1",
+        ),
+    ];
+    for (edges, others, goal) in cases {
+        let points = if edges.contains(" h ") {
+            "branchpoint h;"
+        } else {
+            ""
+        };
+        let others = if others.is_empty() {
+            String::new()
+        } else {
+            format!("trans {others}")
+        };
+        let text = format!(
+            "int[0,2] v; int[0,2] w; int[0,2] f[2]; chan d[3]; chan e; broadcast chan n;
+             int[0,2] value() {{ return v; }}
+             void take(int[0,2] &from) {{ w = from; }}
+             void early() {{ if (w == 0) return; v = 0; }}
+             void unless_two(int n) {{ if (n == 2) w = 0; else v = 0; }}
+             process P() {{ state a, b, c, i {{ v == 0 }}; {points} init a; trans {edges} }}
+             process Q() {{ state x, y, z; init x; {others} }}
+             system P, Q;"
+        );
+        for search in [false, true] {
+            let found = answer(
+                &text,
+                &format!("E<> {goal}"),
+                search,
+                (Order::BreadthFirst, 1),
+            );
+            assert_eq!(found.verdict, Verdict::Satisfied, "{goal}\n{text}");
+        }
+        stored(&text, "A[] !P.i");
+        stored(&text, &format!("E<> {goal}"));
+    }
+}
+
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        ((self.0 >> 20) % limit as u64) as usize
+    }
+
+    fn chance(&mut self, percent: usize) -> bool {
+        self.below(100) < percent
+    }
+
+    fn one_of<'t>(&mut self, texts: &[&'t str]) -> &'t str {
+        texts[self.below(texts.len())]
+    }
+}
+
+const GUARDS: [&str; 9] = [
+    "own == 1",
+    "own == 2",
+    "v == 1",
+    "v == w",
+    "f[1] == 2",
+    "f[v] == 1",
+    "is(w)",
+    "x >= 1",
+    "own != v",
+];
+
+const UPDATES: [&str; 22] = [
+    "own = v",
+    "own = 0",
+    "own = k",
+    "own = k + 1",
+    "v = k",
+    "v = k + 1",
+    "v = own",
+    "v = 0",
+    "w = v",
+    "w = (w + 1) % 3",
+    "f[0] = v",
+    "f[k] = own",
+    "f[1] = k + 1",
+    "own = f[v]",
+    "swap(own)",
+    "set(k)",
+    "clear()",
+    "v > 0 ? w = 0 : 0",
+    "take(v)",
+    "pair = other",
+    "other.s = k, other.t = v",
+    "w = pair.t",
+];
+
+const SYNCS: [&str; 10] = [
+    "c!", "c?", "c!", "c?", "d[k]!", "d[v]?", "d[own]!", "b!", "b?", "d[1]?",
+];
+
+const INVARIANTS: [&str; 4] = ["x <= 3", "own < 2", "v != 1", "w != 2"];
+
+const PLACES: [&str; 5] = ["p", "q", "r", "s", "t"];
+
+fn process(random: &mut Random, index: usize) -> String {
+    let mut text = format!("process P{index}() {{ clock x; int[0,2] own; state ");
+    let states = PLACES.map(|place| {
+        let invariant = random.chance(8).then(|| random.one_of(&INVARIANTS));
+        invariant.map_or(place.to_owned(), |invariant| {
+            format!("{place} {{ {invariant} }}")
+        })
+    });
+    let _ = write!(text, "{};", states.join(", "));
+    let committed: Vec<&str> = PLACES.into_iter().filter(|_| random.chance(15)).collect();
+    if !committed.is_empty() {
+        let _ = write!(text, " commit {};", committed.join(", "));
+    }
+    let edges: Vec<String> = (0..5 + random.below(3))
+        .map(|edge| {
+            let source = if edge < 5 { edge } else { random.below(5) };
+            let target = if random.chance(75) {
+                (source + 1) % 5
+            } else {
+                random.below(5)
+            };
+            let sync = random.chance(40).then(|| random.one_of(&SYNCS));
+            let guard = random.chance(25).then(|| random.one_of(&GUARDS));
+            // Whether a broadcast is heard must not hang on clocks, or deadlocks could not be asked for.
+            let is_timed = |guard: &&str| sync == Some("b?") && guard.starts_with('x');
+            let guard = guard.filter(|guard| !is_timed(guard));
+            let mut updates: Vec<&str> = (0..random.below(3))
+                .map(|_| random.one_of(&UPDATES))
+                .collect();
+            if random.chance(30) {
+                updates.push("x = 0");
+            }
+            let part = |keyword: &str, text: Option<String>| {
+                text.map_or(String::new(), |text| format!("{keyword} {text}; "))
+            };
+            let updates = (!updates.is_empty()).then(|| updates.join(", "));
+            format!(
+                "{} -> {} {{ select k : int[0,1]; {}{}{}}}",
+                PLACES[source],
+                PLACES[target],
+                part("guard", guard.map(str::to_owned)),
+                part("sync", sync.map(str::to_owned)),
+                part("assign", updates),
+            )
+        })
+        .collect();
+    let _ = writeln!(text, " init p; trans {}; }}", edges.join(",\n  "));
+    text
+}
+
+const QUERIES: [&str; 12] = [
+    "E<> P0.q && P1.r",
+    "E<> P0.s && P1.t",
+    "E<> P0.t",
+    "E<> P1.t",
+    "E<> P1.s",
+    "A[] !(P0.r && P1.r)",
+    "E<> deadlock",
+    "E<> P0.r && v == 2",
+    "A[] P1.own < 2",
+    "E<> P0.x - P1.x > 2 && P1.q",
+    "sup: v + P0.own, P1.x",
+    "bounds{P0.q}: f[1], w",
+];
+
+#[test]
+fn answers_are_those_with_all_values() {
+    let networks = std::env::var("NETWORKS").map_or(NETWORKS, |number| {
+        number.parse().expect("NETWORKS is a number")
+    });
+    let (mut full_states, mut reduced_states, mut reduced_searches) = (0, 0, 0);
+    for seed in 1..=networks {
+        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+        for _ in 0..4 {
+            random.below(2);
+        }
+        let count = 2 + random.below(2);
+        let mut text = String::from(
+            "int[0,2] v; int[0,2] w; int[0,2] f[3]; struct { int[0,2] s; int[0,2] t; } pair, other;
+             chan c; chan d[3]; broadcast chan b;
+             bool is(int n) { return n == v; }
+             void swap(int[0,2] &one) { int[0,2] old = one; one = w; w = old; }
+             void set(int[0,2] n) { if (n == 0) { v = 1; w = 0; } else { w = 2; v = 0; } }
+             void clear() { int i; for (i = 0; i < 3; i++) f[i] = 0; }
+             void take(int[0,2] n) { if (n == 2) return; w = n; f[2] = 1; }\n",
+        );
+        for index in 0..count {
+            text += &process(&mut random, index);
+        }
+        let names: Vec<String> = (0..count).map(|index| format!("P{index}")).collect();
+        let mut variables = String::new();
+        if random.chance(10) {
+            variables = String::from("before_update { w = (w + 1) % 3 }\n");
+        }
+        let _ = writeln!(text, "{variables}system {};", names.join(", "));
+        for query in QUERIES {
+            let (full, reduced) = stored(&text, query);
+            full_states += full;
+            reduced_states += reduced;
+            reduced_searches += u64::from(reduced < full);
+        }
+    }
+    assert!(
+        reduced_states < full_states && reduced_searches > networks,
+        "{full_states} states, {reduced_states} without dead values, fewer in {reduced_searches} searches"
+    );
+}
