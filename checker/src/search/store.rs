@@ -41,14 +41,6 @@ enum Width {
 }
 
 impl Width {
-    const ALL: [Width; 5] = [
-        Width::Byte,
-        Width::SignedByte,
-        Width::Short,
-        Width::SignedShort,
-        Width::Whole,
-    ];
-
     /// The least width for values from `low` to `high`.
     fn of(low: i32, high: i32) -> Width {
         let fits = |least: i32, greatest: i32| least <= low && high <= greatest;
@@ -74,55 +66,45 @@ impl Width {
     }
 }
 
-/// Words that are stored alike.
-#[derive(Clone, Debug)]
-struct Group {
+/// Neighbouring words that are stored alike.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    first: usize,
+    count: usize,
     width: Width,
-    /// Where they stand in a state.
-    places: Box<[u32]>,
 }
 
-impl Group {
+impl Run {
     fn bytes(&self) -> usize {
-        self.places.len() * self.width.bytes()
+        self.count * self.width.bytes()
     }
 
-    /// Writes the words of the group into as many bytes as it takes; returns whether all of them fit.
+    /// Writes the words of the run into as many bytes as it takes; returns whether all of them fit.
     fn pack(&self, words: &[i32], bytes: &mut [u8]) -> bool {
-        let words = self.places.iter().map(|&place| words[place as usize]);
+        let words = &words[self.first..self.first + self.count];
         match self.width {
-            Width::Byte => narrow(words, bytes, |word| [word as u8], |word| word & !0xff),
-            Width::SignedByte => narrow(
-                words,
-                bytes,
-                |word| (word as i8).to_le_bytes(),
-                |word| word.wrapping_add(0x80) & !0xff,
-            ),
-            Width::Short => narrow(
-                words,
-                bytes,
-                |word| (word as u16).to_le_bytes(),
-                |word| word & !0xffff,
-            ),
+            Width::Byte => narrow(words, bytes, |word| [word as u8], |[byte]| byte.into()),
+            Width::SignedByte => narrow(words, bytes, |word| (word as i8).to_le_bytes(), from_byte),
+            Width::Short => narrow(words, bytes, |word| (word as u16).to_le_bytes(), from_short),
             Width::SignedShort => narrow(
                 words,
                 bytes,
                 |word| (word as i16).to_le_bytes(),
-                |word| word.wrapping_add(0x8000) & !0xffff,
+                from_signed_short,
             ),
-            Width::Whole => narrow(words, bytes, i32::to_le_bytes, |_| 0),
+            Width::Whole => narrow(words, bytes, i32::to_le_bytes, i32::from_le_bytes),
         }
     }
 
-    /// Writes the words of the group from its bytes.
+    /// Writes the words of the run from its bytes.
     fn unpack(&self, bytes: &[u8], words: &mut [i32]) {
-        let places = &self.places;
+        let words = &mut words[self.first..self.first + self.count];
         match self.width {
-            Width::Byte => widen(bytes, places, words, |[byte]| byte.into()),
-            Width::SignedByte => widen(bytes, places, words, from_byte),
-            Width::Short => widen(bytes, places, words, from_short),
-            Width::SignedShort => widen(bytes, places, words, from_signed_short),
-            Width::Whole => widen(bytes, places, words, i32::from_le_bytes),
+            Width::Byte => widen(bytes, words, |[byte]| byte.into()),
+            Width::SignedByte => widen(bytes, words, from_byte),
+            Width::Short => widen(bytes, words, from_short),
+            Width::SignedShort => widen(bytes, words, from_signed_short),
+            Width::Whole => widen(bytes, words, i32::from_le_bytes),
         }
     }
 }
@@ -139,29 +121,23 @@ fn from_signed_short(bytes: [u8; 2]) -> i32 {
     i16::from_le_bytes(bytes).into()
 }
 
-/// Writes words by `to`; returns whether `beyond` is 0 for all of them.
 fn narrow<const N: usize>(
-    words: impl Iterator<Item = i32>,
+    words: &[i32],
     bytes: &mut [u8],
     to: impl Fn(i32) -> [u8; N],
-    beyond: impl Fn(i32) -> i32,
+    from: impl Fn([u8; N]) -> i32,
 ) -> bool {
-    let mut all = 0;
-    for (word, target) in words.zip(bytes.as_chunks_mut::<N>().0) {
-        *target = to(word);
-        all |= beyond(word);
+    let mut lost = 0;
+    for (word, target) in words.iter().zip(bytes.as_chunks_mut::<N>().0) {
+        *target = to(*word);
+        lost |= from(*target) ^ word;
     }
-    all == 0
+    lost == 0
 }
 
-fn widen<const N: usize>(
-    bytes: &[u8],
-    places: &[u32],
-    words: &mut [i32],
-    from: impl Fn([u8; N]) -> i32,
-) {
-    for (place, bytes) in places.iter().zip(bytes.as_chunks::<N>().0) {
-        words[*place as usize] = from(*bytes);
+fn widen<const N: usize>(bytes: &[u8], words: &mut [i32], from: impl Fn([u8; N]) -> i32) {
+    for (word, bytes) in words.iter_mut().zip(bytes.as_chunks::<N>().0) {
+        *word = from(*bytes);
     }
 }
 
@@ -169,7 +145,7 @@ fn widen<const N: usize>(
 #[derive(Debug)]
 pub struct StateStore {
     /// The words that are stored; those of the identity first.
-    groups: Vec<Group>,
+    runs: Vec<Run>,
     /// The bytes of a record that decide identity.
     identity: usize,
     /// The bytes of a record.
@@ -188,13 +164,13 @@ impl StateStore {
         let written = network.written_words();
         let widths = widths(network);
         let identity_words = network.layout.identity_words as usize;
-        let mut groups = groups_of(&written, &widths, 0, identity_words);
-        let identity = groups.iter().map(Group::bytes).sum();
-        groups.extend(groups_of(&written, &widths, identity_words, written.len()));
-        let stride = groups.iter().map(Group::bytes).sum::<usize>().max(1);
+        let mut runs = runs_of(&written, &widths, 0, identity_words);
+        let identity = runs.iter().map(Run::bytes).sum();
+        runs.extend(runs_of(&written, &widths, identity_words, written.len()));
+        let stride = runs.iter().map(Run::bytes).sum::<usize>().max(1);
         let block_bits = (BLOCK_BYTES / stride).max(1).ilog2();
         StateStore {
-            groups,
+            runs,
             identity,
             stride,
             block_bits,
@@ -226,7 +202,7 @@ impl StateStore {
     /// # Panics
     /// If a word lies outside the range of its variable.
     pub fn pack(&mut self, words: &[i32]) -> &[u8] {
-        let fits = pack(&self.groups, words, &mut self.scratch);
+        let fits = pack(&self.runs, words, &mut self.scratch);
         assert!(fits, "every word lies in the range of its variable");
         &self.scratch[..self.identity]
     }
@@ -283,7 +259,7 @@ impl StateStore {
     /// The id of a stored state.
     pub fn find(&self, words: &[i32]) -> Option<DiscreteId> {
         let mut packed = vec![0; self.stride];
-        if !pack(&self.groups, words, &mut packed) {
+        if !pack(&self.runs, words, &mut packed) {
             return None;
         }
         let key = &packed[..self.identity];
@@ -300,21 +276,21 @@ impl StateStore {
     /// Writes the stored words of a state over those of another state of the same network.
     pub fn load(&self, id: DiscreteId, words: &mut [i32]) {
         let mut record = record(&self.blocks, self.stride, self.block_bits, id.0);
-        for group in &self.groups {
-            let (bytes, rest) = record.split_at(group.bytes());
-            group.unpack(bytes, words);
+        for run in &self.runs {
+            let (bytes, rest) = record.split_at(run.bytes());
+            run.unpack(bytes, words);
             record = rest;
         }
     }
 }
 
-/// Packs the words of all groups; returns whether all of them fit.
-fn pack(groups: &[Group], words: &[i32], bytes: &mut [u8]) -> bool {
+/// Packs the words of all runs; returns whether all of them fit.
+fn pack(runs: &[Run], words: &[i32], bytes: &mut [u8]) -> bool {
     let mut rest = bytes;
     let mut fits = true;
-    for group in groups {
-        let (own, others) = std::mem::take(&mut rest).split_at_mut(group.bytes());
-        fits &= group.pack(words, own);
+    for run in runs {
+        let (own, others) = std::mem::take(&mut rest).split_at_mut(run.bytes());
+        fits &= run.pack(words, own);
         rest = others;
     }
     fits
@@ -358,17 +334,21 @@ fn add_widths(shape: &Shape, widths: &mut Vec<Width>) {
     }
 }
 
-/// The written words from `first` up to `last`, by width.
-fn groups_of(written: &[bool], widths: &[Width], first: usize, last: usize) -> Vec<Group> {
-    let groups = Width::ALL.map(|width| {
-        let places = (first..last).filter(|&word| written[word] && widths[word] == width);
-        Group {
-            width,
-            places: places.map(|word| word as u32).collect(),
+/// The maximal runs of written words of the same width from `first` up to `last`.
+fn runs_of(written: &[bool], widths: &[Width], first: usize, last: usize) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for word in (first..last).filter(|&word| written[word]) {
+        let width = widths[word];
+        match runs.last_mut() {
+            Some(run) if run.first + run.count == word && run.width == width => run.count += 1,
+            _ => runs.push(Run {
+                first: word,
+                count: 1,
+                width,
+            }),
         }
-    });
-    let groups = groups.into_iter();
-    groups.filter(|group| !group.places.is_empty()).collect()
+    }
+    runs
 }
 
 /// A hash of bytes: four lanes of multiply and fold, so that the multiplications overlap.
