@@ -204,6 +204,12 @@ fn values_that_are_read_are_kept() {
             "x -> y { select k : int[0,1]; sync d[k]?; assign w = v; };",
             "w == 2",
         ),
+        // by only one of those that may send on a channel,
+        (
+            "a -> b { assign v = 2; }, b -> c { select k : int[0,1]; sync d[k]!; }, b -> a { sync d[1]!; assign v = 0; };",
+            "x -> y { sync d[1]?; assign w = v; };",
+            "w == 2",
+        ),
         // in one of two branches,
         (
             "a -> b { assign v = 2; }, b -> h { sync e!; }, h -> c { probability 1; }, h -> a { assign v = 0; probability 1; };",
@@ -359,8 +365,9 @@ fn process(random: &mut Random, index: usize) -> String {
             };
             let updates = (!updates.is_empty()).then(|| updates.join(", "));
             format!(
-                "{} -> {} {{ select k : int[0,1]; {}{}{}}}",
+                "{} {} {} {{ select k : int[0,1]; {}{}{}}}",
                 PLACES[source],
+                if random.chance(35) { "-u->" } else { "->" },
                 PLACES[target],
                 part("guard", guard.map(str::to_owned)),
                 part("sync", sync.map(str::to_owned)),
@@ -371,6 +378,15 @@ fn process(random: &mut Random, index: usize) -> String {
     let _ = writeln!(text, " init p; trans {}; }}", edges.join(",\n  "));
     text
 }
+
+const GAMES: [&str; 6] = [
+    "control: A<> P0.s",
+    "control: A<> P1.t && v == 1",
+    "control: A[] !(P0.r && P1.r)",
+    "control: A[ w < 2 U P1.t ]",
+    "control: A[ P0.own < 2 W P1.s ]",
+    "control: A[] (!P0.t && A<> P0.q)",
+];
 
 const QUERIES: [&str; 12] = [
     "E<> P0.q && P1.r",
@@ -422,6 +438,9 @@ fn answers_are_those_with_all_values() {
             full_states += full;
             reduced_states += reduced;
             reduced_searches += u64::from(reduced < full);
+        }
+        for query in GAMES {
+            stored(&text, query);
         }
     }
     assert!(

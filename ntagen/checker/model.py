@@ -229,7 +229,8 @@ class Model:
                 while time stands still; verdicts do not depend on it, counts do.
             live_variables: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may take
                 states for one that differ only in variables whose values nothing reads before
-                they are written; verdicts, values and traces do not depend on it, counts do.
+                they are written, and so may games if neither a strategy nor plans are wanted;
+                verdicts, values and traces do not depend on it, counts do.
             folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
                 folder of the model.
             progress: Is called some twenty times a second with the numbers of explored,

@@ -218,7 +218,7 @@ class _Outputs:
     type=click.Choice(["on", "off"]),
     default="on",
     help="Whether states are one that differ only in variables which are written before they are "
-    "read again (E<>, A[], sup, inf, bounds).",
+    "read again (E<>, A[], sup, inf, bounds; games, where no strategy or plan is wanted).",
 )
 @forced_rule()
 @priority_rule(

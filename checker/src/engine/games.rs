@@ -13,7 +13,7 @@ use crate::game::strategy::{self, Strategy, Under};
 use crate::game::{Nodes, Player, Priorities};
 use crate::ir::{ClockAtom, Network, Objective, Predicate, QueryKind};
 use crate::network::{
-    Abstraction, ClockBounds, Failure, Restriction, Stepper, Symbolic, predicate,
+    Abstraction, ClockBounds, Failure, LiveVariables, Restriction, Stepper, Symbolic, predicate,
 };
 use crate::search::limits::{Counters, StopReason, Watch};
 
@@ -275,6 +275,17 @@ fn played(
             && within.is_none()
             && (!is_strategy_wanted || (seeker == Player::Controller && !is_cooperative)),
     };
+    // A strategy says what to do in states with all their values, and plans have such states.
+    let forgets = options.live_variables
+        && !is_strategy_wanted
+        && options.plans == PlansWanted::No
+        && within.is_none();
+    if forgets {
+        let read = [goal, keep].into_iter().flatten();
+        let read = read.flat_map(predicate::functions);
+        let live = LiveVariables::new(network, read, false);
+        symbolic = symbolic.forgetting(live.map(Arc::new));
+    }
     let mut zones_for_ways = symbolic.another();
     let plain = |verdict, counters| (new_answer(verdict, Evidence::default(), counters), false);
     let graph = match nodes {

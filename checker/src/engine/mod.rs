@@ -148,7 +148,8 @@ pub struct Options {
     pub symmetry: bool,
     /// Whether a search for a state need not take independent moves in every order where time stands still.
     pub partial_order: bool,
-    /// Whether a search for states or values may take states for the same that differ only in variables that are not live.
+    /// Whether a search for states or values, and a game of which only the winner is asked, may take states for the same that differ only
+    /// in variables that are not live.
     pub live_variables: bool,
 }
 

@@ -324,6 +324,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         id: ZoneId,
         urgent: Option<Urgent>,
     ) -> Result<u32, Failure> {
+        self.symbolic.forget(words);
         let discrete = self.discrete_of(words);
         let mut node = self.heads[discrete.0 as usize];
         while node != NONE {
