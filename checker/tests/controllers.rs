@@ -3,16 +3,22 @@
 //! Each is asked in all discrete states of its strategy and in some beside them, at all clock values of a grid and at random ones. What
 //! is expected is looked up in the strategy itself, decision by decision.
 
+#[path = "common/c_programs.rs"]
+mod c_programs;
+
+use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use checker::engine::{CodeEngine, LoadedModel, Options, controller, timing};
 use checker::game::closed_loop;
 use checker::game::strategy::{Decision, Selection, Strategy};
 use checker::network::Part;
+
+use c_programs::{compiled, games, in_folder};
 
 /// Ticks of a unit of time. Clock values are whole numbers of two of them, so that every bound and the middle between is met.
 const TICKS_PER_UNIT: i64 = 4;
@@ -53,6 +59,8 @@ struct Case {
     name: String,
     text: String,
     strategy: Strategy,
+    /// By the words that make a state: whether play has ended there, and the decisions.
+    decided: HashMap<Vec<i32>, (bool, Vec<Decision>)>,
     words: usize,
     clocks: usize,
     /// By number of the controller, the text of its edges.
@@ -80,12 +88,19 @@ fn solve(path: &Path, query: &str) -> Option<Case> {
         Some(line.replace("\\\"", "\"").replace("\\?", "?"))
     });
     let network = timing::network_of(model.network(), &strategy).into_owned();
+    let words = network.layout.identity_words as usize;
+    let decided = closed_loop::joined(&network, &strategy).into_iter();
+    let decided = decided.map(|(state, is_goal, decisions)| {
+        let decisions = decisions.into_iter().cloned().collect();
+        (state[..words].to_vec(), (is_goal, decisions))
+    });
     Some(Case {
+        decided: decided.collect(),
         name: format!("{}: {query}", path.display()),
         actions: actions.collect(),
         text,
         strategy: (*strategy).clone(),
-        words: network.layout.identity_words as usize,
+        words,
         clocks: network.clocks.len().saturating_sub(1),
         network,
     })
@@ -101,11 +116,7 @@ struct Expected<'s> {
 
 impl Case {
     fn at(&self, words: &[i32], clocks: &[i64]) -> Expected<'_> {
-        let joined = closed_loop::joined(&self.network, &self.strategy);
-        let known = joined
-            .into_iter()
-            .find(|(other, _, _)| other[..self.words] == words[..self.words]);
-        let Some((_, is_goal, decisions)) = known else {
+        let Some((is_goal, decisions)) = self.decided.get(&words[..self.words]) else {
             return Expected {
                 is_known: false,
                 is_goal: false,
@@ -119,11 +130,11 @@ impl Case {
         let mut values = vec![0];
         values.extend_from_slice(clocks);
         let applies = decisions
-            .into_iter()
+            .iter()
             .filter(|one| one.zones.contains(&values, TICKS_PER_UNIT));
         Expected {
             is_known: true,
-            is_goal,
+            is_goal: *is_goal,
             decisions: applies.take(most).collect(),
         }
     }
@@ -231,34 +242,10 @@ impl Case {
     }
 
     fn run(&self, folder: &Path) -> usize {
-        let source = folder.join("controller.c");
-        let program = folder.join("controller");
         // Clock values are asked in ticks, as integers.
         let settings =
             format!("#define CONTROLLER_TIME long\n#define CONTROLLER_UNIT {TICKS_PER_UNIT}\n");
-        fs::write(&source, settings + &self.text + DRIVER).expect("the folder can be written");
-        let flags = [
-            "-std=c99",
-            "-pedantic",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-O1",
-            "-o",
-        ];
-        let compiled = Command::new("cc")
-            .args(flags)
-            .arg(&program)
-            .arg(&source)
-            .output();
-        let compiled = compiled.expect("there is a C compiler");
-        let said = String::from_utf8_lossy(&compiled.stderr);
-        assert!(
-            compiled.status.success(),
-            "{}:\n{said}\n{}",
-            self.name,
-            self.text
-        );
+        let program = compiled(folder, &(settings + &self.text + DRIVER), &self.name);
 
         let points = self.points();
         let mut input = String::new();
@@ -289,37 +276,17 @@ impl Case {
     }
 }
 
-fn games() -> Vec<(PathBuf, String)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/games");
-    let files = fs::read_dir(folder).expect("the folder is there");
-    let mut files: Vec<PathBuf> = files
-        .map(|file| file.expect("the folder can be read").path())
-        .collect();
-    files.sort();
-    let mut games = Vec::new();
-    for path in files {
-        let text = fs::read_to_string(&path).expect("the model is there");
-        let queries = text
-            .lines()
-            .filter_map(|line| line.strip_prefix("// query: "));
-        let control = queries.filter(|query| query.starts_with("control"));
-        games.extend(control.map(|query| (path.clone(), query.to_owned())));
-    }
-    games
-}
-
 #[test]
 fn controllers_decide_as_their_strategies() {
-    let folder = std::env::temp_dir().join(format!("controllers-{}", std::process::id()));
-    fs::create_dir_all(&folder).expect("the folder can be made");
     let (mut controllers, mut points) = (0, 0);
-    for (path, query) in games() {
-        if let Some(case) = solve(&path, &query) {
-            points += case.run(&folder);
-            controllers += 1;
+    in_folder("controllers", |folder| {
+        for (path, query) in games("control") {
+            if let Some(case) = solve(&path, &query) {
+                points += case.run(folder);
+                controllers += 1;
+            }
         }
-    }
-    fs::remove_dir_all(&folder).expect("the folder can be removed");
+    });
     assert!(controllers >= 40, "only {controllers} controllers");
     assert!(points >= 15_000, "only {points} points");
 }

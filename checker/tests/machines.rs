@@ -2,14 +2,19 @@
 //!
 //! Of each, all states are asked for all observations.
 
+#[path = "common/c_programs.rs"]
+mod c_programs;
+
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
 use checker::engine::{CodeEngine, LoadedModel, Options, machine_controller, machine_file};
 use checker::game::observed::Machine;
+
+use c_programs::{compiled, games, in_folder};
 
 /// Writes what each state proposes, and where it goes on, observation by observation.
 const DRIVER: &str = r#"
@@ -83,44 +88,23 @@ impl Case {
 }
 
 fn run(folder: &Path, text: &str) -> String {
-    let (source, program) = (folder.join("machine.c"), folder.join("machine"));
-    fs::write(&source, format!("{text}{DRIVER}")).expect("the folder can be written");
-    let compiled = Command::new("cc")
-        .args(["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-o"])
-        .args([&program, &source])
-        .output()
-        .expect("there is a C compiler");
-    let said = String::from_utf8_lossy(&compiled.stderr);
-    assert!(compiled.status.success(), "{said}\n{text}");
+    let program = compiled(folder, &format!("{text}{DRIVER}"), "machine");
     let output = Command::new(&program).output().expect("the machine runs");
     String::from_utf8(output.stdout).expect("it writes text")
 }
 
 #[test]
 fn machines_in_c_do_as_their_machines() {
-    let games = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/games");
-    let files = fs::read_dir(games).expect("the folder is there");
-    let mut files: Vec<PathBuf> = files
-        .map(|file| file.expect("the folder can be read").path())
-        .collect();
-    files.sort();
-    let folder = std::env::temp_dir().join(format!("machines-{}", std::process::id()));
-    fs::create_dir_all(&folder).expect("the folder can be made");
     let mut machines = 0;
-    for path in files {
-        let text = fs::read_to_string(&path).expect("the model is there");
-        let queries = text
-            .lines()
-            .filter_map(|line| line.strip_prefix("// query: "));
-        for query in queries.filter(|query| query.starts_with('{')) {
-            let Some(case) = solve(&path, query) else {
+    in_folder("machines", |folder| {
+        for (path, query) in games("{") {
+            let Some(case) = solve(&path, &query) else {
                 continue;
             };
-            let output = run(&folder, &case.text);
+            let output = run(folder, &case.text);
             assert_eq!(output, case.expected(), "{query}\n{}", case.text);
             machines += 1;
         }
-    }
-    fs::remove_dir_all(&folder).expect("the folder can be removed");
+    });
     assert!(machines >= 10, "only {machines} machines");
 }

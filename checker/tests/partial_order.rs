@@ -5,46 +5,32 @@
 //!
 //! `NETWORKS=50000 cargo test --release --test partial_order` runs more of them than the usual number.
 
+#[path = "common/random.rs"]
+mod random;
+#[path = "common/searches.rs"]
+mod searches;
+
 use std::fmt::Write as _;
 
 use checker::engine::evidence::Proof;
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Options, Verdict};
 use checker::search::reach::Order;
+
+use random::{Random, networks};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 250;
 
-fn answer_in(
-    (order, threads): (Order, usize),
-    text: &str,
-    query: &str,
-    partial_order: bool,
-) -> Answer {
-    let mut model = LoadedModel::load("ordered.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    let query_text = model.add_query(query);
-    let mut options = Options {
-        order,
-        threads,
-        code: CodeEngine::Interpreter,
-        runs: true,
-        partial_order,
-        ..Options::default()
+fn answer_in(manner: (Order, usize), text: &str, query: &str, partial_order: bool) -> Answer {
+    let adjust = |options: &mut Options| {
+        options.partial_order = partial_order;
+        options.limits.states = Some(MOST_STATES);
     };
-    options.limits.states = Some(MOST_STATES);
-    let answer = model
-        .check(&query_text, &options)
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    for witness in &answer.evidence.witnesses {
-        // The replay runs every move that is possible on the way, and some of those may fail.
-        let is_cut = |run: &Option<Proof>| format!("{run:?}").contains("NotCovered(RunTime(");
-        assert!(
-            matches!(witness.run, Some(Proof::Replayed(..))) || is_cut(&witness.run),
-            "{query}: {:#?}\n{text}",
-            witness.run
-        );
-    }
-    answer
+    // The replay runs every move that is possible on the way, and some of those may fail.
+    let is_cut = |run: Option<&Proof>| format!("{run:?}").contains("NotCovered(RunTime(");
+    searches::answer_in(manner, (text, query), adjust, |run| {
+        matches!(run, Some(Proof::Replayed(..))) || is_cut(run)
+    })
 }
 
 /// Larger networks are left out.
@@ -225,25 +211,6 @@ fn orders_that_matter_are_kept() {
     }
 }
 
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        ((self.0 >> 20) % limit as u64) as usize
-    }
-
-    fn chance(&mut self, percent: usize) -> bool {
-        self.below(100) < percent
-    }
-
-    fn one_of<'t>(&mut self, texts: &[&'t str]) -> &'t str {
-        texts[self.below(texts.len())]
-    }
-}
-
 const GUARDS: [&str; 12] = [
     "own == 0",
     "own < 2",
@@ -402,9 +369,7 @@ const QUERIES: [&str; 14] = [
 
 #[test]
 fn verdicts_are_those_of_all_orders() {
-    let networks = std::env::var("NETWORKS").map_or(NETWORKS, |number| {
-        number.parse().expect("NETWORKS is a number")
-    });
+    let networks = networks(NETWORKS);
     let (mut full_states, mut reduced_states, mut reduced_searches) = (0, 0, 0);
     for seed in 1..=networks {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);

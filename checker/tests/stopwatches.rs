@@ -7,6 +7,9 @@
 //!
 //! `NETWORKS=20000 cargo test --release --test stopwatches` runs more of them than the usual number.
 
+#[path = "common/random.rs"]
+mod random;
+
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -18,6 +21,8 @@ use checker::ir::{Predicate, QueryKind};
 use checker::search::extremum::{Extreme, Extremes};
 use checker::verify::certificate::States;
 use checker::verify::{Semantics, State};
+
+use random::{Random, networks};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 400;
@@ -33,25 +38,6 @@ const TICKS: i64 = 2;
 
 /// No clock of a walk exceeds this number of units.
 const GREATEST_VALUE: i64 = 6;
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 20) as usize % limit
-    }
-
-    fn chance(&mut self, percent: usize) -> bool {
-        self.below(100) < percent
-    }
-
-    fn one_of<'t>(&mut self, texts: &[&'t str]) -> &'t str {
-        texts[self.below(texts.len())]
-    }
-}
 
 const CLOCKS: [&str; 3] = ["x", "y", "z"];
 
@@ -433,9 +419,7 @@ fn check_network(random: &mut Random, tally: &mut Tally) {
 
 #[test]
 fn nothing_that_a_walk_meets_contradicts_an_answer() {
-    let networks = std::env::var("NETWORKS").map_or(NETWORKS, |number| {
-        number.parse().expect("a number of networks")
-    });
+    let networks = networks(NETWORKS);
     let mut random = Random(0x57_0b_3a_7c_11_e5);
     let mut tally = Tally::default();
     for _ in 0..networks {

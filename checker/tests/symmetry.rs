@@ -6,40 +6,31 @@
 //!
 //! `NETWORKS=50000 cargo test --release --test symmetry` runs more of them than the usual number.
 
+#[path = "common/random.rs"]
+mod random;
+#[path = "common/searches.rs"]
+mod searches;
+
 use std::fmt::Write as _;
 
 use checker::engine::evidence::Proof;
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 use checker::search::reach::Order;
 
+use random::{Random, networks};
+
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 120;
 
-fn answer_in((order, threads): (Order, usize), text: &str, query: &str, symmetry: bool) -> Answer {
-    let mut model = LoadedModel::load("symmetric.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    let query_text = model.add_query(query);
-    let options = Options {
-        order,
-        threads,
-        code: CodeEngine::Interpreter,
-        runs: true,
-        symmetry,
+fn answer_in(manner: (Order, usize), text: &str, query: &str, symmetry: bool) -> Answer {
+    let adjust = |options: &mut Options| {
+        options.symmetry = symmetry;
         // Where states are counted, symmetry alone is to be seen; the other searches do both.
-        live_variables: (order, threads) != (Order::BreadthFirst, 1),
-        ..Options::default()
+        options.live_variables = manner != (Order::BreadthFirst, 1);
     };
-    let answer = model
-        .check(&query_text, &options)
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    for witness in &answer.evidence.witnesses {
-        assert!(
-            matches!(witness.run, Some(Proof::Replayed(..))),
-            "{query}: {:#?}\n{text}",
-            witness.run
-        );
-    }
-    answer
+    searches::answer_in(manner, (text, query), adjust, |run| {
+        matches!(run, Some(Proof::Replayed(..)))
+    })
 }
 
 /// The answers without and with symmetry reduction, which must be the same.
@@ -166,25 +157,6 @@ fn members_that_are_told_apart_are_not_exchanged() {
         );
         let (full, reduced) = stored(&text, "E<> n > 0 && deadlock && mark[who]");
         assert_eq!(reduced < full, is_reduced, "{full}, {reduced}\n{text}");
-    }
-}
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        ((self.0 >> 20) % limit as u64) as usize
-    }
-
-    fn chance(&mut self, percent: usize) -> bool {
-        self.below(100) < percent
-    }
-
-    fn one_of<'t>(&mut self, texts: &[&'t str]) -> &'t str {
-        texts[self.below(texts.len())]
     }
 }
 
@@ -331,9 +303,7 @@ const QUERIES: [&str; 8] = [
 
 #[test]
 fn verdicts_are_those_of_all_states() {
-    let networks = std::env::var("NETWORKS").map_or(NETWORKS, |number| {
-        number.parse().expect("NETWORKS is a number")
-    });
+    let networks = networks(NETWORKS);
     let (mut full_states, mut reduced_states) = (0, 0);
     for seed in 1..=networks {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);

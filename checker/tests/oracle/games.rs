@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict, strategy_file};
-use checker::game::strategy::{Start, Strategy};
+use checker::game::strategy::{self, Start};
 use checker::game::{Forced, Nodes, Player, Priorities};
 use checker::search::extremum::Extreme;
+use proptest::strategy::Strategy;
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
@@ -23,6 +24,23 @@ pub(crate) const SHAPE: Shape = Shape {
     guarded_urgency: true,
 };
 
+/// The rules for forced moves: those of brute force, and those of the engine.
+pub(crate) const RULES: [(Rule, Forced); 3] = [
+    (Rule::Tiga, Forced::Tiga),
+    (Rule::Product, Forced::Product),
+    (Rule::Neutral, Forced::Neutral),
+];
+
+/// Networks with a goal, what is to be kept, and a seed.
+pub(crate) fn seeded_games() -> impl Strategy<Value = (Network, Formula, Formula, u64)> {
+    (
+        generate::network(SHAPE),
+        generate::formula(SHAPE),
+        generate::formula(SHAPE),
+        proptest::num::u64::ANY,
+    )
+}
+
 fn compare(
     (network, goal, keep): &(Network, Formula, Formula),
     tally: &Tally,
@@ -37,11 +55,6 @@ fn compare(
         Err(error) => Err(error),
     };
     let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
-    let rules = [
-        (Rule::Tiga, Forced::Tiga),
-        (Rule::Product, Forced::Product),
-        (Rule::Neutral, Forced::Neutral),
-    ];
     for (query, kind) in [
         (format!("control: A<> {goal_text}"), Kind::Reach),
         (
@@ -59,7 +72,7 @@ fn compare(
         ),
     ] {
         let has_rule = matches!(kind, Kind::Reach | Kind::Until | Kind::Recur);
-        for (rule, forced) in rules.into_iter().take(if has_rule { 3 } else { 1 }) {
+        for (rule, forced) in RULES.into_iter().take(if has_rule { 3 } else { 1 }) {
             let wins = match &graph {
                 Ok(graph) => Ok(wins(network, (goal, keep), graph, kind, rule)),
                 Err(error) => Err(*error),
@@ -181,7 +194,7 @@ fn enforced(kind: Kind, owner: Player, (goal, keep): (&str, &str)) -> Vec<String
 /// Under a strategy, what it was made for must hold.
 fn check_under(
     model: &mut LoadedModel,
-    strategy: Arc<Strategy>,
+    strategy: Arc<strategy::Strategy>,
     query: &str,
     tally: &Tally,
 ) -> Result<(), TestCaseError> {

@@ -19,6 +19,7 @@ use proptest::test_runner::TestCaseError;
 
 use crate::compare::{self, Tally};
 use crate::explicit::{self, Graph, Label, Objective, Rule, winning};
+use crate::games::RULES;
 use crate::generate::{self, Formula, Network, Shape};
 
 const SHAPE: Shape = Shape {
@@ -361,11 +362,7 @@ impl Asked<'_> {
                 keep,
                 must_reach,
             };
-            for (rule, forced) in [
-                (Rule::Tiga, Forced::Tiga),
-                (Rule::Product, Forced::Product),
-                (Rule::Neutral, Forced::Neutral),
-            ] {
+            for (rule, forced) in RULES {
                 let game = Game {
                     graph,
                     seen,

@@ -17,8 +17,8 @@ use proptest::{prop_assert, prop_assert_eq};
 use crate::closed_loops::Random;
 use crate::compare::{self, Tally};
 use crate::explicit::{Graph, Node, Rule, Step, is_forced};
-use crate::games::{Kind, SHAPE, labels};
-use crate::generate::{self, Formula, Network};
+use crate::games::{Kind, RULES, SHAPE, labels, seeded_games};
+use crate::generate::{Formula, Network};
 
 /// A strategy on the graph of regions, with what is asked.
 struct Closed<'a> {
@@ -316,12 +316,6 @@ fn compare_query<'g>(
     Ok(())
 }
 
-const RULES: [(Rule, Forced); 3] = [
-    (Rule::Tiga, Forced::Tiga),
-    (Rule::Product, Forced::Product),
-    (Rule::Neutral, Forced::Neutral),
-];
-
 /// The constant of the regions: mutations move bounds by one.
 const CONSTANT: i64 = SHAPE.constant as i64 + 1;
 
@@ -440,23 +434,13 @@ fn compare_times(
 
 #[test]
 fn checks_of_mutated_strategies_equal_brute_force() {
-    let strategy = (
-        generate::network(SHAPE),
-        generate::formula(SHAPE),
-        generate::formula(SHAPE),
-        proptest::num::u64::ANY,
-    );
+    let strategy = seeded_games();
     compare::run("mutated strategies", 120, &strategy, compare);
 }
 
 #[test]
 fn checks_of_mutated_strategies_within_a_time_equal_brute_force() {
-    let strategy = (
-        generate::network(SHAPE),
-        generate::formula(SHAPE),
-        generate::formula(SHAPE),
-        proptest::num::u64::ANY,
-    );
+    let strategy = seeded_games();
     let name = "mutated strategies within a time";
     compare::run(name, 60, &strategy, compare_times);
 }

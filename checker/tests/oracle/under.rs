@@ -5,16 +5,16 @@ use std::sync::Arc;
 
 use checker::engine::{NamedStrategy, Options, strategy_file};
 use checker::game::strategy::Strategy;
-use checker::game::{Forced, Player, Priorities};
+use checker::game::{Player, Priorities};
 use checker::network::Part;
 use checker::verify::{Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 
 use crate::closed_loops::{Random, Said, own_moves};
 use crate::compare::{self, Tally};
-use crate::explicit::{Graph, Rule};
-use crate::games::{Kind, SHAPE, check_file, wins};
-use crate::generate::{self, Formula, Network};
+use crate::explicit::Graph;
+use crate::games::{Kind, RULES, SHAPE, check_file, seeded_games, wins};
+use crate::generate::{Formula, Network};
 
 /// Leaves only what the strategy allows.
 fn restrict(graph: &mut Graph, strategy: &Strategy) {
@@ -87,12 +87,7 @@ fn compare(
         ),
     ] {
         let has_rule = matches!(kind, Kind::Reach | Kind::Until | Kind::Recur);
-        let rules = [
-            (Rule::Tiga, Forced::Tiga),
-            (Rule::Product, Forced::Product),
-            (Rule::Neutral, Forced::Neutral),
-        ];
-        for (rule, forced) in rules.into_iter().take(if has_rule { 3 } else { 1 }) {
+        for (rule, forced) in RULES.into_iter().take(if has_rule { 3 } else { 1 }) {
             let expected = if kind == Kind::Safe {
                 let avoided = Formula::Not(Box::new(goal.clone()));
                 wins(network, (goal, &avoided), &graph, kind, rule)[0]
@@ -120,11 +115,6 @@ fn compare(
 
 #[test]
 fn games_under_a_strategy_equal_brute_force() {
-    let strategy = (
-        generate::network(SHAPE),
-        generate::formula(SHAPE),
-        generate::formula(SHAPE),
-        proptest::num::u64::ANY,
-    );
+    let strategy = seeded_games();
     compare::run("games under a strategy", 100, &strategy, compare);
 }
