@@ -70,3 +70,16 @@ fn ways_that_turn_out_to_be_lost_are_left() {
         }
     }
 }
+
+#[test]
+fn losses_that_come_late_are_found() {
+    // The environment takes one more than it can be given, in each of twenty rounds; every round is like the one before.
+    for order in ["g % 4", "3 - g % 4"] {
+        for verify in [false, true] {
+            let (is_safe, _) = asked(order, "control: A[] stock >= 0", verify);
+            assert!(!is_safe, "{order}");
+            let (is_safe, _) = asked(order, "control: A[] stock <= 40", verify);
+            assert!(is_safe, "{order}");
+        }
+    }
+}

@@ -196,10 +196,11 @@ class Model:
             query: The query in UPPAAL's language.
             search: The order of the search; verdicts do not depend on it.
             threads: How many threads share the search for a reachable state (``E<>``, ``A[]``) or
-                for values, breadth first; ``"all"`` (or 0) is one for each core. Other searches
-                take one. With the same number everything is the same again, counts and traces
-                included; verdicts do not depend on the number, unless the model has a run-time
-                error, which may be met before or after what is looked for.
+                for values, breadth first, and compute what is won in games; ``"all"`` (or 0) is one
+                for each core. Other searches take one. With the same number everything is the same
+                again, counts and traces included; verdicts do not depend on the number, unless the
+                model has a run-time error, which may be met before or after what is looked for. In
+                games nothing depends on it.
             seed: For ``search="random"``.
             forced: What happens where time cannot pass and only the environment can move.
             priorities: Whether priorities of channels and processes count in games and under

@@ -196,7 +196,8 @@ class _Outputs:
     type=_Threads(),
     default="1",
     help="Share the work among so many threads, or `all` cores: of E<>, A[], sup, inf and bounds, "
-    "breadth first. Liveness, games, --shortest, --fastest and --certificate take one. Default 1.",
+    "breadth first, and of what is computed with zones in games. Liveness, partial observation, "
+    "--shortest, --fastest and --certificate take one. Default 1.",
 )
 @click.option("--seed", type=int, default=0, help="For --search random.")
 @click.option(

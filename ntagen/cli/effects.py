@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Final
 
 _SYMBOLIC_ONLY: Final = {
-    "threads": "--threads has no effect here: games take one thread",
     "symmetry": "--symmetry has no effect here: games tell all members of scalar sets apart",
     "partial_order": "--partial-order has no effect here: games take moves in all orders",
     "search": "--search has no effect here: games are explored in an order of their own",
@@ -58,6 +57,10 @@ def idle_options(
         notes.append("--shortest and --fastest have no effect without --trace")
     if not any(is_game(query) or re.search(r"\bunder\b", query) for query in queries):
         notes += [note for name, note in _GAMES_ONLY.items() if name in given]
+    if "threads" in given and all(query.lstrip().startswith("{") for query in queries):
+        notes.append(
+            "--threads has no effect here: games under partial observation take one thread"
+        )
     if "seed" in given and values["search"] != "random":
         notes.append("--seed has no effect without --search random")
     if "max_plans" in given and not values["plans"]:

@@ -20,13 +20,13 @@ use crate::search::extremum::{Extreme, Extremes};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::{Bound, Zone};
 
-use super::Options;
 use super::answer::{Answer, Evidence, Values, Verdict, has_differences, new_answer};
 use super::certificate::stop_text;
 use super::games::{self, objective_atoms};
 use super::limits::LimitWatch;
 use super::timing::{TIME, with_time};
 use super::verification::Asked;
+use super::{MOST_THREADS, Options};
 
 /// The limit to start from if the query has none.
 const FIRST_LIMIT: i32 = 16;
@@ -251,6 +251,7 @@ impl Timed<'_, '_> {
         };
         let mut graph = Graph::new(&mut symbolic, wanted)?;
         let mut solver = Solver::new(&mut graph, Player::Controller, self.options.forced);
+        solver.share_among(self.options.threads.clamp(1, MOST_THREADS));
         let result = solver.solve(extent, watch)?;
         conclude(result, &mut solver, watch)
     }

@@ -21,7 +21,7 @@ use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
 use super::cooperation;
 use super::limits::LimitWatch;
 use super::verification::{self, Asked, Played, Verification};
-use super::{Options, PlansWanted};
+use super::{MOST_THREADS, Options, PlansWanted};
 /// What is said of a game whose model has priorities.
 pub(super) const IGNORED_PRIORITIES: &str =
     "games ignore the priorities of the model, unless they are told to keep them";
@@ -297,6 +297,7 @@ fn played(
         Err(failure) => return plain(Verdict::Error(failure), Counters::default()),
     };
     let mut solver = Solver::new(&mut graph, seeker, options.forced);
+    solver.share_among(options.threads.clamp(1, MOST_THREADS));
     if nodes == Nodes::Automatic {
         solver.give_up_if_crowded(STATES_BEFORE_CROWD);
     }

@@ -117,8 +117,8 @@ pub enum TraceWanted {
 pub struct Options {
     /// In which order states are explored.
     pub order: Order,
-    /// How many threads share a search, from 1 to [`MOST_THREADS`]. More than one share searches for a reachable state and for values, breadth
-    /// first; other searches take one.
+    /// How many threads share the work, from 1 to [`MOST_THREADS`]. More than one share searches for a reachable state and for values,
+    /// breadth first, and compute what is won in games; other searches take one.
     pub threads: usize,
     /// The rule for forced moves of the environment.
     pub forced: Forced,

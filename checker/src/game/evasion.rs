@@ -91,13 +91,14 @@ fn allowed_waiting(
     free: &Federation,
     acting: &Federation,
 ) -> Result<Federation, Failure> {
-    let mut at_rest = solver.standstill(node)?.intersection(free);
-    at_rest.subtract(&solver.forced_controller(node)?);
+    let situation = solver.situation(node)?;
+    let mut at_rest = solver.standstill(&situation).intersection(free);
+    at_rest.subtract(&solver.forced_controller(node, &situation));
     if !solver.graph.nodes[node as usize].delays {
         return Ok(at_rest);
     }
     let safe = rest_of(solver, node);
-    let stopped = solver.stopped(node)?;
+    let stopped = situation.stopped;
     let mut waiting = instants::before(&safe, &stopped).intersection(free);
     // Where time can pass at all, and what it does not pass.
     let mut passing = safe.clone();

@@ -5,53 +5,72 @@ use crate::zones::{Federation, Patience};
 use super::graph::{Edge, NONE};
 use super::reach::{Gain, Solver, Win};
 
+/// What a node gains.
+#[derive(Clone, Debug)]
+pub(super) enum Gained {
+    /// Nothing.
+    Nothing,
+    /// All that was not won; this part, unless it is the whole node.
+    Everything(Option<Federation>),
+    /// A part.
+    Part {
+        /// What is won now.
+        won: Federation,
+        /// What of it was not before.
+        part: Federation,
+        /// What is not won.
+        rest: Federation,
+    },
+}
+
 impl Solver<'_, '_, '_> {
-    /// Records that these valuations of a node are won, unless the patience is over; if they are more than before, its predecessors
-    /// are to be updated.
-    pub(super) fn gain(&mut self, node: u32, mut won: Federation, patience: &mut Patience<'_>) {
-        let (mut rest, old_count) = match &self.win[node as usize] {
-            Win::Everything => return,
-            Win::Part(old) => {
-                let rest = &self.rest[&node];
-                (rest.clone(), old.zone_count() + rest.zone_count())
-            }
-            Win::Nothing => (self.whole(node), 0),
+    /// What a node gains if these valuations are won, which is of use unless the patience is over.
+    pub(super) fn gained(
+        &self,
+        node: u32,
+        mut won: Federation,
+        patience: &mut Patience<'_>,
+    ) -> Gained {
+        let (mut rest, is_first) = match &self.win[node as usize] {
+            Win::Everything => return Gained::Nothing,
+            Win::Part(_) => (self.rest[&node].clone(), false),
+            Win::Nothing => (self.whole(node), true),
         };
         if !rest.intersects(&won) {
-            return;
+            return Gained::Nothing;
         }
         won.reduce_within(patience);
-        let is_first = old_count == 0;
         let part = if is_first {
             won.clone()
         } else {
             rest.intersection_within(&won, patience)
         };
         rest.subtract_within(&won, patience);
-        if patience.is_over() {
-            return;
-        }
         if rest.is_empty() {
-            self.rest.remove(&node);
-            self.record(node, Win::Everything, (!is_first).then_some(part));
-            return;
+            return Gained::Everything((!is_first).then_some(part));
         }
         rest.merge_within(patience);
-        if patience.is_over() {
-            return;
-        }
-        let new_count = won.zone_count() + part.zone_count() + rest.zone_count();
-        self.gained_zones += new_count as u64;
-        self.gained_zones -= old_count as u64;
-        self.rest.insert(node, rest);
-        self.record(node, Win::Part(won), Some(part));
+        Gained::Part { won, part, rest }
     }
 
-    /// Records that a part of a node is won of which nothing was; the rest is not.
-    pub(super) fn gain_part(&mut self, node: u32, part: Federation, rest: Federation) {
-        self.gained_zones += (2 * part.zone_count() + rest.zone_count()) as u64;
-        self.rest.insert(node, rest);
-        self.record(node, Win::Part(part.clone()), Some(part));
+    /// Records what a node gains, whose predecessors are to be updated then.
+    pub(super) fn gain(&mut self, node: u32, gained: Gained) {
+        match gained {
+            Gained::Nothing => {}
+            Gained::Everything(part) => {
+                self.rest.remove(&node);
+                self.record(node, Win::Everything, part);
+            }
+            Gained::Part { won, part, rest } => {
+                let new_count = won.zone_count() + part.zone_count() + rest.zone_count();
+                self.gained_zones += new_count as u64;
+                let before = self.rest.insert(node, rest);
+                if let (Win::Part(old), Some(before)) = (&self.win[node as usize], before) {
+                    self.gained_zones -= (old.zone_count() + before.zone_count()) as u64;
+                }
+                self.record(node, Win::Part(won), Some(part));
+            }
+        }
     }
 
     /// Records that all of a node is won.

@@ -9,7 +9,6 @@
 
 use crate::network::Failure;
 use crate::search::limits::Watch;
-use crate::zones::Patience;
 
 use super::reach::{Solver, Win};
 
@@ -63,12 +62,15 @@ impl Solver<'_, '_, '_> {
                     Some(true) => gained.push((node, None)),
                     Some(false) => {}
                     None => {
-                        let (won, reason) = self
-                            .patiently(watch, |solver, patience| solver.winnable(node, patience));
+                        let situation = self.situation_for_win(node)?;
+                        let (one, reason) = self.patiently(watch, |solver, patience| {
+                            let won = solver.winnable(node, &situation, patience);
+                            solver.gained(node, won, patience)
+                        });
                         if reason.is_some() {
                             return Ok(false);
                         }
-                        gained.push((node, Some(won?)));
+                        gained.push((node, Some(one)));
                     }
                 }
                 until_look -= 1;
@@ -79,19 +81,12 @@ impl Solver<'_, '_, '_> {
                     }
                 }
             }
-            for (node, won) in gained {
+            for (node, one) in gained {
                 // What is gained in a layer has one stamp.
                 self.stamp = layer;
-                match won {
+                match one {
                     None => self.gain_everything(node),
-                    Some(won) => {
-                        let gain = |solver: &mut Self, patience: &mut Patience<'_>| {
-                            solver.gain(node, won, patience);
-                        };
-                        if self.patiently(watch, gain).1.is_some() {
-                            return Ok(false);
-                        }
-                    }
+                    Some(one) => self.gain(node, one),
                 }
             }
         }

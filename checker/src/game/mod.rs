@@ -24,6 +24,7 @@ mod repeats;
 mod sought;
 mod stops;
 pub mod strategy;
+mod tasks;
 mod trails;
 mod urgency;
 

@@ -6,30 +6,73 @@ use crate::zones::{ClockSet, Federation, Patience, past};
 use super::Player;
 use super::reach::{Solver, Win};
 
+/// What the formulas for a node need to know of its words.
+#[derive(Debug)]
+pub(super) struct Situation {
+    /// The clocks that stand still.
+    pub(super) stopped: ClockSet,
+    /// Where time cannot pass; see [`super::stops::stops`].
+    pub(super) stops: Vec<(Option<u32>, Federation)>,
+    /// The controllable edges, each with the processes that take part in its first move; none if that does not matter.
+    pub(super) movers: Vec<(Vec<u32>, usize)>,
+}
+
 impl Solver<'_, '_, '_> {
-    /// The valuations of a node that are won by what is known of its successors.
+    /// The situation in a node.
+    pub(super) fn situation(&mut self, node: u32) -> Result<Situation, Failure> {
+        self.situation_with(node, true)
+    }
+
+    /// The situation in a node, as far as it matters for what is won there: time that stops does so only for who may be forced.
+    pub(super) fn situation_for_win(&mut self, node: u32) -> Result<Situation, Failure> {
+        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let may_be_forced = edges.any(|edge| !self.seeker.owns(edge.controllable));
+        self.situation_with(node, may_be_forced)
+    }
+
+    fn situation_with(&mut self, node: u32, stops_matter: bool) -> Result<Situation, Failure> {
+        let mut words = std::mem::take(&mut self.words);
+        self.graph.load(node, &mut words);
+        let mut situation = Situation {
+            stopped: self.graph.symbolic.stopped(&words)?,
+            stops: Vec::new(),
+            movers: Vec::new(),
+        };
+        if stops_matter {
+            situation.stops = self.stops(node, &mut words)?;
+            if self.seeker == Player::Controller {
+                situation.movers = self.controllable_movers(node, &mut words)?;
+            }
+        }
+        self.words = words;
+        Ok(situation)
+    }
+
+    /// The valuations of a node in this situation that are won by what is known of its successors.
     pub(super) fn winnable(
-        &mut self,
+        &self,
         node: u32,
+        situation: &Situation,
         patience: &mut Patience<'_>,
-    ) -> Result<Federation, Failure> {
+    ) -> Federation {
         let mut won = match self.seeker {
-            Player::Controller => self.controllers_gain(node, patience)?,
-            Player::Environment => self.environments_gain(node, patience)?,
+            Player::Controller => self.controllers_gain(node, situation, patience),
+            Player::Environment => self.environments_gain(node, situation, patience),
         };
         match self.graph.urgent(node) {
             None => won.intersect_zone(self.graph.zone(node)),
             Some(urgent) => won = won.intersection(&urgent.reached),
         }
-        Ok(won)
+        won
     }
 
     /// What the controller wins as the seeker, as far as known.
     fn controllers_gain(
-        &mut self,
+        &self,
         node: u32,
+        situation: &Situation,
         patience: &mut Patience<'_>,
-    ) -> Result<Federation, Failure> {
+    ) -> Federation {
         let mut good = self.known(node);
         let goal = self.goal(node);
         let mut bad = self.broken(node);
@@ -42,19 +85,20 @@ impl Solver<'_, '_, '_> {
             }
         }
         bad.subtract_within(&goal, patience);
-        let forced = self.forced_environment(node, &bad)?;
+        let forced = self.forced_environment(node, &bad, situation);
         good.unite(&forced);
-        let mut won = self.safe_past(node, good, &bad, patience)?;
+        let mut won = self.safe_past(node, good, &bad, situation, patience);
         won.unite(&goal);
-        Ok(won)
+        won
     }
 
     /// What the environment wins as the seeker, as far as known.
     fn environments_gain(
-        &mut self,
+        &self,
         node: u32,
+        situation: &Situation,
         patience: &mut Patience<'_>,
-    ) -> Result<Federation, Failure> {
+    ) -> Federation {
         let goal = self.goal(node);
         let mut now = self.broken(node);
         let mut escape = Federation::empty(self.graph.dimension());
@@ -67,13 +111,13 @@ impl Solver<'_, '_, '_> {
             }
         }
         now.subtract_within(&goal, patience);
-        let mut good = self.forced_controller(node)?;
+        let mut good = self.forced_controller(node, situation);
         good.subtract_within(&escape, patience);
         good.unite(&now);
         good.unite(&self.known(node));
         escape.subtract_within(&now, patience);
         escape.unite(&goal);
-        self.safe_past(node, good, &escape, patience)
+        self.safe_past(node, good, &escape, situation, patience)
     }
 
     /// What was won in a node so far, as far as it is a part of it.
@@ -86,27 +130,20 @@ impl Solver<'_, '_, '_> {
 
     /// The valuations of a node that get into `good` without meeting `bad`, by waiting if time may pass.
     pub(super) fn safe_past(
-        &mut self,
+        &self,
         node: u32,
         mut good: Federation,
         bad: &Federation,
+        situation: &Situation,
         patience: &mut Patience<'_>,
-    ) -> Result<Federation, Failure> {
+    ) -> Federation {
         if self.graph.nodes[node as usize].delays {
             if let Some(urgent) = self.graph.urgent(node) {
-                return Ok(urgent.predecessors(&good, bad));
+                return urgent.predecessors(&good, bad);
             }
-            let stopped = self.stopped(node)?;
-            return Ok(past::predecessors_within(&good, bad, &stopped, patience));
+            return past::predecessors_within(&good, bad, &situation.stopped, patience);
         }
         good.subtract_within(bad, patience);
-        Ok(good)
-    }
-
-    /// The clocks that stand still in a node.
-    pub(super) fn stopped(&mut self, node: u32) -> Result<ClockSet, Failure> {
-        let mut words = self.graph.symbolic.stepper.network().initial.clone();
-        self.graph.load(node, &mut words);
-        self.graph.symbolic.stopped(&words)
+        good
     }
 }

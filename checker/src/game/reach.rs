@@ -47,8 +47,10 @@ use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::{Bound, Federation, Patience};
 
 use super::dives::Frontier;
+use super::gains::Gained;
 use super::graph::{Graph, Standing};
 use super::repeats::{Case, Repeats};
+use super::tasks::Task;
 use super::{Forced, Player};
 
 /// So many nodes for each discrete state are many.
@@ -63,6 +65,10 @@ const BETWEEN_COMPUTATIONS: u64 = 4;
 
 /// It is looked what is still in play when the explored states have grown by this part of them.
 const BETWEEN_PLAYS: u64 = 3;
+
+/// Nodes that are computed from the same winning valuations, at most. Some of them may gain more from each other, and are computed
+/// again; among so many that is rare.
+const MOST_TASKS: usize = 64;
 
 /// Updates by words between two looks at the limits, where no node is expanded.
 const UPDATES_BETWEEN_LOOKS: u32 = 1024;
@@ -149,6 +155,8 @@ pub struct Solver<'g, 's, 'a> {
     pub(super) pending: Vec<Pending>,
     /// What was computed before.
     pub(super) repeats: Repeats,
+    /// How many threads compute what nodes win.
+    pub(super) threads: usize,
     /// The words of some node.
     pub(super) words: Vec<i32>,
     /// How many states may be explored before the deferred nodes are computed.
@@ -172,6 +180,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let mut solver = Solver {
             words: graph.symbolic.stepper.network().initial.clone(),
             repeats: Repeats::default(),
+            threads: 1,
             graph,
             seeker,
             targets: None,
@@ -202,6 +211,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         self.crowded_from = explored;
     }
 
+    /// Lets so many threads compute what nodes win.
+    pub fn share_among(&mut self, threads: usize) {
+        self.threads = threads;
+    }
+
     fn is_crowded(&self) -> bool {
         self.graph.explored >= self.crowded_from
             && self.graph.nodes.len() >= CROWD * self.graph.discrete_count()
@@ -220,7 +234,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    fn zone_bytes(&self) -> u64 {
+    pub(super) fn zone_bytes(&self) -> u64 {
         (self.graph.dimension().pow(2) * size_of::<Bound>()) as u64
     }
 
@@ -308,17 +322,15 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             if let Some(reason) = self.propagate_words(watch) {
                 return Ok(Some(reason));
             }
-            let Some(node) = self.deferred.pop_front() else {
+            let tasks = self.next_tasks()?;
+            // Known cases that gained something have left updates.
+            if tasks.is_empty() && self.deferred.is_empty() && self.updates.is_empty() {
                 return Ok(None);
-            };
-            if self.pending[node as usize] != Pending::Computation {
-                continue;
             }
-            self.pending[node as usize] = Pending::No;
-            if let Some(reason) = self.compute(node, watch)? {
+            until_look = until_look.saturating_sub(tasks.len() as u32);
+            if let Some(reason) = self.compute(tasks, watch) {
                 return Ok(Some(reason));
             }
-            until_look -= 1;
             if until_look == 0 {
                 until_look = COMPUTATIONS_BETWEEN_LOOKS;
                 let reason = watch.look(&self.counters());
@@ -326,6 +338,42 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                     return Ok(reason);
                 }
             }
+        }
+    }
+
+    /// Takes some deferred nodes whose winning valuations are to be computed; those of nodes that are known cases are recorded.
+    fn next_tasks(&mut self) -> Result<Vec<Task>, Failure> {
+        let mut tasks = Vec::new();
+        while tasks.len() < MOST_TASKS
+            && let Some(node) = self.deferred.pop_front()
+        {
+            if self.pending[node as usize] != Pending::Computation {
+                continue;
+            }
+            self.pending[node as usize] = Pending::No;
+            let key = match self.case_of(node)? {
+                Case::Known(gained) => {
+                    self.gain_computed(node, gained);
+                    continue;
+                }
+                Case::New(key) => Some(key),
+                Case::None => None,
+            };
+            let situation = self.situation_for_win(node)?;
+            tasks.push(Task {
+                node,
+                situation,
+                key,
+            });
+        }
+        Ok(tasks)
+    }
+
+    /// Records what a node gains that was computed.
+    pub(super) fn gain_computed(&mut self, node: u32, gained: Gained) {
+        self.gain(node, gained);
+        if !matches!(self.win[node as usize], Win::Everything) {
+            self.note_spoilers(node);
         }
     }
 
@@ -497,9 +545,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
 
     /// Does something with zones unless, or until, the watch gives a reason to stop; then the result is of no use.
     pub(super) fn patiently<R>(
-        &mut self,
+        &self,
         watch: &mut dyn Watch,
-        work: impl FnOnce(&mut Self, &mut Patience<'_>) -> R,
+        work: impl FnOnce(&Self, &mut Patience<'_>) -> R,
     ) -> (R, Option<StopReason>) {
         let counters = self.counters();
         let zone_bytes = self.zone_bytes();
@@ -512,39 +560,5 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let mut patience = Patience::as_long_as(&mut goes_on);
         let result = work(self, &mut patience);
         (result, reason)
-    }
-
-    /// Computes the winning valuations of a node anew.
-    fn compute(&mut self, node: u32, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
-        let (known, is_case) = self.known_case(node)?;
-        if let Some(case) = known {
-            match case {
-                Case::Nothing => {}
-                Case::Everything => self.gain_everything(node),
-                Case::Part(part, rest) => self.gain_part(node, part, rest),
-            }
-            if !matches!(self.win[node as usize], Win::Everything) {
-                self.note_spoilers(node);
-            }
-            return Ok(None);
-        }
-        let (result, reason) = self.patiently(watch, |solver, patience| {
-            let won = solver.winnable(node, patience)?;
-            if !patience.is_over() {
-                solver.gain(node, won, patience);
-            }
-            Ok::<_, Failure>(())
-        });
-        result?;
-        if reason.is_some() {
-            return Ok(reason);
-        }
-        if is_case {
-            self.remember_case(node);
-        }
-        if !matches!(self.win[node as usize], Win::Everything) {
-            self.note_spoilers(node);
-        }
-        Ok(None)
     }
 }

@@ -158,8 +158,10 @@ pub(super) fn leave(
         }
     }
     back.subtract(&out);
-    let mut held = solver.forced_controller(node)?;
+    let situation = solver.situation(node)?;
+    let mut held = solver.forced_controller(node, &situation);
     held.subtract(&back);
     out.unite(&held);
-    solver.safe_past(node, out, &back, &mut Patience::endless())
+    let patience = &mut Patience::endless();
+    Ok(solver.safe_past(node, out, &back, &situation, patience))
 }

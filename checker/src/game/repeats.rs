@@ -12,9 +12,9 @@
 use rustc_hash::FxHashMap;
 
 use crate::network::Failure;
-use crate::zones::Federation;
 
 use super::Player;
+use super::gains::Gained;
 use super::graph::Standing;
 use super::reach::{Solver, Win};
 
@@ -28,57 +28,54 @@ const WORTH: u32 = 4;
 /// What cases win.
 #[derive(Debug, Default)]
 pub(super) struct Repeats {
-    cases: FxHashMap<Box<[u32]>, Case>,
+    cases: FxHashMap<Box<[u32]>, Gained>,
     key: Vec<u32>,
+    key_bytes: usize,
     lookups: u32,
     hits: u32,
 }
 
-/// What a case wins.
-#[derive(Clone, Debug)]
+/// Whether a node is a case.
 pub(super) enum Case {
-    Nothing,
-    Everything,
-    /// A part, and what is left.
-    Part(Federation, Federation),
+    /// It is none.
+    None,
+    /// One that is not remembered, with its key.
+    New(Box<[u32]>),
+    /// One of which it is known what it gains.
+    Known(Gained),
 }
 
 impl Repeats {
-    /// The bytes that it takes.
+    /// The bytes that it takes, zones excepted.
     pub(super) fn bytes(&self) -> usize {
-        let keys: usize = self.cases.keys().map(|key| key.len() * 4).sum();
-        keys + self.cases.capacity() * size_of::<(Box<[u32]>, Case)>()
+        self.key_bytes + self.cases.capacity() * size_of::<(Box<[u32]>, Gained)>()
     }
 }
 
 impl Solver<'_, '_, '_> {
-    /// What a node wins, if it is a case that was met before; also whether it is a case at all, whose key is kept then.
-    pub(super) fn known_case(&mut self, node: u32) -> Result<(Option<Case>, bool), Failure> {
+    /// Looks whether a node is a case, and one that was met before.
+    pub(super) fn case_of(&mut self, node: u32) -> Result<Case, Failure> {
         let repeats = &self.repeats;
         if repeats.lookups >= TRIAL && repeats.hits < repeats.lookups / WORTH || !self.is_case(node)
         {
-            return Ok((None, false));
+            return Ok(Case::None);
         }
         self.make_key(node)?;
         let repeats = &mut self.repeats;
-        let known = repeats.cases.get(&repeats.key[..]).cloned();
         repeats.lookups += 1;
-        repeats.hits += u32::from(known.is_some());
-        Ok((known, true))
+        if let Some(known) = repeats.cases.get(&repeats.key[..]) {
+            repeats.hits += 1;
+            return Ok(Case::Known(known.clone()));
+        }
+        Ok(Case::New(repeats.key.clone().into_boxed_slice()))
     }
 
-    /// Remembers what the case wins of which the key was made last: a node that has just been computed.
-    pub(super) fn remember_case(&mut self, node: u32) {
-        if self.repeats.cases.len() >= MOST_CASES {
-            return;
+    /// Remembers what a case gains.
+    pub(super) fn remember_case(&mut self, key: Box<[u32]>, gained: &Gained) {
+        if self.repeats.cases.len() < MOST_CASES {
+            self.repeats.key_bytes += size_of_val(&*key);
+            self.repeats.cases.insert(key, gained.clone());
         }
-        let case = match &self.win[node as usize] {
-            Win::Nothing => Case::Nothing,
-            Win::Everything => Case::Everything,
-            Win::Part(part) => Case::Part(part.clone(), self.rest[&node].clone()),
-        };
-        let key = self.repeats.key.clone().into_boxed_slice();
-        self.repeats.cases.insert(key, case);
     }
 
     fn is_case(&self, node: u32) -> bool {

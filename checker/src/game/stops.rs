@@ -3,57 +3,56 @@
 use crate::network::{Failure, Symbolic};
 use crate::zones::{Bound, Federation};
 
+use super::predecessors::Situation;
 use super::reach::Solver;
 use super::{Forced, Player};
 
 impl Solver<'_, '_, '_> {
     /// The valuations in which time stops, the environment has a move, and must take one.
     pub(super) fn forced_environment(
-        &mut self,
+        &self,
         node: u32,
         bad: &Federation,
-    ) -> Result<Federation, Failure> {
+        situation: &Situation,
+    ) -> Federation {
         let opponent = self.enabled_moves(node, Player::Environment);
         if opponent.is_empty() {
-            return Ok(opponent);
+            return opponent;
         }
-        let mut words = self.graph.symbolic.stepper.network().initial.clone();
-        self.graph.load(node, &mut words);
-        let mut stops = self.stops(node, &mut words)?;
         let mut all = Federation::empty(self.graph.dimension());
-        for (component, stop) in &mut stops {
-            *stop = stop.intersection(&opponent);
+        for (component, stop) in &situation.stops {
+            let mut stop = stop.intersection(&opponent);
             stop.subtract(bad);
-            for (mover, edge) in self.controllable_movers(node, &mut words)? {
+            for (mover, edge) in &situation.movers {
                 let blocks = match (self.forced, *component) {
                     (Forced::Neutral, _) => false,
                     (Forced::Tiga, Some(component)) => mover.contains(&component),
                     (Forced::Product, _) | (Forced::Tiga, None) => true,
                 };
                 if blocks {
-                    stop.subtract(&self.enabled(&self.graph.edges[edge]));
+                    stop.subtract(&self.enabled(&self.graph.edges[*edge]));
                 }
             }
-            all.unite(stop);
+            all.unite(&stop);
         }
         if let Some(urgent) = self.graph.urgent(node) {
             all.subtract(&urgent.obliged);
         }
-        Ok(all)
+        all
     }
 
     /// The valuations in which the controller must move: where it is obliged to, and where time stops, it has a move, and the
     /// environment has none.
-    pub(super) fn forced_controller(&mut self, node: u32) -> Result<Federation, Failure> {
+    pub(super) fn forced_controller(&self, node: u32, situation: &Situation) -> Federation {
         let mut forced = self.enabled_moves(node, Player::Controller);
         if !forced.is_empty() {
-            forced = forced.intersection(&self.standstill(node)?);
+            forced = forced.intersection(&self.standstill(situation));
             forced.subtract(&self.enabled_moves(node, Player::Environment));
         }
         if let Some(urgent) = self.graph.urgent(node) {
             forced.unite(&urgent.obliged.intersection(&urgent.reached));
         }
-        Ok(forced)
+        forced
     }
 
     /// Whether the controller is obliged to move somewhere in a node.
@@ -63,14 +62,12 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The valuations of a node in which time cannot pass.
-    pub(super) fn standstill(&mut self, node: u32) -> Result<Federation, Failure> {
-        let mut words = self.graph.symbolic.stepper.network().initial.clone();
-        self.graph.load(node, &mut words);
+    pub(super) fn standstill(&self, situation: &Situation) -> Federation {
         let mut all = Federation::empty(self.graph.dimension());
-        for (_, stop) in self.stops(node, &mut words)? {
-            all.unite(&stop);
+        for (_, stop) in &situation.stops {
+            all.unite(stop);
         }
-        Ok(all)
+        all
     }
 
     /// The valuations of a node in which a player has a move.
@@ -86,7 +83,7 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The valuations in which time cannot pass, with the process that stops it (`None`: an urgent channel).
-    fn stops(
+    pub(super) fn stops(
         &mut self,
         node: u32,
         words: &mut [i32],
@@ -102,7 +99,7 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The controllable edges of a node, each with the processes that take part in its first move.
-    fn controllable_movers(
+    pub(super) fn controllable_movers(
         &mut self,
         node: u32,
         words: &mut [i32],

@@ -103,6 +103,7 @@ fn compare(
                 // Without a strategy games may end earlier.
                 let quick = Options {
                     verify: false,
+                    threads: 2,
                     ..options.clone()
                 };
                 compare::check(&model.check(&query_text, &quick), expected, tally, || {

@@ -461,7 +461,11 @@ system P;
 @pytest.mark.parametrize(
     ("query", "options", "said"),
     [
-        ("control: A<> P.There", ["--threads", "2"], "--threads has no effect here: games"),
+        (
+            "{ P.Here, P.There } control: A<> P.There",
+            ["--threads", "2"],
+            "--threads has no effect here: games under partial observation",
+        ),
         ("control: A<> P.There", ["--symmetry", "off"], "--symmetry has no effect here: games"),
         ("control: A<> P.There", ["--search", "dfs"], "--search has no effect here: games"),
         ("control: A<> P.There", ["--shortest"], "--shortest and --fastest have no effect here"),

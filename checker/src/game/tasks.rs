@@ -1,0 +1,203 @@
+//! Computing what several nodes win, by several threads.
+//!
+//! All tasks start from the same winning valuations, and what comes out is recorded in the order of the tasks when all are done. So
+//! the result does not hang on how many threads there are, nor on how fast they are.
+
+use std::panic;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
+
+use crate::search::limits::{Counters, StopReason, Watch};
+use crate::zones::Patience;
+
+use super::gains::Gained;
+use super::predecessors::Situation;
+use super::reach::{Solver, Win};
+
+/// How often the limits are looked at while others work.
+const PULSE: Duration = Duration::from_millis(20);
+
+/// Bounds of all the zones that tasks start from, at least, for threads to be worth starting.
+const WORTH_STARTING: usize = 1 << 15;
+
+/// The stack of a thread: as much as that of the first thread of a program.
+const STACK_BYTES: usize = 8 << 20;
+
+/// A node whose winning valuations are to be computed.
+#[derive(Debug)]
+pub(super) struct Task {
+    pub(super) node: u32,
+    pub(super) situation: Situation,
+    /// The key of the case that it is, if it is one: see [`super::repeats`].
+    pub(super) key: Option<Box<[u32]>>,
+}
+
+/// What threads tell each other while they work.
+struct Progress {
+    /// The next task that nobody has begun.
+    next: AtomicUsize,
+    is_cut: AtomicBool,
+    /// By thread: the zones at hand.
+    zones: Vec<AtomicUsize>,
+}
+
+impl Solver<'_, '_, '_> {
+    /// Computes what the nodes of some tasks win, and records it, unless there is a reason to stop before.
+    pub(super) fn compute(
+        &mut self,
+        tasks: Vec<Task>,
+        watch: &mut dyn Watch,
+    ) -> Option<StopReason> {
+        let threads = if self.is_worth_sharing(&tasks) {
+            self.threads.min(tasks.len())
+        } else {
+            1
+        };
+        let progress = Progress {
+            next: AtomicUsize::new(0),
+            is_cut: AtomicBool::new(false),
+            zones: (0..threads).map(|_| AtomicUsize::new(0)).collect(),
+        };
+        let (mut done, reason) = if threads == 1 {
+            self.work_and_look(&tasks, &progress, watch)
+        } else {
+            self.share(&tasks, &progress, watch)
+        };
+        if reason.is_some() {
+            return reason;
+        }
+        done.sort_unstable_by_key(|(index, _)| *index);
+        for (task, (_, gained)) in tasks.into_iter().zip(done) {
+            if let Some(key) = task.key {
+                self.remember_case(key, &gained);
+            }
+            self.gain_computed(task.node, gained);
+        }
+        None
+    }
+
+    /// Whether the tasks are so large that starting threads does not matter.
+    fn is_worth_sharing(&self, tasks: &[Task]) -> bool {
+        if self.threads == 1 || tasks.len() < 2 {
+            return false;
+        }
+        let edges = tasks.iter().flat_map(|task| self.graph.edges_of(task.node));
+        let zones = edges.map(|edge| {
+            let target = self.graph.edges[edge].target;
+            match &self.win[target as usize] {
+                Win::Part(part) => part.zone_count() + self.rest[&target].zone_count(),
+                Win::Nothing | Win::Everything => 1,
+            }
+        });
+        zones.sum::<usize>() * self.graph.dimension().pow(2) >= WORTH_STARTING
+    }
+
+    /// Does the tasks with several threads, of which the caller's is one.
+    fn share(
+        &self,
+        tasks: &[Task],
+        progress: &Progress,
+        watch: &mut dyn Watch,
+    ) -> (Vec<(usize, Gained)>, Option<StopReason>) {
+        thread::scope(|scope| {
+            let (over, is_over) = mpsc::channel();
+            let helpers: Vec<_> = (1..progress.zones.len())
+                .filter_map(|index| {
+                    let over = over.clone();
+                    let work = move || {
+                        let zones = &progress.zones[index];
+                        let mut goes_on = |count: usize| {
+                            zones.store(count, Ordering::Relaxed);
+                            !progress.is_cut.load(Ordering::Relaxed)
+                        };
+                        let done = self.work(tasks, progress, &mut goes_on);
+                        // Nobody listens any more once there is a reason to stop.
+                        let _ = over.send(());
+                        done
+                    };
+                    // Who cannot be started is not missed: the others do its tasks.
+                    let thread = thread::Builder::new().stack_size(STACK_BYTES);
+                    thread.spawn_scoped(scope, work).ok()
+                })
+                .collect();
+            drop(over);
+            let (mut done, mut reason) = self.work_and_look(tasks, progress, watch);
+            let mut working = helpers.len();
+            while working > 0 {
+                match is_over.recv_timeout(PULSE) {
+                    Ok(()) => working -= 1,
+                    Err(RecvTimeoutError::Disconnected) => break,
+                    Err(RecvTimeoutError::Timeout) if reason.is_none() => {
+                        reason = watch.look(&self.counters_with(progress, 0));
+                        progress.is_cut.store(reason.is_some(), Ordering::Relaxed);
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                }
+            }
+            for helper in helpers {
+                match helper.join() {
+                    Ok(more) => done.extend(more),
+                    Err(panic) => panic::resume_unwind(panic),
+                }
+            }
+            (done, reason)
+        })
+    }
+
+    /// Does tasks that nobody has begun, as long as the watch gives no reason to stop.
+    fn work_and_look(
+        &self,
+        tasks: &[Task],
+        progress: &Progress,
+        watch: &mut dyn Watch,
+    ) -> (Vec<(usize, Gained)>, Option<StopReason>) {
+        let mut reason = None;
+        let mut goes_on = |zones: usize| {
+            reason = watch.look(&self.counters_with(progress, zones));
+            reason.is_none()
+        };
+        let done = self.work(tasks, progress, &mut goes_on);
+        if reason.is_some() {
+            progress.is_cut.store(true, Ordering::Relaxed);
+        }
+        (done, reason)
+    }
+
+    /// Does tasks that nobody has begun, as long as it may go on.
+    fn work(
+        &self,
+        tasks: &[Task],
+        progress: &Progress,
+        goes_on: &mut dyn FnMut(usize) -> bool,
+    ) -> Vec<(usize, Gained)> {
+        let mut ask = |zones: usize| goes_on(zones);
+        let mut patience = Patience::as_long_as(&mut ask);
+        let mut done = Vec::new();
+        loop {
+            let index = progress.next.fetch_add(1, Ordering::Relaxed);
+            let Some(Task {
+                node, situation, ..
+            }) = tasks.get(index)
+            else {
+                return done;
+            };
+            let won = self.winnable(*node, situation, &mut patience);
+            let gained = self.gained(*node, won, &mut patience);
+            if patience.is_over() || progress.is_cut.load(Ordering::Relaxed) {
+                return done;
+            }
+            done.push((index, gained));
+        }
+    }
+
+    /// The counters, with the zones that threads have at hand beside what is stored.
+    fn counters_with(&self, progress: &Progress, own_zones: usize) -> Counters {
+        let counters = self.counters();
+        let others = progress.zones.iter();
+        let zones: usize = others.map(|zones| zones.load(Ordering::Relaxed)).sum();
+        let bytes = counters.bytes + (own_zones + zones) as u64 * self.zone_bytes();
+        Counters { bytes, ..counters }
+    }
+}
