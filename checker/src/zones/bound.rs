@@ -113,6 +113,13 @@ impl Bound {
         Bound(sum & !is_infinite | i32::MAX & is_infinite)
     }
 
+    /// The lesser of two bounds, as `min`; by a mask, for vectors that have no minimum.
+    #[inline]
+    pub(super) const fn lesser(self, other: Bound) -> Bound {
+        let is_less = -((other.0 < self.0) as i32);
+        Bound(self.0 ^ ((self.0 ^ other.0) & is_less))
+    }
+
     /// The lesser of `current` and `via + rest`; `via` must be finite.
     ///
     /// Both conditions are one mask, since vectors without a select would otherwise blend twice.

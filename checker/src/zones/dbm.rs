@@ -247,11 +247,28 @@ pub(super) fn upper_bounds<'b>(constraints: &[Constraint], bounds: &'b mut [Boun
 /// own among them: its bound against itself is `<= 0`.
 #[inline(always)]
 pub(super) fn least_sum(row: &[Bound], upper_bounds: &[Bound]) -> Bound {
-    let sums = row
-        .iter()
-        .zip(upper_bounds)
-        .map(|(difference, bound)| difference.plus(*bound));
-    sums.fold(Bound::INFINITY, Bound::min)
+    let length = row.len().min(upper_bounds.len());
+    let (row, upper_bounds) = (&row[..length], &upper_bounds[..length]);
+    let (Some(last), Some(last_bounds)) = (row.last_chunk::<4>(), upper_bounds.last_chunk::<4>())
+    else {
+        let sums = row.iter().zip(upper_bounds);
+        let sums = sums.map(|(difference, bound)| difference.plus(*bound));
+        return sums.fold(Bound::INFINITY, Bound::lesser);
+    };
+    // The last four may count twice.
+    let mut least = four_sums(last, last_bounds);
+    let (rows, _) = row.as_chunks::<4>();
+    let (bounds, _) = upper_bounds.as_chunks::<4>();
+    for (differences, bounds) in rows.iter().zip(bounds) {
+        let sums = four_sums(differences, bounds);
+        least = std::array::from_fn(|lane| least[lane].lesser(sums[lane]));
+    }
+    least.into_iter().fold(Bound::INFINITY, Bound::lesser)
+}
+
+#[inline(always)]
+fn four_sums(differences: &[Bound; 4], bounds: &[Bound; 4]) -> [Bound; 4] {
+    std::array::from_fn(|lane| differences[lane].plus(bounds[lane]))
 }
 
 /// Whether some valuation of the zone satisfies the constraint.
