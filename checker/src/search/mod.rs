@@ -23,6 +23,7 @@ mod shard;
 mod staying;
 pub mod store;
 pub mod taking;
+mod times;
 mod tree;
 
 pub use limits::{Counters, StopReason, Watch};
