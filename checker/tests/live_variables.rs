@@ -6,44 +6,35 @@
 //!
 //! `NETWORKS=50000 cargo test --release --test live_variables` runs more of them than the usual number.
 
+#[path = "common/random.rs"]
+mod random;
+#[path = "common/searches.rs"]
+mod searches;
+
 use std::fmt::Write as _;
 
 use checker::engine::evidence::Proof;
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Options, Verdict};
 use checker::search::reach::Order;
 
+use random::{Random, networks};
+
 /// Networks without the environment variable `NETWORKS`.
-const NETWORKS: u64 = 60;
+const NETWORKS: u64 = 200;
 
 /// Larger networks are left out.
 const MOST_STATES: u64 = 4000;
 
 fn answer(text: &str, query: &str, live_variables: bool, manner: (Order, usize)) -> Answer {
-    let mut model = LoadedModel::load("live.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    let query_text = model.add_query(query);
-    let mut options = Options {
-        order: manner.0,
-        threads: manner.1,
-        code: CodeEngine::Interpreter,
-        runs: true,
-        live_variables,
-        ..Options::default()
+    let adjust = |options: &mut Options| {
+        options.live_variables = live_variables;
+        options.limits.states = Some(MOST_STATES);
     };
-    options.limits.states = Some(MOST_STATES);
-    let answer = model
-        .check(&query_text, &options)
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    for witness in &answer.evidence.witnesses {
-        // The replay runs every move that is possible on the way, and some of those may fail.
-        let is_cut = |run: &Option<Proof>| format!("{run:?}").contains("NotCovered(RunTime(");
-        assert!(
-            matches!(witness.run, Some(Proof::Replayed(..))) || is_cut(&witness.run),
-            "{query}: {:#?}\n{text}",
-            witness.run
-        );
-    }
-    answer
+    // The replay runs every move that is possible on the way, and some of those may fail.
+    let is_cut = |run: Option<&Proof>| format!("{run:?}").contains("NotCovered(RunTime(");
+    searches::answer_in(manner, (text, query), adjust, |run| {
+        matches!(run, Some(Proof::Replayed(..))) || is_cut(run)
+    })
 }
 
 /// How many states are stored without and with the reduction, which must agree in any manner of search.
@@ -264,25 +255,6 @@ fn values_that_are_read_are_kept() {
     }
 }
 
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        ((self.0 >> 20) % limit as u64) as usize
-    }
-
-    fn chance(&mut self, percent: usize) -> bool {
-        self.below(100) < percent
-    }
-
-    fn one_of<'t>(&mut self, texts: &[&'t str]) -> &'t str {
-        texts[self.below(texts.len())]
-    }
-}
-
 const GUARDS: [&str; 9] = [
     "own == 1",
     "own == 2",
@@ -405,9 +377,7 @@ const QUERIES: [&str; 12] = [
 
 #[test]
 fn answers_are_those_with_all_values() {
-    let networks = std::env::var("NETWORKS").map_or(NETWORKS, |number| {
-        number.parse().expect("NETWORKS is a number")
-    });
+    let networks = networks(NETWORKS);
     let (mut full_states, mut reduced_states, mut reduced_searches) = (0, 0, 0);
     for seed in 1..=networks {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
