@@ -14,7 +14,12 @@ import click
 from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.effects import idle_options, unwritten
 from ntagen.cli.limits import limit_options, limits
-from ntagen.cli.models import load_model, pointing_to_explanations, show_warnings
+from ntagen.cli.models import (
+    load_model,
+    pointing_to_explanations,
+    show_warnings,
+    with_pointer,
+)
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError
@@ -38,6 +43,10 @@ _MARK: Final = {
     "unknown": ("stopped", "yellow"),
     "error": ("error", "red"),
 }
+
+
+REJECTED_MARK: Final = ("refused", "red")
+"""Of a query that is rejected, while others are answered."""
 
 
 class _Threads(click.ParamType[int]):
@@ -107,7 +116,8 @@ class _Outputs:
 
 @click.command(
     "check",
-    epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected, "
+    epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected "
+    "(of several queries those that are not are answered), "
     "3 stopped by a limit or maybe, 4 run-time error in the model, 70 internal error "
     "(a strategy or trace that fails its check is one), 130 interrupted, with the counters so far.",
 )
@@ -296,29 +306,39 @@ def command(
         if not as_json:
             _header(model_path, loaded.model)
         for query in todo:
-            with shown_progress(query.text, quiet=as_json) as report:
-                answer = loaded.model.check(
-                    query.text,
-                    search=search,
-                    threads=threads,
-                    seed=seed,
-                    forced=forced,
-                    priorities=priorities,
-                    engine=engine,
-                    **limits(states, memory, timeout),
-                    plans="all" if plans else "none",
-                    max_plans=max_plans,
-                    strategy=strategy is not None or controller is not None,
-                    verify=verify,
-                    trace=verify or trace is not None or wanted_trace is not None,
-                    wanted_trace=wanted_trace or "any",
-                    certificate=certificate is not None,
-                    symmetry=symmetry == "on",
-                    partial_order=partial_order == "on",
-                    live_variables=live_variables == "on",
-                    folder=query.folder,
-                    progress=report,
-                )
+            try:
+                with shown_progress(query.text, quiet=as_json) as report:
+                    answer = loaded.model.check(
+                        query.text,
+                        search=search,
+                        threads=threads,
+                        seed=seed,
+                        forced=forced,
+                        priorities=priorities,
+                        engine=engine,
+                        **limits(states, memory, timeout),
+                        plans="all" if plans else "none",
+                        max_plans=max_plans,
+                        strategy=strategy is not None or controller is not None,
+                        verify=verify,
+                        trace=verify or trace is not None or wanted_trace is not None,
+                        wanted_trace=wanted_trace or "any",
+                        certificate=certificate is not None,
+                        symmetry=symmetry == "on",
+                        partial_order=partial_order == "on",
+                        live_variables=live_variables == "on",
+                        folder=query.folder,
+                        progress=report,
+                    )
+            except InputError as error:
+                if len(todo) == 1:
+                    raise
+                # The others may be all right, and their answers are wanted.
+                click.echo(str(error) if as_json else with_pointer(str(error)), err=True)
+                if not as_json:
+                    _line(REJECTED_MARK, query)
+                worst = InputError.exit_code
+                continue
             if answer.verified is False:
                 click.echo("\n".join([query.text, *answer.verification]), err=True)
                 return INTERNAL_ERROR
@@ -353,7 +373,7 @@ def _say(notes: Sequence[str]) -> None:
         click.echo(f"note: {note}", err=True)
 
 
-_SEVERITIES: Final = (0, 1, STOPPED, MODEL_ERROR)
+_SEVERITIES: Final = (0, 1, STOPPED, MODEL_ERROR, InputError.exit_code)
 """Exit codes of single answers; the last in this order decides."""
 
 
@@ -420,10 +440,14 @@ def _header(path: Path, model: Model) -> None:
     click.echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
 
 
-def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_written: bool) -> None:
-    mark, colour = _MARK[answer.verdict]
+def _line(mark: tuple[str, str], query: _Asked) -> None:
+    """The first line of a query's row: what came of it, with its colour, and what was asked."""
     label = f"{query.name}: {query.text}" if query.name else query.text
-    click.echo(f"  {click.style(f'{mark:<8}', fg=colour, bold=True)}{label}")
+    click.echo(f"  {click.style(f'{mark[0]:<8}', fg=mark[1], bold=True)}{label}")
+
+
+def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_written: bool) -> None:
+    _line(_MARK[answer.verdict], query)
     facts = [f"{answer.explored} states explored", f"{answer.stored} stored"]
     facts.append(f"{1000 * answer.seconds:.1f} ms")
     facts.append(f"{answer.peak_bytes / 2**20:.1f} MiB")

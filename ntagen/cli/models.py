@@ -48,8 +48,13 @@ def pointing_to_explanations(wanted: bool) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        code = re.search(r"\berror\[([A-Z]\d+)\]", str(error))
-        if not (wanted and code):
+        if not wanted:
             raise
-        pointer = f"for an example and the way out: ntagen explain {code[1]}"
-        raise InputError(f"{error}\n{pointer}") from error
+        raise InputError(with_pointer(str(error))) from error
+
+
+def with_pointer(rejection: str) -> str:
+    """A rejection with the command that explains its first diagnostic, if it has one."""
+    code = re.search(r"\berror\[([A-Z]\d+)\]", rejection)
+    pointer = f"\nfor an example and the way out: ntagen explain {code[1]}" if code else ""
+    return rejection + pointer

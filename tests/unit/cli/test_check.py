@@ -532,3 +532,20 @@ def test_games_without_plans_say_so(
     plans = tmp_path / "plans.json"
     out, _ = check_run(capsys, 0, path, *safe, "--query", query, "--json", "--plans", plans)
     assert "not under a strategy" in json.loads(out.splitlines()[-1])["message"]
+
+
+def test_queries_beside_a_rejected_one_are_answered(
+    gate: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ("--query", "E<> Gate.Open", "--query", "Pr[<=9] (<> Gate.Open)")
+    asked += ("--query", "A[] Gate.Closed")
+    out, err = check_run(capsys, 2, gate, *asked, "--json")
+    verdicts = [json.loads(line)["verdict"] for line in out.splitlines()]
+    assert verdicts == ["satisfied", "not satisfied"]
+    assert err.count("error[E0274]") == 1
+    out, err = check_run(capsys, 2, gate, *asked)
+    rows = [
+        line.split()[0] for line in out.splitlines() if line.startswith("  ") and line[2:3] != " "
+    ]
+    assert rows == ["yes", "refused", "no"]
+    assert err.rstrip().endswith("ntagen explain E0274")
