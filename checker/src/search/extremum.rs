@@ -18,9 +18,9 @@
 use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockRange, Measure, Network, Predicate};
 use crate::network::{Failure, Moves, Part, Symbolic, differences, predicate};
 use crate::zones::clocks::Assignment;
-use crate::zones::{Bound, Federation, Zone, clocks, dbm};
+use crate::zones::{Bound, Zone, clocks, dbm};
 
-use super::goal::{Goal, Look, SharedGoal, Visited};
+use super::goal::{Goal, Look, SharedGoal, Target, Visited};
 use super::limits::{Counters, StopReason, Watch};
 use super::reach::{self, Manner, Trace};
 
@@ -285,7 +285,7 @@ impl<'q> Measuring<'q> {
         };
         let clock = symbolic.chosen_clock(choice, &mut words)?.0 as usize;
         let dimension = symbolic.dimension();
-        let counting = self.counting(symbolic, &mut words, zone)?;
+        let counting = self.question.predicate.part(symbolic, &mut words, zone)?;
         let is_unbounded =
             |zone: &[Bound]| dbm::clock_bounds(zone, dimension, clock).1.is_infinite();
         let pump = Pump {
@@ -325,17 +325,6 @@ impl<'q> Measuring<'q> {
         };
         self.items.iter().map(extremes).collect()
     }
-
-    /// Where in the zone the predicate holds.
-    fn counting(
-        &self,
-        symbolic: &mut Symbolic<'_>,
-        words: &mut [i32],
-        zone: &Zone,
-    ) -> Result<Federation, Failure> {
-        let extent = symbolic.extent(self.question.predicate, words, zone.bounds())?;
-        Ok(extent.to_federation(zone.bounds(), symbolic.dimension()))
-    }
 }
 
 impl Item {
@@ -360,7 +349,7 @@ impl Goal for Measuring<'_> {
             zone,
             ..
         } = visited;
-        let counting = self.counting(symbolic, words, zone)?;
+        let counting = self.question.predicate.part(symbolic, words, zone)?;
         if counting.is_empty() {
             return Ok(Look::Continue);
         }
@@ -400,7 +389,12 @@ impl Goal for Measuring<'_> {
             let upper = dbm::clock_bounds(part, zone.dimension(), clock).1;
             ceiling.is_some_and(|ceiling| upper > ceiling)
         };
-        Ok(self.counting(symbolic, words, zone)?.zones().any(exceeds))
+        Ok(self
+            .question
+            .predicate
+            .part(symbolic, words, zone)?
+            .zones()
+            .any(exceeds))
     }
 }
 
