@@ -380,10 +380,7 @@ fn answers_are_those_with_all_values() {
     let networks = networks(NETWORKS);
     let (mut full_states, mut reduced_states, mut reduced_searches) = (0, 0, 0);
     for seed in 1..=networks {
-        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-        for _ in 0..4 {
-            random.below(2);
-        }
+        let mut random = Random::of_network(seed);
         let count = 2 + random.below(2);
         let mut text = String::from(
             "int[0,2] v; int[0,2] w; int[0,2] f[3]; struct { int[0,2] s; int[0,2] t; } pair, other;

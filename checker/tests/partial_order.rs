@@ -372,10 +372,7 @@ fn verdicts_are_those_of_all_orders() {
     let networks = networks(NETWORKS);
     let (mut full_states, mut reduced_states, mut reduced_searches) = (0, 0, 0);
     for seed in 1..=networks {
-        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-        for _ in 0..4 {
-            random.below(2);
-        }
+        let mut random = Random::of_network(seed);
         let count = 4 + random.below(2);
         let mut text = String::from(
             "int[0,2] v; int[0,1] a[5]; clock g; chan c; chan d[5]; broadcast chan b; urgent chan u;

@@ -306,10 +306,7 @@ fn verdicts_are_those_of_all_states() {
     let networks = networks(NETWORKS);
     let (mut full_states, mut reduced_states) = (0, 0);
     for seed in 1..=networks {
-        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-        for _ in 0..4 {
-            random.below(2);
-        }
+        let mut random = Random::of_network(seed);
         let mut text = String::from(HEAD);
         text += if random.chance(15) {
             random.one_of(&APART)

@@ -4,6 +4,15 @@
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
+    /// The generator of a network with this number; its first numbers, which are alike for neighbouring seeds, are left out.
+    pub(crate) fn of_network(number: u64) -> Random {
+        let mut random = Random(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+        for _ in 0..4 {
+            random.below(2);
+        }
+        random
+    }
+
     /// A number below the limit.
     pub(crate) fn below(&mut self, limit: usize) -> usize {
         self.0 ^= self.0 << 13;
