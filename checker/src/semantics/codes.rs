@@ -21,7 +21,7 @@ codes! {
     RANGE_EXPECTED = "E0208" "range-expected";
     /// More values than can be run through.
     RANGE_TOO_LARGE = "E0209" "range-too-large";
-    /// An array or scalar set without parts.
+    /// A negative size; a scalar set, or an array of clocks or channels, without parts.
     SIZE_NOT_POSITIVE = "E0210" "size-not-positive";
     /// An array size or `select` range that depends on a free parameter of a process set.
     SIZE_HANGS_ON_FREE_PARAMETER = "E0211" "size-hangs-on-free-parameter";
@@ -117,6 +117,8 @@ codes! {
     FREE_PARAMETER_UNBOUNDED = "E0259" "free-parameter-unbounded";
     /// A process that stands twice in the system line.
     PROCESS_TWICE = "E0260" "process-twice";
+    /// A system whose sets of processes are all empty.
+    SYSTEM_EMPTY = "E0261" "system-empty";
     /// A channel with two priorities.
     PRIORITY_TWICE = "E0262" "priority-twice";
     /// A construct that was read and is not supported.
@@ -159,4 +161,6 @@ codes! {
     STRATEGY_TWICE = "W0204" "strategy-twice";
     /// A hybrid clock, which symbolic and game queries do not see.
     HYBRID_CLOCK_IGNORED = "W0206" "hybrid-clock-ignored";
+    /// An array without parts.
+    ARRAY_EMPTY = "W0207" "array-empty";
 }

@@ -75,6 +75,9 @@ impl Checker<'_> {
                 self.misplaced_type(ty.span, &result);
                 return Type::Error;
             }
+            if index.length == 0 {
+                self.note_emptiness(&result, dimension_span(dimension));
+            }
             result = Type::array(result, index);
             if result.checked_size().is_none() {
                 self.error(
@@ -87,6 +90,36 @@ impl Checker<'_> {
             }
         }
         result
+    }
+
+    /// Says that an array has no parts, which generated models have for what there is none of.
+    fn note_emptiness(&mut self, part: &Type, span: Span) {
+        if part.size().clocks + part.size().channels > 0 {
+            self.error(
+                codes::SIZE_NOT_POSITIVE,
+                span,
+                "an array of clocks or channels cannot be empty",
+                "give it at least one part",
+            );
+            return;
+        }
+        self.report(
+            Diagnostic::new(codes::ARRAY_EMPTY, span, "this array has no parts")
+                .note("whatever index is used on it is a run-time error"),
+        );
+    }
+
+    /// Refuses a variable for which there is no value.
+    pub(super) fn expect_values(&mut self, ty: &Type, span: Span) {
+        let is_empty = |part: &Type| part.bounds().0 > part.bounds().1;
+        if ty.any_stored(&is_empty) {
+            self.error(
+                codes::RANGE_EMPTY,
+                span,
+                format!("there is no value of the type {ty}"),
+                "give the range at least one value",
+            );
+        }
     }
 
     fn misplaced_type(&mut self, span: Span, ty: &Type) {
@@ -171,22 +204,20 @@ impl Checker<'_> {
         let size = self.expression(expr);
         self.expect_pure(&size, "the size of an array");
         let value = self.known_int(&size, "the size of an array")?;
-        match u32::try_from(value) {
-            Ok(length) if length > 0 => Some(Index {
-                first: 0,
-                length,
-                set: None,
-            }),
-            _ => {
-                self.error(
-                    codes::SIZE_NOT_POSITIVE,
-                    expr.span,
-                    format!("the size of an array must be positive, but this is {value}"),
-                    "an array has at least one part",
-                );
-                None
-            }
-        }
+        let Ok(length) = u32::try_from(value) else {
+            self.error(
+                codes::SIZE_NOT_POSITIVE,
+                expr.span,
+                format!("the size of an array cannot be negative, but this is {value}"),
+                "write the number of its parts",
+            );
+            return None;
+        };
+        Some(Index {
+            first: 0,
+            length,
+            set: None,
+        })
     }
 
     /// The type that a type expression means.
@@ -255,7 +286,8 @@ impl Checker<'_> {
         let (Some(low), Some(high)) = (self.known_bound(&low), self.known_bound(&high)) else {
             return Type::Error;
         };
-        if low > high {
+        // As long as there is exactly nothing in between, it is the range of a number that happens to be zero.
+        if low > high && i64::from(low) != i64::from(high) + 1 {
             self.error(
                 codes::RANGE_EMPTY,
                 span,
@@ -271,6 +303,15 @@ impl Checker<'_> {
         let Some(index) = self.size(size) else {
             return Type::Error;
         };
+        if index.length == 0 {
+            self.error(
+                codes::SIZE_NOT_POSITIVE,
+                size.span,
+                "a scalar set cannot be empty",
+                "give it at least one member",
+            );
+            return Type::Error;
+        }
         let sets = &mut self.world.network.scalar_sets;
         sets.push(ScalarSet {
             size: index.length,
@@ -371,6 +412,7 @@ impl Checker<'_> {
         if matches!(ty, Type::Void) || (ty == Type::String && !variable.ty.prefixes.constant) {
             self.misplaced_type(variable.ty.span, &ty);
         }
+        self.expect_values(&ty, variable.ty.span);
         let entity = if ty.is_error() || ty == Type::Void || ty == Type::String {
             Entity::Broken
         } else if variable.ty.prefixes.constant {

@@ -491,6 +491,15 @@ impl Checker<'_> {
             self.scopes.pop();
             return Expr::error(span);
         };
+        if range.0 > range.1 {
+            // The body may speak of the members of a set of processes that has none.
+            let value = i32::from(quantifier == Quantifier::ForAll);
+            let ty = match quantifier {
+                Quantifier::Sum => Type::ANY_INT,
+                Quantifier::ForAll | Quantifier::Exists => Type::Bool,
+            };
+            return Expr::int(value, ty, span);
+        }
         let local = self.new_local(range_type.clone());
         let place = Place {
             root: Root::Local(local),

@@ -188,6 +188,7 @@ impl Checker<'_> {
             .initialiser
             .as_ref()
             .map(|initialiser| self.initialiser(initialiser, &ty));
+        self.expect_values(&ty, variable.ty.span);
         let prefixes = variable.ty.prefixes;
         let size = ty.size();
         if size.clocks + size.channels > 0

@@ -47,6 +47,9 @@ impl Group {
 
 fn parameter_count(ty: &Type) -> u32 {
     let (low, high) = ty.bounds();
+    if low > high {
+        return 0;
+    }
     high.abs_diff(low).saturating_add(1)
 }
 
@@ -80,6 +83,17 @@ impl Checker<'_> {
             for name in names {
                 self.system_line_name(document, name, level as u32, &mut used);
             }
+        }
+        let mut groups = self.world.processes.groups.values();
+        if self.world.network.processes.is_empty() && groups.any(|group| group.count() == 0) {
+            let mut names = document.system.processes.iter().flatten();
+            let name = names.next().expect("a set of processes has a name");
+            self.error(
+                codes::SYSTEM_EMPTY,
+                name.span,
+                "the system has no process: its sets of processes are empty",
+                "give their parameters at least one value",
+            );
         }
         for (template, _) in document
             .templates
@@ -203,6 +217,9 @@ impl Checker<'_> {
             return;
         }
         self.world.processes.groups.insert(name.text.clone(), group);
+        if count == 0 {
+            return;
+        }
         let first = self.world.network.processes.len() as u32;
         for values in combinations(&types) {
             self.make_process(document, (name, target, formals), (&types, &values), level);

@@ -119,6 +119,16 @@ impl Checker<'_> {
     }
 
     fn checked_member(&mut self, group: Group, arguments: Vec<Expr>) -> Result<Member, ()> {
+        if group.count() == 0 {
+            let span = arguments[0].span;
+            self.error(
+                codes::CONSTANT_OUT_OF_RANGE,
+                span,
+                "this set of processes is empty",
+                "give the range of its parameter at least one value",
+            );
+            return Err(());
+        }
         for (argument, ty) in arguments.iter().zip(&group.parameters) {
             if argument.is_error() {
                 return Err(());

@@ -46,6 +46,10 @@ impl Checker<'_> {
                 continue;
             };
             let edge = self.edge(template, edge, &nodes, LocationId(source));
+            if edge.select.iter().any(|select| select.low > select.high) {
+                // It stands for no edge at all.
+                continue;
+            }
             locations[source as usize]
                 .edges
                 .push(EdgeId(edges.len() as u32));
@@ -356,7 +360,7 @@ impl Checker<'_> {
         let types: Vec<Type> = ranges.iter().map(|(_, ty)| ty.clone()).collect();
         let counts = types.iter().map(|ty| {
             let (low, high) = ty.bounds();
-            u64::from(high.abs_diff(low)) + 1
+            u64::try_from(i64::from(high) - i64::from(low) + 1).unwrap_or(0)
         });
         if counts.fold(1, u64::saturating_mul) > BRANCH_LIMIT {
             self.error(

@@ -289,7 +289,9 @@ impl Expr {
 
     /// An expression that may have any value of its type.
     pub(super) fn new(kind: Kind, ty: Type, span: Span) -> Expr {
-        let interval = ty.bounds();
+        let (low, high) = ty.bounds();
+        // What runs through an empty range has no value, and its interval is not to turn around.
+        let interval = (low.min(high), high.max(low));
         Expr {
             kind,
             ty,

@@ -227,6 +227,19 @@ impl Type {
             }
     }
 
+    /// Whether any part that a value has satisfies the condition: arrays without parts have none.
+    pub(super) fn any_stored(&self, condition: &impl Fn(&Type) -> bool) -> bool {
+        condition(self)
+            || match self {
+                Type::Array(array) => array.index.length > 0 && array.part.any_stored(condition),
+                Type::Struct(record) => {
+                    let mut fields = record.fields.iter();
+                    fields.any(|(_, ty)| ty.any_stored(condition))
+                }
+                _ => false,
+            }
+    }
+
     /// The room that a value takes, or `None` if it is more than [`SIZE_LIMIT`] in any memory.
     pub(super) fn checked_size(&self) -> Option<Size> {
         let size = match self {
@@ -275,6 +288,12 @@ impl Type {
         }
     }
 
+    /// Whether a value lies in words, be it in none of them.
+    pub(super) fn has_words(&self) -> bool {
+        let size = self.size();
+        size.words > 0 || size.clocks + size.channels == 0
+    }
+
     /// The values of an integer register of this type.
     pub(super) fn bounds(&self) -> (i32, i32) {
         match self {
@@ -298,6 +317,9 @@ impl Type {
                 let start = words.len();
                 array.part.default_words(words);
                 let part = words[start..].to_vec();
+                if array.index.length == 0 {
+                    words.truncate(start);
+                }
                 for _ in 1..array.index.length {
                     words.extend_from_slice(&part);
                 }

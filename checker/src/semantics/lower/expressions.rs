@@ -334,6 +334,9 @@ impl Builder<'_> {
         span: Span,
         body: &mut dyn FnMut(&mut Self, Register),
     ) {
+        if low > high {
+            return;
+        }
         let counter = self.register(RegisterType::Integer);
         self.emit(Instruction::Integer {
             target: counter,
@@ -384,8 +387,8 @@ impl Builder<'_> {
                 self.assign_clock(expr, target, source.as_deref(), value.as_deref());
             }
             Kind::Call { .. } if !expr.ty.is_register() => {
-                let words = expr.ty.size().words;
-                let result = (words > 0).then(|| self.frame(words));
+                let is_aggregate = expr.ty.is_aggregate();
+                let result = is_aggregate.then(|| self.frame(expr.ty.size().words));
                 self.call(expr, result);
             }
             Kind::Ternary(condition, then, otherwise) => {
@@ -629,7 +632,7 @@ impl Builder<'_> {
         registers: &mut Vec<Register>,
     ) -> Option<ClockSet> {
         let size = parameter.ty.size();
-        if size.words > 0 {
+        if parameter.ty.has_words() {
             let address = if parameter.constant {
                 self.checked_address(argument, &parameter.ty)
             } else {
@@ -708,6 +711,10 @@ fn extent(expr: &Expr) -> (u32, u32) {
                 length,
                 stride,
             } => {
+                if *length == 0 {
+                    // The index is an error, and nothing is touched.
+                    return (0, 0);
+                }
                 match index.constant() {
                     Some(i) if i >= *first && i.abs_diff(*first) < *length => {
                         offset += i.abs_diff(*first) * stride.words;

@@ -112,7 +112,8 @@ impl<'n> Builder<'n> {
             let local = LocalId(i as u32);
             let home = if parameter.reference {
                 let size = parameter.ty.size();
-                let address = (size.words > 0).then(|| self.register(RegisterType::Address));
+                let has_words = parameter.ty.has_words();
+                let address = has_words.then(|| self.register(RegisterType::Address));
                 let clock = (size.clocks > 0).then(|| self.register(RegisterType::Integer));
                 Home::Reference { address, clock }
             } else if parameter.ty.is_aggregate() {

@@ -122,6 +122,10 @@ impl Builder<'_> {
             stride,
             site,
         });
+        if length == 0 {
+            // Any index is an error, so nothing is touched; what comes after must lie somewhere all the same.
+            return address_path(self.frame(stride));
+        }
         path.reach += (length - 1) * stride;
         path.index = Some(self.add_indices(path.index, scaled));
         path
