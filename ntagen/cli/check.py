@@ -122,6 +122,7 @@ class _Outputs:
     "(a strategy or trace that fails its check is one), 130 interrupted, with the counters so far.",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
+@click.argument("second_path", metavar="[FILE.q]", required=False, type=click.Path(path_type=Path))
 @click.option(
     "--query",
     "asked",
@@ -134,7 +135,7 @@ class _Outputs:
     "query_file",
     metavar="FILE.q",
     type=click.Path(path_type=Path),
-    help="A file of queries, answered instead of the model's own.",
+    help="A file of queries, answered instead of the model's own; may also stand after MODEL.",
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line, nothing else.")
 @click.option("--trace", metavar="FILE|-", help="Write witnesses and counterexamples; - is stdout.")
@@ -240,6 +241,7 @@ class _Outputs:
 @limit_options()
 def command(
     model_path: Path,
+    second_path: Path | None,
     asked: tuple[str, ...],
     query_file: Path | None,
     as_json: bool,
@@ -273,7 +275,7 @@ def command(
     Examples:
       ntagen check examples/paper.nsl --plans plans.json
       ntagen check model.xml --query "E<> Gate.Open" --trace -
-      ntagen check model.xml --queries model.q --json --timeout 60s
+      ntagen check model.xml model.q --json --timeout 60s
       ntagen check game.xml --query "control: A<> Main.Won" --verify --strategy -
       ntagen check game.xml --query "control: A[] not Main.Lost" --controller safe.c
       ntagen check game.xml --query "{Gate.Shut, x >= 2} control: A<> Main.Won" --strategy -
@@ -294,13 +296,15 @@ def command(
     """  # noqa: D301  click wants the control character
     if as_json and strategy == "-":
         raise click.UsageError("--json and --strategy - both write on standard output")
+    if second_path and query_file:
+        raise click.UsageError(f"two files of queries: {query_file} and {second_path}")
     _check_ranking(ranking)
     outputs = _Outputs(trace, certificate, strategy, controller, plans, ranking)
     worst = 0
     with pointing_to_explanations(not as_json):
         loaded = load_model(model_path)
         shown_already = len(loaded.model.warnings)
-        todo = _queries(loaded.model, asked, query_file)
+        todo = _queries(loaded.model, asked, query_file or second_path)
         show_warnings(loaded.model.warnings[shown_already:])
         _say_idle_options([query.text for query in todo], is_environment=loaded.scene is not None)
         if not as_json:

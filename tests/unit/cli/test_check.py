@@ -87,6 +87,9 @@ def test_queries_of_a_file_and_their_names(
         "E<> Gate.Open",
         "A[] Gate.Closed",
     ]
+    assert check_run(capsys, 1, gate, file, "--json")[0].count("\n") == 2
+    _, err = check_run(capsys, 2, gate, file, "--queries", file)
+    assert "two files of queries" in err
 
 
 def test_a_limit_is_an_answer(gate: Path, capsys: pytest.CaptureFixture[str]) -> None:
