@@ -1,11 +1,13 @@
-"""How far the solver of timed games gets: time and memory against the size of two families.
+"""How far the solver of timed games gets: time and memory against the size of three families.
 
-    python tests/benchmarks/games.py [--seconds 60] [--gibibytes 4] [--family cell|trains]
+    python tests/benchmarks/games.py [--seconds 60] [--gibibytes 4] [--family cell|trains|jobs]
 
 *cell* is a production cell: plates come on a belt, an arm takes each to a press that is ready when
 it likes, and a plate that waits too long falls. *trains* is a gate in front of a bridge: trains
-that come can be stopped for a while. In the *uncontrollable* variants the environment says when
-plates and trains come, in the *controllable* ones the controller does. Each game grows, by a
+that come can be stopped for a while. *jobs* is a workshop: each job goes through three machines,
+from another one on, and all are to be done in the least time. In the *uncontrollable* variants the
+environment says when plates and trains come and how long a machine takes, in the *controllable*
+ones the controller does. As a yardstick, six jobs should take a few seconds. Each game grows, by a
 quarter once it is large, until the time or the memory is not enough. There is a line for each size.
 """
 
@@ -63,6 +65,27 @@ process Gate() {{
 system Train, Gate;
 """
 
+JOBS = """
+const int N = {size};
+const int MACHINES = 3;
+typedef int[0, N - 1] id_t;
+bool busy[MACHINES];
+process Job(const id_t id) {{
+  clock x;
+  int[0, MACHINES - 1] step;
+  int[0, MACHINES - 1] machine() {{ return (id + step) % MACHINES; }}
+  int shortest() {{ return 1 + (2 * id + step) % 4; }}
+  state Waiting, Working {{ x <= 2 * shortest() }}, Done;
+  init Waiting;
+  trans Waiting -> Working {{ guard !busy[machine()]; assign busy[machine()] = true, x = 0; }},
+        Working {arrow} Waiting {{ guard step < MACHINES - 1 && x >= shortest();
+                                   assign busy[machine()] = false, step++; }},
+        Working {arrow} Done {{ guard step == MACHINES - 1 && x >= shortest();
+                                assign busy[machine()] = false; }};
+}}
+system Job;
+"""
+
 ONE_ON_THE_BRIDGE = (
     "control: A[] forall (i : id_t) forall (j : id_t) "
     "(Train(i).Bridge && Train(j).Bridge imply i == j)"
@@ -93,11 +116,13 @@ GAMES = [
     Game("trains", "controllable", TRAINS, ONE_ON_THE_BRIDGE),
     Game("trains", "uncontrollable", TRAINS, "control: A<> Train(0).Bridge"),
     Game("trains", "controllable", TRAINS, "control: A<> Train(0).Bridge"),
+    Game("jobs", "uncontrollable", JOBS, "control_t*: A<> forall (i : id_t) Job(i).Done"),
+    Game("jobs", "controllable", JOBS, "control_t*: A<> forall (i : id_t) Job(i).Done"),
 ]
 
 
 MOST_CLOCKS = 255
-"""More than so many the engine does not take; each plate and each train has one."""
+"""More than so many the engine does not take; each plate, train and job has one."""
 
 
 def rows(game: Game, timeout_s: float, memory_bytes: int) -> Iterator[tuple[int, checker.Answer]]:
@@ -117,7 +142,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--gibibytes", type=float, default=4.0)
-    parser.add_argument("--family", choices=["cell", "trains"])
+    parser.add_argument("--family", choices=["cell", "trains", "jobs"])
     arguments = parser.parse_args()
     memory_bytes = int(arguments.gibibytes * 2**30)
     for game in GAMES:

@@ -5,15 +5,19 @@
 //! needed: the least limit with which the game is won. Where g is what it is meant to be, a time that certainly passes before the
 //! goal, that is the least time. Without u, the limit is doubled until it is enough, if the goal can be forced at all.
 //!
+//! The clock tells apart when a state is reached, so that there are soon many zones for each discrete state. Then there is one node for each,
+//! if that is possible: how much time is needed does not hang on how much has passed. The limit has no part in how many these are, so that a
+//! generous one is tried first.
+//!
 //! For a strategy the game is solved again, with the time that was found as the limit and a clock that starts at 0.
 
 use std::sync::Arc;
 
 use crate::exec::Executor;
-use crate::game::Player;
 use crate::game::graph::{Deadline, Graph, Objective as GameObjective};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver, Win};
 use crate::game::strategy::{self, Strategy};
+use crate::game::{Nodes, Player};
 use crate::ir::{ClockAtom, ClockId, ClockRange, FunctionId, Network, Objective, Predicate};
 use crate::network::{Abstraction, ClockBounds, Failure, Stepper};
 use crate::search::extremum::{Extreme, Extremes};
@@ -21,6 +25,7 @@ use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::{Bound, Zone};
 
 use super::answer::{Answer, Evidence, Values, Verdict, has_differences, new_answer};
+use super::attempt::{Attempt, STATES_BEFORE_CROWD};
 use super::certificate::stop_text;
 use super::games::{self, objective_atoms};
 use super::limits::LimitWatch;
@@ -30,6 +35,15 @@ use super::{MOST_THREADS, Options};
 
 /// The limit to start from if the query has none.
 const FIRST_LIMIT: i32 = 16;
+
+/// The limit to start from in discrete states.
+const FIRST_LIMIT_IN_DISCRETE_STATES: i32 = 1 << 12;
+
+/// So many zones for each discrete state are many: with more of them, there will be more still.
+const CROWD: usize = 2;
+
+/// Discrete states that are explored, at most. Beside the clock, zones that are reached are rarely few enough to be worth more.
+const MOST_DISCRETE_STATES: u64 = 1 << 20;
 
 /// What is asked: the goal, what is kept, and the bounds u and g.
 pub(super) struct Race<'q> {
@@ -45,6 +59,8 @@ enum Run {
     Time(Option<Time>),
     Stopped(StopReason),
     Approximate,
+    /// There are many zones for each discrete state, or discrete states take too much.
+    GivenUp,
 }
 
 /// Answers a time-optimal query.
@@ -98,13 +114,30 @@ pub(super) fn fastest(
         race,
         options,
     };
+    let mut nodes = game.first_nodes();
     loop {
-        let run = game.time_needed(limit, &mut counters, watch);
+        if race.limit.is_none() && nodes == Nodes::Discrete {
+            limit = limit.max(FIRST_LIMIT_IN_DISCRETE_STATES);
+        }
+        let run = game.time_needed(limit, nodes, &mut counters, watch);
         let (verdict, time) = match run {
             Ok(Run::Time(None)) if race.limit.is_none() && limit <= Bound::MAX_VALUE / 2 => {
                 limit *= 2;
                 continue;
             }
+            Ok(Run::GivenUp) if nodes == Nodes::Automatic => {
+                nodes = Nodes::Discrete;
+                continue;
+            }
+            // A run-time error may lie in a state that no run reaches.
+            Ok(Run::GivenUp) | Err(_) if nodes == Nodes::Discrete => {
+                nodes = Nodes::Symbolic;
+                if race.limit.is_none() {
+                    limit = FIRST_LIMIT;
+                }
+                continue;
+            }
+            Ok(Run::GivenUp) => unreachable!("symbolic states are all there is"),
             Ok(Run::Time(None)) => (Verdict::NotSatisfied, None),
             Ok(Run::Time(time)) => (Verdict::Satisfied, time),
             Ok(Run::Stopped(reason)) => (Verdict::Unknown(reason), None),
@@ -174,23 +207,48 @@ struct Timed<'a, 'q> {
 }
 
 impl Timed<'_, '_> {
+    /// What nodes are tried first.
+    fn first_nodes(&self) -> Nodes {
+        let asked = (self.race.objective, false);
+        let can_be_discrete = games::can_be_discrete(self.network, asked, self.options)
+            && !has_differences(self.network, &objective_atoms(self.race.objective));
+        if can_be_discrete {
+            self.options.nodes
+        } else {
+            Nodes::Symbolic
+        }
+    }
+
     /// The time that is needed, if it is at most the limit.
     fn time_needed(
         &self,
         limit: i32,
+        nodes: Nodes,
         counters: &mut Counters,
-        watch: &mut dyn Watch,
+        watch: &mut LimitWatch,
     ) -> Result<Run, Failure> {
         if limit < 0 {
             return Ok(Run::Time(None));
         }
-        self.solve((limit, true), Extent::Start, watch, |result, solver, _| {
+        let conclude = |result, solver: &mut Solver<'_, '_, '_>, _: &mut dyn Watch| {
             *counters = *counters + solver.counters();
             Ok(match result {
+                GameAnswer::Stopped(_) if solver.has_given_up => Run::GivenUp,
                 GameAnswer::Stopped(reason) => Run::Stopped(reason),
                 GameAnswer::Won(_) if solver.graph.symbolic.is_approximate() => Run::Approximate,
                 GameAnswer::Won(_) => Run::Time(needed(solver, self.clock, limit)),
             })
+        };
+        let start = (limit, Some(nodes));
+        if nodes != Nodes::Discrete {
+            return self.solve(start, watch, conclude);
+        }
+        let mut attempt = Attempt::in_discrete_states(watch).with_most(MOST_DISCRETE_STATES);
+        let run = self.solve(start, &mut attempt, conclude)?;
+        Ok(if attempt.is_given_up {
+            Run::GivenUp
+        } else {
+            run
         })
     }
 
@@ -200,8 +258,7 @@ impl Timed<'_, '_> {
         limit: i32,
         watch: &mut dyn Watch,
     ) -> Result<Result<Strategy, StopReason>, Failure> {
-        let extent = Extent::Verdict;
-        self.solve((limit, false), extent, watch, |result, solver, watch| {
+        self.solve((limit, None), watch, |result, solver, watch| {
             if let GameAnswer::Stopped(reason) = result {
                 return Ok(Err(reason));
             }
@@ -215,20 +272,20 @@ impl Timed<'_, '_> {
         })
     }
 
-    /// Solves the game with a limit; the clock starts at 0, or anywhere up to the limit.
+    /// Solves the game with a limit: as far as it takes to know who wins if the clock starts at 0, or in these nodes wholly, with a clock
+    /// that starts anywhere up to the limit.
     fn solve<R>(
         &self,
-        (limit, starts_anywhere): (i32, bool),
-        extent: Extent,
+        (limit, nodes): (i32, Option<Nodes>),
         watch: &mut dyn Watch,
         conclude: impl FnOnce(GameAnswer, &mut Solver<'_, '_, '_>, &mut dyn Watch) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
         let mut atoms = objective_atoms(self.race.objective);
         atoms.extend(limits_of(self.clock, limit.max(0)));
-        let abstraction = if has_differences(self.network, &atoms) {
-            Abstraction::Differences
-        } else {
-            Abstraction::Maximum
+        let abstraction = match nodes {
+            _ if has_differences(self.network, &atoms) => Abstraction::Differences,
+            Some(Nodes::Discrete) => Abstraction::Exact,
+            _ => Abstraction::Maximum,
         };
         let bounds = ClockBounds::new(self.network, &atoms, abstraction);
         let mut symbolic = games::zones_of(self.network, self.executor, bounds, self.options);
@@ -244,15 +301,24 @@ impl Timed<'_, '_> {
             deadline: Some(Deadline {
                 clock: self.clock,
                 limit,
-                starts_anywhere,
+                starts_anywhere: nodes.is_some(),
                 rest: self.race.rest,
             }),
             leaves_dead_ends: true,
         };
-        let mut graph = Graph::new(&mut symbolic, wanted)?;
+        let mut graph = match nodes {
+            Some(Nodes::Discrete) => Graph::of_discrete_states(&mut symbolic, wanted),
+            _ => Graph::new(&mut symbolic, wanted),
+        }?;
         let mut solver = Solver::new(&mut graph, Player::Controller, self.options.forced);
         solver.share_among(self.options.threads.clamp(1, MOST_THREADS));
-        let result = solver.solve(extent, watch)?;
+        if nodes == Some(Nodes::Automatic) {
+            solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD);
+        }
+        let result = match nodes {
+            Some(_) => solver.solve_backward(watch)?,
+            None => solver.solve(Extent::Verdict, watch)?,
+        };
         conclude(result, &mut solver, watch)
     }
 }

@@ -15,9 +15,10 @@ use crate::ir::{ClockAtom, Network, Objective, Predicate, QueryKind};
 use crate::network::{
     Abstraction, ClockBounds, Failure, LiveVariables, Restriction, Stepper, Symbolic, predicate,
 };
-use crate::search::limits::{Counters, StopReason, Watch};
+use crate::search::limits::{Counters, Watch};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
+use super::attempt::{Attempt, CROWD, STATES_BEFORE_CROWD};
 use super::cooperation;
 use super::limits::LimitWatch;
 use super::verification::{self, Asked, Played, Verification};
@@ -67,52 +68,6 @@ pub(super) fn unsupported_game(
     }
 }
 
-/// States that a game is explored for without abstraction where two clocks are compared. Many such games are finite so, and then far
-/// smaller than with zones that are cut along the comparisons.
-const MOST_EXACT_STATES: u64 = 4096;
-
-/// States that a game is explored for before it is looked whether there are many zones for each discrete state.
-const STATES_BEFORE_CROWD: u64 = 2048;
-
-/// Discrete states that are explored instead, at most. More of them are rather such that no run reaches.
-const MOST_DISCRETE_STATES: u64 = 64 * STATES_BEFORE_CROWD;
-
-/// Bytes that a discrete state may take, on average, before zones that are reached are looked at again: winning sets of all that
-/// invariants allow can fall into many more pieces than those of what is reached.
-const MOST_BYTES_OF_DISCRETE_STATE: u64 = 64 << 10;
-
-/// Looks at the limits that a discrete state may take, on average, for the same reason: they come with every operation on many zones.
-/// Where the pieces stay few there are some dozens, and where they do not, thousands soon.
-const MOST_LOOKS_AT_DISCRETE_STATE: u64 = 256;
-
-/// States that are counted beside those that are stored, for the bytes and the looks that an average one may take.
-const STATES_OF_GRACE: u64 = 256;
-
-/// Stops a search after a number of states, or when the average one takes too much memory or work, if nothing else does before.
-struct Attempt<'w> {
-    watch: &'w mut dyn Watch,
-    most: u64,
-    most_bytes_each: u64,
-    most_looks_each: u64,
-    looks: u64,
-    is_given_up: bool,
-}
-
-impl Watch for Attempt<'_> {
-    fn look(&mut self, counters: &Counters) -> Option<StopReason> {
-        let reason = self.watch.look(counters);
-        self.looks += 1;
-        let states = counters.stored + STATES_OF_GRACE;
-        let takes_too_much = counters.bytes > states.saturating_mul(self.most_bytes_each)
-            || self.looks > states.saturating_mul(self.most_looks_each);
-        if reason.is_none() && (counters.explored > self.most || takes_too_much) {
-            self.is_given_up = true;
-            return Some(StopReason::States);
-        }
-        reason
-    }
-}
-
 /// The strategy that a game is played under: as a restriction, and as a value.
 pub(super) type Allowed<'a> = (&'a ClosedLoop, &'a Arc<Under>);
 
@@ -137,14 +92,7 @@ pub(super) fn game(
     };
     if !has_differences(network, &atoms) {
         let in_discrete_states = |watch: &mut LimitWatch| {
-            let mut attempt = Attempt {
-                watch,
-                most: MOST_DISCRETE_STATES,
-                most_bytes_each: MOST_BYTES_OF_DISCRETE_STATE,
-                most_looks_each: MOST_LOOKS_AT_DISCRETE_STATE,
-                looks: 0,
-                is_given_up: false,
-            };
+            let mut attempt = Attempt::in_discrete_states(watch);
             let zones = zones(Abstraction::Exact);
             let (answer, _) = played(zones, Nodes::Discrete, &mut attempt);
             // A run-time error may lie in a state that no run reaches.
@@ -180,14 +128,7 @@ pub(super) fn game(
         answer.counters.explored += before.explored;
         return answer;
     }
-    let mut attempt = Attempt {
-        watch,
-        most: MOST_EXACT_STATES,
-        most_bytes_each: u64::MAX,
-        most_looks_each: u64::MAX,
-        looks: 0,
-        is_given_up: false,
-    };
+    let mut attempt = Attempt::without_abstraction(watch);
     let exact = zones(Abstraction::Exact);
     let (first, _) = played(exact, Nodes::Symbolic, &mut attempt);
     if !attempt.is_given_up {
@@ -215,7 +156,7 @@ pub(super) fn zones_of<'a>(
 
 /// Whether the game may be played in discrete states with all that invariants allow: if it does not matter what is reached, and if
 /// neither clocks that stop, nor priorities, nor clock guards on urgent channels make it hang on more than the state.
-fn can_be_discrete(
+pub(super) fn can_be_discrete(
     network: &Network,
     (objective, is_cooperative): (&Objective, bool),
     options: &Options,
@@ -299,7 +240,7 @@ fn played(
     let mut solver = Solver::new(&mut graph, seeker, options.forced);
     solver.share_among(options.threads.clamp(1, MOST_THREADS));
     if nodes == Nodes::Automatic {
-        solver.give_up_if_crowded(STATES_BEFORE_CROWD);
+        solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD);
     }
     let is_planned = options.plans != PlansWanted::No
         && matches!(objective, Objective::Reach(_) | Objective::Until(..))

@@ -4,6 +4,7 @@
 //! is the one for the time limit and the measured seconds.
 
 pub mod answer;
+mod attempt;
 mod best;
 pub mod certificate;
 pub mod controller;

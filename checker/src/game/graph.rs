@@ -20,7 +20,7 @@
 //! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly. Where two clocks are compared,
 //! zones are cut along the comparisons, and a move has an edge for each piece; there are no chains then.
 
-use crate::ir::{FunctionId, Predicate};
+use crate::ir::Predicate;
 use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
 use crate::search::store::{DiscreteId, StateStore};
 use crate::zones::dbm::{self, Constraint};
@@ -28,6 +28,7 @@ use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Federation, Zone, clocks};
 
 use super::dead_ends::DeadEnds;
+pub use super::deadlines::Deadline;
 use super::programs::{ProgramId, ProgramStep, Programs};
 use super::trails::{Ending, Root, Trails};
 use super::urgency::Urgent;
@@ -119,25 +120,13 @@ pub struct Objective<'q> {
     pub leaves_dead_ends: bool,
 }
 
-/// A limit on the time that play takes.
-#[derive(Clone, Copy, Debug)]
-pub struct Deadline {
-    /// The clock that measures the time; nothing sets it.
-    pub clock: usize,
-    /// The limit.
-    pub limit: i32,
-    /// Whether the clock may start at any value up to the limit, so that the valuations of the initial node show how much time is
-    /// needed; else it starts at 0.
-    pub starts_anywhere: bool,
-    /// How much time, at least, is still to be left in a state before the goal; a negative value counts as 0.
-    pub rest: Option<FunctionId>,
-}
-
 /// The game graph.
 pub struct Graph<'s, 'a> {
     /// The network.
     pub symbolic: &'s mut Symbolic<'a>,
-    objective: Objective<'s>,
+    pub(super) objective: Objective<'s>,
+    /// How late a state may be, if there is a deadline.
+    pub(super) latest: Option<Constraint>,
     store: StateStore,
     pub(super) zones: ZoneTable,
     /// What edges do to clocks.
@@ -185,7 +174,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         symbolic: &'s mut Symbolic<'a>,
         objective: Objective<'s>,
     ) -> Result<Graph<'s, 'a>, Failure> {
-        let mut graph = Graph::without_nodes(symbolic, objective);
+        let mut graph = Graph::without_nodes(symbolic, objective)?;
         if graph.symbolic.has_barriers() {
             graph.start_urgently()?;
             return Ok(graph);
@@ -197,7 +186,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         Ok(graph)
     }
 
-    /// A graph of discrete states that holds the initial node only. No clock may be stopped, and there must be no deadline.
+    /// A graph of discrete states that holds the initial node only. No clock may be stopped.
     ///
     /// Source: N. Jensen, K. G. Larsen, D. Lime, J. Srba, "On-the-Fly Symbolic Algorithm for Timed ATL with Abstractions", CONCUR 2025
     /// (expansion abstraction).
@@ -205,11 +194,11 @@ impl<'s, 'a> Graph<'s, 'a> {
         symbolic: &'s mut Symbolic<'a>,
         objective: Objective<'s>,
     ) -> Result<Graph<'s, 'a>, Failure> {
-        let mut graph = Graph::without_nodes(symbolic, objective);
+        let mut graph = Graph::without_nodes(symbolic, objective)?;
         graph.has_discrete_nodes = true;
         graph.trails = Trails::new(false, &graph.objective);
         let (mut words, _, invariant) = graph.symbolic.start()?;
-        let zone = Zone::of_constraints(graph.dimension(), &invariant);
+        let zone = graph.anything_within(&invariant);
         let id = graph.zones.intern(zone.bounds());
         graph.node_of(&mut words, &zone, id, None)?;
         Ok(graph)
@@ -221,9 +210,15 @@ impl<'s, 'a> Graph<'s, 'a> {
         self.trails = Trails::new(false, &self.objective);
     }
 
-    fn without_nodes(symbolic: &'s mut Symbolic<'a>, objective: Objective<'s>) -> Graph<'s, 'a> {
+    fn without_nodes(
+        symbolic: &'s mut Symbolic<'a>,
+        objective: Objective<'s>,
+    ) -> Result<Graph<'s, 'a>, Failure> {
         let network = symbolic.stepper.network();
-        Graph {
+        let deadline = objective.deadline;
+        let latest = deadline.map(|deadline| deadline.until(deadline.limit));
+        Ok(Graph {
+            latest: latest.transpose()?,
             store: StateStore::new(network),
             zones: ZoneTable::new(symbolic.dimension()),
             programs: Programs::default(),
@@ -252,7 +247,14 @@ impl<'s, 'a> Graph<'s, 'a> {
             longest_chain: LONGEST_CHAIN,
             objective,
             symbolic,
-        }
+        })
+    }
+
+    /// All that is allowed by an invariant, up to the deadline.
+    fn anything_within(&self, invariant: &[Constraint]) -> Zone {
+        let mut zone = Zone::of_constraints(self.dimension(), invariant);
+        zone.constrain_all(self.latest.as_slice());
+        zone
     }
 
     /// The initial words and zone.
@@ -261,6 +263,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         let may_delay = self.symbolic.may_delay(&mut words)?;
         self.symbolic
             .delay(&words, may_delay, &invariant, zone.bounds_mut())?;
+        zone.constrain_all(self.latest.as_slice());
         Ok((words, zone))
     }
 
@@ -269,7 +272,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         let (words, mut zone, invariant) = self.symbolic.start()?;
         if let Some(deadline) = self.objective.deadline.filter(|one| one.starts_anywhere) {
             clocks::free_clock(zone.bounds_mut(), self.dimension(), deadline.clock);
-            zone.constrain(deadline.clock, 0, weak(deadline.limit)?);
+            zone.constrain_all(&[deadline.until(deadline.limit)?]);
         }
         Ok((words, zone, invariant))
     }
@@ -446,22 +449,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             Some(keep) => self.symbolic.extent(keep, words, zone.bounds())?,
             None => Extent::Everywhere,
         };
-        let Some(deadline) = self.objective.deadline else {
-            return Ok((goal, keep));
-        };
-        let rest = match deadline.rest {
-            Some(rest) => self.symbolic.stepper.evaluate(rest, words)?.max(0),
-            None => 0,
-        };
-        let until = |limit: i32| {
-            Ok::<_, Failure>(Constraint {
-                left: deadline.clock,
-                right: 0,
-                bound: weak(limit)?,
-            })
-        };
-        let keep = within(&keep, until(deadline.limit.saturating_sub(rest))?, zone);
-        Ok((within(&goal, until(deadline.limit)?, zone), keep))
+        self.in_time(words, zone, (goal, keep))
     }
 
     /// Computes the edges of a node. Nodes that this makes are behind the ones there were.
@@ -556,7 +544,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             return self.end_in_pieces(target, origin);
         }
         let mut zone = self.entries.swap_remove(0);
-        let may_delay = delay_after(self.symbolic, target, &self.steps, &mut zone)?;
+        let may_delay = delay_after(self.symbolic, target, (&self.steps, self.latest), &mut zone)?;
         self.go_on(origin, target, zone, (1, may_delay))
     }
 
@@ -574,7 +562,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             push_step(&mut self.steps, may_delay, &self.effect);
             std::mem::swap(target, &mut self.spare);
             length += 1;
-            may_delay = delay_after(self.symbolic, target, &self.steps, &mut zone)?;
+            may_delay = delay_after(self.symbolic, target, (&self.steps, self.latest), &mut zone)?;
         }
         self.end(target, zone, origin, length)
     }
@@ -627,7 +615,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             return Ok(());
         }
         for zone in &mut zones {
-            delay_after(self.symbolic, target, &self.steps, zone)?;
+            delay_after(self.symbolic, target, (&self.steps, self.latest), zone)?;
         }
         if self.has_discrete_nodes {
             // All pieces end in the same node, and the steps say from where.
@@ -655,7 +643,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             return Ok(());
         }
         if self.has_discrete_nodes {
-            zone = Zone::of_constraints(self.dimension(), invariant_after(&self.steps));
+            zone = self.anything_within(invariant_after(&self.steps));
         } else {
             self.symbolic.extrapolate(target, zone.bounds_mut());
         }
@@ -728,15 +716,16 @@ impl<'s, 'a> Graph<'s, 'a> {
     }
 }
 
-/// Lets time pass in a state that the steps lead to, within its invariant, if it may; returns whether it may.
+/// Lets time pass in a state that the steps lead to, within its invariant and until it is too late, if it may; returns whether it may.
 pub(super) fn delay_after(
     symbolic: &mut Symbolic<'_>,
     words: &mut [i32],
-    steps: &[ProgramStep],
+    (steps, latest): (&[ProgramStep], Option<Constraint>),
     zone: &mut Zone,
 ) -> Result<bool, Failure> {
     let may_delay = symbolic.may_delay(words)?;
     symbolic.delay(words, may_delay, invariant_after(steps), zone.bounds_mut())?;
+    zone.constrain_all(latest.as_slice());
     Ok(may_delay)
 }
 
@@ -753,24 +742,5 @@ pub(super) fn push_step(steps: &mut Vec<ProgramStep>, delays: bool, effect: &Clo
     if delays || is_kept || !effect.is_trivial() {
         let effect = effect.clone();
         steps.push(ProgramStep { delays, effect });
-    }
-}
-
-fn weak(limit: i32) -> Result<Bound, Failure> {
-    Bound::weak(limit).ok_or(Failure::ClockLimit(limit))
-}
-
-/// The part of an extent that satisfies a constraint.
-fn within(extent: &Extent, constraint: Constraint, zone: &Zone) -> Extent {
-    let mut inside = zone.clone();
-    if inside.constrain_all(&[constraint]) && inside == *zone {
-        return extent.clone();
-    }
-    let mut part = extent.to_federation(zone.bounds(), zone.dimension());
-    part.constrain_all(&[constraint]);
-    if part.is_empty() {
-        Extent::Nowhere
-    } else {
-        Extent::Part(part)
     }
 }

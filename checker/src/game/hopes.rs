@@ -12,8 +12,6 @@
 //!
 //! Nodes lose hope as the graph grows and never gain it again.
 
-use crate::zones::{ClockSet, dbm};
-
 use super::Player;
 use super::graph::{Edge, NONE};
 use super::reach::{Solver, Win};
@@ -99,10 +97,6 @@ impl Solver<'_, '_, '_> {
     fn may_stop(&self, node: u32) -> bool {
         !self.graph.nodes[node as usize].delays
             || self.graph.urgent(node).is_some()
-            || dbm::is_delay_bounded(
-                self.graph.zone(node),
-                self.graph.dimension(),
-                &ClockSet::EMPTY,
-            )
+            || self.graph.is_delay_bounded(node)
     }
 }

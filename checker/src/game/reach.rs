@@ -53,11 +53,8 @@ use super::repeats::{Case, Repeats};
 use super::tasks::Task;
 use super::{Forced, Player};
 
-/// So many nodes for each discrete state are many.
-const CROWD: usize = 4;
-
 /// Expanded nodes between two looks at the limits.
-const LOOK_EVERY: u64 = 64;
+pub(super) const LOOK_EVERY: u64 = 64;
 
 /// Nodes whose winning valuations hang on clocks are computed when the explored states have grown by this part of them. Each time
 /// costs more than looking at words, and the more is known by then, the fewer are computed twice.
@@ -68,7 +65,7 @@ const BETWEEN_PLAYS: u64 = 3;
 
 /// Nodes that are computed from the same winning valuations, at most. Some of them may gain more from each other, and are computed
 /// again; among so many that is rare.
-const MOST_TASKS: usize = 64;
+pub(super) const MOST_TASKS: usize = 64;
 
 /// Updates by words between two looks at the limits, where no node is expanded.
 const UPDATES_BETWEEN_LOOKS: u32 = 1024;
@@ -103,8 +100,6 @@ pub enum Extent {
     Verdict,
     /// Until the verdict is known, and if the seeker loses, until nothing is left out that the evader may do.
     Permissive,
-    /// The winning valuations of the initial node.
-    Start,
     /// The winning valuations of all nodes that can be reached.
     Everything,
 }
@@ -142,6 +137,8 @@ pub struct Solver<'g, 's, 'a> {
     pub(super) stamp: u32,
     /// After how many explored states it is looked whether there are many nodes for each discrete state.
     crowded_from: u64,
+    /// So many are many.
+    crowd: usize,
     /// Whether the solver has given up for having many nodes for each discrete state.
     pub has_given_up: bool,
     /// The nodes to be expanded.
@@ -193,6 +190,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             forced,
             stamp: 0,
             crowded_from: u64::MAX,
+            crowd: usize::MAX,
             has_given_up: false,
             frontier: Frontier::default(),
             has_hope: Vec::new(),
@@ -205,10 +203,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         solver
     }
 
-    /// Lets the solver give up, when it has explored so many states for a verdict, if it has many nodes for each discrete state. It
-    /// stops then for their number, and [`Solver::has_given_up`] is set.
-    pub fn give_up_if_crowded(&mut self, explored: u64) {
+    /// Lets the solver give up, when it has explored so many states, if it has so many nodes for each discrete state. It stops then for
+    /// their number, and [`Solver::has_given_up`] is set.
+    pub fn give_up_if_crowded(&mut self, explored: u64, crowd: usize) {
         self.crowded_from = explored;
+        self.crowd = crowd;
     }
 
     /// Lets so many threads compute what nodes win.
@@ -216,9 +215,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         self.threads = threads;
     }
 
-    fn is_crowded(&self) -> bool {
+    pub(super) fn is_crowded(&self) -> bool {
         self.graph.explored >= self.crowded_from
-            && self.graph.nodes.len() >= CROWD * self.graph.discrete_count()
+            && self.graph.nodes.len() >= self.crowd * self.graph.discrete_count()
     }
 
     /// What was done so far.
@@ -351,22 +350,27 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 continue;
             }
             self.pending[node as usize] = Pending::No;
-            let key = match self.case_of(node)? {
-                Case::Known(gained) => {
-                    self.gain_computed(node, gained);
-                    continue;
-                }
-                Case::New(key) => Some(key),
-                Case::None => None,
-            };
-            let situation = self.situation_for_win(node)?;
-            tasks.push(Task {
-                node,
-                situation,
-                key,
-            });
+            tasks.extend(self.task_of(node)?);
         }
         Ok(tasks)
+    }
+
+    /// The task to compute what a node wins; if it is a known case, that is recorded, and there is none.
+    pub(super) fn task_of(&mut self, node: u32) -> Result<Option<Task>, Failure> {
+        let key = match self.case_of(node)? {
+            Case::Known(gained) => {
+                self.gain_computed(node, gained);
+                return Ok(None);
+            }
+            Case::New(key) => Some(key),
+            Case::None => None,
+        };
+        let situation = self.situation_for_win(node)?;
+        Ok(Some(Task {
+            node,
+            situation,
+            key,
+        }))
     }
 
     /// Records what a node gains that was computed.

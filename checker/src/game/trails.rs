@@ -308,7 +308,7 @@ impl Graph<'_, '_> {
     ) -> Result<Onward, Failure> {
         let mut target = words.to_vec();
         last.enter_locations(&mut target);
-        let may_delay = delay_after(self.symbolic, &mut target, &steps, &mut zone)?;
+        let may_delay = delay_after(self.symbolic, &mut target, (&steps, self.latest), &mut zone)?;
         let is_end = length as usize == LONGEST_CHAIN
             || (may_delay && !self.chains_delays)
             || (trails.is_objective_fixed && !self.is_open(&mut target, &zone)?);

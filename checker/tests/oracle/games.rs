@@ -264,6 +264,7 @@ fn compare_times(
         let query = format!("control_t*{limit}: A[ {keep} U {goal} ]");
         let answer = ask(&mut model, &query);
         let describe = || format!("{text}{query}\n{answer:?}");
+        check_in_discrete_states(&mut model, &query, answer.as_ref().ok(), describe)?;
         let value = answer.as_ref().ok().and_then(|answer| answer.value.clone());
         let least = value.and_then(|values| values.items[0].least);
         let expected = if let Some(Extreme::Value { value, is_reached }) = least {
@@ -302,6 +303,31 @@ fn compare_times(
                     .map_err(|error| TestCaseError::fail(format!("{}\n{error}", describe())))?;
             }
         }
+    }
+    Ok(())
+}
+
+/// The time must be the same with one node for each discrete state.
+fn check_in_discrete_states(
+    model: &mut LoadedModel,
+    query: &str,
+    answer: Option<&Answer>,
+    describe: impl Fn() -> String,
+) -> Result<(), TestCaseError> {
+    let options = Options {
+        priorities: Priorities::Kept,
+        nodes: Nodes::Discrete,
+        ..compare::options()
+    };
+    let query = model.add_query(query);
+    let other = model.check(&query, &options);
+    let is_known = |answer: &&Answer| !matches!(answer.verdict, Verdict::Unknown(_));
+    let both = answer
+        .filter(is_known)
+        .zip(other.as_ref().ok().filter(is_known));
+    if let Some((answer, other)) = both {
+        prop_assert_eq!(&answer.verdict, &other.verdict, "{}", describe());
+        prop_assert_eq!(&answer.value, &other.value, "{}", describe());
     }
     Ok(())
 }
