@@ -37,6 +37,11 @@ impl Reserve {
     pub(super) fn forget_nodes(&mut self) {
         self.sources.clear();
     }
+
+    /// The bytes that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        self.sources.len()
+    }
 }
 
 impl Solver<'_, '_, '_> {
@@ -128,7 +133,7 @@ impl Solver<'_, '_, '_> {
     pub(super) fn keep_in_play(&mut self, is_in_play: &[bool]) {
         for (node, is_in_play) in is_in_play.iter().enumerate() {
             if !is_in_play && self.may_have_hope(node as u32) && !self.is_decided(node as u32) {
-                self.win[node] = Win::Everything;
+                self.replace_win(node, Win::Everything);
             }
         }
     }

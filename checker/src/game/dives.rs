@@ -45,6 +45,12 @@ impl Frontier {
         self.waiting.len()
     }
 
+    /// The bytes that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        let lists = self.waiting.len() + self.spoilers.len();
+        lists * size_of::<u32>() + self.is_waiting.len() + self.reserve.bytes()
+    }
+
     /// Makes room for one more node, which does not wait.
     pub(super) fn add_node(&mut self) {
         self.is_waiting.push(false);

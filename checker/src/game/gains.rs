@@ -1,5 +1,6 @@
 //! The valuations that nodes win, the rest of them, and where edges lead into either.
 
+use crate::zones::federation::block_bytes;
 use crate::zones::{Federation, Patience};
 
 use super::graph::{Edge, NONE};
@@ -46,11 +47,14 @@ impl Solver<'_, '_, '_> {
             rest.intersection_within(&won, patience)
         };
         rest.subtract_within(&won, patience);
-        if rest.is_empty() {
-            return Gained::Everything((!is_first).then_some(part));
-        }
-        rest.merge_within(patience);
-        Gained::Part { won, part, rest }
+        let mut gained = if rest.is_empty() {
+            Gained::Everything((!is_first).then_some(part))
+        } else {
+            rest.merge_within(patience);
+            Gained::Part { won, part, rest }
+        };
+        gained.shrink();
+        gained
     }
 
     /// Records what a node gains, whose predecessors are to be updated then.
@@ -58,16 +62,11 @@ impl Solver<'_, '_, '_> {
         match gained {
             Gained::Nothing => {}
             Gained::Everything(part) => {
-                self.rest.remove(&node);
+                self.replace_rest(node, None);
                 self.record(node, Win::Everything, part);
             }
             Gained::Part { won, part, rest } => {
-                let new_count = won.zone_count() + part.zone_count() + rest.zone_count();
-                self.gained_zones += new_count as u64;
-                let before = self.rest.insert(node, rest);
-                if let (Win::Part(old), Some(before)) = (&self.win[node as usize], before) {
-                    self.gained_zones -= (old.zone_count() + before.zone_count()) as u64;
-                }
+                self.replace_rest(node, Some(rest));
                 self.record(node, Win::Part(won), Some(part));
             }
         }
@@ -75,18 +74,54 @@ impl Solver<'_, '_, '_> {
 
     /// Records that all of a node is won.
     pub(super) fn gain_everything(&mut self, node: u32) {
-        let rest = self.rest.remove(&node);
+        let rest = self.replace_rest(node, None);
         self.record(node, Win::Everything, rest);
+    }
+
+    /// Replaces what is left of a node, of which a part is won if there is a rest; gives what it was.
+    pub(super) fn replace_rest(
+        &mut self,
+        node: u32,
+        rest: Option<Federation>,
+    ) -> Option<Federation> {
+        let old = match rest {
+            Some(rest) => {
+                self.gained_bytes += rest.heap_bytes() as u64;
+                self.rest.insert(node, rest)
+            }
+            None => self.rest.remove(&node),
+        };
+        let old_bytes = old.as_ref().map_or(0, Federation::heap_bytes);
+        self.gained_bytes -= old_bytes as u64;
+        old
+    }
+
+    /// Replaces what a node wins.
+    pub(super) fn replace_win(&mut self, node: usize, win: Win) {
+        self.gained_bytes += win.heap_bytes();
+        let old = std::mem::replace(&mut self.win[node], win);
+        self.gained_bytes -= old.heap_bytes();
     }
 
     /// Records what a node gains.
     fn record(&mut self, node: u32, win: Win, part: Option<Federation>) {
         self.stamp += 1;
-        self.gains[node as usize].push(Gain {
+        let gains = &mut self.gains[node as usize];
+        // Most nodes gain once.
+        if gains.is_empty() {
+            gains.reserve_exact(1);
+        }
+        let room = gains.capacity();
+        let part_bytes = part.as_ref().map_or(0, Federation::heap_bytes);
+        gains.push(Gain {
             stamp: self.stamp,
             part,
         });
-        self.win[node as usize] = win;
+        let bytes = |room: usize| block_bytes(room * size_of::<Gain>());
+        let is_first = gains.len() == 1;
+        self.gained_bytes += (bytes(gains.capacity()) + part_bytes) as u64;
+        self.gained_bytes -= if is_first { 0 } else { bytes(room) as u64 };
+        self.replace_win(node as usize, win);
         let mut edge = self.graph.nodes[node as usize].first_in;
         while edge != NONE {
             let Edge {

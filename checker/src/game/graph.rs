@@ -27,6 +27,7 @@ use crate::zones::dbm::{self, Constraint};
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Federation, Zone, clocks};
 
+use super::account::table_bytes;
 use super::dead_ends::DeadEnds;
 pub use super::deadlines::Deadline;
 use super::programs::{ProgramId, ProgramStep, Programs};
@@ -138,6 +139,8 @@ pub struct Graph<'s, 'a> {
     heads: Vec<u32>,
     parts: rustc_hash::FxHashMap<u32, Parts>,
     pub(super) urgent: rustc_hash::FxHashMap<u32, Urgent>,
+    /// The bytes that the zones of `parts` and `urgent` take.
+    cut_bytes: usize,
     /// How many states were expanded, those inside chains included.
     pub explored: u64,
     words: Vec<i32>,
@@ -227,6 +230,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             heads: Vec::new(),
             parts: rustc_hash::FxHashMap::default(),
             urgent: rustc_hash::FxHashMap::default(),
+            cut_bytes: 0,
             explored: 0,
             words: network.initial.clone(),
             target: network.initial.clone(),
@@ -299,13 +303,18 @@ impl<'s, 'a> Graph<'s, 'a> {
 
     /// The bytes that nodes, edges and states take.
     pub fn bytes(&self) -> u64 {
-        let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
+        let nodes = size_of_val(&*self.nodes) + size_of_val(&*self.heads);
+        let cut = table_bytes::<(u32, Parts)>(self.parts.capacity())
+            + table_bytes::<(u32, Urgent)>(self.urgent.capacity())
+            + self.cut_bytes;
         (self.store.bytes()
             + self.zones.bytes()
+            + self.programs.bytes()
             + self.trails.bytes()
-            + self.symbolic.stepper.bytes()
+            + self.symbolic.bytes()
             + nodes
-            + self.edges.capacity() * size_of::<Edge>()) as u64
+            + size_of_val(&*self.edges)
+            + cut) as u64
     }
 
     /// Writes the words of a node over those of another state.
@@ -347,6 +356,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         let head = &mut self.heads[discrete.0 as usize];
         self.nodes[made as usize].next = std::mem::replace(head, made);
         if let Some(urgent) = urgent {
+            self.cut_bytes += urgent.heap_bytes();
             self.urgent.insert(made, urgent);
         }
         Ok(made)
@@ -429,7 +439,12 @@ impl<'s, 'a> Graph<'s, 'a> {
                         return Ok(Standing::Broken);
                     }
                 }
-                self.parts.insert(made, Parts { goal, broken });
+                goal.shrink();
+                broken.shrink();
+                self.cut_bytes += goal.heap_bytes() + broken.heap_bytes();
+                if let Some(old) = self.parts.insert(made, Parts { goal, broken }) {
+                    self.cut_bytes -= old.goal.heap_bytes() + old.broken.heap_bytes();
+                }
                 Ok(Standing::Mixed)
             }
         }

@@ -50,12 +50,13 @@ impl Solver<'_, '_, '_> {
         }
         let is_open = has_hope[0];
         if !is_open {
-            for (win, has_hope) in self.win.iter_mut().zip(&has_hope) {
-                *win = if *has_hope {
+            for (node, has_hope) in has_hope.iter().enumerate() {
+                let win = if *has_hope {
                     Win::Everything
                 } else {
                     Win::Nothing
                 };
+                self.replace_win(node, win);
             }
         }
         self.has_hope = has_hope;
@@ -71,7 +72,7 @@ impl Solver<'_, '_, '_> {
     pub(super) fn keep_out_of_unexpanded(&mut self) {
         for node in 0..self.win.len() {
             if !self.graph.nodes[node].is_expanded && !self.is_decided(node as u32) {
-                self.win[node] = Win::Everything;
+                self.replace_win(node, Win::Everything);
             }
         }
     }

@@ -9,8 +9,10 @@
 
 use crate::network::Failure;
 use crate::search::limits::Watch;
+use crate::zones::Federation;
 
-use super::reach::{Solver, Win};
+use super::account::table_bytes;
+use super::reach::{Gain, Solver, Win};
 
 /// Computations between two looks at the limits.
 const BETWEEN_LOOKS: u32 = 64;
@@ -28,13 +30,18 @@ impl Solver<'_, '_, '_> {
         let win = std::mem::take(&mut self.win);
         let gains = std::mem::take(&mut self.gains);
         let rest = std::mem::take(&mut self.rest);
-        let (gained_zones, stamp) = (self.gained_zones, self.stamp);
+        let (gained_bytes, stamp) = (self.gained_bytes, self.stamp);
+        let by_node = size_of::<Win>() + size_of::<Vec<Gain>>();
+        let tables = win.len() * by_node + table_bytes::<(u32, Federation)>(rest.capacity());
+        self.aside_bytes += gained_bytes + tables as u64;
         self.begin_anew();
-        if !self.gain_in_layers(watch)? {
+        let is_layered = self.gain_in_layers(watch)?;
+        self.aside_bytes -= gained_bytes + tables as u64;
+        if !is_layered {
             self.win = win;
             self.gains = gains;
             self.rest = rest;
-            (self.gained_zones, self.stamp) = (gained_zones, stamp);
+            (self.gained_bytes, self.stamp) = (gained_bytes, stamp);
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 //! The controller owns a move if all participating edges are controllable; all other moves are the environment's. The
 //! environment is faster: where both can move at the same instant, it may.
 
+mod account;
 mod choices;
 pub mod closed_loop;
 pub mod cooperation;

@@ -7,8 +7,11 @@ use rustc_hash::FxHashMap;
 
 use crate::network::ClockEffect;
 use crate::zones::dbm::Constraint;
+use crate::zones::federation::block_bytes;
 use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, ClockSet, Federation, Zone};
+
+use super::account::table_bytes;
 
 /// The index of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -32,6 +35,14 @@ pub struct Programs {
     index: FxHashMap<Vec<ProgramStep>, u32>,
     /// By program, source zone and target zone: whether every valuation of the source gets into the target.
     totals: FxHashMap<(ProgramId, ZoneId, ZoneId), bool>,
+    /// What the steps take.
+    step_bytes: usize,
+}
+
+/// The bytes that some steps take.
+pub(super) fn steps_bytes(steps: &[ProgramStep]) -> usize {
+    let effects = steps.iter().map(|step| step.effect.heap_bytes());
+    block_bytes(size_of_val(steps)) + effects.sum::<usize>()
 }
 
 impl Programs {
@@ -51,9 +62,18 @@ impl Programs {
         }
         let id = self.steps.len() as u32;
         self.last = id;
+        self.step_bytes += 2 * steps_bytes(steps);
         self.steps.push(steps.to_vec());
         self.index.insert(steps.to_vec(), id);
         ProgramId(id)
+    }
+
+    /// The bytes that they take.
+    pub(super) fn bytes(&self) -> usize {
+        self.step_bytes
+            + self.steps.len() * size_of::<Vec<ProgramStep>>()
+            + table_bytes::<(Vec<ProgramStep>, u32)>(self.index.capacity())
+            + table_bytes::<((ProgramId, ZoneId, ZoneId), bool)>(self.totals.capacity())
     }
 
     /// The valuations from which the first move of the program is possible.

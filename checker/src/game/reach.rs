@@ -44,7 +44,7 @@ use rustc_hash::FxHashMap;
 
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
-use crate::zones::{Bound, Federation, Patience};
+use crate::zones::{Federation, Patience};
 
 use super::dives::Frontier;
 use super::gains::Gained;
@@ -55,6 +55,9 @@ use super::{Forced, Player};
 
 /// Expanded nodes between two looks at the limits.
 pub(super) const LOOK_EVERY: u64 = 64;
+
+/// Bytes of zones that are made between two looks at the limits, at most, one expansion aside.
+const ZONE_BYTES_BETWEEN_LOOKS: u64 = 4 << 20;
 
 /// Nodes whose winning valuations hang on clocks are computed when the explored states have grown by this part of them. Each time
 /// costs more than looking at words, and the more is known by then, the fewer are computed twice.
@@ -127,8 +130,10 @@ pub struct Solver<'g, 's, 'a> {
     pub(super) is_cooperative: bool,
     /// By node: the valuations from which the seeker wins.
     pub win: Vec<Win>,
-    /// How many zones the gains, the winning valuations and the rests have.
-    pub(super) gained_zones: u64,
+    /// The bytes that zones of the gains, the winning valuations and the rests take.
+    pub(super) gained_bytes: u64,
+    /// The bytes of what belongs to the game and is kept elsewhere meanwhile.
+    pub(super) aside_bytes: u64,
     /// The rest of each node of which a part is won.
     pub(super) rest: FxHashMap<u32, Federation>,
     /// By node: the gains, by ascending stamp. What is sought has stamp 0.
@@ -146,9 +151,9 @@ pub struct Solver<'g, 's, 'a> {
     /// By node, as far as it was looked at: whether the seeker may still win; see [`super::hopes`].
     pub(super) has_hope: Vec<bool>,
     /// Nodes to be looked at again, first those that were put in first.
-    updates: VecDeque<u32>,
+    pub(super) updates: VecDeque<u32>,
     /// Nodes whose winning valuations are to be computed with zones; some may be settled meanwhile.
-    deferred: VecDeque<u32>,
+    pub(super) deferred: VecDeque<u32>,
     pub(super) pending: Vec<Pending>,
     /// What was computed before.
     pub(super) repeats: Repeats,
@@ -184,7 +189,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             goes_on: false,
             is_cooperative: false,
             win: Vec::new(),
-            gained_zones: 0,
+            gained_bytes: 0,
+            aside_bytes: 0,
             rest: FxHashMap::default(),
             gains: Vec::new(),
             forced,
@@ -220,26 +226,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             && self.graph.nodes.len() >= self.crowd * self.graph.discrete_count()
     }
 
-    /// What was done so far.
-    pub fn counters(&self) -> Counters {
-        Counters {
-            explored: self.graph.explored,
-            stored: self.graph.nodes.len() as u64,
-            waiting: self.frontier.len() as u64,
-            bytes: self.graph.bytes()
-                + self.repeats.bytes() as u64
-                + (self.win.capacity() * (size_of::<Win>() + size_of::<Vec<Gain>>() + 2)) as u64
-                + self.gained_zones * self.zone_bytes(),
-        }
-    }
-
-    pub(super) fn zone_bytes(&self) -> u64 {
-        (self.graph.dimension().pow(2) * size_of::<Bound>()) as u64
-    }
-
     /// Solves the game.
     pub fn solve(&mut self, extent: Extent, watch: &mut dyn Watch) -> Result<Answer, Failure> {
         let mut next_look = LOOK_EVERY;
+        let zones_between_looks = (ZONE_BYTES_BETWEEN_LOOKS / self.zone_bytes()) as usize;
+        let mut zones_at_look = self.graph.zones.len() + zones_between_looks;
         let (mut next_hope, mut next_crowd) = (1, 1);
         self.frontier.reserve.is_kept = extent == Extent::Verdict;
         loop {
@@ -295,8 +286,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 continue;
             }
             self.expand(node)?;
-            if self.graph.explored >= next_look {
+            if self.graph.explored >= next_look || self.graph.zones.len() >= zones_at_look {
                 next_look = self.graph.explored + LOOK_EVERY;
+                zones_at_look = self.graph.zones.len() + zones_between_looks;
                 if let Some(reason) = watch.look(&self.counters()) {
                     return Ok(Answer::Stopped(reason));
                 }
@@ -426,7 +418,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         self.stamp = 0;
         self.win.clear();
         self.rest.clear();
-        self.gained_zones = 0;
+        self.gained_bytes = 0;
         self.gains.clear();
         self.frontier.forget_nodes();
         self.pending.clear();

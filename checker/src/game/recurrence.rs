@@ -22,6 +22,7 @@ use crate::search::limits::Watch;
 use crate::zones::{Federation, Patience};
 
 use super::Player;
+use super::account::wins_bytes;
 use super::graph::Standing;
 use super::reach::{Answer, Extent, Solver, Win};
 
@@ -41,14 +42,18 @@ pub fn solve(
     let mut kept: Vec<Win> = (0..solver.graph.nodes.len() as u32)
         .map(|node| unbroken(solver, node))
         .collect();
+    let mut rounds_bytes = 0;
     loop {
         let mut targets = Vec::with_capacity(kept.len());
         for node in 0..kept.len() as u32 {
             targets.push(target(solver, node, &kept)?);
         }
+        let kept_bytes = wins_bytes(&kept);
         if let Some(rounds) = &mut rounds {
             rounds.push(kept.clone());
+            rounds_bytes += kept_bytes;
         }
+        solver.aside_bytes = wins_bytes(&targets) + kept_bytes + rounds_bytes;
         solver.restart(targets);
         if let Some(reason) = solver.propagate(watch)? {
             return Ok(Answer::Stopped(reason));

@@ -12,8 +12,10 @@
 use rustc_hash::FxHashMap;
 
 use crate::network::Failure;
+use crate::zones::federation::block_bytes;
 
 use super::Player;
+use super::account::table_bytes;
 use super::gains::Gained;
 use super::graph::Standing;
 use super::reach::{Solver, Win};
@@ -30,7 +32,8 @@ const WORTH: u32 = 4;
 pub(super) struct Repeats {
     cases: FxHashMap<Box<[u32]>, Gained>,
     key: Vec<u32>,
-    key_bytes: usize,
+    /// What keys and gains take beside the table.
+    kept_bytes: u64,
     lookups: u32,
     hits: u32,
 }
@@ -46,9 +49,10 @@ pub(super) enum Case {
 }
 
 impl Repeats {
-    /// The bytes that it takes, zones excepted.
-    pub(super) fn bytes(&self) -> usize {
-        self.key_bytes + self.cases.capacity() * size_of::<(Box<[u32]>, Gained)>()
+    /// The bytes that it takes.
+    pub(super) fn bytes(&self) -> u64 {
+        let table = table_bytes::<(Box<[u32]>, Gained)>(self.cases.capacity());
+        self.kept_bytes + table as u64
     }
 }
 
@@ -73,7 +77,8 @@ impl Solver<'_, '_, '_> {
     /// Remembers what a case gains.
     pub(super) fn remember_case(&mut self, key: Box<[u32]>, gained: &Gained) {
         if self.repeats.cases.len() < MOST_CASES {
-            self.repeats.key_bytes += size_of_val(&*key);
+            let key_bytes = block_bytes(size_of_val(&*key)) as u64;
+            self.repeats.kept_bytes += key_bytes + gained.heap_bytes();
             self.repeats.cases.insert(key, gained.clone());
         }
     }

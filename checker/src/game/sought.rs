@@ -3,6 +3,7 @@
 use crate::zones::Federation;
 
 use super::Player;
+use super::account::gains_bytes;
 use super::graph::Standing;
 use super::reach::{Gain, Pending, Solver, Win};
 
@@ -14,8 +15,8 @@ impl Solver<'_, '_, '_> {
             if let Win::Part(part) = &win {
                 let mut rest = self.whole(node as u32);
                 rest.subtract(part);
-                self.gained_zones += (2 * part.zone_count() + rest.zone_count()) as u64;
-                self.rest.insert(node as u32, rest);
+                rest.shrink();
+                self.replace_rest(node as u32, Some(rest));
             }
             let gains = match &win {
                 Win::Nothing => Vec::new(),
@@ -28,6 +29,7 @@ impl Solver<'_, '_, '_> {
                     part: Some(part.clone()),
                 }],
             };
+            self.gained_bytes += win.heap_bytes() + gains_bytes(&gains);
             self.win.push(win);
             self.gains.push(gains);
             self.frontier.add_node();

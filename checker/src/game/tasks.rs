@@ -4,13 +4,14 @@
 //! the result does not hang on how many threads there are, nor on how fast they are.
 
 use std::panic;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::Duration;
 
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::Patience;
+use crate::zones::federation::block_bytes;
 
 use super::gains::Gained;
 use super::predecessors::Situation;
@@ -34,6 +35,18 @@ pub(super) struct Task {
     pub(super) key: Option<Box<[u32]>>,
 }
 
+impl Task {
+    /// The bytes that it takes beside the value itself, keys excepted.
+    fn heap_bytes(&self) -> u64 {
+        let Situation { stops, movers, .. } = &self.situation;
+        let zones = stops.iter().map(|(_, stop)| stop.heap_bytes());
+        let parts = movers
+            .iter()
+            .map(|(parts, _)| block_bytes(size_of_val(&**parts)));
+        (zones.sum::<usize>() + parts.sum::<usize>()) as u64
+    }
+}
+
 /// What threads tell each other while they work.
 struct Progress {
     /// The next task that nobody has begun.
@@ -41,6 +54,8 @@ struct Progress {
     is_cut: AtomicBool,
     /// By thread: the zones at hand.
     zones: Vec<AtomicUsize>,
+    /// The bytes of the tasks, and of what is computed and not recorded yet.
+    done_bytes: AtomicU64,
 }
 
 impl Solver<'_, '_, '_> {
@@ -59,6 +74,7 @@ impl Solver<'_, '_, '_> {
             next: AtomicUsize::new(0),
             is_cut: AtomicBool::new(false),
             zones: (0..threads).map(|_| AtomicUsize::new(0)).collect(),
+            done_bytes: AtomicU64::new(tasks.iter().map(Task::heap_bytes).sum()),
         };
         let (mut done, reason) = if threads == 1 {
             self.work_and_look(&tasks, &progress, watch)
@@ -188,6 +204,8 @@ impl Solver<'_, '_, '_> {
             if patience.is_over() || progress.is_cut.load(Ordering::Relaxed) {
                 return done;
             }
+            let bytes = gained.heap_bytes();
+            progress.done_bytes.fetch_add(bytes, Ordering::Relaxed);
             done.push((index, gained));
         }
     }
@@ -197,7 +215,9 @@ impl Solver<'_, '_, '_> {
         let counters = self.counters();
         let others = progress.zones.iter();
         let zones: usize = others.map(|zones| zones.load(Ordering::Relaxed)).sum();
-        let bytes = counters.bytes + (own_zones + zones) as u64 * self.zone_bytes();
+        let bytes = counters.bytes
+            + progress.done_bytes.load(Ordering::Relaxed)
+            + (own_zones + zones) as u64 * self.zone_bytes();
         Counters { bytes, ..counters }
     }
 }

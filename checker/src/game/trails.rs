@@ -14,11 +14,12 @@ use rustc_hash::FxHashMap;
 
 use crate::ir::Predicate;
 use crate::network::{Extent, Failure, FixedMove, Moves, OfferId, VectorId};
-use crate::zones::Zone;
+use crate::zones::federation::block_bytes;
 use crate::zones::zone_table::ZoneId;
+use crate::zones::{Bound, Zone};
 
 use super::graph::{Graph, LONGEST_CHAIN, Objective, Origin, delay_after, push_step};
-use super::programs::{ProgramId, ProgramStep};
+use super::programs::{ProgramId, ProgramStep, steps_bytes};
 
 /// Trails take at most about so many bytes.
 const MOST_BYTES: usize = 32 << 20;
@@ -141,8 +142,9 @@ impl Trails {
 
     fn add(&mut self, trail: Trail) -> Onward {
         let dimension = trail.zone.dimension();
-        self.bytes += 2 * size_of::<Trail>() + 8 * dimension * dimension;
-        self.bytes += trail.steps.len() * size_of::<ProgramStep>();
+        // The end has its zone too.
+        self.bytes += size_of::<Trail>() + 2 * block_bytes(size_of::<Bound>() * dimension.pow(2));
+        self.bytes += steps_bytes(&trail.steps) + trail.last.heap_bytes();
         self.points.push(trail);
         Onward::To(self.points.len() as u32 - 1)
     }

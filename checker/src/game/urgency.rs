@@ -34,6 +34,12 @@ pub struct Urgent {
 }
 
 impl Urgent {
+    /// The bytes that it takes beside the value itself.
+    pub(super) fn heap_bytes(&self) -> usize {
+        let parts = [&self.channel, &self.obliged, &self.reached];
+        parts.iter().map(|part| part.heap_bytes()).sum()
+    }
+
     /// All valuations that stop time.
     pub(super) fn stops(&self) -> Federation {
         let mut stops = self.channel.clone();

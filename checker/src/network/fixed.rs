@@ -11,6 +11,7 @@ use super::symbolic::to_constraints;
 use super::{ClockEffect, MoveRef, Stepper, Symbolic};
 use crate::zones::clocks::Assignment;
 use crate::zones::dbm::Constraint;
+use crate::zones::federation::block_bytes;
 
 /// A move that is worked out.
 #[derive(Clone, Debug)]
@@ -24,6 +25,13 @@ pub struct FixedMove {
 }
 
 impl FixedMove {
+    /// The bytes that it takes beside the value itself, arguments of functions excepted.
+    pub fn heap_bytes(&self) -> usize {
+        block_bytes(size_of_val(&*self.calls))
+            + block_bytes(size_of_val(&*self.targets))
+            + self.effect.heap_bytes()
+    }
+
     /// Enters the locations of the target, and leaves variables as they are.
     pub fn enter_locations(&self, words: &mut [i32]) {
         for &(process, location) in &self.targets {

@@ -2,6 +2,7 @@
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ChannelId;
+use crate::zones::federation::block_bytes;
 
 use super::offers::OfferId;
 
@@ -107,12 +108,12 @@ impl Moves {
         self.offer = None;
     }
 
-    /// The bytes that the moves take.
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.headers)
-            + size_of_val(&*self.parts)
-            + size_of_val(&*self.constraints)
-            + size_of_val(&*self.excluded)
+    /// The bytes that the moves take beside the value itself.
+    pub(super) fn heap_bytes(&self) -> usize {
+        block_bytes(size_of_val(&*self.headers))
+            + block_bytes(size_of_val(&*self.parts))
+            + block_bytes(size_of_val(&*self.constraints))
+            + block_bytes(size_of_val(&*self.excluded))
     }
 
     /// Replaces the moves by others and keeps the memory.

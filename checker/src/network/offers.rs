@@ -17,15 +17,19 @@ use hashbrown::HashTable;
 use rustc_hash::FxHasher;
 
 use crate::ir::FunctionId;
+use crate::zones::federation::block_bytes;
 
 use super::Moves;
 
 /// What is remembered takes at most about so many bytes.
-const MOST_BYTES: usize = 16 << 20;
+const MOST_BYTES: usize = 24 << 20;
 /// A location vector with more offers is unsuited: its guards seldom answer the same.
 const MOST_OFFERS: u32 = 64;
 /// A location vector that asks more is unsuited.
 const MOST_QUESTIONS: usize = 256;
+
+/// A question has few answers, mostly no and yes.
+const USUAL_ANSWERS: usize = 2;
 
 /// So many states of a search make a trial of whether remembering pays; one of [`LEAST_FOUND`] must find its moves.
 const TRIAL: u32 = 1024;
@@ -260,7 +264,7 @@ impl Offers {
             return None;
         }
         let offer = OfferId(self.moves.len() as u32);
-        self.bytes += moves.bytes() + size_of::<Moves>();
+        self.bytes += moves.heap_bytes() + size_of::<Moves>();
         moves.offer = Some(offer);
         self.moves.push(moves.clone());
         let root = self.graft(root, record, Point::Offer(offer));
@@ -277,11 +281,13 @@ impl Offers {
             let question = if let Some(Point::Ask(question)) = way {
                 question
             } else {
-                self.bytes += size_of::<Question>() + size_of_val(&*arguments) + 32;
+                self.bytes += size_of::<Question>()
+                    + block_bytes(size_of_val(&*arguments))
+                    + block_bytes(USUAL_ANSWERS * size_of::<(i32, Point)>());
                 self.questions.push(Question {
                     function,
                     arguments,
-                    answers: Vec::new(),
+                    answers: Vec::with_capacity(USUAL_ANSWERS),
                 });
                 let question = self.questions.len() as u32 - 1;
                 self.attach(parent, &mut first, Point::Ask(question));

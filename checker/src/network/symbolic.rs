@@ -15,6 +15,7 @@ use crate::ir::ClockId;
 use crate::zones::clocks::{self, Assignment};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::extrapolate::Ceilings;
+use crate::zones::federation::block_bytes;
 use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
 
 use super::bounds::ClockBounds;
@@ -484,6 +485,18 @@ impl<'a> Symbolic<'a> {
 }
 
 impl ClockEffect {
+    /// The bytes that it takes beside the value itself.
+    pub fn heap_bytes(&self) -> usize {
+        let excluded = self.excluded.iter();
+        block_bytes(size_of_val(&*self.guard))
+            + block_bytes(size_of_val(&*self.assignments))
+            + block_bytes(size_of_val(&*self.invariant))
+            + block_bytes(size_of_val(&*self.excluded))
+            + excluded
+                .map(|one| block_bytes(size_of_val(&**one)))
+                .sum::<usize>()
+    }
+
     /// Whether the move is possible everywhere and leaves every zone as it is.
     pub fn is_trivial(&self) -> bool {
         self.guard.is_empty()

@@ -58,6 +58,16 @@ impl Federation {
         self.bounds.len() / self.size()
     }
 
+    /// The bytes that its zones take, beside the value itself.
+    pub fn heap_bytes(&self) -> usize {
+        block_bytes(self.bounds.capacity() * size_of::<Bound>())
+    }
+
+    /// Gives up the room for zones that are not there.
+    pub fn shrink(&mut self) {
+        self.bounds.shrink_to_fit();
+    }
+
     /// Whether there is no valuation in it.
     pub fn is_empty(&self) -> bool {
         self.bounds.is_empty()
@@ -440,6 +450,14 @@ impl Federation {
         }
         self.bounds.truncate(kept);
     }
+}
+
+/// What a block of so many bytes takes of the heap: allocators keep its size in front of it, and common ones give multiples of 16.
+pub fn block_bytes(bytes: usize) -> usize {
+    if bytes == 0 {
+        return 0;
+    }
+    (bytes + size_of::<usize>()).next_multiple_of(16).max(32)
 }
 
 /// A zone that is taken away from others: its minimal constraints are found once.

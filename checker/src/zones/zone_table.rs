@@ -17,6 +17,8 @@ pub struct ZoneTable {
     bounds: Vec<Bound>,
     table: HashTable<u32>,
     count: u32,
+    /// How many bounds there were at most before zones were forgotten.
+    most_bounds: usize,
 }
 
 impl ZoneTable {
@@ -32,6 +34,7 @@ impl ZoneTable {
             bounds: Vec::new(),
             table: HashTable::new(),
             count: 0,
+            most_bounds: 0,
         }
     }
 
@@ -67,13 +70,15 @@ impl ZoneTable {
 
     /// Forgets all zones and keeps the memory.
     pub fn clear(&mut self) {
+        self.most_bounds = self.most_bounds.max(self.bounds.len());
         self.bounds.clear();
         self.table.clear();
         self.count = 0;
     }
 
-    /// The bytes that the table takes.
+    /// The bytes that the table takes; room for zones to come takes none before it is written to.
     pub fn bytes(&self) -> usize {
-        self.bounds.capacity() * size_of::<Bound>() + self.table.capacity() * 5 * 8 / 7
+        let bounds = self.bounds.len().max(self.most_bounds);
+        bounds * size_of::<Bound>() + self.table.allocation_size()
     }
 }
