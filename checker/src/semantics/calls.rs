@@ -84,8 +84,8 @@ impl Checker<'_> {
         if converted.len() < signature.parameters.len() || signature.result.is_error() {
             return Expr::error(span);
         }
-        if signature.effects.uses_clock_values {
-            self.clock_values.push(span);
+        if let Some(unknown) = &signature.unknown {
+            self.unknowns.push(unknown.diagnostic.clone());
         }
         let kind = Kind::Call {
             function,
@@ -157,15 +157,9 @@ impl Checker<'_> {
         }
         let Some(function) = math_function(name) else {
             if is_random(name) {
-                self.error(
-                    codes::RANDOM_UNSUPPORTED,
-                    name_span,
-                    format!("'{name}' is a random function: these exist in statistical model checking only"),
-                    "use select, or several edges, for a choice",
-                );
-            } else {
-                self.unknown_name(name, name_span);
+                return self.random(name, name_span, arguments);
             }
+            self.unknown_name(name, name_span);
             return Expr::error(span);
         };
         let parameters = function.parameters();
@@ -186,6 +180,28 @@ impl Checker<'_> {
             return Expr::error(span);
         }
         folded_math(function, converted, span)
+    }
+
+    /// A random number, which nothing may depend on.
+    fn random(&mut self, name: &str, name_span: Span, arguments: Vec<Expr>) -> Expr {
+        let diagnostic = Diagnostic::new(
+            codes::RANDOM_UNSUPPORTED,
+            name_span,
+            format!(
+                "'{name}' is a random function: these exist in statistical model checking only"
+            ),
+        );
+        let diagnostic = diagnostic.help("use select, or several edges, for a choice");
+        if arguments.iter().any(Expr::is_error) {
+            return Expr::error(name_span);
+        }
+        if self.is_query || arguments.iter().any(Expr::has_effect) {
+            self.report(diagnostic);
+            return Expr::error(name_span);
+        }
+        let from = arguments.into_iter().next();
+        let from = from.unwrap_or_else(|| Expr::int(0, Type::ANY_INT, name_span));
+        self.unknown(diagnostic, from, Type::Double)
     }
 
     /// `fint(argument)`

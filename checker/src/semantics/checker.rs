@@ -40,8 +40,8 @@ pub(super) struct Checker<'a> {
     has_errors: bool,
     /// The locals of the function, guard or update that is being checked.
     pub(super) locals: Vec<Local>,
-    /// Where values of clocks are used as numbers, as long as it is open whether anything depends on them.
-    pub(super) clock_values: Vec<Span>,
+    /// The values that only statistical queries know, as long as it is open whether anything depends on them: what is to be said if so.
+    pub(super) unknowns: Vec<Diagnostic>,
     /// The hybrid clocks that were declared; a warning about each if the model is accepted.
     pub(super) hybrid_clocks: Vec<(String, Span)>,
     /// Set when a free parameter is looked up.
@@ -91,7 +91,7 @@ impl<'a> Checker<'a> {
             reported: HashSet::new(),
             has_errors: false,
             locals: Vec::new(),
-            clock_values: Vec::new(),
+            unknowns: Vec::new(),
             hybrid_clocks: Vec::new(),
             free_parameter_seen: false,
             is_generic: false,
@@ -120,6 +120,13 @@ impl<'a> Checker<'a> {
         self.report(Diagnostic::new(code, span, message).help(help));
     }
 
+    /// A value that only statistical queries know; what is said of it is reported if anything depends on it.
+    pub(super) fn unknown(&mut self, diagnostic: Diagnostic, from: Expr, ty: Type) -> Expr {
+        let span = diagnostic.span;
+        self.unknowns.push(diagnostic);
+        Expr::new(Kind::Unknown(Box::new(from)), ty, span)
+    }
+
     /// An expression that the parser has reported: nothing can be lowered any more.
     pub(super) fn reported_by_parser(&mut self, span: Span) -> Expr {
         self.has_errors = true;
@@ -128,13 +135,8 @@ impl<'a> Checker<'a> {
 
     /// Whether code may be made: nothing was wrong so far, and all values are known.
     pub(super) fn can_lower(&mut self) -> bool {
-        for span in std::mem::take(&mut self.clock_values) {
-            self.error(
-                codes::CLOCK_AS_NUMBER,
-                span,
-                "the value of a clock is no number here: it is known only symbolically",
-                "compare the clock in a guard instead",
-            );
+        for diagnostic in std::mem::take(&mut self.unknowns) {
+            self.report(diagnostic);
         }
         !self.has_errors && !self.is_generic
     }

@@ -11,7 +11,7 @@ use super::expressions::known_offset;
 use super::operators::{integer_operation, is_clock_term};
 use super::typed::{ClockRelation, ClockSum, Expr, Kind, Root};
 use super::types::{Class, Memory, Type};
-use crate::diagnostics::Span;
+use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{CLOCK_LIMIT, ClockId, IntegerOperator, Relation};
 use crate::syntax::ast::BinaryOp;
 
@@ -55,9 +55,13 @@ impl Checker<'_> {
         if !is_clock_term(&expr) {
             return expr;
         }
-        let span = expr.span;
-        self.clock_values.push(span);
-        Expr::new(Kind::ClockValue(Box::new(expr)), Type::Double, span)
+        let diagnostic = Diagnostic::new(
+            codes::CLOCK_AS_NUMBER,
+            expr.span,
+            "the value of a clock is no number here: it is known only symbolically",
+        );
+        let diagnostic = diagnostic.help("compare the clock in a guard instead");
+        self.unknown(diagnostic, expr, Type::Double)
     }
 
     fn too_many_clocks(&mut self, span: Span) {
@@ -82,12 +86,7 @@ impl Checker<'_> {
 
     /// Reports that a clock meets a double.
     pub(super) fn clock_with_double(&mut self, span: Span) {
-        self.error(
-            codes::CLOCK_WITH_DOUBLE,
-            span,
-            "a clock meets a double here: clocks have exact, symbolic values",
-            "use integers for clocks; fint(…) truncates a double",
-        );
+        self.report(clock_with_double(span));
     }
 
     /// A comparison in which at least one side is a clock or a sum with one.
@@ -101,7 +100,11 @@ impl Checker<'_> {
         let (left, right) = (integral_double(left), integral_double(right));
         let is_term = |e: &Expr| is_clock_term(e) || e.ty.is_integral();
         if !is_term(&left) || !is_term(&right) {
-            return self.clock_as_number(&left, &right, span);
+            let is_number = |e: &Expr| is_clock_term(e) || e.ty.is_number();
+            if self.is_query || !is_number(&left) || !is_number(&right) {
+                return self.clock_as_number(&left, &right, span);
+            }
+            return self.unknown(clock_with_double(span), left, Type::Bool);
         }
         let (left, right, relation) = match relation {
             Relation::Greater => (right, left, ClockRelation::Less),
@@ -139,8 +142,15 @@ impl Checker<'_> {
             bound: Box::new(bound),
             negated: is_negated,
         };
-        self.refuse_hybrid(&kind, span);
-        Expr::new(kind, Type::Constraint(class), span)
+        let compared = Expr::new(kind, Type::Constraint(class), span);
+        match hybrid_comparison(&compared) {
+            Some(diagnostic) if self.is_query => {
+                self.report(diagnostic);
+                compared
+            }
+            Some(diagnostic) => self.unknown(diagnostic, compared, Type::Bool),
+            None => compared,
+        }
     }
 
     fn check_bound(&mut self, bound: &Expr) {
@@ -152,22 +162,6 @@ impl Checker<'_> {
                 bound.span,
                 format!("a clock is compared with {value}; the limit is {CLOCK_LIMIT}"),
                 "measure time in a larger unit",
-            );
-        }
-    }
-
-    /// Hybrid clocks are abstracted away, so nothing may depend on them.
-    fn refuse_hybrid(&mut self, kind: &Kind, span: Span) {
-        let Kind::ClockCompare { left, right, .. } = kind else {
-            return;
-        };
-        let hybrid = Type::Clock { hybrid: true };
-        if left.iter().chain(right).any(|clock| clock.ty == hybrid) {
-            self.error(
-                codes::HYBRID_CLOCK_COMPARED,
-                span,
-                "hybrid clocks are abstracted away in symbolic and game queries and cannot be compared",
-                "use an ordinary clock, or keep the hybrid one out of conditions",
             );
         }
     }
@@ -191,7 +185,7 @@ impl Checker<'_> {
         };
         if hybrid {
             // Nothing depends on a hybrid clock, so its rate may depend on anything.
-            self.clock_values.truncate(before);
+            self.unknowns.truncate(before);
             return Expr::new(
                 Kind::Int(1),
                 Type::Constraint(Class::InvariantWithRate),
@@ -230,7 +224,7 @@ impl Checker<'_> {
             if value.has_effect() {
                 return value;
             }
-            self.clock_values.truncate(before);
+            self.unknowns.truncate(before);
             return Expr::new(Kind::Int(0), Type::Void, span);
         }
         let value = integral_double(value);
@@ -265,6 +259,32 @@ impl Checker<'_> {
         let offset = known_offset(expr, Memory::Clocks)?;
         (root.root == Root::State).then_some(ClockId(offset))
     }
+}
+
+fn clock_with_double(span: Span) -> Diagnostic {
+    Diagnostic::new(
+        codes::CLOCK_WITH_DOUBLE,
+        span,
+        "a clock meets a double here: clocks have exact, symbolic values",
+    )
+    .help("use integers for clocks; fint(…) truncates a double")
+}
+
+/// What is to be said of a comparison that hangs on hybrid clocks, which are abstracted away.
+fn hybrid_comparison(compared: &Expr) -> Option<Diagnostic> {
+    let Kind::ClockCompare { left, right, .. } = &compared.kind else {
+        return None;
+    };
+    let hybrid = Type::Clock { hybrid: true };
+    let mut clocks = left.iter().chain(right);
+    clocks.any(|clock| clock.ty == hybrid).then(|| {
+        Diagnostic::new(
+            codes::HYBRID_CLOCK_COMPARED,
+            compared.span,
+            "hybrid clocks are abstracted away in symbolic and game queries and cannot be compared",
+        )
+        .help("use an ordinary clock, or keep the hybrid one out of conditions")
+    })
 }
 
 /// A double constant without fraction as the integer that it is.

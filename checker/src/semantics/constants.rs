@@ -78,7 +78,15 @@ impl Checker<'_> {
     }
 
     fn run_expression(&mut self, expr: &Expr) -> Option<Vec<i32>> {
-        if !self.can_lower() {
+        // What is open elsewhere in a function does not matter here.
+        let elsewhere = if expr.is_unknown() {
+            Vec::new()
+        } else {
+            std::mem::take(&mut self.unknowns)
+        };
+        let can_lower = self.can_lower();
+        self.unknowns.extend(elsewhere);
+        if !can_lower {
             if let Some(kind) = failure(expr) {
                 self.report_failure(kind, expr.span);
             }

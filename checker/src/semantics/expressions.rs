@@ -37,7 +37,7 @@ impl Checker<'_> {
                 self.ternary(condition, then, otherwise, span)
             }
             ExprKind::Assign(operator, target, value) => {
-                let before = self.clock_values.len();
+                let before = self.unknowns.len();
                 let target = self.expression(target);
                 let value = self.expression(value);
                 match operator {
@@ -287,7 +287,7 @@ impl Checker<'_> {
         if operator == BinaryOp::Equal {
             for (rate, value) in [(left, right), (right, left)] {
                 if let ExprKind::Rate(clock) = &rate.kind {
-                    let before = self.clock_values.len();
+                    let before = self.unknowns.len();
                     let clock = self.expression(clock);
                     let value = self.expression(value);
                     return self.rate(clock, value, before, span);

@@ -6,9 +6,11 @@ use super::checker::Checker;
 use super::codes;
 use super::scalars::is_order_irrelevant;
 use super::scope::{Entity, Scope};
-use super::typed::{Effects, Expr, Kind, LocalId, Parameter, Place, Root, Signature, Statement};
+use super::typed::{
+    Effects, Expr, Kind, LocalId, Parameter, Place, Root, Signature, Statement, Unknown,
+};
 use super::types::{Size, Type};
-use crate::diagnostics::Span;
+use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::FunctionId;
 use crate::syntax::ast::{self, Declaration, Name};
 
@@ -19,7 +21,7 @@ impl Checker<'_> {
     /// Checks a function, lowers it, and declares its name.
     pub(super) fn function(&mut self, function: &ast::Function) {
         let outer_locals = std::mem::take(&mut self.locals);
-        let clock_values = self.clock_values.len();
+        let unknowns = self.unknowns.len();
         let result = self.result_type(&function.return_type);
         self.function_span = function.name.span;
         self.declare(&function.name, Entity::OpenFunction);
@@ -44,11 +46,13 @@ impl Checker<'_> {
             parameters,
             result,
             effects: Effects::default(),
+            unknown: None,
         };
-        if self.clock_values.len() > clock_values {
+        if self.unknowns.len() > unknowns {
             // Such a function can only be called where nothing depends on the result.
-            self.clock_values.truncate(clock_values);
-            signature.effects.uses_clock_values = true;
+            let first = self.unknowns.swap_remove(unknowns);
+            self.unknowns.truncate(unknowns);
+            signature.unknown = Some(Unknown::of(&body, first));
         }
         let id = self.lower_function(&mut signature, &body);
         self.locals = outer_locals;
@@ -66,7 +70,7 @@ impl Checker<'_> {
     }
 
     fn lower_function(&mut self, signature: &mut Signature, body: &Statement) -> FunctionId {
-        if signature.effects.uses_clock_values || !self.can_lower() {
+        if signature.unknown.is_some() || !self.can_lower() {
             return NO_FUNCTION;
         }
         let name = match &self.process {
@@ -359,14 +363,22 @@ impl Checker<'_> {
     }
 
     /// An expression that stands for its effect.
-    fn effect_expression(&mut self, expr: &ast::Expr) -> Expr {
+    pub(super) fn effect_expression(&mut self, expr: &ast::Expr) -> Expr {
+        let before = self.unknowns.len();
         let checked = self.expression(expr);
         self.warn_without_effect(&checked);
+        let is_call =
+            matches!(&checked.kind, Kind::Call { signature, .. } if signature.unknown.is_some());
+        if is_call && !checked.has_effect() {
+            // All that it does, it does to what nothing depends on.
+            self.unknowns.truncate(before);
+            return Expr::new(Kind::Int(0), Type::Void, checked.span);
+        }
         checked
     }
 
     /// Warns of an expression whose value is dropped and that changes nothing.
-    pub(super) fn warn_without_effect(&mut self, expr: &Expr) {
+    fn warn_without_effect(&mut self, expr: &Expr) {
         // A call of a function without effect is common in libraries of models; a dropped comparison is a typing mistake.
         let is_silent = expr.is_error() || expr.ty == Type::Void || expr.has_effect();
         if !is_silent && !matches!(expr.kind, Kind::Call { .. }) {
@@ -387,24 +399,25 @@ impl Checker<'_> {
         if checked.is_error() {
             return checked;
         }
+        if matches!(checked.ty, Type::Constraint(_)) {
+            let diagnostic = Diagnostic::new(
+                codes::CONDITION_EXPECTED,
+                checked.span,
+                "functions cannot look at clocks: their values are known only symbolically",
+            );
+            let diagnostic = diagnostic.help("test the clock in the guard of an edge");
+            return self.unknown(diagnostic, checked, Type::Bool);
+        }
         if !checked.ty.is_integral() {
-            let (message, help) = if matches!(checked.ty, Type::Constraint(_)) {
-                (
-                    String::from(
-                        "functions cannot look at clocks: their values are known only symbolically",
-                    ),
-                    "test the clock in the guard of an edge",
-                )
-            } else {
-                (
-                    format!(
-                        "a condition is needed, but this is {}",
-                        checked.ty.described()
-                    ),
-                    "compare it with something",
-                )
-            };
-            self.error(codes::CONDITION_EXPECTED, checked.span, message, help);
+            self.error(
+                codes::CONDITION_EXPECTED,
+                checked.span,
+                format!(
+                    "a condition is needed, but this is {}",
+                    checked.ty.described()
+                ),
+                "compare it with something",
+            );
             return Expr::error(checked.span);
         }
         checked

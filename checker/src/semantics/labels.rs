@@ -159,8 +159,7 @@ impl Checker<'_> {
     ) -> Update {
         let mut checked = Vec::new();
         for expr in exprs {
-            let expr = self.expression(expr);
-            self.warn_without_effect(&expr);
+            let expr = self.effect_expression(expr);
             if !matches!(expr.kind, Kind::Int(_)) {
                 checked.push(expr);
             }

@@ -118,10 +118,10 @@ impl Checker<'_> {
             None => (Guard::default(), Vec::new()),
         };
         if let Some(rate) = &location.exponential_rate {
-            let before = self.clock_values.len();
+            let before = self.unknowns.len();
             let rate = self.expression(rate);
             self.expect_number(&rate, "an exponential rate");
-            self.clock_values.truncate(before);
+            self.unknowns.truncate(before);
         }
         ir::Location {
             name,
@@ -391,10 +391,10 @@ impl Checker<'_> {
             .map(|_| self.new_local(Type::ANY_INT))
             .collect();
         if let Some(weight) = &leg.probability {
-            let before = self.clock_values.len();
+            let before = self.unknowns.len();
             let weight = self.expression(weight);
             self.expect_number(&weight, "a weight");
-            self.clock_values.truncate(before);
+            self.unknowns.truncate(before);
         }
         self.update(
             &leg.update,

@@ -7,7 +7,7 @@
 //!   [`Kind::Field`]; which memory it means follows from the type at its top.
 
 use super::types::{Size, Type};
-use crate::diagnostics::Span;
+use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{
     ClockAtom, ClockRange, DoubleOperator, FunctionId, IntegerOperator, MathFunction, Relation,
 };
@@ -81,8 +81,9 @@ pub(super) enum Kind {
     Field { record: Box<Expr>, offset: Size },
     /// An integer as a double.
     ToDouble(Box<Expr>),
-    /// The value of a clock as a double; it stands only where nothing depends on it, and is never lowered.
-    ClockValue(Box<Expr>),
+    /// A value that only statistical queries know, and what it comes from; it stands only where nothing depends on it, and is never
+    /// lowered.
+    Unknown(Box<Expr>),
     /// A double truncated to an integer.
     ToInteger(Box<Expr>),
     /// Arithmetic on integers.
@@ -181,6 +182,17 @@ pub(super) struct Signature {
     pub(super) result: Type,
     /// What it does to the state.
     pub(super) effects: Effects,
+    /// Set if its result hangs on values that only statistical queries know. Then it is not lowered.
+    pub(super) unknown: Option<Unknown>,
+}
+
+/// That a function hangs on values which only statistical queries know.
+#[derive(Clone, Debug)]
+pub(super) struct Unknown {
+    /// What is to be said where anything depends on the function.
+    pub(super) diagnostic: Diagnostic,
+    /// Whether it may change something outside itself.
+    may_write: bool,
 }
 
 /// A parameter of a function.
@@ -209,8 +221,6 @@ pub(super) struct Effects {
     pub(super) reads_state: bool,
     /// Whether a clock is mentioned.
     pub(super) mentions_clocks: bool,
-    /// Whether the value of a clock is used as a number.
-    pub(super) uses_clock_values: bool,
 }
 
 /// An assignment to a clock that may be a parameter of the function.
@@ -398,7 +408,7 @@ impl Expr {
             | Kind::Deadlock => {}
             Kind::Field { record: inner, .. }
             | Kind::ToDouble(inner)
-            | Kind::ClockValue(inner)
+            | Kind::Unknown(inner)
             | Kind::ToInteger(inner)
             | Kind::Not(inner)
             | Kind::Step { target: inner, .. }
@@ -465,6 +475,28 @@ impl Expr {
         })
     }
 
+    /// Whether it hangs on values that only statistical queries know.
+    pub(super) fn is_unknown(&self) -> bool {
+        self.any(&|e| match &e.kind {
+            Kind::Unknown(_) => true,
+            Kind::Call { signature, .. } => signature.unknown.is_some(),
+            _ => false,
+        })
+    }
+
+    /// Whether it changes something else than a local, itself and not in an expression below it.
+    fn changes_state(&self) -> bool {
+        match &self.kind {
+            Kind::Assign(target, _) | Kind::Compound(_, target, _) | Kind::Step { target, .. } => {
+                let place = target.variable();
+                !place.is_some_and(|place| matches!(place.root, Root::Local(_)))
+            }
+            Kind::AssignClock { .. } => true,
+            Kind::Call { signature, .. } => signature.may_write(),
+            _ => false,
+        }
+    }
+
     /// Whether it depends on clocks or on `deadlock`.
     pub(super) fn mentions_clocks(&self) -> bool {
         self.any(&|e| {
@@ -479,11 +511,48 @@ impl Expr {
 impl Signature {
     /// Whether a call may change something outside the function.
     pub(super) fn may_write(&self) -> bool {
-        !self.effects.writes.is_empty()
+        self.unknown
+            .as_ref()
+            .is_some_and(|unknown| unknown.may_write)
+            || !self.effects.writes.is_empty()
             || !self.effects.assignments.is_empty()
             || self
                 .parameters
                 .iter()
                 .any(|parameter| parameter.reference && !parameter.constant)
+    }
+}
+
+impl Unknown {
+    /// That of a function with this body.
+    pub(super) fn of(body: &Statement, diagnostic: Diagnostic) -> Unknown {
+        Unknown {
+            diagnostic,
+            may_write: body.any(&Expr::changes_state),
+        }
+    }
+}
+
+impl Statement {
+    /// Whether an expression in it satisfies the condition.
+    fn any(&self, condition: &impl Fn(&Expr) -> bool) -> bool {
+        let holds = |expr: &Option<Expr>| expr.as_ref().is_some_and(|expr| expr.any(condition));
+        match self {
+            Statement::Block(statements) => statements.iter().any(|one| one.any(condition)),
+            Statement::Expr(expr) | Statement::Assert(expr, _) => expr.any(condition),
+            Statement::Declare(_, assignments) => assignments.iter().any(|one| one.any(condition)),
+            Statement::Loop {
+                condition: head,
+                step,
+                body,
+                ..
+            } => holds(head) || holds(step) || body.any(condition),
+            Statement::Iterate { body, .. } => body.any(condition),
+            Statement::If(head, then, otherwise) => {
+                let mut branches = [Some(then), otherwise.as_ref()].into_iter().flatten();
+                head.any(condition) || branches.any(|branch| branch.any(condition))
+            }
+            Statement::Return(value) => holds(value),
+        }
     }
 }
