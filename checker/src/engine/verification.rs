@@ -349,7 +349,7 @@ pub fn describe(network: &Network, verification: &Verification) -> Vec<String> {
             coverage.regions, coverage.own_moves, coverage.opponent_moves, coverage.goals
         )],
         Ok(strategy::Outcome::TooLarge(coverage)) => vec![format!(
-            "strategy not verified: more than {} regions",
+            "strategy not verified: more than {} regions; the limit of states (--states) sets another bound",
             coverage.regions
         )],
         Ok(strategy::Outcome::Violated(violation, _)) => violation_lines(network, violation),
