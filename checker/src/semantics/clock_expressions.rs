@@ -183,16 +183,21 @@ impl Checker<'_> {
             );
             return Expr::error(span);
         };
+        let nothing = Expr::new(
+            Kind::Int(1),
+            Type::Constraint(Class::InvariantWithRate),
+            span,
+        );
         if hybrid {
             // Nothing depends on a hybrid clock, so its rate may depend on anything.
             self.unknowns.truncate(before);
-            return Expr::new(
-                Kind::Int(1),
-                Type::Constraint(Class::InvariantWithRate),
-                span,
-            );
+            return nothing;
         }
         let rate = integral_double(rate);
+        if rate.constant() == Some(1) {
+            // That is the rate of any clock.
+            return nothing;
+        }
         let outside = rate.interval.1 < 0 || rate.interval.0 > 1;
         if !rate.ty.is_integral() || outside {
             self.error(
