@@ -194,7 +194,7 @@ impl Checker<'_> {
             return nothing;
         }
         let rate = integral_double(rate);
-        if rate.constant() == Some(1) {
+        if rate.constant() == Some(1) && !self.is_query {
             // That is the rate of any clock.
             return nothing;
         }
