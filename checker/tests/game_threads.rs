@@ -11,7 +11,11 @@ use checker::search::StopReason;
 #[path = "common/games.rs"]
 mod games;
 
+#[path = "common/plates.rs"]
+mod plates;
+
 use games::{ONE_ON_THE_BRIDGE, trains};
+use plates::{NONE_FALLEN, plates};
 
 fn check(text: &str, query: &str, options: &Options) -> Answer {
     let mut model = LoadedModel::load("trains.xta", text.as_bytes())
@@ -22,6 +26,25 @@ fn check(text: &str, query: &str, options: &Options) -> Answer {
         .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
 }
 
+/// All that is answered, with a strategy if one is wanted.
+fn facts(text: &str, query: &str, strategy: bool, threads: usize) -> String {
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        threads,
+        strategy,
+        ..Options::default()
+    };
+    let answer = check(text, query, &options);
+    assert_eq!(answer.evidence.strategy.is_some(), strategy);
+    let Answer {
+        verdict,
+        counters,
+        evidence,
+        ..
+    } = answer;
+    format!("{verdict:?} {counters:?} {:?}", evidence.strategy)
+}
+
 #[test]
 fn games_do_not_depend_on_the_number_of_threads() {
     for (text, query, strategy) in [
@@ -30,28 +53,20 @@ fn games_do_not_depend_on_the_number_of_threads() {
         (trains(12, "->"), "control: A<> Train(0).Bridge", false),
         (trains(3, "->"), "control: A<> Train(0).Bridge", true),
     ] {
-        let facts = |threads| {
-            let options = Options {
-                code: CodeEngine::Interpreter,
-                threads,
-                strategy,
-                ..Options::default()
-            };
-            let answer = check(&text, query, &options);
-            assert_eq!(answer.evidence.strategy.is_some(), strategy);
-            let Answer {
-                verdict,
-                counters,
-                evidence,
-                ..
-            } = answer;
-            format!("{verdict:?} {counters:?} {:?}", evidence.strategy)
-        };
-        let expected = facts(1);
+        let expected = facts(&text, query, strategy, 1);
         for threads in [2, 3, 7] {
-            assert!(facts(threads) == expected, "{query} by {threads} threads");
+            let by_threads = facts(&text, query, strategy, threads);
+            assert!(by_threads == expected, "{query} by {threads} threads");
         }
     }
+}
+
+/// Discrete states are tried, and given up when they have taken so many operations, which is when they are nearly done.
+#[test]
+fn giving_up_does_not_depend_on_the_number_of_threads() {
+    let text = plates(5, [12, 12, 12]);
+    let by_threads = |threads| facts(&text, NONE_FALLEN, false, threads);
+    assert_eq!(by_threads(1), by_threads(2));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::game::reach::{Solver, Win};
 use crate::game::strategy::{self, Start, Strategy, Way};
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
-use crate::search::limits::Watch;
+use crate::search::limits::{StopReason, Watch};
 use crate::search::reach::{self, Outcome, Trace};
 use crate::search::schedule::Finish;
 use crate::verify::replay::{End, Run};
@@ -29,12 +29,11 @@ pub(super) fn strategy(
 ) -> Result<Result<Strategy, String>, Failure> {
     if winner == Player::Environment {
         let nodes = (0..solver.graph.nodes.len() as u32).rev().collect();
-        let mut strategy = match rounds {
-            Some(rounds) => denial::extract(solver, rounds, nodes)?,
-            None => strategy::extract_from(solver, winner, nodes)?,
+        let strategy = match rounds {
+            Some(rounds) => denial::extract(solver, rounds, nodes, watch)?,
+            None => strategy::extract_from(solver, winner, nodes, watch)?,
         };
-        strategy.start = Start::Anywhere;
-        return Ok(Ok(strategy));
+        return Ok(started(strategy, Start::Anywhere));
     }
     let mut winning = Winning::of(solver);
     let report = reach::search(zones, &mut winning, options.order, watch);
@@ -60,9 +59,16 @@ pub(super) fn strategy(
             "the way does not end where the controller wins".to_owned()
         ));
     };
-    let mut strategy = strategy::extract_from(solver, winner, vec![node])?;
-    strategy.start = Start::After(way);
-    Ok(Ok(strategy))
+    let strategy = strategy::extract_from(solver, winner, vec![node], watch)?;
+    Ok(started(strategy, Start::After(way)))
+}
+
+/// A strategy that begins there, or why there is none.
+fn started(strategy: Result<Strategy, StopReason>, start: Start) -> Result<Strategy, String> {
+    match strategy {
+        Ok(strategy) => Ok(Strategy { start, ..strategy }),
+        Err(reason) => Err(stop_text(reason).to_owned()),
+    }
 }
 
 /// A trace with times at whose end the controller wins.

@@ -14,6 +14,7 @@
 use std::sync::Arc;
 
 use crate::exec::Executor;
+use crate::game::allowance::Allowance;
 use crate::game::graph::{Deadline, Graph, Objective as GameObjective};
 use crate::game::reach::{Answer as GameAnswer, Extent, Solver, Win};
 use crate::game::strategy::{self, Strategy};
@@ -25,7 +26,7 @@ use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::{Bound, Zone};
 
 use super::answer::{Answer, Evidence, Values, Verdict, has_differences, new_answer};
-use super::attempt::{Attempt, STATES_BEFORE_CROWD};
+use super::attempt::{IN_DISCRETE_STATES, STATES_BEFORE_CROWD};
 use super::certificate::stop_text;
 use super::games::{self, objective_atoms};
 use super::limits::LimitWatch;
@@ -189,6 +190,9 @@ pub(super) fn fastest(
                     answer.evidence.strategy = Some(Arc::new(strategy));
                 }
                 Ok(Err(reason)) => remarks.push(format!("no strategy: {}", stop_text(reason))),
+                Err(Failure::Interrupted) => {
+                    remarks.push(format!("no strategy: {}", stop_text(watch.stop())));
+                }
                 Err(failure) => answer.verdict = Verdict::Error(failure),
             }
         }
@@ -240,16 +244,7 @@ impl Timed<'_, '_> {
             })
         };
         let start = (limit, Some(nodes));
-        if nodes != Nodes::Discrete {
-            return self.solve(start, watch, conclude);
-        }
-        let mut attempt = Attempt::in_discrete_states(watch).with_most(MOST_DISCRETE_STATES);
-        let run = self.solve(start, &mut attempt, conclude)?;
-        Ok(if attempt.is_given_up {
-            Run::GivenUp
-        } else {
-            run
-        })
+        self.solve(start, watch, conclude)
     }
 
     /// The strategy of the player who wins with this limit.
@@ -266,9 +261,11 @@ impl Timed<'_, '_> {
                 return Ok(Err(reason));
             }
             solver.put_into_layers(watch)?;
-            let mut strategy = strategy::extract(solver)?;
-            strategy.time_limit = Some(limit);
-            Ok(Ok(strategy))
+            let strategy = strategy::extract(solver, watch)?;
+            Ok(strategy.map(|strategy| Strategy {
+                time_limit: Some(limit),
+                ..strategy
+            }))
         })
     }
 
@@ -312,8 +309,13 @@ impl Timed<'_, '_> {
         }?;
         let mut solver = Solver::new(&mut graph, Player::Controller, self.options.forced);
         solver.share_among(self.options.threads.clamp(1, MOST_THREADS));
-        if nodes == Some(Nodes::Automatic) {
-            solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD);
+        match nodes {
+            Some(Nodes::Automatic) => solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD),
+            Some(Nodes::Discrete) => solver.give_up_beyond(Some(Allowance {
+                explored: MOST_DISCRETE_STATES,
+                ..IN_DISCRETE_STATES
+            })),
+            Some(Nodes::Symbolic) | None => {}
         }
         let result = match nodes {
             Some(_) => solver.solve_backward(watch)?,

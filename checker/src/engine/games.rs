@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use crate::exec::Executor;
+use crate::game::allowance::Allowance;
 use crate::game::closed_loop::ClosedLoop;
 use crate::game::denial;
 use crate::game::graph::{Graph, Objective as GameObjective};
 use crate::game::plans::{NoPlans, Plan, Plans};
-use crate::game::reach::{Answer as GameAnswer, Extent, Solver};
+use crate::game::reach::{Answer as GameAnswer, Extent, Solver, Win};
 use crate::game::recurrence;
 use crate::game::strategy::{self, Strategy, Under};
 use crate::game::{Nodes, Player, Priorities};
@@ -15,10 +16,11 @@ use crate::ir::{ClockAtom, Network, Objective, Predicate, QueryKind};
 use crate::network::{
     Abstraction, ClockBounds, Failure, LiveVariables, Restriction, Stepper, Symbolic, predicate,
 };
-use crate::search::limits::{Counters, Watch};
+use crate::search::limits::{Counters, StopReason, Watch};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
-use super::attempt::{Attempt, CROWD, STATES_BEFORE_CROWD};
+use super::attempt::{CROWD, IN_DISCRETE_STATES, STATES_BEFORE_CROWD, WITHOUT_ABSTRACTION};
+use super::certificate::stop_text;
 use super::cooperation;
 use super::limits::LimitWatch;
 use super::verification::{self, Asked, Played, Verification};
@@ -86,21 +88,21 @@ pub(super) fn game(
         let restriction = under.map(|(closed, _)| closed as &dyn Restriction);
         zones_of(network, executor, bounds, options).restricted(restriction)
     };
-    let played = |zones, nodes, watch: &mut dyn Watch| {
+    let played = |zones, nodes, allowance, watch: &mut dyn Watch| {
         let within = under.map(|(_, within)| within);
-        played(zones, (asked, within), options, nodes, watch)
+        played(zones, (asked, within), options, (nodes, allowance), watch)
     };
     if !has_differences(network, &atoms) {
         let in_discrete_states = |watch: &mut LimitWatch| {
-            let mut attempt = Attempt::in_discrete_states(watch);
             let zones = zones(Abstraction::Exact);
-            let (answer, _) = played(zones, Nodes::Discrete, &mut attempt);
+            let allowance = Some(IN_DISCRETE_STATES);
+            let (answer, has_given_up) = played(zones, Nodes::Discrete, allowance, watch);
             // A run-time error may lie in a state that no run reaches.
-            let is_of_use = !attempt.is_given_up && !matches!(answer.verdict, Verdict::Error(_));
+            let is_of_use = !has_given_up && !matches!(answer.verdict, Verdict::Error(_));
             (answer, is_of_use)
         };
         let in_symbolic_states =
-            |nodes, watch: &mut LimitWatch| played(zones(Abstraction::Maximum), nodes, watch);
+            |nodes, watch: &mut LimitWatch| played(zones(Abstraction::Maximum), nodes, None, watch);
         let nodes = if under.is_none() && can_be_discrete(network, asked, options) {
             options.nodes
         } else {
@@ -128,14 +130,14 @@ pub(super) fn game(
         answer.counters.explored += before.explored;
         return answer;
     }
-    let mut attempt = Attempt::without_abstraction(watch);
     let exact = zones(Abstraction::Exact);
-    let (first, _) = played(exact, Nodes::Symbolic, &mut attempt);
-    if !attempt.is_given_up {
+    let allowance = Some(WITHOUT_ABSTRACTION);
+    let (first, has_given_up) = played(exact, Nodes::Symbolic, allowance, watch);
+    if !has_given_up {
         return first;
     }
     let cut = zones(Abstraction::Differences);
-    let (mut second, _) = played(cut, Nodes::Symbolic, watch);
+    let (mut second, _) = played(cut, Nodes::Symbolic, None, watch);
     second.counters.explored += first.counters.explored;
     second
 }
@@ -183,12 +185,13 @@ pub(super) fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
     both.flat_map(predicate::atoms).collect()
 }
 
-/// Plays the game of a query in these zones; also says whether it was given up for having many zones for each discrete state.
+/// Plays the game of a query in these zones; also says whether it was given up, for having many zones for each discrete state or
+/// for taking more than is allowed.
 fn played(
     mut symbolic: Symbolic<'_>,
     ((objective, is_cooperative), within): ((&Objective, bool), Option<&Arc<Under>>),
     options: &Options,
-    nodes: Nodes,
+    (nodes, allowance): (Nodes, Option<Allowance>),
     watch: &mut dyn Watch,
 ) -> (Answer, bool) {
     let network = symbolic.stepper.network();
@@ -239,6 +242,7 @@ fn played(
     };
     let mut solver = Solver::new(&mut graph, seeker, options.forced);
     solver.share_among(options.threads.clamp(1, MOST_THREADS));
+    solver.give_up_beyond(allowance);
     if nodes == Nodes::Automatic {
         solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD);
     }
@@ -296,22 +300,34 @@ fn played(
             let zones = &mut zones_for_ways;
             cooperation::strategy(&mut solver, (winner, denied), zones, options, watch)
         } else {
-            match solver.explore_dead_ends(watch) {
-                Ok(None) => answer.counters = solver.counters(),
-                Ok(Some(reason)) => return plain(Verdict::Unknown(reason), solver.counters()),
-                Err(failure) => return plain(Verdict::Error(failure), solver.counters()),
+            let explored = solver.explore_dead_ends(watch);
+            answer.counters = solver.counters();
+            if solver.has_given_up {
+                return (answer, true);
             }
-            let layered = solver.put_into_layers(watch);
-            let strategy = layered.and_then(|()| match winner {
-                Player::Environment if is_recurring => {
-                    denial::extract(&mut solver, &rounds, vec![0])
-                }
-                _ => strategy::extract(&mut solver),
-            });
-            strategy.map(Ok)
+            let denied = (winner == Player::Environment && is_recurring).then_some(&rounds[..]);
+            let strategy = match explored {
+                Ok(None) => strategy_of(&mut solver, denied, watch),
+                Ok(Some(reason)) => Ok(Err(reason)),
+                Err(failure) => Err(failure),
+            };
+            strategy.map(|result| result.map_err(|reason| stop_text(reason).to_owned()))
+        };
+        // What was asked is known, so that an end of the strategy is none of the answer.
+        let strategy = match strategy {
+            Err(Failure::Interrupted) => {
+                let reason = watch.look(&solver.counters());
+                let reason = reason.unwrap_or(StopReason::Interrupted);
+                Ok(Err(stop_text(reason).to_owned()))
+            }
+            strategy => strategy,
         };
         match strategy {
-            Ok(Err(reason)) => answer.message = Some(format!("no strategy: {reason}")),
+            Ok(Err(reason)) => {
+                let message = answer.message.map(|message| format!("{message}; "));
+                let message = message.unwrap_or_default();
+                answer.message = Some(format!("{message}no strategy: {reason}"));
+            }
             Ok(Ok(mut strategy)) => {
                 strategy.under = within.cloned();
                 if options.verify {
@@ -329,6 +345,20 @@ fn played(
         }
     }
     (answer, false)
+}
+
+/// The strategy of the player who wins a solved game; that of the environment where a goal does not recur is in these rounds. An error of
+/// the inner result is why it was not finished.
+fn strategy_of(
+    solver: &mut Solver<'_, '_, '_>,
+    denied: Option<&[Vec<Win>]>,
+    watch: &mut dyn Watch,
+) -> Result<Result<Strategy, StopReason>, Failure> {
+    solver.put_into_layers(watch)?;
+    match denied {
+        Some(rounds) => denial::extract(solver, rounds, vec![0], watch),
+        None => strategy::extract(solver, watch),
+    }
 }
 
 /// Checks a strategy in closed loop.

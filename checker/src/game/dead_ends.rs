@@ -146,7 +146,7 @@ impl Solver<'_, '_, '_> {
             }
             next += 1;
             if next.is_multiple_of(BETWEEN_LOOKS)
-                && let Some(reason) = watch.look(&self.counters())
+                && let Some(reason) = self.look(watch)
             {
                 return Ok(Some(reason));
             }

@@ -11,8 +11,9 @@
 //! Along a play the rank never grows. A goal that is met is one from which play leaves X, so that the rank falls: there are no more
 //! goals than ranks, and after the last one the goal does not come again.
 
-use crate::network::Failure;
-use crate::zones::{ClockSet, Federation};
+use crate::network::{Failure, Part};
+use crate::search::limits::{StopReason, Watch};
+use crate::zones::{ClockSet, Federation, Patience};
 
 use super::Player;
 use super::evasion::{new_decision, spoiling, within_invariant};
@@ -20,14 +21,34 @@ use super::graph::{Edge, Standing};
 use super::reach::{Solver, Win};
 use super::recurrence::{leave, to_federation};
 use super::strategy::{
-    Decision, Selection, Start, Strategy, StrategyState, moves_of, walk, whole_or_part,
+    Decision, Selection, Start, Strategy, StrategyState, keep, moves_of, walk, whole_or_part,
 };
 
 /// Reads the strategy of the environment, which wins from these nodes, from the rounds of the solution.
+///
+/// # Errors
+/// The model fails in a state of it. An error of the inner result says why it was not finished.
 pub fn extract(
     solver: &mut Solver<'_, '_, '_>,
     rounds: &[Vec<Win>],
+    waiting: Vec<u32>,
+    watch: &mut dyn Watch,
+) -> Result<Result<Strategy, StopReason>, Failure> {
+    let (strategy, reason) = solver.patiently(watch, |solver, patience| {
+        extract_within(solver, rounds, waiting, patience)
+    });
+    match reason {
+        Some(reason) => Ok(Err(reason)),
+        None => strategy.map(Ok),
+    }
+}
+
+/// As [`extract`], which is of use unless the patience is over.
+fn extract_within(
+    solver: &mut Solver<'_, '_, '_>,
+    rounds: &[Vec<Win>],
     mut waiting: Vec<u32>,
+    patience: &mut Patience<'_>,
 ) -> Result<Strategy, Failure> {
     let mut strategy = Strategy {
         owner: Player::Environment,
@@ -42,9 +63,13 @@ pub fn extract(
         seen[node as usize] = true;
     }
     while let Some(node) = waiting.pop() {
+        if patience.ends() {
+            break;
+        }
+        let known = strategy.states.len();
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);
-        let (decisions, taken) = decisions(solver, node, rounds)?;
+        let (decisions, taken) = decisions(solver, node, rounds, patience)?;
         strategy.states.push(StrategyState {
             words: words.clone(),
             decisions,
@@ -52,11 +77,13 @@ pub fn extract(
         });
         for edge in taken {
             let edge = solver.graph.edges[edge];
-            inner_states(solver, &edge, &words, rounds, &mut strategy)?;
+            let inner = inner_states(solver, &edge, &words, rounds, patience)?;
+            strategy.states.extend(inner);
             if !std::mem::replace(&mut seen[edge.target as usize], true) {
                 waiting.push(edge.target);
             }
         }
+        keep(solver, &strategy.states[known..], patience);
     }
     Ok(strategy)
 }
@@ -66,19 +93,22 @@ fn decisions(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
     rounds: &[Vec<Win>],
+    patience: &mut Patience<'_>,
 ) -> Result<(Vec<Decision>, Vec<usize>), Failure> {
     let mut decisions = Vec::new();
     let mut taken = Vec::new();
     let moves = moves_of(solver, node)?;
     for (after, before) in (1..rounds.len()).zip(rounds) {
         let mut lost = to_federation(solver, node, &before[node as usize]);
-        lost.subtract(&to_federation(solver, node, &rounds[after][node as usize]));
+        let left = to_federation(solver, node, &rounds[after][node as usize]);
+        lost.subtract_within(&left, patience);
         if lost.is_empty() {
             continue;
         }
-        let leaving = leave(solver, node, before)?.intersection(&lost);
+        let leaving = leave(solver, node, before, patience)?;
+        let leaving = leaving.intersection_within(&lost, patience);
         let mut evading = lost.clone();
-        evading.subtract(&leaving);
+        evading.subtract_within(&leaving, patience);
         for (part, kept) in [(leaving, before), (evading, &rounds[after])] {
             let mut waiting = part.clone();
             for index in solver.graph.edges_of(node) {
@@ -86,17 +116,17 @@ fn decisions(
                 if edge.controllable {
                     continue;
                 }
-                let acting = solver
-                    .missing(&edge, &kept[edge.target as usize], None)
-                    .intersection(&part);
+                let kept = &kept[edge.target as usize];
+                let acting = solver.missing(&edge, (kept, None), patience);
+                let acting = acting.intersection_within(&part, patience);
                 if !acting.is_empty() {
-                    waiting.subtract(&acting);
+                    waiting.subtract_within(&acting, patience);
                     let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
-                    push(&mut decisions, acting, action, after);
+                    push(&mut decisions, (acting, action, after), patience);
                     taken.push(index);
                 }
             }
-            push(&mut decisions, waiting, None, after);
+            push(&mut decisions, (waiting, None, after), patience);
         }
         for index in solver.graph.edges_of(node) {
             let edge = solver.graph.edges[index];
@@ -112,12 +142,11 @@ fn decisions(
 
 fn push(
     decisions: &mut Vec<Decision>,
-    mut zones: Federation,
-    action: Option<Vec<crate::network::Part>>,
-    rank: usize,
+    (mut zones, action, rank): (Federation, Option<Vec<Part>>, usize),
+    patience: &mut Patience<'_>,
 ) {
     if !zones.is_empty() {
-        zones.reduce();
+        zones.reduce_within(patience);
         decisions.push(Decision {
             rank: rank as u32,
             ..new_decision(zones, action)
@@ -125,15 +154,15 @@ fn push(
     }
 }
 
-/// Adds the states inside a chain, where the goal holds nowhere. Each has one move, which the environment takes, if it owns it,
+/// The states inside a chain, where the goal holds nowhere. Each has one move, which the environment takes, if it owns it,
 /// where the rest of the chain does not lead into what is kept.
 fn inner_states(
     solver: &mut Solver<'_, '_, '_>,
     edge: &Edge,
     source: &[i32],
     rounds: &[Vec<Win>],
-    strategy: &mut Strategy,
-) -> Result<(), Failure> {
+    patience: &mut Patience<'_>,
+) -> Result<Vec<StrategyState>, Failure> {
     let inside = walk(solver, edge, source)?;
     let dimension = solver.graph.dimension();
     let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
@@ -151,29 +180,29 @@ fn inner_states(
             let acting = if inner.controllable {
                 Federation::empty(dimension)
             } else {
-                spoiling(inner, &kept)
+                spoiling(inner, &kept, patience)
             };
             if inner.delays {
                 kept.down(&ClockSet::EMPTY);
                 kept.constrain_all(&inner.invariant);
             }
             let mut lost = within_invariant(inner, dimension);
-            lost.subtract(&kept);
-            lost.subtract(&taken[index]);
-            taken[index].unite(&lost);
-            let acting = acting.intersection(&lost);
-            lost.subtract(&acting);
+            lost.subtract_within(&kept, patience);
+            lost.subtract_within(&taken[index], patience);
+            taken[index].unite_within(&lost, patience);
+            let acting = acting.intersection_within(&lost, patience);
+            lost.subtract_within(&acting, patience);
             let action = Some(inner.parts.clone());
-            push(&mut decisions[index], acting, action, rank);
-            push(&mut decisions[index], lost, None, rank);
+            push(&mut decisions[index], (acting, action, rank), patience);
+            push(&mut decisions[index], (lost, None, rank), patience);
         }
     }
-    for (inner, decisions) in inside.into_iter().zip(decisions) {
-        strategy.states.push(StrategyState {
+    let states = inside.into_iter().zip(decisions);
+    Ok(states
+        .map(|(inner, decisions)| StrategyState {
             words: inner.words,
             decisions,
             is_goal: false,
-        });
-    }
-    Ok(())
+        })
+        .collect())
 }

@@ -4,7 +4,7 @@
 //! it can, since the controller might get away later. The controller allows everything that stays outside.
 
 use crate::network::{Failure, Part};
-use crate::zones::{ClockSet, Federation, Zone, instants, past};
+use crate::zones::{ClockSet, Federation, Patience, Zone, instants, past};
 
 use super::Player;
 use super::graph::Standing;
@@ -15,11 +15,12 @@ use super::strategy::{Decision, Inner, Strategy, StrategyState, moves_of, walk, 
 pub(super) fn decisions(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
+    patience: &mut Patience<'_>,
 ) -> Result<(Vec<Decision>, Vec<u32>), Failure> {
     let mut decisions = Vec::new();
     let mut taken = Vec::new();
     let mut free = rest_of(solver, node);
-    free.subtract(&ended(solver, node));
+    free.subtract_within(&ended(solver, node), patience);
     if free.is_empty() {
         return Ok((decisions, taken));
     }
@@ -33,9 +34,10 @@ pub(super) fn decisions(
             }
             continue;
         }
-        let zones = solver.spoiling(&edge).intersection(&free);
+        let spoiling = solver.spoiling(&edge, patience);
+        let zones = spoiling.intersection_within(&free, patience);
         if !zones.is_empty() {
-            acting.unite(&zones);
+            acting.unite_within(&zones, patience);
             let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
             decisions.push(new_decision(zones, action));
             taken.push(index as u32);
@@ -43,13 +45,13 @@ pub(super) fn decisions(
     }
     let mut waiting = match solver.seeker {
         Player::Controller => {
-            free.subtract(&acting);
+            free.subtract_within(&acting, patience);
             free
         }
-        Player::Environment => allowed_waiting(solver, node, &free, &acting)?,
+        Player::Environment => allowed_waiting(solver, node, (&free, &acting), patience)?,
     };
     if !waiting.is_empty() {
-        waiting.reduce();
+        waiting.reduce_within(patience);
         decisions.push(new_decision(waiting, None));
     }
     Ok((decisions, taken))
@@ -88,44 +90,49 @@ fn ended(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
 fn allowed_waiting(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
-    free: &Federation,
-    acting: &Federation,
+    (free, acting): (&Federation, &Federation),
+    patience: &mut Patience<'_>,
 ) -> Result<Federation, Failure> {
     let situation = solver.situation(node)?;
-    let mut at_rest = solver.standstill(&situation).intersection(free);
-    at_rest.subtract(&solver.forced_controller(node, &situation));
+    let standstill = solver.standstill(&situation);
+    let mut at_rest = standstill.intersection_within(free, patience);
+    at_rest.subtract_within(&solver.forced_controller(node, &situation), patience);
     if !solver.graph.nodes[node as usize].delays {
         return Ok(at_rest);
     }
     let safe = rest_of(solver, node);
     let stopped = situation.stopped;
-    let mut waiting = instants::before(&safe, &stopped).intersection(free);
+    let before = instants::before_within(&safe, &stopped, patience);
+    let mut waiting = before.intersection_within(free, patience);
     // Where time can pass at all, and what it does not pass.
     let mut passing = safe.clone();
     let mut impassable = Federation::empty(safe.dimension());
     if let Some(urgent) = solver.graph.urgent(node) {
         let mut standstill = urgent.standstill();
         standstill.unite(&urgent.obliged);
-        waiting.subtract(&standstill);
-        passing.subtract(&standstill);
+        waiting.subtract_within(&standstill, patience);
+        passing.subtract_within(&standstill, patience);
         impassable.unite(&urgent.stops());
     }
     // What is safe may end in a limit that is not itself safe. Before such an end, the last valuations with a move must use it.
     let mut unsafe_ones = whole_or_part(solver, node, None);
-    unsafe_ones.subtract(&safe);
-    let ends = unsafe_ones.intersection(&instants::after(&passing, &stopped));
+    unsafe_ones.subtract_within(&safe, patience);
+    let after = instants::after_within(&passing, &stopped, patience);
+    let ends = unsafe_ones.intersection_within(&after, patience);
     if !ends.is_empty() {
         let mut others = unsafe_ones.clone();
-        others.unite(&impassable);
-        others.subtract(&ends);
-        let ending = past::predecessors(&ends, &others, &stopped).intersection(&safe);
-        let mut last = ending.intersection(acting);
+        others.unite_within(&impassable, patience);
+        others.subtract_within(&ends, patience);
+        let before = past::predecessors_within(&ends, &others, &stopped, patience);
+        let ending = before.intersection_within(&safe, patience);
+        let mut last = ending.intersection_within(acting, patience);
         let mut later = ending;
-        later.subtract(acting);
-        last.subtract(&past::predecessors(&later, &unsafe_ones, &stopped));
-        waiting.subtract(&last);
+        later.subtract_within(acting, patience);
+        let earlier = past::predecessors_within(&later, &unsafe_ones, &stopped, patience);
+        last.subtract_within(&earlier, patience);
+        waiting.subtract_within(&last, patience);
     }
-    waiting.unite(&at_rest);
+    waiting.unite_within(&at_rest, patience);
     Ok(waiting)
 }
 
@@ -135,6 +142,7 @@ pub(super) fn inner_states(
     edge: u32,
     source: &[i32],
     strategy: &mut Strategy,
+    patience: &mut Patience<'_>,
 ) -> Result<(), Failure> {
     let edge = solver.graph.edges[edge as usize];
     let inside = walk(solver, &edge, source)?;
@@ -150,7 +158,7 @@ pub(super) fn inner_states(
         let is_own = !solver.seeker.owns(inner.controllable);
         let mut decisions = Vec::new();
         let acting = if is_own {
-            spoiling(&inner, &won)
+            spoiling(&inner, &won, patience)
         } else {
             Federation::empty(won.dimension())
         };
@@ -159,8 +167,8 @@ pub(super) fn inner_states(
             won.constrain_all(&inner.invariant);
         }
         let mut waiting = within_invariant(&inner, won.dimension());
-        waiting.subtract(&won);
-        waiting.subtract(&acting);
+        waiting.subtract_within(&won, patience);
+        waiting.subtract_within(&acting, patience);
         if !acting.is_empty() {
             decisions.push(new_decision(acting, Some(inner.parts)));
         }
@@ -178,10 +186,10 @@ pub(super) fn inner_states(
 }
 
 /// Where the move of a state inside a chain is possible, and leads to none of the valuations that are won.
-pub(super) fn spoiling(inner: &Inner, won: &Federation) -> Federation {
+pub(super) fn spoiling(inner: &Inner, won: &Federation, patience: &mut Patience<'_>) -> Federation {
     let zone = Zone::of_constraints(won.dimension(), &inner.invariant);
     let mut acting = inner.effect.enabled_part(zone.bounds(), won.dimension());
-    acting.subtract(won);
+    acting.subtract_within(won, patience);
     acting
 }
 

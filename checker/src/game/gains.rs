@@ -161,21 +161,26 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The valuations from which a move of the evader is not known to lead into won ones.
-    pub(super) fn spoiling(&self, edge: &Edge) -> Federation {
+    pub(super) fn spoiling(&self, edge: &Edge, patience: &mut Patience<'_>) -> Federation {
         let is_missed = (edge.length == 1).then(|| self.lost(edge.target));
-        self.missing(edge, &self.win[edge.target as usize], is_missed)
+        self.missing(edge, (&self.win[edge.target as usize], is_missed), patience)
     }
 
     /// The valuations from which an edge is possible and does not lead into the given valuations of its target, whose others are
     /// computed unless they are given too. In a chain somebody may still wait or get stuck, so there it is what is not led into
     /// them; other edges may be pieces of a move, and lead into the rest of their own target.
-    pub(super) fn missing(&self, edge: &Edge, hit: &Win, missed: Option<Win>) -> Federation {
+    pub(super) fn missing(
+        &self,
+        edge: &Edge,
+        (hit, missed): (&Win, Option<Win>),
+        patience: &mut Patience<'_>,
+    ) -> Federation {
         if edge.length == 1 {
-            let missed = missed.unwrap_or_else(|| self.complement(edge.target, hit));
+            let missed = missed.unwrap_or_else(|| self.complement(edge.target, hit, patience));
             return self.before(edge, &missed);
         }
         let mut missing = self.enabled(edge);
-        missing.subtract(&self.before(edge, hit));
+        missing.subtract_within(&self.before(edge, hit), patience);
         missing
     }
 
@@ -189,13 +194,13 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The other valuations of a node.
-    fn complement(&self, node: u32, part: &Win) -> Win {
+    fn complement(&self, node: u32, part: &Win, patience: &mut Patience<'_>) -> Win {
         match part {
             Win::Nothing => Win::Everything,
             Win::Everything => Win::Nothing,
             Win::Part(part) => {
                 let mut rest = self.whole(node);
-                rest.subtract(part);
+                rest.subtract_within(part, patience);
                 Win::Part(rest)
             }
         }

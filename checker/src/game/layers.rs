@@ -35,7 +35,10 @@ impl Solver<'_, '_, '_> {
         let tables = win.len() * by_node + table_bytes::<(u32, Federation)>(rest.capacity());
         self.aside_bytes += gained_bytes + tables as u64;
         self.begin_anew();
-        let is_layered = self.gain_in_layers(watch)?;
+        let is_layered = match self.gain_in_layers(watch) {
+            Err(Failure::Interrupted) => false,
+            result => result?,
+        };
         self.aside_bytes -= gained_bytes + tables as u64;
         if !is_layered {
             self.win = win;

@@ -4,6 +4,7 @@
 //! environment is faster: where both can move at the same instant, it may.
 
 mod account;
+pub mod allowance;
 mod choices;
 pub mod closed_loop;
 pub mod cooperation;

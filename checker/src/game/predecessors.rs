@@ -79,16 +79,18 @@ impl Solver<'_, '_, '_> {
         for index in self.graph.edges_of(node) {
             let edge = self.graph.edges[index];
             if edge.controllable {
-                good.unite(&self.before(&edge, &self.win[edge.target as usize]));
+                let before = self.before(&edge, &self.win[edge.target as usize]);
+                good.unite_within(&before, patience);
             } else {
-                bad.unite(&self.spoiling(&edge));
+                let spoiling = self.spoiling(&edge, patience);
+                bad.unite_within(&spoiling, patience);
             }
         }
         bad.subtract_within(&goal, patience);
-        let forced = self.forced_environment(node, &bad, situation);
-        good.unite(&forced);
+        let forced = self.forced_environment(node, &bad, situation, patience);
+        good.unite_within(&forced, patience);
         let mut won = self.safe_past(node, good, &bad, situation, patience);
-        won.unite(&goal);
+        won.unite_within(&goal, patience);
         won
     }
 
@@ -105,18 +107,20 @@ impl Solver<'_, '_, '_> {
         for index in self.graph.edges_of(node) {
             let edge = self.graph.edges[index];
             if edge.controllable {
-                escape.unite(&self.spoiling(&edge));
+                let spoiling = self.spoiling(&edge, patience);
+                escape.unite_within(&spoiling, patience);
             } else {
-                now.unite(&self.before(&edge, &self.win[edge.target as usize]));
+                let before = self.before(&edge, &self.win[edge.target as usize]);
+                now.unite_within(&before, patience);
             }
         }
         now.subtract_within(&goal, patience);
         let mut good = self.forced_controller(node, situation);
         good.subtract_within(&escape, patience);
-        good.unite(&now);
-        good.unite(&self.known(node));
+        good.unite_within(&now, patience);
+        good.unite_within(&self.known(node), patience);
         escape.subtract_within(&now, patience);
-        escape.unite(&goal);
+        escape.unite_within(&goal, patience);
         self.safe_past(node, good, &escape, situation, patience)
     }
 
@@ -139,7 +143,7 @@ impl Solver<'_, '_, '_> {
     ) -> Federation {
         if self.graph.nodes[node as usize].delays {
             if let Some(urgent) = self.graph.urgent(node) {
-                return urgent.predecessors(&good, bad);
+                return urgent.predecessors(&good, bad, patience);
             }
             return past::predecessors_within(&good, bad, &situation.stopped, patience);
         }

@@ -46,6 +46,7 @@ use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::{Federation, Patience};
 
+use super::allowance::Allowance;
 use super::dives::Frontier;
 use super::gains::Gained;
 use super::graph::{Graph, Standing};
@@ -144,8 +145,11 @@ pub struct Solver<'g, 's, 'a> {
     crowded_from: u64,
     /// So many are many.
     crowd: usize,
-    /// Whether the solver has given up for having many nodes for each discrete state.
+    /// Whether the solver has given up: for having many nodes for each discrete state, or for what it has taken.
     pub has_given_up: bool,
+    pub(super) allowance: Option<Allowance>,
+    /// How many operations on many zones were done in computing what nodes win.
+    pub(super) operations: u64,
     /// The nodes to be expanded.
     pub(super) frontier: Frontier,
     /// By node, as far as it was looked at: whether the seeker may still win; see [`super::hopes`].
@@ -198,6 +202,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             crowded_from: u64::MAX,
             crowd: usize::MAX,
             has_given_up: false,
+            allowance: None,
+            operations: 0,
             frontier: Frontier::default(),
             has_hope: Vec::new(),
             updates: VecDeque::new(),
@@ -289,7 +295,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             if self.graph.explored >= next_look || self.graph.zones.len() >= zones_at_look {
                 next_look = self.graph.explored + LOOK_EVERY;
                 zones_at_look = self.graph.zones.len() + zones_between_looks;
-                if let Some(reason) = watch.look(&self.counters()) {
+                if let Some(reason) = self.look(watch) {
                     return Ok(Answer::Stopped(reason));
                 }
             }
@@ -324,7 +330,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             }
             if until_look == 0 {
                 until_look = COMPUTATIONS_BETWEEN_LOOKS;
-                let reason = watch.look(&self.counters());
+                let reason = self.look(watch);
                 if reason.is_some() {
                     return Ok(reason);
                 }
@@ -398,7 +404,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             until_look -= 1;
             if until_look == 0 {
                 until_look = UPDATES_BETWEEN_LOOKS;
-                let reason = watch.look(&self.counters());
+                let reason = self.look(watch);
                 if reason.is_some() {
                     return reason;
                 }
@@ -457,7 +463,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
         let mut edges = self.graph.edges.iter();
         self.win.iter().any(|win| !matches!(win, Win::Everything))
-            || edges.any(|edge| edge.length > 1 && !self.spoiling(edge).is_empty())
+            || edges.any(|edge| {
+                edge.length > 1 && !self.spoiling(edge, &mut Patience::endless()).is_empty()
+            })
     }
 
     /// Whether the seeker wins from the initial valuation.
@@ -541,9 +549,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
 
     /// Does something with zones unless, or until, the watch gives a reason to stop; then the result is of no use.
     pub(super) fn patiently<R>(
-        &self,
+        &mut self,
         watch: &mut dyn Watch,
-        work: impl FnOnce(&Self, &mut Patience<'_>) -> R,
+        work: impl FnOnce(&mut Self, &mut Patience<'_>) -> R,
     ) -> (R, Option<StopReason>) {
         let counters = self.counters();
         let zone_bytes = self.zone_bytes();

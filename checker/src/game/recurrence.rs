@@ -26,6 +26,9 @@ use super::account::wins_bytes;
 use super::graph::Standing;
 use super::reach::{Answer, Extent, Solver, Win};
 
+/// Nodes between two looks at the limits.
+const NODES_BETWEEN_LOOKS: u32 = 64;
+
 /// Solves the game of a new solver with the controller as its seeker. The goal of its graph must be p ∩ q, and p what is kept.
 /// On a win, the strategy can be read from it. If the players work together, it is enough that it can be won from somewhere.
 /// `rounds`, if wanted, becomes the sets X by node, the first one first.
@@ -46,7 +49,18 @@ pub fn solve(
     loop {
         let mut targets = Vec::with_capacity(kept.len());
         for node in 0..kept.len() as u32 {
-            targets.push(target(solver, node, &kept)?);
+            let (target, reason) = solver.patiently(watch, |solver, patience| {
+                target(solver, node, &kept, patience)
+            });
+            if let Some(reason) = reason {
+                return Ok(Answer::Stopped(reason));
+            }
+            targets.push(target?);
+            if node.is_multiple_of(NODES_BETWEEN_LOOKS)
+                && let Some(reason) = solver.look(watch)
+            {
+                return Ok(Answer::Stopped(reason));
+            }
         }
         let kept_bytes = wins_bytes(&kept);
         if let Some(rounds) = &mut rounds {
@@ -66,7 +80,16 @@ pub fn solve(
         }
         let mut has_shrunk = false;
         for (node, old) in kept.iter_mut().enumerate() {
-            has_shrunk |= !is_within(solver, node as u32, old, &solver.win[node]);
+            if !has_shrunk {
+                let node = node as u32;
+                let (is_same, reason) = solver.patiently(watch, |solver, patience| {
+                    is_within(solver, node, (old, &solver.win[node as usize]), patience)
+                });
+                if let Some(reason) = reason {
+                    return Ok(Answer::Stopped(reason));
+                }
+                has_shrunk = !is_same;
+            }
             old.clone_from(&solver.win[node]);
         }
         if !has_shrunk {
@@ -81,7 +104,7 @@ pub fn solve(
                 Player::Environment
             }));
         }
-        if let Some(reason) = watch.look(&solver.counters()) {
+        if let Some(reason) = solver.look(watch) {
             return Ok(Answer::Stopped(reason));
         }
     }
@@ -116,16 +139,29 @@ pub(super) fn to_federation(solver: &Solver<'_, '_, '_>, node: u32, win: &Win) -
     }
 }
 
-fn is_within(solver: &Solver<'_, '_, '_>, node: u32, one: &Win, other: &Win) -> bool {
+fn is_within(
+    solver: &Solver<'_, '_, '_>,
+    node: u32,
+    (one, other): (&Win, &Win),
+    patience: &mut Patience<'_>,
+) -> bool {
     match (one, other) {
         (Win::Nothing, _) | (_, Win::Everything) => true,
         (_, Win::Nothing) => false,
-        _ => to_federation(solver, node, one).is_subset(&to_federation(solver, node, other)),
+        _ => {
+            let other = to_federation(solver, node, other);
+            to_federation(solver, node, one).is_subset_within(&other, patience)
+        }
     }
 }
 
 /// The part of a node in which the goal holds, and from which the controller can go on without leaving what is kept.
-fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Win, Failure> {
+fn target(
+    solver: &mut Solver<'_, '_, '_>,
+    node: u32,
+    kept: &[Win],
+    patience: &mut Patience<'_>,
+) -> Result<Win, Failure> {
     let mut goal = match solver.graph.nodes[node as usize].standing {
         Standing::Open | Standing::Broken | Standing::Dead => return Ok(Win::Nothing),
         Standing::Goal => solver.whole(node),
@@ -137,8 +173,8 @@ fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Wi
             )
         }
     };
-    goal.subtract(&leave(solver, node, kept)?);
-    if goal.includes_zone(solver.graph.zone(node)) {
+    goal.subtract_within(&leave(solver, node, kept, patience)?, patience);
+    if goal.includes_zone_within(solver.graph.zone(node), patience) {
         return Ok(Win::Everything);
     }
     Ok(as_win(goal))
@@ -149,24 +185,25 @@ pub(super) fn leave(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
     kept: &[Win],
+    patience: &mut Patience<'_>,
 ) -> Result<Federation, Failure> {
     let mut out = solver.whole(node);
-    out.subtract(&to_federation(solver, node, &kept[node as usize]));
+    out.subtract_within(&to_federation(solver, node, &kept[node as usize]), patience);
     let mut back = Federation::empty(solver.graph.dimension());
     for index in solver.graph.edges_of(node) {
         let edge = solver.graph.edges[index];
         let kept = &kept[edge.target as usize];
         if edge.controllable {
-            back.unite(&solver.before(&edge, kept));
+            back.unite_within(&solver.before(&edge, kept), patience);
         } else {
-            out.unite(&solver.missing(&edge, kept, None));
+            let missing = solver.missing(&edge, (kept, None), patience);
+            out.unite_within(&missing, patience);
         }
     }
-    back.subtract(&out);
+    back.subtract_within(&out, patience);
     let situation = solver.situation(node)?;
     let mut held = solver.forced_controller(node, &situation);
-    held.subtract(&back);
-    out.unite(&held);
-    let patience = &mut Patience::endless();
+    held.subtract_within(&back, patience);
+    out.unite_within(&held, patience);
     Ok(solver.safe_past(node, out, &back, &situation, patience))
 }

@@ -1,7 +1,7 @@
 //! Where time stops, and who must move there.
 
 use crate::network::{Failure, Symbolic};
-use crate::zones::{Bound, Federation};
+use crate::zones::{Bound, Federation, Patience};
 
 use super::predecessors::Situation;
 use super::reach::Solver;
@@ -14,6 +14,7 @@ impl Solver<'_, '_, '_> {
         node: u32,
         bad: &Federation,
         situation: &Situation,
+        patience: &mut Patience<'_>,
     ) -> Federation {
         let opponent = self.enabled_moves(node, Player::Environment);
         if opponent.is_empty() {
@@ -22,7 +23,7 @@ impl Solver<'_, '_, '_> {
         let mut all = Federation::empty(self.graph.dimension());
         for (component, stop) in &situation.stops {
             let mut stop = stop.intersection(&opponent);
-            stop.subtract(bad);
+            stop.subtract_within(bad, patience);
             for (mover, edge) in &situation.movers {
                 let blocks = match (self.forced, *component) {
                     (Forced::Neutral, _) => false,

@@ -23,8 +23,10 @@
 use std::sync::Arc;
 
 use crate::network::{ClockEffect, Failure, Moves, Part};
+use crate::search::limits::{StopReason, Watch};
 use crate::zones::dbm::Constraint;
-use crate::zones::{ClockSet, Federation};
+use crate::zones::federation::block_bytes;
+use crate::zones::{ClockSet, Federation, Patience};
 
 use super::Player;
 use super::evasion;
@@ -52,6 +54,21 @@ pub struct StrategyState {
     pub decisions: Vec<Decision>,
     /// Whether play has ended here, won, whatever the clocks say.
     pub is_goal: bool,
+}
+
+impl StrategyState {
+    /// The bytes that it takes.
+    fn bytes(&self) -> u64 {
+        let decisions = self.decisions.iter().map(|decision| {
+            let action = decision.action.as_ref();
+            let parts = action.map_or(0, |parts| block_bytes(size_of_val(&**parts)));
+            decision.zones.heap_bytes() + parts
+        });
+        let own = size_of::<StrategyState>()
+            + block_bytes(size_of_val(&*self.words))
+            + block_bytes(self.decisions.capacity() * size_of::<Decision>());
+        (own + decisions.sum::<usize>()) as u64
+    }
 }
 
 /// Which of the decisions that apply counts.
@@ -114,20 +131,46 @@ pub struct Way {
 }
 
 /// Reads the strategy of the player who wins a solved game.
-pub fn extract(solver: &mut Solver<'_, '_, '_>) -> Result<Strategy, Failure> {
+///
+/// # Errors
+/// The model fails in a state of it. An error of the inner result says why it was not finished.
+pub fn extract(
+    solver: &mut Solver<'_, '_, '_>,
+    watch: &mut dyn Watch,
+) -> Result<Result<Strategy, StopReason>, Failure> {
     let owner = if solver.is_won() {
         solver.seeker
     } else {
         solver.seeker.opponent()
     };
-    extract_from(solver, owner, vec![0])
+    extract_from(solver, owner, vec![0], watch)
 }
 
 /// Reads the strategy of a player who wins from these nodes of a solved game.
+///
+/// # Errors
+/// As [`extract`].
 pub fn extract_from(
     solver: &mut Solver<'_, '_, '_>,
     owner: Player,
+    waiting: Vec<u32>,
+    watch: &mut dyn Watch,
+) -> Result<Result<Strategy, StopReason>, Failure> {
+    let (strategy, reason) = solver.patiently(watch, |solver, patience| {
+        extract_within(solver, owner, waiting, patience)
+    });
+    match reason {
+        Some(reason) => Ok(Err(reason)),
+        None => strategy.map(Ok),
+    }
+}
+
+/// As [`extract_from`], which is of use unless the patience is over.
+fn extract_within(
+    solver: &mut Solver<'_, '_, '_>,
+    owner: Player,
     mut waiting: Vec<u32>,
+    patience: &mut Patience<'_>,
 ) -> Result<Strategy, Failure> {
     let is_seeking = owner == solver.seeker;
     let mut strategy = Strategy {
@@ -147,12 +190,16 @@ pub fn extract_from(
         seen[node as usize] = true;
     }
     while let Some(node) = waiting.pop() {
+        if patience.ends() {
+            break;
+        }
+        let known = strategy.states.len();
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);
         let (decisions, taken) = if is_seeking {
-            decisions(solver, node)?
+            decisions(solver, node, patience)?
         } else {
-            evasion::decisions(solver, node)?
+            evasion::decisions(solver, node, patience)?
         };
         let standing = solver.graph.nodes[node as usize].standing;
         let source = words.clone();
@@ -164,22 +211,33 @@ pub fn extract_from(
         steps_to_end.resize(strategy.states.len(), 0);
         for edge in taken {
             if is_seeking {
-                inner_states(solver, edge, &source, &mut strategy)?;
+                inner_states(solver, edge, &source, &mut strategy, patience)?;
                 let inner = strategy.states.len() - steps_to_end.len();
                 steps_to_end.extend((1..=inner as u32).rev());
             } else {
-                evasion::inner_states(solver, edge, &source, &mut strategy)?;
+                evasion::inner_states(solver, edge, &source, &mut strategy, patience)?;
             }
             let target = solver.graph.edges[edge as usize].target;
             if !std::mem::replace(&mut seen[target as usize], true) {
                 waiting.push(target);
             }
         }
+        keep(solver, &strategy.states[known..], patience);
     }
     if is_seeking {
         rank_chains(&mut strategy, &steps_to_end);
     }
     Ok(strategy)
+}
+
+/// Counts what new states take.
+pub(super) fn keep(
+    solver: &Solver<'_, '_, '_>,
+    states: &[StrategyState],
+    patience: &mut Patience<'_>,
+) {
+    let bytes: u64 = states.iter().map(StrategyState::bytes).sum();
+    patience.keep(bytes.div_ceil(solver.zone_bytes()) as usize);
 }
 
 /// Ranks states inside chains above the end of their chain, by their steps to it. Their words may be those of a node as well; at
@@ -212,6 +270,7 @@ fn won_standing(owner: Player) -> Standing {
 fn decisions(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
+    patience: &mut Patience<'_>,
 ) -> Result<(Vec<Decision>, Vec<u32>), Failure> {
     let mut decisions = Vec::new();
     let mut taken = Vec::new();
@@ -231,14 +290,14 @@ fn decisions(
                     continue;
                 }
                 let earlier = if gain.stamp > 0 {
-                    won_before(solver, edge_data.target, gain.stamp)
+                    won_before(solver, edge_data.target, gain.stamp, patience)
                 } else {
                     solver.win[edge_data.target as usize].clone()
                 };
                 let mut zones = solver.before(&edge_data, &earlier);
-                zones = zones.intersection(&rest);
+                zones = zones.intersection_within(&rest, patience);
                 if !zones.is_empty() {
-                    rest.subtract(&zones);
+                    rest.subtract_within(&zones, patience);
                     let action = Some(moves.get(edge_data.ordinal as usize).parts.to_vec());
                     decisions.push(Decision {
                         zones,
@@ -288,7 +347,12 @@ pub(super) fn whole_or_part(
 }
 
 /// The valuations of a node that were won before a stamp.
-fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
+fn won_before(
+    solver: &Solver<'_, '_, '_>,
+    node: u32,
+    stamp: u32,
+    patience: &mut Patience<'_>,
+) -> Win {
     let mut won: Option<Federation> = None;
     for Gain { stamp: _, part } in solver.gains[node as usize]
         .iter()
@@ -300,7 +364,7 @@ fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
         match &mut won {
             None => won = Some(part.clone()),
             Some(won) => {
-                won.unite(part);
+                won.unite_within(part, patience);
             }
         }
     }
@@ -326,12 +390,16 @@ fn inner_states(
     edge: u32,
     source: &[i32],
     strategy: &mut Strategy,
+    patience: &mut Patience<'_>,
 ) -> Result<(), Failure> {
     let edge = solver.graph.edges[edge as usize];
     let inside = walk(solver, &edge, source)?;
     let is_own = |inner: &Inner| solver.seeker.owns(inner.controllable);
     let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
     for gain in &solver.gains[edge.target as usize] {
+        if patience.ends() {
+            return Ok(());
+        }
         let mut won = whole_or_part(solver, edge.target, gain.part.as_ref());
         for (inner, decisions) in inside.iter().zip(&mut decisions).rev() {
             inner.effect.preimage(&mut won);

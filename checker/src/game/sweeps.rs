@@ -98,7 +98,7 @@ impl Solver<'_, '_, '_> {
             }
             if self.graph.explored >= next_look {
                 next_look = self.graph.explored + LOOK_EVERY;
-                if let Some(reason) = watch.look(&self.counters()) {
+                if let Some(reason) = self.look(watch) {
                     return Ok(Some(reason));
                 }
             }
@@ -137,7 +137,7 @@ impl Solver<'_, '_, '_> {
             until_look -= 1;
             if until_look == 0 {
                 until_look = BATCHES_BETWEEN_LOOKS;
-                let reason = watch.look(&self.counters());
+                let reason = self.look(watch);
                 if reason.is_some() {
                     return Ok(reason);
                 }

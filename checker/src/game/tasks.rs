@@ -56,6 +56,10 @@ struct Progress {
     zones: Vec<AtomicUsize>,
     /// The bytes of the tasks, and of what is computed and not recorded yet.
     done_bytes: AtomicU64,
+    /// How many operations on many zones were done.
+    operations: AtomicU64,
+    /// After so many operations the game is given up: see [`super::allowance`].
+    most_operations: u64,
 }
 
 impl Solver<'_, '_, '_> {
@@ -65,6 +69,11 @@ impl Solver<'_, '_, '_> {
         tasks: Vec<Task>,
         watch: &mut dyn Watch,
     ) -> Option<StopReason> {
+        // Whatever is seen before or afterwards, however many threads there are, no thread sees by chance.
+        let reason = self.look(watch);
+        if reason.is_some() || tasks.is_empty() {
+            return reason;
+        }
         let threads = if self.is_worth_sharing(&tasks) {
             self.threads.min(tasks.len())
         } else {
@@ -75,6 +84,8 @@ impl Solver<'_, '_, '_> {
             is_cut: AtomicBool::new(false),
             zones: (0..threads).map(|_| AtomicUsize::new(0)).collect(),
             done_bytes: AtomicU64::new(tasks.iter().map(Task::heap_bytes).sum()),
+            operations: AtomicU64::new(self.operations),
+            most_operations: self.most_operations(),
         };
         let (mut done, reason) = if threads == 1 {
             self.work_and_look(&tasks, &progress, watch)
@@ -83,6 +94,11 @@ impl Solver<'_, '_, '_> {
         };
         if reason.is_some() {
             return reason;
+        }
+        self.operations = progress.operations.load(Ordering::Relaxed);
+        if self.operations > progress.most_operations {
+            self.has_given_up = true;
+            return Some(StopReason::States);
         }
         done.sort_unstable_by_key(|(index, _)| *index);
         for (task, (_, gained)) in tasks.into_iter().zip(done) {
@@ -188,8 +204,10 @@ impl Solver<'_, '_, '_> {
         progress: &Progress,
         goes_on: &mut dyn FnMut(usize) -> bool,
     ) -> Vec<(usize, Gained)> {
-        let mut ask = |zones: usize| goes_on(zones);
-        let mut patience = Patience::as_long_as(&mut ask);
+        let mut ask = |zones: usize| {
+            let operations = progress.operations.fetch_add(1, Ordering::Relaxed);
+            operations < progress.most_operations && goes_on(zones)
+        };
         let mut done = Vec::new();
         loop {
             let index = progress.next.fetch_add(1, Ordering::Relaxed);
@@ -199,6 +217,8 @@ impl Solver<'_, '_, '_> {
             else {
                 return done;
             };
+            // Each task has a patience of its own, so that what it asks does not hang on who does it.
+            let mut patience = Patience::as_long_as(&mut ask);
             let won = self.winnable(*node, situation, &mut patience);
             let gained = self.gained(*node, won, &mut patience);
             if patience.is_over() || progress.is_cut.load(Ordering::Relaxed) {

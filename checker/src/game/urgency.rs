@@ -18,7 +18,7 @@
 use crate::network::{Failure, Moves};
 use crate::zones::dbm::Constraint;
 use crate::zones::future::{self, Barriers};
-use crate::zones::{ClockSet, Federation, Zone, instants, past};
+use crate::zones::{ClockSet, Federation, Patience, Zone, instants, past};
 
 use super::graph::{Graph, Origin, push_step};
 
@@ -76,27 +76,34 @@ impl Urgent {
     /// The safe timed predecessors of `good` with respect to `bad` where time is stopped on the way: a valuation that stops time can
     /// be the last one of a delay, and no other. So of those in `good` only the first moments are led to, and where an
     /// obligation has none, those as soon as one likes.
-    pub(super) fn predecessors(&self, good: &Federation, bad: &Federation) -> Federation {
+    pub(super) fn predecessors(
+        &self,
+        good: &Federation,
+        bad: &Federation,
+        patience: &mut Patience<'_>,
+    ) -> Federation {
         let stops = self.stops();
         let mut now = good.clone();
-        now.subtract(bad);
+        now.subtract_within(bad, patience);
         let mut running = self.reached.clone();
-        running.subtract(&stops);
+        running.subtract_within(&stops, patience);
         let first = instants::after(&running, &ClockSet::EMPTY);
-        let entered = now.intersection(&stops).intersection(&first);
-        let mut soon = now.intersection(&self.obliged);
-        soon.subtract(&self.channel);
-        let mut sooner = instants::before(&soon, &ClockSet::EMPTY).intersection(&running);
-        sooner.subtract(bad);
+        let entered = now.intersection_within(&stops, patience);
+        let entered = entered.intersection_within(&first, patience);
+        let mut soon = now.intersection_within(&self.obliged, patience);
+        soon.subtract_within(&self.channel, patience);
+        let mut sooner = instants::before(&soon, &ClockSet::EMPTY);
+        sooner = sooner.intersection_within(&running, patience);
+        sooner.subtract_within(bad, patience);
         let mut ends = now.clone();
-        ends.subtract(&stops);
-        ends.unite(&entered);
-        ends.unite(&sooner);
+        ends.subtract_within(&stops, patience);
+        ends.unite_within(&entered, patience);
+        ends.unite_within(&sooner, patience);
         let mut barred = stops;
-        barred.subtract(&entered);
-        barred.unite(bad);
-        let mut all = past::predecessors(&ends, &barred, &ClockSet::EMPTY);
-        all.unite(&now);
+        barred.subtract_within(&entered, patience);
+        barred.unite_within(bad, patience);
+        let mut all = past::predecessors_within(&ends, &barred, &ClockSet::EMPTY, patience);
+        all.unite_within(&now, patience);
         all
     }
 }

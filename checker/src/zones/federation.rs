@@ -104,6 +104,16 @@ impl Federation {
             .fold(false, |is_new, zone| self.add(zone) | is_new)
     }
 
+    /// As [`Federation::unite`], with limited patience.
+    pub fn unite_within(&mut self, other: &Federation, patience: &mut Patience<'_>) {
+        for zone in other.zones() {
+            if patience.ends_through(self.zone_count()) {
+                return;
+            }
+            self.add(zone);
+        }
+    }
+
     /// Whether the valuation is in the federation; see [`dbm::contains`].
     pub fn contains(&self, numerators: &[i64], denominator: i64) -> bool {
         self.zones()
@@ -141,7 +151,7 @@ impl Federation {
             }
             let mut part = self.clone();
             part.intersect_zone(zone);
-            result.unite(&part);
+            result.unite_within(&part, patience);
         }
         result
     }
@@ -244,14 +254,25 @@ impl Federation {
 
     /// Whether every valuation of the zone is in the federation; exact.
     pub fn includes_zone(&self, zone: &[Bound]) -> bool {
+        self.includes_zone_within(zone, &mut Patience::endless())
+    }
+
+    /// As [`Federation::includes_zone`], with limited patience.
+    pub fn includes_zone_within(&self, zone: &[Bound], patience: &mut Patience<'_>) -> bool {
         dbm::is_empty(zone)
             || self.zones().any(|other| dbm::is_subset(zone, other))
-            || is_covered(zone, &self.bounds, self.dimension)
+            || is_covered(zone, &self.bounds, self.dimension, patience)
     }
 
     /// Whether every valuation of this federation is in the other; exact.
     pub fn is_subset(&self, other: &Federation) -> bool {
-        self.zones().all(|zone| other.includes_zone(zone))
+        self.is_subset_within(other, &mut Patience::endless())
+    }
+
+    /// As [`Federation::is_subset`], with limited patience.
+    pub fn is_subset_within(&self, other: &Federation, patience: &mut Patience<'_>) -> bool {
+        let mut zones = self.zones();
+        zones.all(|zone| other.includes_zone_within(zone, patience))
     }
 
     /// Whether the two are the same set; exact.
@@ -312,9 +333,12 @@ impl Federation {
     }
 
     /// Removes every zone that a single other one contains. Quadratic in the number of zones.
-    pub fn remove_included(&mut self) {
+    fn remove_included(&mut self, patience: &mut Patience<'_>) {
         let zones = std::mem::take(&mut self.bounds);
         for zone in zones.chunks_exact(self.size()) {
+            if patience.ends_through(self.zone_count()) {
+                return;
+            }
             self.add(zone);
         }
     }
@@ -338,7 +362,7 @@ impl Federation {
 
     /// As [`Federation::merge`], with limited patience.
     pub fn merge_within(&mut self, patience: &mut Patience<'_>) {
-        self.remove_included();
+        self.remove_included(patience);
         self.join_pairs(patience);
     }
 
@@ -378,7 +402,7 @@ impl Federation {
                 .bounds
                 .drain(index * size..(index + 1) * size)
                 .collect();
-            if !self.includes_zone(&zone) {
+            if !self.includes_zone_within(&zone, patience) {
                 self.bounds.splice(index * size..index * size, zone);
                 index += 1;
             }
@@ -533,14 +557,23 @@ fn is_contradiction(constraints: &[Constraint]) -> bool {
 }
 
 /// Whether the zones, one after the other in `cover`, contain the whole zone.
-fn is_covered(zone: &[Bound], cover: &[Bound], dimension: usize) -> bool {
+fn is_covered(
+    zone: &[Bound],
+    cover: &[Bound],
+    dimension: usize,
+    patience: &mut Patience<'_>,
+) -> bool {
+    if patience.ends_through(cover.len() / (dimension * dimension)) {
+        return false;
+    }
     let mut cover = cover;
     while let Some((first, others)) = cover.split_at_checked(dimension * dimension) {
         if dbm::is_subset(zone, first) {
             return true;
         }
         if !dbm::are_apart(zone, first, dimension) {
-            let mut is_part_covered = |part: &[Bound]| is_covered(part, others, dimension);
+            let mut is_part_covered =
+                |part: &[Bound]| is_covered(part, others, dimension, patience);
             return Subtrahend::new(first, dimension).subtract_from(zone, &mut is_part_covered);
         }
         cover = others;

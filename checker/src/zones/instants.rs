@@ -9,18 +9,38 @@
 //! Cost: one closing for each zone.
 
 use super::federation::Federation;
-use super::{Bound, ClockSet, dbm};
+use super::{Bound, ClockSet, Patience, dbm};
 
 /// The valuations from which every small enough delay leads into the federation.
 #[must_use]
 pub fn before(federation: &Federation, stopped: &ClockSet) -> Federation {
-    moved(federation, stopped, &weak, &strict)
+    before_within(federation, stopped, &mut Patience::endless())
+}
+
+/// As [`before`], with limited patience.
+#[must_use]
+pub fn before_within(
+    federation: &Federation,
+    stopped: &ClockSet,
+    patience: &mut Patience<'_>,
+) -> Federation {
+    moved(federation, stopped, (&weak, &strict), patience)
 }
 
 /// The valuations that every small enough delay has just led out of the federation, or on within it.
 #[must_use]
 pub fn after(federation: &Federation, stopped: &ClockSet) -> Federation {
-    moved(federation, stopped, &strict, &weak)
+    after_within(federation, stopped, &mut Patience::endless())
+}
+
+/// As [`after`], with limited patience.
+#[must_use]
+pub fn after_within(
+    federation: &Federation,
+    stopped: &ClockSet,
+    patience: &mut Patience<'_>,
+) -> Federation {
+    moved(federation, stopped, (&strict, &weak), patience)
 }
 
 fn weak(bound: Bound) -> Bound {
@@ -43,13 +63,16 @@ fn strict(bound: Bound) -> Bound {
 fn moved(
     federation: &Federation,
     stopped: &ClockSet,
-    from_below: &dyn Fn(Bound) -> Bound,
-    from_above: &dyn Fn(Bound) -> Bound,
+    (from_below, from_above): (&dyn Fn(Bound) -> Bound, &dyn Fn(Bound) -> Bound),
+    patience: &mut Patience<'_>,
 ) -> Federation {
     let dimension = federation.dimension();
     let mut result = Federation::empty(dimension);
     let mut moved = Vec::new();
     for zone in federation.zones() {
+        if patience.ends_through(result.zone_count() + 1) {
+            break;
+        }
         moved.clear();
         moved.extend_from_slice(zone);
         for running in (1..dimension).filter(|clock| !stopped.contains(*clock)) {

@@ -51,7 +51,8 @@ pub fn predecessors_within(
             }
             // Where the pasts do not meet, this bad zone forbids nothing.
             if !dbm::are_apart(&good.past, &bad.past, dimension) {
-                lost.unite(&lost_to(&good, bad, dimension, stopped));
+                let lost_to_it = lost_to(&good, bad, dimension, stopped);
+                lost.unite_within(&lost_to_it, patience);
             }
         }
         if lost.zone_count() > WORTH_REDUCING {
@@ -59,7 +60,7 @@ pub fn predecessors_within(
         }
         let mut safe = Federation::of_zone(dimension, &good.past);
         safe.subtract_within(&lost, patience);
-        result.unite(&safe);
+        result.unite_within(&safe, patience);
     }
     result
 }

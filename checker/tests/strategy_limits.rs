@@ -1,0 +1,58 @@
+//! Limits that come while a strategy is made: what is known is answered, and why there is no strategy is said.
+
+use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+
+#[path = "common/games.rs"]
+mod games;
+
+use games::{ONE_ON_THE_BRIDGE, trains};
+
+fn check(text: &str, query: &str, limits: Limits) -> Answer {
+    let mut model = LoadedModel::load("trains.xta", text.as_bytes())
+        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        strategy: true,
+        limits,
+        ..Options::default()
+    };
+    let query = model.add_query(query);
+    model
+        .check(&query, &options)
+        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
+}
+
+#[test]
+fn memory_ends_a_strategy_and_not_the_answer() {
+    // Of each kind of strategy some: permissive, seeking, evading, with a goal that comes again and one that is denied, after a way, and
+    // from anywhere.
+    let queries = [
+        ONE_ON_THE_BRIDGE,
+        "control: A<> Train(0).Stopped",
+        "control: A<> Train(0).Bridge && Train(1).Bridge",
+        "control: A[] not Train(0).Near",
+        "control: A[] (true && A<> not Train(0).Bridge)",
+        "control: A[] (not Train(0).Near && A<> Train(1).Stopped)",
+        "E<> control: A<> Train(0).Stopped && Train(1).Bridge",
+        "E<> control: A[] not Train(0).Near && Train(0).Bridge",
+    ];
+    let mut lost = 0;
+    for query in queries {
+        for text in [trains(3, "->"), trains(3, "-u->")] {
+            let whole = check(&text, query, Limits::default());
+            assert!(whole.evidence.strategy.is_some(), "{query}");
+            lost += u32::from(whole.verdict == Verdict::NotSatisfied);
+            // The most memory is taken when a strategy is nearly finished.
+            let limits = Limits {
+                memory_bytes: Some(whole.peak_bytes),
+                ..Limits::default()
+            };
+            let answer = check(&text, query, limits);
+            assert_eq!(answer.verdict, whole.verdict, "{query}");
+            assert!(answer.evidence.strategy.is_none(), "{query}");
+            let reason = "no strategy: the search for it was stopped by the limit of memory";
+            assert_eq!(answer.message.as_deref(), Some(reason), "{query}");
+        }
+    }
+    assert!((4..=12).contains(&lost), "{lost} of 16 are lost");
+}
