@@ -188,7 +188,7 @@ impl Checker<'_> {
             Type::Constraint(Class::InvariantWithRate),
             span,
         );
-        if hybrid {
+        if hybrid && !self.is_query {
             // Nothing depends on a hybrid clock, so its rate may depend on anything.
             self.unknowns.truncate(before);
             return nothing;
