@@ -27,7 +27,7 @@ demo: $(INSTALLED) ## Run the main job on the paper's environment; results in de
 	$(BIN)/ntagen compile examples/paper.nsl -o demo
 	$(BIN)/ntagen check examples/paper.nsl --plans demo/plans.json
 	$(BIN)/ntagen plot examples/paper.nsl -o demo/scene.png --plans 10
-	$(BIN)/ntagen drive examples/paper.nsl --seed 1 --log demo/run.mcap
+	$(BIN)/ntagen drive examples/paper.nsl --log demo/run.mcap
 	@printf '%s\n' '' \
 	  'What happened: the environment became a UPPAAL model; both queries of the paper were checked on it;' \
 	  'all plans were ranked; a virtual needle was steered to the target by measuring and planning anew.' \

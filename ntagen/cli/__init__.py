@@ -100,7 +100,7 @@ def _ntagen() -> None:
       ntagen check examples/paper.nsl
       ntagen check model.xml --query "E<> Gate.Open" --trace -
       ntagen info model.xml
-      ntagen drive examples/paper.nsl --seed 1 --log run.mcap
+      ntagen drive examples/paper.nsl --log run.mcap
 
     `ntagen COMMAND --help` tells more about a command.
     """  # noqa: D301  click wants the control character

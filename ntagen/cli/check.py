@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli import INTERNAL_ERROR
-from ntagen.cli.effects import idle_options, unwritten
+from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import (
     load_model,
@@ -354,7 +354,7 @@ def command(
             else:
                 _row(answer, query, notes, trace_is_written=trace is not None)
             worst = max(worst, _severity(answer), key=_SEVERITIES.index)
-    _say(unwritten(outputs.wanted(), outputs.written))
+    say(unwritten(outputs.wanted(), outputs.written))
     return worst
 
 
@@ -366,15 +366,8 @@ def _check_ranking(text: str) -> None:
 
 def _say_idle_options(queries: Sequence[str], *, is_environment: bool) -> None:
     """Says which options of the command line make no difference."""
-    context = click.get_current_context()
-    source = click.core.ParameterSource.COMMANDLINE
-    given = [name for name in context.params if context.get_parameter_source(name) is source]
-    _say(idle_options(given, context.params, queries, ranks=is_environment))
-
-
-def _say(notes: Sequence[str]) -> None:
-    for note in notes:
-        click.echo(f"note: {note}", err=True)
+    values = click.get_current_context().params
+    say(idle_options(given_options(), values, queries, ranks=is_environment))
 
 
 _SEVERITIES: Final = (0, 1, STOPPED, MODEL_ERROR, InputError.exit_code)

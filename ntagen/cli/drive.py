@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from ntagen.cli.effects import say_idle
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -125,7 +127,7 @@ def command(
 
     \b
     Examples:
-      ntagen drive examples/paper.nsl --seed 1 --log run.mcap
+      ntagen drive examples/paper.nsl --log run.mcap
       ntagen drive examples/paper.nsl --seed 1 --noise 0.1 --known none
     """  # noqa: D301  click wants the control character
     from ntagen.drive.settings import Settings
@@ -136,6 +138,10 @@ def command(
     from ntagen.units import rad_from_deg
 
     _require_virtual(needle)
+    if not (noise_mm or roll_error_deg):
+        say_idle({"seed": "--seed"}, "without --noise or --roll-error: it is that of the errors")
+    if as_json:
+        say_idle({"quiet": "--quiet"}, "with --json")
     scene, warnings = load_with_warnings(environment)
     for warning in warnings:
         click.echo(warning.render(), err=True)

@@ -1,4 +1,4 @@
-"""What `ntagen check` was told in vain: idle options, and files that nobody wrote."""
+"""What commands were told in vain: idle options, and files that nobody wrote."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Final
+
+import click
 
 _SYMBOLIC_ONLY: Final = {
     "symmetry": "--symmetry has no effect here: games tell all members of scalar sets apart",
@@ -57,9 +59,16 @@ def idle_options(
         notes.append("--shortest and --fastest have no effect without --trace")
     if not any(is_game(query) or re.search(r"\bunder\b", query) for query in queries):
         notes += [note for name, note in _GAMES_ONLY.items() if name in given]
-    if "threads" in given and all(query.lstrip().startswith("{") for query in queries):
+    if "threads" in given and not any(_takes_threads(query, values) for query in queries):
         notes.append(
-            "--threads has no effect here: games under partial observation take one thread"
+            "--threads has no effect here: games under partial observation take one thread, and so "
+            "do E[], A<> and -->, and searches that are not breadth first"
+        )
+    keeps_values = any(values[name] for name in ("strategy", "controller", "plans", "verify"))
+    if "live_variables" in given and keeps_values and all(is_game(query) for query in queries):
+        notes.append(
+            "--live-variables has no effect here: strategies and plans are about states with all "
+            "their values"
         )
     if "seed" in given and values["search"] != "random":
         notes.append("--seed has no effect without --search random")
@@ -70,6 +79,38 @@ def idle_options(
     elif "ranking" in given and not ranks:
         notes.append("--rank has no effect here: only plans of environments (.nsl) are ranked")
     return notes
+
+
+def _takes_threads(query: str, values: Mapping[str, object]) -> bool:
+    """Whether more than one thread can share the work of a query."""
+    if is_game(query):
+        return not query.lstrip().startswith("{")
+    is_liveness = re.match(r"\s*(E\s*\[|A\s*<)", query) or "-->" in query
+    return values["search"] == "bfs" and not is_liveness
+
+
+def given_options() -> list[str]:
+    """The names of the parameters that stand on the command line."""
+    context = click.get_current_context()
+    source = click.core.ParameterSource.COMMANDLINE
+    return [name for name in context.params if context.get_parameter_source(name) is source]
+
+
+def say_idle(options: Mapping[str, str], why: str) -> None:
+    """Says of those of some options that stand on the command line that they have no effect.
+
+    Args:
+        options: By parameter: the option.
+        why: Why, after the words "has no effect".
+    """
+    given = given_options()
+    say([f"{option} has no effect {why}" for name, option in options.items() if name in given])
+
+
+def say(notes: Sequence[str]) -> None:
+    """Says something about the command line, on standard error."""
+    for note in notes:
+        click.echo(f"note: {note}", err=True)
 
 
 def unwritten(wanted: Mapping[str, str | Path | None], written: Collection[str]) -> list[str]:

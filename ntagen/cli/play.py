@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, ParamSpec
 
 import click
 
+from ntagen.cli.effects import say_idle
 from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
@@ -125,6 +126,11 @@ def command(
     """  # noqa: D301  click wants the control character
     if strategy_path and asked:
         raise InputError("give either --strategy or --query: the file says which query it answers")
+    if steps is None:
+        say_idle({"seed": "--seed"}, "without --auto")
+    if strategy_path:
+        idle = {"states": "--states", "memory": "--memory", "timeout": "--timeout"}
+        say_idle(idle, "with --strategy: nothing is synthesised")
     with pointing_to_explanations(True):
         model = load_model(model_path).model
         if strategy_path:

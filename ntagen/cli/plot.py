@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from ntagen.cli.effects import say_idle
+
 if TYPE_CHECKING:
     from ntagen.plot.picture import Picture
 
@@ -59,6 +61,10 @@ def command(source: Path, output: Path | None, shown: int, ranking: str) -> None
     from ntagen.plot.save import format_of, save
 
     criteria = parse_ranking(ranking)
+    if _is_log(source):
+        say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked when it was driven")
+    elif shown == 0:
+        say_idle({"ranking": "--rank"}, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
     format_of(path)
     picture = _of_run(source, shown) if _is_log(source) else _of_scene(source, shown, criteria)

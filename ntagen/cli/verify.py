@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, Final
 
 import click
 
+from ntagen.cli.effects import say_idle
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError
@@ -16,6 +18,9 @@ VIOLATED: Final = 1
 
 NOT_COVERED: Final = 3
 """Exit code where the check does not cover the model or the query."""
+
+_WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certificate)"')
+"""How a file begins whose check does not hang on the rules of games."""
 
 
 @click.command(
@@ -53,7 +58,12 @@ def command(
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(True):
         loaded = load_model(model_path)
-        checked = loaded.model.verify(_read(file), str(file), forced=forced, priorities=priorities)
+        text = _read(file)
+        checked = loaded.model.verify(text, str(file), forced=forced, priorities=priorities)
+    kind = _WITHOUT_RULES.match(text)
+    if kind:
+        idle = {"forced": "--forced", "priorities": "--priorities"}
+        say_idle(idle, f"here: it is a rule for strategies, and this is a {kind[1]}")
     for line in checked.lines:
         click.echo(line)
     return {True: 0, False: VIOLATED, None: NOT_COVERED}[checked.holds]

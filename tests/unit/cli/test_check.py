@@ -476,6 +476,13 @@ system P;
         ("E<> P.There", ["--forced", "neutral"], "--forced has no effect here"),
         ("E<> P.There", ["--priorities", "keep"], "--priorities has no effect here"),
         ("E<> P.There", ["--seed", "3"], "--seed has no effect without --search random"),
+        ("E<> P.There", ["--search", "dfs", "--threads", "2"], "--threads has no effect here"),
+        ("E[] not P.Lost", ["--threads", "2"], "--threads has no effect here"),
+        (
+            "control: A<> P.There",
+            ["--verify", "--live-variables", "off"],
+            "--live-variables has no effect here: strategies",
+        ),
         ("control: A<> P.There", ["--max-plans", "3"], "--max-plans has no effect without"),
         ("control: A<> P.There", ["--rank", "rolls"], "--rank has no effect without --plans"),
     ],

@@ -51,7 +51,9 @@ def test_drive_ends_at_the_time_limit(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["drive", PAPER, "--json", "--seed", "3", "--known", "none"]) == 0
+    assert (
+        main(["drive", PAPER, "--json", "--seed", "3", "--noise", "0.01", "--known", "none"]) == 0
+    )
     out, err = capsys.readouterr()
     summary = json.loads(out)
     assert out.count("\n") == 1
@@ -137,3 +139,19 @@ def test_plot_refuses_bad_input(
     capsys: pytest.CaptureFixture[str], says: str, arguments: list[str]
 ) -> None:
     check_refused(capsys, says, "plot", *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["drive", PAPER, "--seed", "1", "--quiet"], "--seed has no effect without --noise or"),
+        (["drive", PAPER, "--json", "--quiet"], "--quiet has no effect with --json"),
+        (["plot", PAPER, "--plans", "0", "--rank", "rolls"], "--rank has no effect with --plans 0"),
+    ],
+)
+def test_options_without_an_effect_are_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: list[str], said: str
+) -> None:
+    output = ["-o", str(tmp_path / "scene.svg")] if arguments[0] == "plot" else []
+    assert main([*arguments, *output]) == 0
+    assert f"note: {said}" in capsys.readouterr().err

@@ -45,6 +45,10 @@ class Player:
         self._capsys = capsys
         self._monkeypatch = monkeypatch
 
+    def silence(self) -> None:
+        """Types nothing."""
+        self._monkeypatch.setattr(sys, "stdin", io.StringIO())
+
     def __call__(self, *arguments: str | Path, lines: str = "", code: int = 0) -> str:
         self._monkeypatch.setattr(sys, "stdin", io.StringIO(lines))
         assert main(["play", *map(str, arguments)]) == code
@@ -158,6 +162,21 @@ def test_chance_plays_the_same_with_the_same_seed(machine: Path, player: Player)
     first = player(*arguments, "--seed", "3")
     assert first == player(*arguments, "--seed", "3")
     assert len({player(*arguments, "--seed", str(seed)) for seed in range(5)}) > 1
+
+
+def test_options_without_an_effect_are_named(
+    machine: Path, tmp_path: Path, player: Player, capsys: pytest.CaptureFixture[str]
+) -> None:
+    strategy = str(tmp_path / "safe.json")
+    assert main(["check", str(machine), "--query", SAFE, "--strategy", strategy]) == 0
+    capsys.readouterr()
+    assert main(["play", str(machine), "--strategy", strategy, "--auto", "2", "--seed", "3"]) == 0
+    assert capsys.readouterr().err == ""
+    player.silence()
+    assert main(["play", str(machine), "--strategy", strategy, "--seed", "3", "--states", "9"]) == 0
+    err = capsys.readouterr().err
+    assert "note: --seed has no effect without --auto\n" in err
+    assert "note: --states has no effect with --strategy: nothing is synthesised\n" in err
 
 
 def test_wrong_strategy_is_defeated(machine: Path, tmp_path: Path, player: Player) -> None:

@@ -205,3 +205,19 @@ def test_strategy_of_another_query_or_model_is_rejected(
     check_exit(2, "verify", lamp, path)
     said = capsys.readouterr().err
     assert "strategy.json: at states[0].locations: the model's process Lamp" in said
+
+
+def test_rules_without_an_effect_are_named(
+    lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace, certificate = tmp_path / "trace.json", tmp_path / "safe.jsonl"
+    strategy = tmp_path / "strategy.json"
+    check_exit(0, "check", lamp, "--query", "E<> Lamp.Dim", "--trace", trace)
+    check_exit(0, "check", lamp, "--query", "A[] x >= 0", "--certificate", certificate)
+    check_exit(0, "check", lamp, "--query", "control: A[] not Lamp.Dim", "--strategy", strategy)
+    capsys.readouterr()
+    for file, kind in ((trace, "trace"), (certificate, "certificate"), (strategy, None)):
+        check_exit(0, "verify", lamp, file, "--forced", "tiga")
+        err = capsys.readouterr().err
+        note = f"--forced has no effect here: it is a rule for strategies, and this is a {kind}"
+        assert err == (f"note: {note}\n" if kind else "")
