@@ -1,6 +1,11 @@
-//! Of several ways to evade, a verdict needs one: the others are explored only where the seeker wins against those before.
+//! Of several ways to evade, a verdict needs one: the others are explored only where the seeker wins against those before. Where time
+//! passes, the evader may wait: no way is explored before there is something to evade.
 
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
+use checker::game::Nodes;
+
+#[path = "common/games.rs"]
+mod games;
 
 /// Every round the controller gives and the environment takes, both up to four.
 const TEXT: &str = "
@@ -21,11 +26,19 @@ system Store;
 /// Whether the controller wins if it tries gifts in this order, and how many states were explored for it.
 fn asked(order: &str, query: &str, verify: bool) -> (bool, u64) {
     let text = TEXT.replace("ORDER", order);
-    let mut model = LoadedModel::load("store.xta", text.as_bytes()).expect("it is accepted");
     let options = Options {
-        code: CodeEngine::Interpreter,
         verify,
         ..Options::default()
+    };
+    asked_of(&text, query, options)
+}
+
+/// Whether the controller wins, and how many states were explored for it.
+fn asked_of(text: &str, query: &str, options: Options) -> (bool, u64) {
+    let mut model = LoadedModel::load("model.xta", text.as_bytes()).expect("it is accepted");
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        ..options
     };
     let query = model.add_query(query);
     let answer = model.check(&query, &options).expect("it is answered");
@@ -80,6 +93,72 @@ fn losses_that_come_late_are_found() {
             assert!(!is_safe, "{order}");
             let (is_safe, _) = asked(order, "control: A[] stock <= 40", verify);
             assert!(is_safe, "{order}");
+        }
+    }
+}
+
+#[test]
+fn while_time_passes_moves_are_explored_as_they_are_needed() {
+    for (trains, nodes) in [(3, Nodes::Symbolic), (4, Nodes::Discrete)] {
+        let text = games::trains(trains, "-u->");
+        let query = games::ONE_ON_THE_BRIDGE;
+        let options = |strategy| Options {
+            strategy,
+            nodes,
+            ..Options::default()
+        };
+        let (is_safe, explored) = asked_of(&text, query, options(false));
+        let (is_still_safe, of_all) = asked_of(&text, query, options(true));
+        assert!(is_safe && is_still_safe, "{trains} trains");
+        assert!(2 * explored < of_all, "{trains}: {explored} of {of_all}");
+    }
+}
+
+/// An attacker that strikes three time units after it has begun, at the earliest, and a shield that takes a while to go up and only does
+/// so during an attack. Decoys move now and then, without any effect.
+const SHIELD: &str = "
+const int DECOYS = 1;
+typedef int[0, DECOYS - 1] decoy_t;
+bool is_up, attacks;
+process Decoy(const decoy_t id) {
+  clock z;
+  state Left, Right;
+  init Left;
+  trans Left -> Right { guard z >= 1; assign z = 0; }, Right -> Left { guard z >= 1; assign z = 0; };
+}
+process Attacker() {
+  clock x;
+  state Calm, Charging { x <= 5 }, Struck, Repelled;
+  init Calm;
+  trans Calm -u-> Charging { assign x = 0, attacks = true; },
+        Charging -u-> Struck { guard x >= 3 && !is_up; },
+        Charging -u-> Repelled { guard x >= 3 && is_up; };
+}
+process Shield() {
+  clock y;
+  state Down, Rising { y <= TIME }, Up;
+  init Down;
+  trans Down -> Rising { guard attacks; assign y = 0; },
+        Rising -u-> Up { guard y >= TIME; assign is_up = true; };
+}
+system Decoy, Attacker, Shield;
+";
+
+#[test]
+fn moves_help_that_have_nothing_in_common_with_the_attack() {
+    for (time, expected) in [(1, true), (2, true), (3, false), (4, false)] {
+        let text = SHIELD.replace("TIME", &time.to_string());
+        for nodes in [Nodes::Symbolic, Nodes::Discrete] {
+            for verify in [false, true] {
+                let query = "control: A[] not Attacker.Struck";
+                let options = Options {
+                    verify,
+                    nodes,
+                    ..Options::default()
+                };
+                let (is_safe, _) = asked_of(&text, query, options);
+                assert_eq!(is_safe, expected, "a shield that takes {time}");
+            }
         }
     }
 }

@@ -15,6 +15,8 @@ fn played(nodes: Nodes) -> Answer {
         LoadedModel::load("plates.xta", plates(4, [8, 10, 9]).as_bytes()).expect("it is accepted");
     let options = Options {
         nodes,
+        // So all that the controller may do is explored; for a verdict few states are.
+        strategy: true,
         code: CodeEngine::Interpreter,
         limits: Limits {
             timeout: Some(Duration::from_mins(10)),

@@ -89,6 +89,7 @@ impl Solver<'_, '_, '_> {
             + self.has_hope.len()
             + (self.updates.capacity() + self.deferred.capacity()) * size_of::<u32>()
             + self.frontier.bytes()
+            + self.defences.bytes()
             + table_bytes::<(u32, Federation)>(self.rest.capacity());
         self.graph.bytes()
             + self.repeats.bytes()

@@ -2,10 +2,10 @@
 //!
 //! When only a verdict is wanted, a single way to evade is enough. So where time does not pass, and the evader has moves that lead
 //! on from everywhere, one of these after the other is explored, in the order of moves: the next one when the seeker has won
-//! something of all before. The others are in *reserve*.
+//! something of all before. The others are in *reserve*. Where time passes, moves are held back instead: see [`super::defences`].
 //!
-//! The nodes *in play* are those that play gets to by moves of the seeker, and by those of the evader that are not in reserve; it
-//! does not go on where the seeker has won everything, or has no hope ([`super::hopes`]). Only they need to be explored. If all of
+//! The nodes *in play* are those that play gets to by moves of the seeker, and by those of the evader that are neither in reserve
+//! nor held back; it does not go on where the seeker has won everything, or has no hope ([`super::hopes`]). Only they need to be explored. If all of
 //! them are, and no wins are to be computed any more, but the initial valuation is not won, then the evader wins. For in the game in
 //! which it never moves to what is in reserve, what the seeker wins of the nodes in play follows from what it wins of each other,
 //! and it wins nothing that is not known; and more moves do the evader no harm.
@@ -14,7 +14,10 @@ use super::graph::Edge;
 use super::reach::{Solver, Win};
 
 /// So many nodes may be looked at for each explored state to find those in play; if that is not enough, reserves do not pay.
-const MOST_LOOKS: u64 = 16;
+const MOST_LOOKS: u64 = 32;
+
+/// States that are counted beside those that are explored, for that.
+const STATES_OF_GRACE: u64 = 1 << 10;
 
 /// The nodes of which some that the evader may move to are kept in reserve.
 #[derive(Debug, Default)]
@@ -96,16 +99,17 @@ impl Solver<'_, '_, '_> {
     /// Lets the unexplored nodes wait that are in play, and no others; returns by node whether it is in play.
     pub(super) fn wait_for_nodes_in_play(&mut self) -> Vec<bool> {
         let reserve = &mut self.frontier.reserve;
-        reserve.looks += self.graph.nodes.len() as u64;
-        if reserve.looks > MOST_LOOKS * self.graph.explored {
+        if reserve.looks > MOST_LOOKS * (self.graph.explored + STATES_OF_GRACE) {
             reserve.is_kept = false;
             reserve.sources.fill(false);
+            self.defences.release();
         }
         let mut is_in_play = vec![false; self.graph.nodes.len()];
         is_in_play[0] = true;
         let mut stack = vec![0];
         let mut unexplored = Vec::new();
         while let Some(node) = stack.pop() {
+            self.frontier.reserve.looks += 1;
             if self.is_unexplored(node) {
                 unexplored.push(node);
             }
@@ -116,7 +120,8 @@ impl Solver<'_, '_, '_> {
             let chosen = has_reserve.then(|| self.chosen(node)).flatten();
             for index in self.graph.edges_of(node) {
                 let edge = &self.graph.edges[index];
-                let is_left = has_reserve && self.is_evasion(edge) && chosen != Some(edge.target);
+                let is_left = has_reserve && self.is_evasion(edge) && chosen != Some(edge.target)
+                    || self.defences.holds(index);
                 if !is_left && !std::mem::replace(&mut is_in_play[edge.target as usize], true) {
                     stack.push(edge.target);
                 }
@@ -138,11 +143,11 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    fn is_unexplored(&self, node: u32) -> bool {
+    pub(super) fn is_unexplored(&self, node: u32) -> bool {
         !self.graph.nodes[node as usize].is_expanded && !self.is_decided(node)
     }
 
-    fn is_evasion(&self, edge: &Edge) -> bool {
+    pub(super) fn is_evasion(&self, edge: &Edge) -> bool {
         !self.seeker.owns(edge.controllable)
     }
 }

@@ -151,6 +151,7 @@ impl Solver<'_, '_, '_> {
         let edges = self.graph.edges_of(node);
         let first = edges.start + self.frontier.random.below(edges.len().max(1));
         let has_reserve = self.begin_reserve(node);
+        let is_held = !has_reserve && self.hold_back(node)?;
         let turns: &[Option<bool>] = if self.frontier.is_impartial {
             &[None]
         } else {
@@ -164,7 +165,7 @@ impl Solver<'_, '_, '_> {
                     ..
                 } = self.graph.edges[edge];
                 let is_own = self.seeker.owns(controllable);
-                if (is_own || !has_reserve) && turn.is_none_or(|it| it == is_own) {
+                if (is_own || !has_reserve && !is_held) && turn.is_none_or(|it| it == is_own) {
                     self.wait_for(target);
                 }
             }

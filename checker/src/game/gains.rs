@@ -105,6 +105,25 @@ impl Solver<'_, '_, '_> {
 
     /// Records what a node gains.
     fn record(&mut self, node: u32, win: Win, part: Option<Federation>) {
+        if !self.schedule.is_running {
+            self.note_gain(node, part);
+        }
+        if self.frontier.reserve.is_used || self.schedule.is_running {
+            self.note_attackers(node);
+        }
+        self.replace_win(node as usize, win);
+        let mut edge = self.graph.nodes[node as usize].first_in;
+        while edge != NONE {
+            let Edge {
+                source, next_in, ..
+            } = self.graph.edges[edge as usize];
+            self.mark(source);
+            edge = next_in;
+        }
+    }
+
+    /// Records what a node gains with a new stamp.
+    fn note_gain(&mut self, node: u32, part: Option<Federation>) {
         self.stamp += 1;
         let gains = &mut self.gains[node as usize];
         // Most nodes gain once.
@@ -121,15 +140,6 @@ impl Solver<'_, '_, '_> {
         let is_first = gains.len() == 1;
         self.gained_bytes += (bytes(gains.capacity()) + part_bytes) as u64;
         self.gained_bytes -= if is_first { 0 } else { bytes(room) as u64 };
-        self.replace_win(node as usize, win);
-        let mut edge = self.graph.nodes[node as usize].first_in;
-        while edge != NONE {
-            let Edge {
-                source, next_in, ..
-            } = self.graph.edges[edge as usize];
-            self.mark(source);
-            edge = next_in;
-        }
     }
 
     /// The valuations of an edge's source from which it leads into the given valuations of its target.

@@ -98,8 +98,10 @@ pub struct Edge {
     pub program: ProgramId,
     /// The index of the first move among the moves of the source.
     pub ordinal: u32,
+    /// The processes that take part in the first move, a bit for each; those with the same index modulo 32 share one.
+    pub movers: u32,
     /// How many moves it stands for.
-    pub length: u32,
+    pub length: u8,
     /// Whether the controller owns the first move.
     pub controllable: bool,
     /// Whether it leads from every valuation of the source into the target.
@@ -169,6 +171,7 @@ pub(super) struct Origin {
     /// The index of the first move.
     pub(super) ordinal: u32,
     controllable: bool,
+    movers: u32,
 }
 
 impl<'s, 'a> Graph<'s, 'a> {
@@ -489,11 +492,13 @@ impl<'s, 'a> Graph<'s, 'a> {
         let delays = self.symbolic.may_delay_with(words, moves)?;
         let first = self.edges.len() as u32;
         for ordinal in 0..moves.len() as u32 {
-            let controllable = moves.get(ordinal as usize).controllable;
+            let one = moves.get(ordinal as usize);
+            let processes = one.parts.iter().map(|part| part.process % u32::BITS);
             let origin = Origin {
                 node,
                 ordinal,
-                controllable,
+                controllable: one.controllable,
+                movers: processes.fold(0, |all, process| all | 1 << process),
             };
             let mut target = std::mem::take(&mut self.target);
             target.copy_from_slice(words);
@@ -715,6 +720,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             node: source,
             ordinal,
             controllable,
+            movers,
         } = origin;
         let edge = self.edges.len() as u32;
         let next_in = std::mem::replace(&mut self.nodes[target as usize].first_in, edge);
@@ -724,7 +730,8 @@ impl<'s, 'a> Graph<'s, 'a> {
             next_in,
             program,
             ordinal,
-            length,
+            movers,
+            length: length as u8,
             controllable,
             is_total,
         });

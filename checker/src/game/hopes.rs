@@ -95,7 +95,7 @@ impl Solver<'_, '_, '_> {
     }
 
     /// Whether time may come to a stop in an expanded node.
-    fn may_stop(&self, node: u32) -> bool {
+    pub(super) fn may_stop(&self, node: u32) -> bool {
         !self.graph.nodes[node as usize].delays
             || self.graph.urgent(node).is_some()
             || self.graph.is_delay_bounded(node)

@@ -55,24 +55,37 @@ impl Solver<'_, '_, '_> {
         situation: &Situation,
         patience: &mut Patience<'_>,
     ) -> Federation {
-        let mut won = match self.seeker {
-            Player::Controller => self.controllers_gain(node, situation, patience),
-            Player::Environment => self.environments_gain(node, situation, patience),
+        self.winnable_without(node, situation, &[], patience).0
+    }
+
+    /// The valuations of a node that are won if the evader does not use the edges that are held back, and those in which it does not matter
+    /// what it uses.
+    pub(super) fn winnable_without(
+        &self,
+        node: u32,
+        situation: &Situation,
+        held: &[usize],
+        patience: &mut Patience<'_>,
+    ) -> (Federation, Federation) {
+        let (mut won, decided) = match self.seeker {
+            Player::Controller => self.controllers_gain(node, situation, held, patience),
+            Player::Environment => self.environments_gain(node, situation, held, patience),
         };
         match self.graph.urgent(node) {
             None => won.intersect_zone(self.graph.zone(node)),
             Some(urgent) => won = won.intersection(&urgent.reached),
         }
-        won
+        (won, decided)
     }
 
-    /// What the controller wins as the seeker, as far as known.
+    /// What the controller wins as the seeker, as far as known, and the goal.
     fn controllers_gain(
         &self,
         node: u32,
         situation: &Situation,
+        held: &[usize],
         patience: &mut Patience<'_>,
-    ) -> Federation {
+    ) -> (Federation, Federation) {
         let mut good = self.known(node);
         let goal = self.goal(node);
         let mut bad = self.broken(node);
@@ -81,7 +94,7 @@ impl Solver<'_, '_, '_> {
             if edge.controllable {
                 let before = self.before(&edge, &self.win[edge.target as usize]);
                 good.unite_within(&before, patience);
-            } else {
+            } else if !held.contains(&index) {
                 let spoiling = self.spoiling(&edge, patience);
                 bad.unite_within(&spoiling, patience);
             }
@@ -91,21 +104,25 @@ impl Solver<'_, '_, '_> {
         good.unite_within(&forced, patience);
         let mut won = self.safe_past(node, good, &bad, situation, patience);
         won.unite_within(&goal, patience);
-        won
+        (won, goal)
     }
 
-    /// What the environment wins as the seeker, as far as known.
+    /// What the environment wins as the seeker, as far as known, and what of it it has at once.
     fn environments_gain(
         &self,
         node: u32,
         situation: &Situation,
+        held: &[usize],
         patience: &mut Patience<'_>,
-    ) -> Federation {
+    ) -> (Federation, Federation) {
         let goal = self.goal(node);
         let mut now = self.broken(node);
         let mut escape = Federation::empty(self.graph.dimension());
         for index in self.graph.edges_of(node) {
             let edge = self.graph.edges[index];
+            if held.contains(&index) {
+                continue;
+            }
             if edge.controllable {
                 let spoiling = self.spoiling(&edge, patience);
                 escape.unite_within(&spoiling, patience);
@@ -121,7 +138,8 @@ impl Solver<'_, '_, '_> {
         good.unite_within(&self.known(node), patience);
         escape.subtract_within(&now, patience);
         escape.unite_within(&goal, patience);
-        self.safe_past(node, good, &escape, situation, patience)
+        let won = self.safe_past(node, good, &escape, situation, patience);
+        (won, now)
     }
 
     /// What was won in a node so far, as far as it is a part of it.

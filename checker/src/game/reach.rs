@@ -27,8 +27,9 @@
 //! valuations of one stamp into those of smaller ones makes progress. Where the seeker wins nowhere any more, the evader has only
 //! to stay outside of what is won.
 //!
-//! Forward, the solver dives ([`super::dives`]), and explores only as many moves of the evader as it needs ([`super::choices`]). From
-//! time to time it is looked whether the seeker may still win at all ([`super::hopes`]), so that both answers can come early.
+//! Forward, the solver dives ([`super::dives`]), and explores only as many moves of the evader as it needs ([`super::choices`],
+//! [`super::defences`]). From time to time it is looked whether the seeker may still win at all ([`super::hopes`], and with zones
+//! [`super::prospects`]), so that both answers can come early.
 //!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are. What
 //! takes zones is put off until the graph has grown by a part of itself, and goes round in turns: so a node meets what several of
@@ -47,9 +48,11 @@ use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::{Federation, Patience};
 
 use super::allowance::Allowance;
+use super::defences::Defences;
 use super::dives::Frontier;
 use super::gains::Gained;
 use super::graph::{Graph, Standing};
+use super::prospects::{Outlook, Schedule};
 use super::repeats::{Case, Repeats};
 use super::tasks::Task;
 use super::{Forced, Player};
@@ -159,6 +162,10 @@ pub struct Solver<'g, 's, 'a> {
     /// Nodes whose winning valuations are to be computed with zones; some may be settled meanwhile.
     pub(super) deferred: VecDeque<u32>,
     pub(super) pending: Vec<Pending>,
+    /// The moves that the evader holds back.
+    pub(super) defences: Defences,
+    /// When prospects are computed.
+    pub(super) schedule: Schedule,
     /// What was computed before.
     pub(super) repeats: Repeats,
     /// How many threads compute what nodes win.
@@ -209,6 +216,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             updates: VecDeque::new(),
             deferred: VecDeque::new(),
             pending: Vec::new(),
+            defences: Defences::default(),
+            schedule: Schedule::default(),
             next_computation: 0,
         };
         solver.adopt_new_nodes();
@@ -242,7 +251,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         loop {
             let explored = self.graph.explored;
             let is_dry = self.frontier.len() == 0;
-            let reason = if is_dry || explored >= self.next_computation {
+            let is_computed = is_dry || explored >= self.next_computation;
+            let reason = if is_computed {
                 self.next_computation = explored + explored / BETWEEN_COMPUTATIONS;
                 self.propagate(watch)?
             } else {
@@ -256,6 +266,13 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                     break;
                 }
                 let has_reserve = self.frontier.reserve.is_used;
+                if is_computed && self.is_prospect_due() {
+                    match self.look_ahead(watch)? {
+                        Outlook::Open | Outlook::Settled => {}
+                        Outlook::Hopeless => break,
+                        Outlook::Stopped(reason) => return Ok(Answer::Stopped(reason)),
+                    }
+                }
                 if explored >= next_hope && extent == Extent::Verdict {
                     if !self.has_hope() {
                         break;
@@ -277,8 +294,15 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 if has_reserve && self.frontier.len() == 0 {
                     let is_in_play = self.wait_for_nodes_in_play();
                     if is_dry && self.frontier.len() == 0 {
-                        self.keep_in_play(&is_in_play);
-                        break;
+                        match self.outlook(watch)? {
+                            Outlook::Open => {}
+                            Outlook::Hopeless => break,
+                            Outlook::Settled => {
+                                self.keep_in_play(&is_in_play);
+                                break;
+                            }
+                            Outlook::Stopped(reason) => return Ok(Answer::Stopped(reason)),
+                        }
                     }
                     continue;
                 }
@@ -315,6 +339,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         watch: &mut dyn Watch,
     ) -> Result<Option<StopReason>, Failure> {
         let mut until_look = COMPUTATIONS_BETWEEN_LOOKS;
+        self.count_hubs();
         loop {
             if let Some(reason) = self.propagate_words(watch) {
                 return Ok(Some(reason));
@@ -356,7 +381,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// The task to compute what a node wins; if it is a known case, that is recorded, and there is none.
     pub(super) fn task_of(&mut self, node: u32) -> Result<Option<Task>, Failure> {
         let key = match self.case_of(node)? {
-            Case::Known(gained) => {
+            Case::Known(gained, defence) => {
+                self.defend(node, &defence);
                 self.gain_computed(node, gained);
                 return Ok(None);
             }
@@ -374,7 +400,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     /// Records what a node gains that was computed.
     pub(super) fn gain_computed(&mut self, node: u32, gained: Gained) {
         self.gain(node, gained);
-        if !matches!(self.win[node as usize], Win::Everything) {
+        if !self.schedule.is_running && !matches!(self.win[node as usize], Win::Everything) {
             self.note_spoilers(node);
         }
     }
@@ -390,7 +416,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 continue;
             }
             let decision = self.quick(node);
-            if decision != Some(true) {
+            if decision != Some(true) && !self.schedule.is_running {
                 self.choose(node);
             }
             match decision {
@@ -428,6 +454,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         self.gains.clear();
         self.frontier.forget_nodes();
         self.pending.clear();
+        self.defences.forget_nodes();
         self.updates.clear();
         self.deferred.clear();
         self.adopt_new_nodes();

@@ -3,7 +3,8 @@
 //! In models with much data, many nodes have the same zone, the same edges as far as clocks go, and the same successors won. What they
 //! win first is computed once. It hangs on nothing but what the key of such a case holds:
 //! * the zone of the node, whether time may pass, which clocks stand still, and where invariants stop time;
-//! * of each edge what it does to clocks, who owns it, the zone of its target, and whether all of the target is won or nothing.
+//! * of each edge what it does to clocks, who owns it, the zone of its target, and whether all of the target is won or nothing,
+//!   and whether the evader holds it back.
 //!
 //! Other nodes are no such cases: those in which the goal or what must be kept hang on clocks, or time is cut short, those of which
 //! something is won or that lead to nodes of which a part is; and those in which it matters which processes move, because the
@@ -16,6 +17,7 @@ use crate::zones::federation::block_bytes;
 
 use super::Player;
 use super::account::table_bytes;
+use super::defences::Defence;
 use super::gains::Gained;
 use super::graph::Standing;
 use super::reach::{Solver, Win};
@@ -30,7 +32,7 @@ const WORTH: u32 = 4;
 /// What cases win.
 #[derive(Debug, Default)]
 pub(super) struct Repeats {
-    cases: FxHashMap<Box<[u32]>, Gained>,
+    cases: FxHashMap<Box<[u32]>, (Gained, Defence)>,
     key: Vec<u32>,
     /// What keys and gains take beside the table.
     kept_bytes: u64,
@@ -44,14 +46,14 @@ pub(super) enum Case {
     None,
     /// One that is not remembered, with its key.
     New(Box<[u32]>),
-    /// One of which it is known what it gains.
-    Known(Gained),
+    /// One of which it is known what it gains, and how the evader defends itself.
+    Known(Gained, Defence),
 }
 
 impl Repeats {
     /// The bytes that it takes.
     pub(super) fn bytes(&self) -> u64 {
-        let table = table_bytes::<(Box<[u32]>, Gained)>(self.cases.capacity());
+        let table = table_bytes::<(Box<[u32]>, (Gained, Defence))>(self.cases.capacity());
         self.kept_bytes + table as u64
     }
 }
@@ -67,19 +69,21 @@ impl Solver<'_, '_, '_> {
         self.make_key(node)?;
         let repeats = &mut self.repeats;
         repeats.lookups += 1;
-        if let Some(known) = repeats.cases.get(&repeats.key[..]) {
+        if let Some((gained, defence)) = repeats.cases.get(&repeats.key[..]) {
             repeats.hits += 1;
-            return Ok(Case::Known(known.clone()));
+            return Ok(Case::Known(gained.clone(), defence.clone()));
         }
         Ok(Case::New(repeats.key.clone().into_boxed_slice()))
     }
 
-    /// Remembers what a case gains.
-    pub(super) fn remember_case(&mut self, key: Box<[u32]>, gained: &Gained) {
+    /// Remembers what a case gains, and how the evader defends itself.
+    pub(super) fn remember_case(&mut self, key: Box<[u32]>, gained: &Gained, defence: &Defence) {
         if self.repeats.cases.len() < MOST_CASES {
             let key_bytes = block_bytes(size_of_val(&*key)) as u64;
-            self.repeats.kept_bytes += key_bytes + gained.heap_bytes();
-            self.repeats.cases.insert(key, gained.clone());
+            self.repeats.kept_bytes += key_bytes + gained.heap_bytes() + defence.heap_bytes();
+            self.repeats
+                .cases
+                .insert(key, (gained.clone(), defence.clone()));
         }
     }
 
@@ -115,7 +119,8 @@ impl Solver<'_, '_, '_> {
         self.words = words;
         let known = &self.graph.nodes[node as usize];
         key.push(known.zone.0);
-        key.push(u32::from(known.delays) * 2 + u32::from(is_urgent));
+        let flags = [self.defences.uses_weak, known.delays, is_urgent];
+        key.push(flags.iter().fold(0, |all, one| all * 2 + u32::from(*one)));
         for clock in &stopped? {
             key.push(clock as u32);
         }
@@ -123,9 +128,12 @@ impl Solver<'_, '_, '_> {
         for (_, bound) in bounds? {
             key.extend([bound.left as u32, bound.bound.raw().cast_unsigned()]);
         }
-        for edge in &self.graph.edges[self.graph.edges_of(node)] {
+        for index in self.graph.edges_of(node) {
+            let edge = &self.graph.edges[index];
+            let is_held = self.defences.holds(index);
             let is_won = matches!(self.win[edge.target as usize], Win::Everything);
-            let flags = [edge.controllable, edge.is_total, edge.length == 1, is_won];
+            let is_one = edge.length == 1;
+            let flags = [edge.controllable, edge.is_total, is_one, is_won, is_held];
             let flags = flags.iter().fold(1, |all, one| all * 2 + u32::from(*one));
             let target = self.graph.nodes[edge.target as usize].zone;
             key.extend([edge.program.0, target.0, flags]);

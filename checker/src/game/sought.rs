@@ -34,6 +34,7 @@ impl Solver<'_, '_, '_> {
             self.gains.push(gains);
             self.frontier.add_node();
             self.pending.push(Pending::No);
+            self.defences.add_node();
             if node == 0 {
                 self.wait_for(0);
             }

@@ -13,6 +13,7 @@ use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::Patience;
 use crate::zones::federation::block_bytes;
 
+use super::defences::Defence;
 use super::gains::Gained;
 use super::predecessors::Situation;
 use super::reach::{Solver, Win};
@@ -45,6 +46,14 @@ impl Task {
             .map(|(parts, _)| block_bytes(size_of_val(&**parts)));
         (zones.sum::<usize>() + parts.sum::<usize>()) as u64
     }
+}
+
+/// What comes of a task.
+struct Done {
+    /// Which task it is.
+    index: usize,
+    gained: Gained,
+    defence: Defence,
 }
 
 /// What threads tell each other while they work.
@@ -100,12 +109,13 @@ impl Solver<'_, '_, '_> {
             self.has_given_up = true;
             return Some(StopReason::States);
         }
-        done.sort_unstable_by_key(|(index, _)| *index);
-        for (task, (_, gained)) in tasks.into_iter().zip(done) {
+        done.sort_unstable_by_key(|one| one.index);
+        for (task, one) in tasks.into_iter().zip(done) {
             if let Some(key) = task.key {
-                self.remember_case(key, &gained);
+                self.remember_case(key, &one.gained, &one.defence);
             }
-            self.gain_computed(task.node, gained);
+            self.defend(task.node, &one.defence);
+            self.gain_computed(task.node, one.gained);
         }
         None
     }
@@ -132,7 +142,7 @@ impl Solver<'_, '_, '_> {
         tasks: &[Task],
         progress: &Progress,
         watch: &mut dyn Watch,
-    ) -> (Vec<(usize, Gained)>, Option<StopReason>) {
+    ) -> (Vec<Done>, Option<StopReason>) {
         thread::scope(|scope| {
             let (over, is_over) = mpsc::channel();
             let helpers: Vec<_> = (1..progress.zones.len())
@@ -184,7 +194,7 @@ impl Solver<'_, '_, '_> {
         tasks: &[Task],
         progress: &Progress,
         watch: &mut dyn Watch,
-    ) -> (Vec<(usize, Gained)>, Option<StopReason>) {
+    ) -> (Vec<Done>, Option<StopReason>) {
         let mut reason = None;
         let mut goes_on = |zones: usize| {
             reason = watch.look(&self.counters_with(progress, zones));
@@ -203,7 +213,7 @@ impl Solver<'_, '_, '_> {
         tasks: &[Task],
         progress: &Progress,
         goes_on: &mut dyn FnMut(usize) -> bool,
-    ) -> Vec<(usize, Gained)> {
+    ) -> Vec<Done> {
         let mut ask = |zones: usize| {
             let operations = progress.operations.fetch_add(1, Ordering::Relaxed);
             operations < progress.most_operations && goes_on(zones)
@@ -219,14 +229,18 @@ impl Solver<'_, '_, '_> {
             };
             // Each task has a patience of its own, so that what it asks does not hang on who does it.
             let mut patience = Patience::as_long_as(&mut ask);
-            let won = self.winnable(*node, situation, &mut patience);
+            let (won, defence) = self.winnable_against_defence(*node, situation, &mut patience);
             let gained = self.gained(*node, won, &mut patience);
             if patience.is_over() || progress.is_cut.load(Ordering::Relaxed) {
                 return done;
             }
             let bytes = gained.heap_bytes();
             progress.done_bytes.fetch_add(bytes, Ordering::Relaxed);
-            done.push((index, gained));
+            done.push(Done {
+                index,
+                gained,
+                defence,
+            });
         }
     }
 
