@@ -4,7 +4,13 @@
 //! That nothing is lost by it, random networks show: they must give the same answers with a process beside them that could write the
 //! flags and take part in the synchronisations, as far as the analysis of a single process knows.
 
+#[path = "common/random.rs"]
+#[expect(dead_code, reason = "other tests throw dice")]
+mod random;
+
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+
+use random::{Random, networks};
 
 fn check(text: &str, query: &str) -> Answer {
     let mut model = LoadedModel::load("activity.xta", text.as_bytes())
@@ -215,22 +221,8 @@ fn clocks_matter_before_a_flag_that_is_set_without_them() {
     }
 }
 
-/// A linear congruential generator.
-struct Random(u64);
-
+/// What random networks are made of.
 impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        usize::try_from(self.0 >> 33).expect("31 bits fit") % limit
-    }
-
-    fn one_of<'a>(&mut self, texts: &[&'a str]) -> &'a str {
-        texts[self.below(texts.len())]
-    }
-
     /// A comparison of one of the three clocks.
     fn comparison(&mut self) -> String {
         let (clock, relation) = (
@@ -287,9 +279,9 @@ impl Random {
 
 #[test]
 fn verdicts_do_not_hang_on_who_could_write_a_flag_or_take_part() {
-    let mut random = Random(17);
     let (mut satisfied, mut fewer) = (0, 0);
-    for _ in 0..800 {
+    for number in 0..networks(800) {
+        let mut random = Random::of_network(number);
         let processes = random.process(0) + &random.process(1);
         // Nobody gets to `B`, but the analysis of a single process does not know.
         let model = |edges: &str| {

@@ -8,17 +8,16 @@ mod c_programs;
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
-use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use checker::engine::{CodeEngine, LoadedModel, Options, controller, timing};
+use checker::engine::{controller, timing};
 use checker::game::closed_loop;
 use checker::game::strategy::{Decision, Selection, Strategy};
 use checker::network::Part;
 
-use c_programs::{compiled, games, in_folder};
+use c_programs::{compiled, games, in_folder, solved};
 
 /// Ticks of a unit of time. Clock values are whole numbers of two of them, so that every bound and the middle between is met.
 const TICKS_PER_UNIT: i64 = 4;
@@ -69,15 +68,8 @@ struct Case {
 }
 
 fn solve(path: &Path, query: &str) -> Option<Case> {
-    let bytes = fs::read(path).expect("the model is there");
-    let mut model = LoadedModel::load("model.xta", &bytes).expect("the model is right");
-    let text = model.add_query(query);
-    let options = Options {
-        code: CodeEngine::Interpreter,
-        strategy: true,
-        ..Options::default()
-    };
-    let strategy = model.check(&text, &options).ok()?.evidence.strategy?;
+    let (model, answer) = solved(path, query)?;
+    let strategy = answer.evidence.strategy?;
     let text = controller::write(model.network(), &strategy, query).ok()?;
     let again = controller::write(model.network(), &strategy, query);
     assert_eq!(again.as_ref(), Ok(&text), "the text is always the same");

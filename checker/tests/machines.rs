@@ -6,15 +6,14 @@
 mod c_programs;
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use checker::engine::{CodeEngine, LoadedModel, Options, machine_controller, machine_file};
+use checker::engine::{LoadedModel, machine_controller, machine_file};
 use checker::game::observed::Machine;
 
-use c_programs::{compiled, games, in_folder};
+use c_programs::{compiled, games, in_folder, solved};
 
 /// Writes what each state proposes, and where it goes on, observation by observation.
 const DRIVER: &str = r#"
@@ -46,15 +45,8 @@ struct Case {
 }
 
 fn solve(path: &Path, query: &str) -> Option<Case> {
-    let bytes = fs::read(path).expect("the model is there");
-    let mut model = LoadedModel::load("model.xta", &bytes).expect("the model is right");
-    let text = model.add_query(query);
-    let options = Options {
-        code: CodeEngine::Interpreter,
-        strategy: true,
-        ..Options::default()
-    };
-    let machine = model.check(&text, &options).ok()?.evidence.machine?;
+    let (model, answer) = solved(path, query)?;
+    let machine = answer.evidence.machine?;
     let text = machine_controller::write(model.network(), &machine, query);
     Some(Case {
         model,

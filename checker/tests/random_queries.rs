@@ -7,6 +7,10 @@
 //!
 //! `NETWORKS=50000 cargo test --release --test random_queries` runs more of them than the usual number.
 
+#[path = "common/random.rs"]
+#[expect(dead_code, reason = "other tests have a generator for each network")]
+mod random;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
@@ -15,29 +19,13 @@ use checker::engine::{CodeEngine, Limits, LoadedModel, Options, TraceWanted, Ver
 use checker::search::extremum::Extreme;
 use checker::verify::replay::End;
 
-/// Networks without the environment variable `NETWORKS`.
-const NETWORKS: u64 = 1500;
+use random::{Random, networks};
 
 /// No network needs so many states: a search that stores them does not end.
 const MOST_STATES: u64 = 5000;
 
 /// Above this the region graph does not tell values of clocks apart.
 const TOP: i32 = 6;
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 20) % limit
-    }
-
-    fn chance(&mut self, percent: u64) -> bool {
-        self.below(100) < percent
-    }
-}
 
 /// `clock relation constant`, with the relations `<`, `<=`, `>=`, `>`.
 #[derive(Clone, Copy)]
@@ -53,8 +41,8 @@ const CLOCKS: [&str; 2] = ["x", "y"];
 impl Atom {
     fn random(random: &mut Random) -> Atom {
         Atom {
-            clock: random.below(2) as usize,
-            relation: random.below(4) as usize,
+            clock: random.below(2),
+            relation: random.below(4),
             constant: random.below(4) as i32,
         }
     }
@@ -94,7 +82,7 @@ struct Edge {
     guard: Vec<Atom>,
     resets: Vec<usize>,
     /// 0 internal, 1 sends, 2 receives.
-    sync: u64,
+    sync: usize,
 }
 
 struct Network {
@@ -103,7 +91,7 @@ struct Network {
     is_urgent: bool,
     is_broadcast: bool,
     /// 0 none, 1 the channel above internal edges, 2 below, 3 the second process above the first.
-    priority: u64,
+    priority: usize,
 }
 
 /// Of each clock the integer part and the rank of its fraction, 0 for none; `(TOP, 1)` is anything above.
@@ -114,7 +102,7 @@ impl Network {
     fn random(random: &mut Random) -> Network {
         let locations = [(); 2].map(|()| {
             let count = 2 + random.below(2);
-            let location = |index: u64, random: &mut Random| Location {
+            let location = |index: usize, random: &mut Random| Location {
                 invariant: if random.chance(45) {
                     let mut atom = Atom::random(random);
                     atom.relation %= 2;
@@ -134,13 +122,13 @@ impl Network {
                 .collect::<Vec<_>>()
         });
         let edges = [0, 1].map(|process: usize| {
-            let places = locations[process].len() as u64;
+            let places = locations[process].len();
             let edge = |random: &mut Random| Edge {
-                source: random.below(places) as usize,
-                target: random.below(places) as usize,
+                source: random.below(places),
+                target: random.below(places),
                 guard: (0..random.below(3)).map(|_| Atom::random(random)).collect(),
                 resets: (0..2).filter(|_| random.chance(35)).collect(),
-                sync: random.below(2) * (1 + process as u64),
+                sync: random.below(2) * (1 + process),
             };
             (0..2 + random.below(3))
                 .map(|_| edge(random))
@@ -225,7 +213,7 @@ impl Network {
 
     /// The combinations of edges whose guards hold, with whether they synchronise.
     fn enabled(&self, (places, region): &State) -> Vec<(Vec<(usize, usize)>, bool)> {
-        let open = |process: usize, sync: u64| {
+        let open = |process: usize, sync: usize| {
             let edges = self.edges[process].iter().enumerate();
             let is_open = |edge: &Edge| {
                 edge.source == places[process]
@@ -463,7 +451,7 @@ impl Condition {
             if random.chance(50) {
                 Ok(Atom::random(random))
             } else {
-                Err((random.below(2) as usize, random.below(2) as usize))
+                Err((random.below(2), random.below(2)))
             }
         };
         let parts = [part(), part()];
@@ -683,11 +671,8 @@ fn check_network(random: &mut Random) {
 
 #[test]
 fn answers_agree_with_the_region_graph() {
-    let networks = std::env::var("NETWORKS")
-        .ok()
-        .and_then(|count| count.parse().ok());
     let mut random = Random(0x5eed_1234_5678_9abc);
-    for _ in 0..networks.unwrap_or(NETWORKS) {
+    for _ in 0..networks(1500) {
         check_network(&mut random);
     }
 }

@@ -20,6 +20,7 @@ use proptest::test_runner::TestCaseError;
 use crate::compare::{self, Tally};
 use crate::explicit::Graph;
 use crate::generate::{self, Formula, Network, Shape};
+use crate::random::Random;
 
 const SHAPE: Shape = Shape {
     clocks: 2,
@@ -34,20 +35,8 @@ const SHAPE: Shape = Shape {
 /// Regions that brute force explores before it gives a case up.
 const MOST_REGIONS: usize = 3_000;
 
-pub(crate) struct Random(pub(crate) u64);
-
+/// What random strategies are made of.
 impl Random {
-    pub(crate) fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 20) as usize % limit
-    }
-
-    pub(crate) fn chance(&mut self, percent: usize) -> bool {
-        self.below(100) < percent
-    }
-
     fn constraint(&mut self, dimension: usize) -> Constraint {
         let value = self.below(4) as i32;
         let is_upper = self.chance(50);

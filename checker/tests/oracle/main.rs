@@ -14,6 +14,9 @@ mod games;
 mod generate;
 mod mutations;
 mod observed;
+#[path = "../common/random.rs"]
+#[expect(dead_code, reason = "networks are made by proptest here")]
+mod random;
 mod random_mutations;
 mod reachability;
 mod under;

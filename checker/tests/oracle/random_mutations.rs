@@ -14,11 +14,11 @@ use checker::verify::{Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
-use crate::closed_loops::Random;
 use crate::compare::{self, Tally};
 use crate::explicit::{Graph, Node, Rule, Step, is_forced};
 use crate::games::{Kind, RULES, SHAPE, labels, seeded_games};
 use crate::generate::{Formula, Network};
+use crate::random::Random;
 
 /// A strategy on the graph of regions, with what is asked.
 struct Closed<'a> {

@@ -10,11 +10,12 @@ use checker::network::Part;
 use checker::verify::{Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 
-use crate::closed_loops::{Random, Said, own_moves};
+use crate::closed_loops::{Said, own_moves};
 use crate::compare::{self, Tally};
 use crate::explicit::Graph;
 use crate::games::{Kind, RULES, SHAPE, check_file, seeded_games, wins};
 use crate::generate::{Formula, Network};
+use crate::random::Random;
 
 /// Leaves only what the strategy allows.
 fn restrict(graph: &mut Graph, strategy: &Strategy) {
