@@ -1,14 +1,18 @@
-"""How far the solver of timed games gets: time and memory against the size of three families.
+"""How far the solver of timed games gets: time and memory against the size of five families.
 
-    python tests/benchmarks/games.py [--seconds 60] [--gibibytes 4] [--family cell|trains|jobs]
+    python tests/benchmarks/games.py [--seconds 60] [--gibibytes 4] [--family NAME]
 
 *cell* is a production cell: plates come on a belt, an arm takes each to a press that is ready when
 it likes, and a plate that waits too long falls. *trains* is a gate in front of a bridge: trains
 that come can be stopped for a while. *jobs* is a workshop: each job goes through three machines,
-from another one on, and all are to be done in the least time. In the *uncontrollable* variants the
-environment says when plates and trains come and how long a machine takes, in the *controllable*
-ones the controller does. As a yardstick, six jobs should take a few seconds. Each game grows, by a
-quarter once it is large, until the time or the memory is not enough. There is a line for each size.
+from another one on, and all are to be done in the least time. *queue* is the gate again, which lets
+stopped trains go in the order in which they came. *standoff* has as many foes, each of whom draws
+once and fires a while later, as friends, who are faster and fire only at who has drawn.
+
+In the *uncontrollable* variants the environment says when plates and trains come, when foes draw
+and how long a machine takes, in the *controllable* ones the controller does. As a yardstick, six
+jobs should take a few seconds. Each game grows, by a quarter once it is large, until the time or
+the memory is not enough. There is a line for each size.
 """
 
 from __future__ import annotations
@@ -86,10 +90,76 @@ process Job(const id_t id) {{
 system Job;
 """
 
+QUEUE = """
+const int N = {size};
+typedef int[0, N - 1] id_t;
+chan come[N], stop[N], go[N], leave[N];
+int[0, N] length;
+int[0, N - 1] queue[N];
+void put(id_t id) {{ queue[length] = id; length++; }}
+void take() {{
+  int i;
+  for (i = 0; i < N - 1; i++) queue[i] = queue[i + 1];
+  queue[N - 1] = 0;
+  length--;
+}}
+process Train(const id_t id) {{
+  clock x;
+  state Away, Near {{ x <= 20 }}, Stopped, Starting {{ x <= 15 }}, Bridge {{ x <= 5 }};
+  init Away;
+  trans Away {arrow} Near {{ sync come[id]!; assign x = 0; }},
+        Near -u-> Bridge {{ guard x >= 10; assign x = 0; }},
+        Near -> Stopped {{ guard x <= 10; sync stop[id]?; }},
+        Stopped -> Starting {{ sync go[id]?; assign x = 0; }},
+        Starting -u-> Bridge {{ guard x >= 7; assign x = 0; }},
+        Bridge -u-> Away {{ guard x >= 3; sync leave[id]!; assign x = 0; }};
+}}
+process Gate() {{
+  state Any;
+  init Any;
+  trans Any -> Any {{ select e : id_t; sync come[e]?; }},
+        Any -> Any {{ select e : id_t; sync leave[e]?; }},
+        Any -> Any {{ select e : id_t; sync stop[e]!; assign put(e); }},
+        Any -> Any {{ guard length > 0; sync go[queue[0]]!; assign take(); }};
+}}
+system Train, Gate;
+"""
+
+STANDOFF = """
+const int N = {size};
+typedef int[0, N - 1] id_t;
+bool friend_fell[N], foe_fell[N], has_drawn[N];
+process Friend(const id_t id) {{
+  clock x;
+  id_t aim;
+  state Calm, Drawing {{ x <= 3 }};
+  init Calm;
+  trans Calm -> Drawing {{ select e : id_t;
+                           guard !friend_fell[id] && has_drawn[e] && !foe_fell[e];
+                           assign aim = e, x = 0; }},
+        Drawing -u-> Calm {{ guard x >= 1 && !friend_fell[id]; assign foe_fell[aim] = true; }},
+        Drawing -u-> Calm {{ guard friend_fell[id]; }};
+}}
+process Foe(const id_t id) {{
+  clock x;
+  id_t aim;
+  state Calm, Drawing {{ x <= 6 }}, Spent;
+  init Calm;
+  trans Calm {arrow} Drawing {{ select e : id_t; guard !friend_fell[e];
+                                assign aim = e, x = 0, has_drawn[id] = true; }},
+        Drawing -u-> Spent {{ guard x >= 4 && !foe_fell[id];
+                              assign friend_fell[aim] = true, has_drawn[id] = false; }},
+        Drawing -u-> Spent {{ guard foe_fell[id]; assign has_drawn[id] = false; }};
+}}
+system Friend, Foe;
+"""
+
 ONE_ON_THE_BRIDGE = (
     "control: A[] forall (i : id_t) forall (j : id_t) "
     "(Train(i).Bridge && Train(j).Bridge imply i == j)"
 )
+
+NONE_FELL = "control: A[] forall (i : id_t) not friend_fell[i]"
 
 
 @dataclass(frozen=True)
@@ -118,11 +188,14 @@ GAMES = [
     Game("trains", "controllable", TRAINS, "control: A<> Train(0).Bridge"),
     Game("jobs", "uncontrollable", JOBS, "control_t*: A<> forall (i : id_t) Job(i).Done"),
     Game("jobs", "controllable", JOBS, "control_t*: A<> forall (i : id_t) Job(i).Done"),
+    Game("queue", "uncontrollable", QUEUE, ONE_ON_THE_BRIDGE),
+    Game("standoff", "uncontrollable", STANDOFF, "control: A[] not friend_fell[0]"),
+    Game("standoff", "uncontrollable", STANDOFF, NONE_FELL),
 ]
 
 
 MOST_CLOCKS = 255
-"""More than so many the engine does not take; each plate, train and job has one."""
+"""More than so many the engine does not take; each plate, train, job, friend and foe has one."""
 
 
 def rows(game: Game, timeout_s: float, memory_bytes: int) -> Iterator[tuple[int, checker.Answer]]:
@@ -142,7 +215,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--gibibytes", type=float, default=4.0)
-    parser.add_argument("--family", choices=["cell", "trains", "jobs"])
+    parser.add_argument("--family", choices=sorted({game.family for game in GAMES}))
     arguments = parser.parse_args()
     memory_bytes = int(arguments.gibibytes * 2**30)
     for game in GAMES:
