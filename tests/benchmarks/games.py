@@ -1,4 +1,4 @@
-"""How far the solver of timed games gets: time and memory against the size of five families.
+"""How far the solver of timed games gets: time and memory against the size of seven families.
 
     python tests/benchmarks/games.py [--seconds 60] [--gibibytes 4] [--family NAME]
 
@@ -7,12 +7,15 @@ it likes, and a plate that waits too long falls. *trains* is a gate in front of 
 that come can be stopped for a while. *jobs* is a workshop: each job goes through three machines,
 from another one on, and all are to be done in the least time. *queue* is the gate again, which lets
 stopped trains go in the order in which they came. *standoff* has as many foes, each of whom draws
-once and fires a while later, as friends, who are faster and fire only at who has drawn.
+once and fires a while later, as friends, who are faster and fire only at who has drawn. *circuit*
+has trains that come to the bridge again and again and must not meet, and the first one is to get
+over it each time; *patrol* is a guard who goes round, past doors that somebody shuts.
 
 In the *uncontrollable* variants the environment says when plates and trains come, when foes draw
 and how long a machine takes, in the *controllable* ones the controller does. As a yardstick, six
-jobs should take a few seconds. Each game grows, by a quarter once it is large, until the time or
-the memory is not enough. There is a line for each size.
+jobs should take a few seconds, and so should five trains on a circuit; a hundred doors should take
+less than one. Each game grows, by a quarter once it is large, until the time or the memory is not
+enough. There is a line for each size.
 """
 
 from __future__ import annotations
@@ -154,12 +157,67 @@ process Foe(const id_t id) {{
 system Friend, Foe;
 """
 
+CIRCUIT = """
+const int N = {size};
+typedef int[0, N - 1] id_t;
+bool bridge;
+process Train(const id_t id) {{
+  clock x;
+  state Away {{ x <= 12 + 4 * id }}, Near {{ x <= 20 }}, Stopped, Starting {{ x <= 6 }},
+        Bridge {{ x <= 5 }}, Crashed;
+  init Away;
+  trans Away {arrow} Near {{ guard x >= 6; assign x = 0; }},
+        Near -u-> Bridge {{ guard x >= 10 && !bridge; assign x = 0, bridge = true; }},
+        Near -u-> Crashed {{ guard x >= 10 && bridge; }},
+        Near -> Stopped {{ guard x <= 10; }},
+        Stopped -> Starting {{ guard !bridge; assign x = 0; }},
+        Starting -u-> Bridge {{ guard x >= 4 && !bridge; assign x = 0, bridge = true; }},
+        Starting -u-> Crashed {{ guard x >= 4 && bridge; }},
+        Bridge -u-> Away {{ guard x >= 3; assign x = 0, bridge = false; }};
+}}
+system Train;
+"""
+
+PATROL = """
+const int N = {size};
+typedef int[0, N - 1] id_t;
+id_t at;
+int[0, N] seen;
+bool shut[N];
+process Guard() {{
+  clock x;
+  state Standing, Walking {{ x <= 4 }}, Home;
+  init Standing;
+  trans Standing -> Walking {{ guard x >= 1 && seen < N; assign x = 0; }},
+        Walking -u-> Standing {{ guard x >= 2 && !shut[at];
+                                 assign at = (at + 1) % N, seen++, x = 0; }},
+        Walking -u-> Standing {{ guard x >= 2 && shut[at]; assign x = 0; }},
+        Standing -> Home {{ guard seen == N; assign seen = 0, x = 0; }},
+        Home -> Standing {{ assign x = 0; }};
+}}
+process Somebody() {{
+  clock y;
+  id_t door;
+  state Idle, Holding {{ y <= 7 }};
+  init Idle;
+  trans Idle {arrow} Holding {{ select d : id_t; guard y >= 15;
+                                assign door = d, shut[d] = true, y = 0; }},
+        Holding -u-> Idle {{ guard y >= 3; assign shut[door] = false, y = 0; }};
+}}
+system Guard, Somebody;
+"""
+
 ONE_ON_THE_BRIDGE = (
     "control: A[] forall (i : id_t) forall (j : id_t) "
     "(Train(i).Bridge && Train(j).Bridge imply i == j)"
 )
 
 NONE_FELL = "control: A[] forall (i : id_t) not friend_fell[i]"
+
+
+FIRST_AGAIN_AND_AGAIN = (
+    "control: A[] ((forall (i : id_t) not Train(i).Crashed) && A<> Train(0).Bridge)"
+)
 
 
 @dataclass(frozen=True)
@@ -191,6 +249,8 @@ GAMES = [
     Game("queue", "uncontrollable", QUEUE, ONE_ON_THE_BRIDGE),
     Game("standoff", "uncontrollable", STANDOFF, "control: A[] not friend_fell[0]"),
     Game("standoff", "uncontrollable", STANDOFF, NONE_FELL),
+    Game("circuit", "uncontrollable", CIRCUIT, FIRST_AGAIN_AND_AGAIN),
+    Game("patrol", "uncontrollable", PATROL, "control: A[] (true && A<> Guard.Home)"),
 ]
 
 

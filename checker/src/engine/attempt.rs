@@ -41,3 +41,9 @@ pub(super) const IN_DISCRETE_STATES: Allowance = Allowance {
     operations_each: MOST_OPERATIONS_ON_DISCRETE_STATE,
     states_of_grace: STATES_OF_GRACE,
 };
+
+/// To play a game with a goal that is to recur in discrete states. All nodes are computed in each round, in symbolic states too.
+pub(super) const IN_DISCRETE_STATES_BY_ROUNDS: Allowance = Allowance {
+    operations_each: 16 * MOST_OPERATIONS_ON_DISCRETE_STATE,
+    ..IN_DISCRETE_STATES
+};

@@ -213,8 +213,7 @@ struct Timed<'a, 'q> {
 impl Timed<'_, '_> {
     /// What nodes are tried first.
     fn first_nodes(&self) -> Nodes {
-        let asked = (self.race.objective, false);
-        let can_be_discrete = games::can_be_discrete(self.network, asked, self.options)
+        let can_be_discrete = games::can_be_discrete(self.network, false, self.options)
             && !has_differences(self.network, &objective_atoms(self.race.objective));
         if can_be_discrete {
             self.options.nodes

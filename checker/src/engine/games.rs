@@ -19,7 +19,10 @@ use crate::network::{
 use crate::search::limits::{Counters, StopReason, Watch};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
-use super::attempt::{CROWD, IN_DISCRETE_STATES, STATES_BEFORE_CROWD, WITHOUT_ABSTRACTION};
+use super::attempt::{
+    CROWD, IN_DISCRETE_STATES, IN_DISCRETE_STATES_BY_ROUNDS, STATES_BEFORE_CROWD,
+    WITHOUT_ABSTRACTION,
+};
 use super::certificate::stop_text;
 use super::cooperation;
 use super::limits::LimitWatch;
@@ -95,7 +98,11 @@ pub(super) fn game(
     if !has_differences(network, &atoms) {
         let in_discrete_states = |watch: &mut LimitWatch| {
             let zones = zones(Abstraction::Exact);
-            let allowance = Some(IN_DISCRETE_STATES);
+            let allowance = match asked.0 {
+                Objective::Buchi(..) => IN_DISCRETE_STATES_BY_ROUNDS,
+                _ => IN_DISCRETE_STATES,
+            };
+            let allowance = Some(allowance);
             let (answer, has_given_up) = played(zones, Nodes::Discrete, allowance, watch);
             // A run-time error may lie in a state that no run reaches.
             let is_of_use = !has_given_up && !matches!(answer.verdict, Verdict::Error(_));
@@ -103,7 +110,7 @@ pub(super) fn game(
         };
         let in_symbolic_states =
             |nodes, watch: &mut LimitWatch| played(zones(Abstraction::Maximum), nodes, None, watch);
-        let nodes = if under.is_none() && can_be_discrete(network, asked, options) {
+        let nodes = if under.is_none() && can_be_discrete(network, asked.1, options) {
             options.nodes
         } else {
             Nodes::Symbolic
@@ -158,18 +165,11 @@ pub(super) fn zones_of<'a>(
 
 /// Whether the game may be played in discrete states with all that invariants allow: if it does not matter what is reached, and if
 /// neither clocks that stop, nor priorities, nor clock guards on urgent channels make it hang on more than the state.
-pub(super) fn can_be_discrete(
-    network: &Network,
-    (objective, is_cooperative): (&Objective, bool),
-    options: &Options,
-) -> bool {
+pub(super) fn can_be_discrete(network: &Network, is_cooperative: bool, options: &Options) -> bool {
     let has_priorities = network.features.priorities && options.priorities == Priorities::Kept;
     let is_urgent = network.features.clock_guarded_urgent;
     let hangs_on_more = network.features.stopwatches || has_priorities || is_urgent;
-    options.plans == PlansWanted::No
-        && !is_cooperative
-        && !matches!(objective, Objective::Buchi(..))
-        && !hangs_on_more
+    options.plans == PlansWanted::No && !is_cooperative && !hangs_on_more
 }
 
 /// The clock comparisons of an objective.

@@ -13,7 +13,7 @@ use crate::network::Failure;
 
 use super::choices::Reserve;
 use super::graph::{Edge, NONE, Standing};
-use super::reach::{Solver, Win};
+use super::reach::{AfterGoal, Solver, Win};
 
 /// One in so many starts is from the oldest node.
 const STARTS_FROM_OLDEST: u32 = 16;
@@ -186,7 +186,7 @@ impl Solver<'_, '_, '_> {
             return;
         };
         let is_left = match known.standing {
-            Standing::Goal => !self.goes_on,
+            Standing::Goal => self.after_goal == AfterGoal::Ends,
             Standing::Broken => !self.is_cooperative,
             Standing::Dead => true,
             Standing::Open | Standing::Mixed => false,

@@ -3,6 +3,7 @@
 use crate::zones::federation::block_bytes;
 use crate::zones::{Federation, Patience};
 
+use super::Player;
 use super::graph::{Edge, NONE};
 use super::reach::{Gain, Solver, Win};
 
@@ -172,6 +173,9 @@ impl Solver<'_, '_, '_> {
 
     /// The valuations from which a move of the evader is not known to lead into won ones.
     pub(super) fn spoiling(&self, edge: &Edge, patience: &mut Patience<'_>) -> Federation {
+        if self.seeker == Player::Environment && self.graph.programs.waits(edge.program) {
+            return self.enabled(edge);
+        }
         let is_missed = (edge.length == 1).then(|| self.lost(edge.target));
         self.missing(edge, (&self.win[edge.target as usize], is_missed), patience)
     }

@@ -76,6 +76,13 @@ impl Programs {
             + table_bytes::<((ProgramId, ZoneId, ZoneId), bool)>(self.totals.capacity())
     }
 
+    /// Whether time may pass between the moves of the program.
+    pub(super) fn waits(&self, program: ProgramId) -> bool {
+        self.steps[program.0 as usize]
+            .iter()
+            .any(|step| step.delays)
+    }
+
     /// The valuations from which the first move of the program is possible.
     pub fn enabled(&self, program: ProgramId, zone: &[Bound], dimension: usize) -> Federation {
         match self.steps[program.0 as usize].first() {

@@ -120,6 +120,17 @@ pub enum Answer {
     Stopped(StopReason),
 }
 
+/// What becomes of play in the goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum AfterGoal {
+    /// It ends.
+    Ends,
+    /// It goes on, and what comes is to be known too.
+    GoesOn,
+    /// It goes on, and the goal makes no difference to it.
+    IsLikeBefore,
+}
+
 /// A solver with its graph.
 pub struct Solver<'g, 's, 'a> {
     /// The graph.
@@ -128,8 +139,7 @@ pub struct Solver<'g, 's, 'a> {
     pub seeker: Player,
     /// What is sought, by node, if it is not where the goal holds. Play does not end there, and all nodes are expanded.
     pub(super) targets: Option<Vec<Win>>,
-    /// Whether play goes on from the goal.
-    pub(super) goes_on: bool,
+    pub(super) after_goal: AfterGoal,
     /// Whether it matters what can be reached at all, through whatever has been won or lost.
     pub(super) is_cooperative: bool,
     /// By node: the valuations from which the seeker wins.
@@ -197,7 +207,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             graph,
             seeker,
             targets: None,
-            goes_on: false,
+            after_goal: AfterGoal::Ends,
             is_cooperative: false,
             win: Vec::new(),
             gained_bytes: 0,
@@ -463,9 +473,24 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
+    /// Computes anew, in an explored graph, from where the environment can break what must be kept, whether the goal was met or not. A chain
+    /// in which the controller waits counts as a way to get away, since it chooses how long.
+    pub(super) fn seek_to_break(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<Option<StopReason>, Failure> {
+        self.seeker = Player::Environment;
+        self.after_goal = AfterGoal::IsLikeBefore;
+        self.targets = None;
+        self.begin_anew();
+        let reason = self.sweep(watch)?;
+        self.after_goal = AfterGoal::GoesOn;
+        Ok(reason)
+    }
+
     /// Lets nodes be expanded in which the goal holds; in a cooperative game also those that are broken.
     pub(super) fn go_on(&mut self, is_cooperative: bool) {
-        self.goes_on = true;
+        self.after_goal = AfterGoal::GoesOn;
         self.is_cooperative = is_cooperative;
         self.wait_for(0);
     }
@@ -547,7 +572,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             }
         }
         let is_open = match &self.targets {
-            None => self.graph.nodes[node as usize].standing == Standing::Open,
+            None => match self.graph.nodes[node as usize].standing {
+                Standing::Open => true,
+                Standing::Goal => self.after_goal == AfterGoal::IsLikeBefore,
+                Standing::Broken | Standing::Mixed | Standing::Dead => false,
+            },
             Some(targets) => {
                 matches!(targets[node as usize], Win::Nothing)
                     && self.graph.nodes[node as usize].standing != Standing::Mixed

@@ -10,9 +10,11 @@
 //! X      = from where the controller can force play into the target, within p ([`super::reach`])
 //! ```
 //!
-//! X begins with everything and shrinks until it stays; the graph is explored before. With the goals that are met at the start of
+//! The graph is explored before. X begins with what the controller wins of the game in which it has to keep p only, and shrinks until it stays;
+//! what breaks p would else come off it round by round. With the goals that are met at the start of
 //! each round, the strategy of the last one is a strategy for the whole: see [`super::strategy`]. What each round takes away shows how
-//! the environment wins there: see [`super::denial`].
+//! the environment wins there, if X begins with everything: see [`super::denial`]. So it does in a second solution, once it is known that the
+//! environment wins.
 //!
 //! Source: L. de Alfaro, M. Faella, T. Henzinger, R. Majumdar, M. Stoelinga, "The Element of Surprise in Timed Games", CONCUR 2003
 //! (nested fixpoints over timed predecessors).
@@ -24,27 +26,48 @@ use crate::zones::{Federation, Patience};
 use super::Player;
 use super::account::wins_bytes;
 use super::graph::Standing;
-use super::reach::{Answer, Extent, Solver, Win};
+use super::reach::{Answer, Solver, Win};
 
 /// Nodes between two looks at the limits.
 const NODES_BETWEEN_LOOKS: u32 = 64;
 
 /// Solves the game of a new solver with the controller as its seeker. The goal of its graph must be p ∩ q, and p what is kept.
 /// On a win, the strategy can be read from it. If the players work together, it is enough that it can be won from somewhere.
-/// `rounds`, if wanted, becomes the sets X by node, the first one first.
+/// `rounds`, if wanted, becomes the sets X by node, the first one first, unless the controller wins.
 pub fn solve(
     solver: &mut Solver<'_, '_, '_>,
+    is_cooperative: bool,
+    rounds: Option<&mut Vec<Vec<Win>>>,
+    watch: &mut dyn Watch,
+) -> Result<Answer, Failure> {
+    solver.go_on(is_cooperative);
+    if let Some(reason) = solver.explore(watch)? {
+        return Ok(Answer::Stopped(reason));
+    }
+    if let Some(reason) = solver.seek_to_break(watch)? {
+        return Ok(Answer::Stopped(reason));
+    }
+    let nodes = 0..solver.graph.nodes.len() as u32;
+    let safe: Vec<Win> = nodes.clone().map(|node| solver.lost(node)).collect();
+    solver.seeker = Player::Controller;
+    let answer = shrink(solver, safe, is_cooperative, None, watch)?;
+    match rounds {
+        Some(rounds) if answer == Answer::Won(Player::Environment) => {
+            let unbroken = nodes.map(|node| unbroken(solver, node)).collect();
+            shrink(solver, unbroken, is_cooperative, Some(rounds), watch)
+        }
+        _ => Ok(answer),
+    }
+}
+
+/// Lets X begin with what is kept, and shrink until it stays or it is clear who wins.
+fn shrink(
+    solver: &mut Solver<'_, '_, '_>,
+    mut kept: Vec<Win>,
     is_cooperative: bool,
     mut rounds: Option<&mut Vec<Vec<Win>>>,
     watch: &mut dyn Watch,
 ) -> Result<Answer, Failure> {
-    solver.go_on(is_cooperative);
-    if let Answer::Stopped(reason) = solver.solve(Extent::Everything, watch)? {
-        return Ok(Answer::Stopped(reason));
-    }
-    let mut kept: Vec<Win> = (0..solver.graph.nodes.len() as u32)
-        .map(|node| unbroken(solver, node))
-        .collect();
     let mut rounds_bytes = 0;
     loop {
         let mut targets = Vec::with_capacity(kept.len());
@@ -69,7 +92,7 @@ pub fn solve(
         }
         solver.aside_bytes = wins_bytes(&targets) + kept_bytes + rounds_bytes;
         solver.restart(targets);
-        if let Some(reason) = solver.propagate(watch)? {
+        if let Some(reason) = solver.sweep(watch)? {
             return Ok(Answer::Stopped(reason));
         }
         if !is_cooperative && !solver.is_won() {

@@ -5,7 +5,7 @@ use crate::zones::Federation;
 use super::Player;
 use super::account::gains_bytes;
 use super::graph::Standing;
-use super::reach::{Gain, Pending, Solver, Win};
+use super::reach::{AfterGoal, Gain, Pending, Solver, Win};
 
 impl Solver<'_, '_, '_> {
     /// Gives nodes that were just made their place: what is sought is won from the start.
@@ -65,7 +65,7 @@ impl Solver<'_, '_, '_> {
     pub(super) fn is_decided(&self, node: u32) -> bool {
         match self.graph.nodes[node as usize].standing {
             Standing::Broken | Standing::Dead => true,
-            Standing::Goal => self.targets.is_none(),
+            Standing::Goal => self.targets.is_none() && self.after_goal != AfterGoal::IsLikeBefore,
             Standing::Open | Standing::Mixed => false,
         }
     }
@@ -81,6 +81,9 @@ impl Solver<'_, '_, '_> {
             };
         }
         let none = || Federation::empty(dimension);
+        if self.after_goal == AfterGoal::IsLikeBefore {
+            return none();
+        }
         let parts = self.graph.parts(node);
         parts.map_or_else(none, |parts| parts.goal.clone())
     }
