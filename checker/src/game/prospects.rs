@@ -6,8 +6,8 @@
 //! against the attacks of the whole game, those that aim at somebody who takes part first, and weak moves only where there are no others.
 //!
 //! Prospects shrink as the graph grows, so each time they are computed anew. That costs as much as all that was computed before, and is
-//! done only if there are several times as many explored states as before, and if some node is pressed; in between the evader uses
-//! weak moves as well.
+//! done only if there are several times as many explored states as before, ever more times, and if some node is pressed; in between
+//! the evader uses weak moves as well.
 //!
 //! Source: the losing states of F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis
 //! of Timed Games", CONCUR 2005. There they are kept beside the winning ones as the graph grows; here they are what lies outside of the
@@ -20,9 +20,9 @@ use crate::zones::{Federation, Patience};
 use super::account::{table_bytes, wins_bytes};
 use super::reach::{Solver, Win};
 
-/// Prospects are computed when there are so many times as many explored states as before,
-const GROWTH: u64 = 3;
-/// and so many more.
+/// Prospects are computed again when there are so many times as many explored states as the first time,
+const FIRST_GROWTH: u64 = 3;
+/// and so many more. Each time they did not end the game, the next ones wait for twice the growth.
 const LEAST_GROWTH: u64 = 16;
 
 /// How the game goes on.
@@ -43,6 +43,8 @@ pub(super) enum Outlook {
 pub(super) struct Schedule {
     /// How many states are to be explored before they are computed again.
     next: u64,
+    /// How many times as many as the next time.
+    growth: u64,
     /// Whether they are being computed, instead of what is won.
     pub(super) is_running: bool,
 }
@@ -83,7 +85,9 @@ impl Solver<'_, '_, '_> {
     /// The model fails in computing what a node wins.
     pub(super) fn look_ahead(&mut self, watch: &mut dyn Watch) -> Result<Outlook, Failure> {
         let explored = self.graph.explored;
-        self.schedule.next = GROWTH * explored + LEAST_GROWTH;
+        let growth = self.schedule.growth.max(FIRST_GROWTH);
+        self.schedule.next = growth * explored + LEAST_GROWTH;
+        self.schedule.growth = 2 * growth;
         let win = self.win.clone();
         let rest = self.rest.clone();
         let attackers = self.defences.attackers.clone();
