@@ -595,9 +595,9 @@ impl Answer {
         }
         let strategy = self.inner.evidence.strategy.as_ref()?;
         Some(
-            self.model.get().with(|model| {
-                strategy_file::write(model.network(), strategy, &self.query).to_string()
-            }),
+            self.model
+                .get()
+                .with(|model| strategy_file::text(model.network(), strategy, &self.query)),
         )
     }
 

@@ -58,7 +58,10 @@ fn file() -> Value {
 fn read(file: &Value) -> Result<Value, strategy_file::Mismatch> {
     let model = load();
     let (query, strategy) = strategy_file::read(model.network(), file.to_string().as_bytes())?;
-    Ok(strategy_file::write(model.network(), &strategy, &query))
+    let file = strategy_file::write(model.network(), &strategy, &query);
+    let text = strategy_file::text(model.network(), &strategy, &query);
+    assert_eq!(text, file.to_string());
+    Ok(file)
 }
 
 #[test]

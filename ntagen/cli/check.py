@@ -516,9 +516,9 @@ def _write_evidence(
         outputs.written.add("--certificate")
         states = certificate.count("\n") - 1
         notes.append(f"certificate of {states} states written to {outputs.certificate}")
-    if outputs.strategy and (text := answer.strategy_text()) is not None:
+    if outputs.strategy and (text := _strategy_text(answer, query, outputs.strategy)) is not None:
         outputs.written.add("--strategy")
-        notes += _write_strategy(answer, query, outputs.strategy, text)
+        notes += _write_strategy(answer, outputs.strategy, text)
     controller = answer.controller_c() if outputs.controller else None
     if outputs.controller and controller is not None:
         write_files({outputs.controller: controller})
@@ -540,13 +540,20 @@ def _write_trace(answer: Answer, query: _Asked, target: str, text: str) -> list[
     return [f"trace written to {path}"]
 
 
-def _write_strategy(answer: Answer, query: _Asked, target: str, text: str) -> list[str]:
+def _strategy_text(answer: Answer, query: _Asked, target: str) -> str | None:
+    """The strategy as it is written there, in that form alone: large ones take seconds."""
+    is_json = Path(target).suffix == ".json"
+    text = answer.strategy_json() if is_json else answer.strategy_text()
+    if text is None or target == "-":
+        return text
+    return f"{text}\n" if is_json else f"{query.text}\n\n{text}"
+
+
+def _write_strategy(answer: Answer, target: str, text: str) -> list[str]:
     if target == "-":
         click.echo(text, nl=False)
         return []
-    path = Path(target)
-    as_json = answer.strategy_json() if path.suffix == ".json" else None
-    write_files({path: f"{as_json}\n" if as_json else f"{query.text}\n\n{text}"})
+    write_files({Path(target): text})
     whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
     return [f"{whose} written to {target}"]
 

@@ -96,7 +96,7 @@ impl LoadedModel {
     ) -> Result<Answer, Rejection> {
         let strategy = self.existing_strategy(name, span)?;
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
-        let text = strategy_file::write(self.network(), &strategy, query).to_string();
+        let text = strategy_file::text(self.network(), &strategy, query);
         let path = self.strategy_path(file, options);
         write_whole(&path, &(text + "\n")).map_err(|error| {
             let message = format!("{} cannot be written: {error}", path.display());

@@ -45,17 +45,60 @@ const SEE_FORMAT: &str = "docs/strategy.md describes the format";
 /// A strategy as JSON. Decisions of states with the same words are joined and come in the order of their ranks.
 pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
     let network = &*timing::network_of(network, strategy);
-    let joined = closed_loop::joined(network, strategy);
-    let states = joined.iter().map(|(words, is_goal, decisions)| {
-        let decisions: Vec<Json> = decisions.iter().map(|one| decision(network, one)).collect();
-        json!({
-            "locations": json::locations(network, words),
-            "variables": json::variables(network, words),
-            "goal": is_goal,
-            "decisions": decisions,
-        })
-    });
-    let states: Vec<Json> = states.collect();
+    let mut file = frame(network, strategy, query);
+    let states = closed_loop::joined(network, strategy);
+    file["states"] = states.iter().map(|one| state(network, one)).collect();
+    if let Some(under) = &strategy.under {
+        file["under"] = write(network, &under.strategy, &under.query);
+    }
+    file
+}
+
+/// The text of what [`write`] gives, made state by state, since the whole takes twenty times the memory of the text.
+pub fn text(network: &Network, strategy: &Strategy, query: &str) -> String {
+    let network = &*timing::network_of(network, strategy);
+    let frame = frame(network, strategy, query).to_string();
+    // Quotes inside of strings are escaped, so that only the fields themselves are found.
+    let (before, after) = frame
+        .split_once(NO_STATES)
+        .expect("a frame has a field for states");
+    let mut text = format!("{before}\"states\":[");
+    for (index, one) in closed_loop::joined(network, strategy).iter().enumerate() {
+        if index > 0 {
+            text.push(',');
+        }
+        text.push_str(&state(network, one).to_string());
+    }
+    text.push(']');
+    match (&strategy.under, after.split_once(NO_UNDER)) {
+        (Some(under), Some((before, after))) => {
+            let whole = self::text(network, &under.strategy, &under.query);
+            text.extend([before, "\"under\":", &whole, after]);
+        }
+        _ => text.push_str(after),
+    }
+    text
+}
+
+/// The field of the states of a frame.
+const NO_STATES: &str = "\"states\":[]";
+
+/// The field of the strategy that a game is played under, of a frame.
+const NO_UNDER: &str = "\"under\":null";
+
+/// A discrete state with its joined decisions.
+fn state(network: &Network, (words, is_goal, decisions): &(&[i32], bool, Vec<&Decision>)) -> Json {
+    let decisions: Vec<Json> = decisions.iter().map(|one| decision(network, one)).collect();
+    json!({
+        "locations": json::locations(network, words),
+        "variables": json::variables(network, words),
+        "goal": is_goal,
+        "decisions": decisions,
+    })
+}
+
+/// The JSON of a strategy without its states, and without the strategy that it is played under.
+fn frame(network: &Network, strategy: &Strategy, query: &str) -> Json {
     let mut file = json!({
         "format": FORMAT,
         "version": VERSION,
@@ -68,14 +111,14 @@ pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
             Selection::First => "first",
             Selection::Any => "any",
         },
-        "states": states,
+        "states": [],
     });
     if let Some(limit) = strategy.time_limit {
         file["time_limit"] = json!(limit);
     }
-    if let Some(under) = &strategy.under {
+    if strategy.under.is_some() {
         file["query"] = json!(alone(query));
-        file["under"] = write(network, &under.strategy, &under.query);
+        file["under"] = Json::Null;
     }
     match &strategy.start {
         Start::Initial => {}

@@ -139,7 +139,7 @@ impl Strategy {
         let (strategy, query) = (&self.inner.strategy, &self.inner.query);
         self.model
             .get()
-            .with(|model| strategy_file::write(model.network(), strategy, query).to_string())
+            .with(|model| strategy_file::text(model.network(), strategy, query))
     }
 
     /// The entry of its file for a state, given as JSON with `locations` and `variables`.

@@ -349,6 +349,8 @@ pub(crate) fn check_file(
     let again =
         read.map(|(query, strategy)| strategy_file::write(model.network(), &strategy, &query));
     prop_assert_eq!(again.as_ref(), Ok(&file), "{}", describe());
+    let text = strategy_file::text(model.network(), strategy, query);
+    prop_assert_eq!(text, file.to_string(), "{}", describe());
     Ok(())
 }
 
