@@ -1,15 +1,18 @@
 //! Which moves the evader defends itself with where time passes: as few as it needs, as far as known.
 //!
-//! Where time passes, the evader may wait, and as long as the seeker has no way to win it needs no move. So for a verdict its moves are
-//! *held back*, and what they lead to is not explored, until the seeker *threatens* to win something more: if the evader did not use
-//! the held moves, it would win valuations that it has not won. Then those of them that help are taken, one after the other: such in
-//! which a process takes part that also takes part in the attack first. Moves that share no process with the attack are *weak*. They
-//! rather put things off, and there may be many of them, so a node against which nothing else helps is left *pressed*, until a look at
-//! the whole game says what to do ([`super::prospects`]).
+//! Where time passes, the evader may wait, and as long as the seeker has no way to win it needs no move. So in a safety game for a
+//! verdict its moves are *held back*, and what they lead to is not explored, until the seeker *threatens* to win something more: if
+//! the evader did not use the held moves, it would win valuations that it has not won. Then those of them that help are taken, one
+//! after the other: first such in which a process takes part that also takes part in the attack. Moves that share no process with the
+//! attack are *weak*. They rather put things off, and there may be many of them, so a node against which nothing else helps is left
+//! *pressed*, until a look at the whole game says what to do ([`super::prospects`]).
 //!
 //! A held move counts as an escape for what the seeker wins, and what is won is recorded only where it does not help. So all that is
 //! known stays sound, and when nothing is left to be explored or computed and no node is pressed, then the seeker wins nothing
 //! that is not known: as in [`super::choices`], what it wins of the nodes in play follows from what it wins of each other.
+//!
+//! Where the controller seeks a goal, nothing is held back: there the moves of the environment are rather the way to it, and whether
+//! dives that leave them out find it sooner is a matter of luck.
 
 use crate::network::Failure;
 use crate::zones::federation::block_bytes;
@@ -118,7 +121,8 @@ impl Solver<'_, '_, '_> {
     pub(super) fn hold_back(&mut self, node: u32) -> Result<bool, Failure> {
         let edges = self.graph.edges_of(node);
         let mut own = self.graph.edges[edges.clone()].iter();
-        if !self.frontier.reserve.is_kept
+        if self.seeker == Player::Controller
+            || !self.frontier.reserve.is_kept
             || !self.graph.nodes[node as usize].delays
             || self.graph.urgent(node).is_some()
             || self.graph.symbolic.stepper.network().features.stopwatches
@@ -140,17 +144,10 @@ impl Solver<'_, '_, '_> {
         Ok(true)
     }
 
-    /// Whether the evader may have to move somewhere in a node because time stops.
+    /// Whether the controller may have to move somewhere in a node because time stops.
     fn may_be_forced(&mut self, node: u32) -> Result<bool, Failure> {
         let situation = self.situation(node)?;
-        let forced = match self.seeker {
-            Player::Environment => self.forced_controller(node, &situation),
-            Player::Controller => {
-                let nothing = Federation::empty(self.graph.dimension());
-                self.forced_environment(node, &nothing, &situation, &mut Patience::endless())
-            }
-        };
-        Ok(!forced.is_empty())
+        Ok(!self.forced_controller(node, &situation).is_empty())
     }
 
     /// Lets the evader use a move that is held back.

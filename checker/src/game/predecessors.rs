@@ -68,7 +68,10 @@ impl Solver<'_, '_, '_> {
         patience: &mut Patience<'_>,
     ) -> (Federation, Federation) {
         let (mut won, decided) = match self.seeker {
-            Player::Controller => self.controllers_gain(node, situation, held, patience),
+            Player::Controller => {
+                let nothing = Federation::empty(self.graph.dimension());
+                (self.controllers_gain(node, situation, patience), nothing)
+            }
             Player::Environment => self.environments_gain(node, situation, held, patience),
         };
         match self.graph.urgent(node) {
@@ -78,14 +81,13 @@ impl Solver<'_, '_, '_> {
         (won, decided)
     }
 
-    /// What the controller wins as the seeker, as far as known, and the goal.
+    /// What the controller wins as the seeker, as far as known.
     fn controllers_gain(
         &self,
         node: u32,
         situation: &Situation,
-        held: &[usize],
         patience: &mut Patience<'_>,
-    ) -> (Federation, Federation) {
+    ) -> Federation {
         let mut good = self.known(node);
         let goal = self.goal(node);
         let mut bad = self.broken(node);
@@ -94,7 +96,7 @@ impl Solver<'_, '_, '_> {
             if edge.controllable {
                 let before = self.before(&edge, &self.win[edge.target as usize]);
                 good.unite_within(&before, patience);
-            } else if !held.contains(&index) {
+            } else {
                 let spoiling = self.spoiling(&edge, patience);
                 bad.unite_within(&spoiling, patience);
             }
@@ -104,7 +106,7 @@ impl Solver<'_, '_, '_> {
         good.unite_within(&forced, patience);
         let mut won = self.safe_past(node, good, &bad, situation, patience);
         won.unite_within(&goal, patience);
-        (won, goal)
+        won
     }
 
     /// What the environment wins as the seeker, as far as known, and what of it it has at once.
