@@ -206,7 +206,9 @@ fn extract_within(
         strategy.states.push(StrategyState {
             words,
             decisions,
-            is_goal: standing == won_standing(owner) && solver.targets.is_none(),
+            is_goal: standing == won_standing(owner)
+                && solver.targets.is_none()
+                && !hangs_on_time(solver, owner),
         });
         steps_to_end.resize(strategy.states.len(), 0);
         for edge in taken {
@@ -258,6 +260,11 @@ fn rank_chains(strategy: &mut Strategy, steps_to_end: &[u32]) {
     }
 }
 
+/// Whether a player wins in the goal only until some time.
+fn hangs_on_time(solver: &Solver<'_, '_, '_>, owner: Player) -> bool {
+    owner == Player::Controller && solver.graph.latest.is_some()
+}
+
 /// The nodes in which play has ended in favour of a player.
 fn won_standing(owner: Player) -> Standing {
     match owner {
@@ -275,7 +282,8 @@ fn decisions(
     let mut decisions = Vec::new();
     let mut taken = Vec::new();
     let is_over = solver.graph.nodes[node as usize].standing == won_standing(solver.seeker);
-    if is_over && solver.targets.is_none() {
+    let is_ever_over = solver.targets.is_none() && !hangs_on_time(solver, solver.seeker);
+    if is_over && is_ever_over {
         return Ok((decisions, taken));
     }
     let moves = moves_of(solver, node)?;
