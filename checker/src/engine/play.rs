@@ -3,9 +3,12 @@
 //! Whatever happens here is computed by [`crate::verify`], so that playing does not depend on the solver.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::hash::BuildHasher as _;
 use std::sync::Arc;
 
+use hashbrown::HashTable;
+use hashbrown::hash_table::Entry;
+use rustc_hash::FxBuildHasher;
 use serde_json::{Map, Value as Json, json};
 
 use crate::game::closed_loop;
@@ -29,8 +32,18 @@ pub struct Follower {
     pub query: String,
     /// The strategy.
     pub strategy: Arc<Strategy>,
-    /// By the words that tell states apart: where they stand in the strategy.
-    by_words: HashMap<Vec<i32>, Vec<u32>>,
+    /// By the words that tell states apart: the index of the first state in the strategy with these.
+    by_words: HashTable<u32>,
+    /// By state: the index of the next one with the same words, [`NONE`] without one.
+    next: Vec<u32>,
+}
+
+/// No state.
+const NONE: u32 = u32::MAX;
+
+/// The hash of the words that tell states apart.
+fn hash(words: &[i32]) -> u64 {
+    FxBuildHasher.hash_one(words)
 }
 
 /// Why a strategy says nothing of a state.
@@ -57,15 +70,26 @@ impl From<Mismatch> for Unadvised {
 impl Follower {
     /// A strategy of the network, for the query with this text.
     pub fn new(network: &Network, query: String, strategy: Arc<Strategy>) -> Follower {
-        let mut by_words: HashMap<Vec<i32>, Vec<u32>> = HashMap::new();
-        for (index, state) in strategy.states.iter().enumerate() {
-            let words = identity(network, &state.words).to_vec();
-            by_words.entry(words).or_default().push(index as u32);
+        let words_of = |index: u32| identity(network, &strategy.states[index as usize].words);
+        let mut by_words = HashTable::with_capacity(strategy.states.len());
+        let mut next = vec![NONE; strategy.states.len()];
+        for index in (0..strategy.states.len() as u32).rev() {
+            let words = words_of(index);
+            let same = |&first: &u32| words_of(first) == words;
+            match by_words.entry(hash(words), same, |&first| hash(words_of(first))) {
+                Entry::Occupied(mut known) => {
+                    next[index as usize] = std::mem::replace(known.get_mut(), index);
+                }
+                Entry::Vacant(free) => {
+                    free.insert(index);
+                }
+            }
         }
         Follower {
             query,
             strategy,
             by_words,
+            next,
         }
     }
 
@@ -81,16 +105,20 @@ impl Follower {
 
     /// The part of the strategy for some words; without a state if it has none for them.
     fn at(&self, network: &Network, words: &[i32]) -> Strategy {
-        let indices = self.by_words.get(identity(network, words));
-        let states = indices.into_iter().flatten();
+        let states = &self.strategy.states;
+        let words = identity(network, words);
+        let same = |&first: &u32| identity(network, &states[first as usize].words) == words;
+        let first = self.by_words.find(hash(words), same).copied();
+        let following = |&index: &u32| Some(self.next[index as usize]).filter(|&next| next != NONE);
+        let indices = std::iter::successors(first, following);
         Strategy {
             owner: self.strategy.owner,
             selection: self.strategy.selection,
             time_limit: self.strategy.time_limit,
             under: None,
             start: Start::Initial,
-            states: states
-                .map(|&index| self.strategy.states[index as usize].clone())
+            states: indices
+                .map(|index| states[index as usize].clone())
                 .collect(),
         }
     }
