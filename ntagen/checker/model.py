@@ -190,7 +190,8 @@ class Model:
         """Answers a query.
 
         The strategy of ``strategy S = control: …`` is kept under its name: later queries of the
-        same model may be asked ``under S``.
+        same model may be asked ``under S``. Unless it is wanted with the answer, it is made when it
+        is first used, within the limits of that query.
 
         Args:
             query: The query in UPPAAL's language.

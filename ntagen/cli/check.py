@@ -309,7 +309,8 @@ def command(
         _say_idle_options([query.text for query in todo], is_environment=loaded.scene is not None)
         if not as_json:
             _header(model_path, loaded.model)
-        for query in todo:
+        for number, query in enumerate(todo):
+            is_used = _is_used(query, todo[number + 1 :])
             try:
                 with shown_progress(query.text, quiet=as_json) as report:
                     answer = loaded.model.check(
@@ -323,7 +324,7 @@ def command(
                         **limits(states, memory, timeout),
                         plans="all" if plans else "none",
                         max_plans=max_plans,
-                        strategy=strategy is not None or controller is not None,
+                        strategy=is_used or strategy is not None or controller is not None,
                         verify=verify,
                         trace=verify or trace is not None or wanted_trace is not None,
                         wanted_trace=wanted_trace or "any",
@@ -391,6 +392,15 @@ def _queries(model: Model, asked: Sequence[str], file: Path | None) -> list[_Ask
     if not (from_file or known):
         raise InputError("the model holds no query\nhint: give one with --query or --queries")
     return from_file or known
+
+
+def _is_used(query: _Asked, later: Sequence[_Asked]) -> bool:
+    """Whether the strategy that a query defines is used by those after it."""
+    named = re.match(r"\s*strategy\s+(\w+)\s*=", query.text)
+    if not named:
+        return False
+    use = re.compile(rf"\b(under\s+|saveStrategy\s*\(.*,\s*){named[1]}\b")
+    return any(use.search(other.text) for other in later)
 
 
 def _asked(query: Query, folder: Path | None = None) -> _Asked:

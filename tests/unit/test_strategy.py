@@ -448,3 +448,34 @@ def test_strategies_within_strategies_are_loaded_in_queries(tmp_path: Path) -> N
     assert more.under is not None
     assert more.under.under is not None
     assert more.verify().holds
+
+
+LAZY = """
+int[0, 59] level, before;
+process Dial() {
+  clock x;
+  state On { x <= 1 };
+  init On;
+  trans On -> On { select to : int[0, 59]; guard x >= 1; assign before = level, level = to, x = 0; },
+        On -u-> On { guard x >= 1; assign level = 0, x = 0; };
+}
+system Dial;
+"""
+
+
+def test_a_named_strategy_is_made_when_it_is_first_used(tmp_path: Path) -> None:
+    path = tmp_path / "dial.xta"
+    path.write_text(LAZY)
+    model = ntagen.load(path)
+    query = "control: A[] level + before <= 50"
+    answer = model.check(f"strategy Low = {query}", states=500)
+    assert (answer.verdict, answer.strategy) == ("satisfied", None)
+    with pytest.raises(
+        ntagen.InputError, match="'Low': the search for it was stopped by the limit of states"
+    ):
+        model.check("sup: level under Low", states=500)
+    assert model.check("sup: level under Low").value == 50
+    with_strategy = model.check(f"strategy Low = {query}", strategy=True)
+    assert with_strategy.strategy is not None
+    assert with_strategy.explored > 20 * answer.explored
+    assert model.check("E<> level == 50 under Low").verdict == "satisfied"

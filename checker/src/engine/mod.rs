@@ -52,6 +52,7 @@ use crate::verify;
 
 pub use answer::{Answer, Evidence, Verdict};
 pub use limits::Limits;
+use strategies::Due;
 pub use strategies::NamedStrategy;
 pub use verification::Verification;
 use verification::{Asked, Played};
@@ -324,6 +325,12 @@ impl LoadedModel {
     pub fn check(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
         let start = Instant::now();
         let (query, warnings) = self.compile(text.span)?;
+        self.load_seconds += start.elapsed().as_secs_f64();
+        if let Some(name) = &query.under {
+            // What is supported hangs on it.
+            self.existing_strategy(name, query.span, options)?;
+        }
+        let start = Instant::now();
         self.refuse_unsupported(&query, options.priorities)?;
         self.prepare_code(options.code, query.span)?;
         self.load_seconds += start.elapsed().as_secs_f64();
@@ -345,51 +352,61 @@ impl LoadedModel {
 
     /// Answers a query that is no file operation; keeps the strategy that it defines.
     fn answer(&mut self, query: &crate::ir::Query, options: &Options) -> Result<Answer, Rejection> {
-        let under = query.under.as_ref();
-        let under = under.map(|name| self.existing_strategy(name, query.span));
-        let under = under.transpose()?;
-        let time_limit = under.as_ref().and_then(|strategy| strategy.time_limit);
-        let network = timing::with_limit(&self.model.network, time_limit);
-        let within = under.as_ref().map(|strategy| {
-            let name = query.under.as_deref().unwrap_or_default();
-            let query = self.strategy(name).map(|one| one.query.clone());
-            Arc::new(Under {
-                query: query.unwrap_or_default(),
-                strategy: Arc::clone(strategy),
+        let within = match &query.under {
+            None => None,
+            Some(name) => {
+                let strategy = self.existing_strategy(name, query.span, options)?;
+                let query = self.strategy(name).map(|one| one.query.clone());
+                Some(Arc::new(Under {
+                    query: query.unwrap_or_default(),
+                    strategy,
+                }))
+            }
+        };
+        let answer = self.answer_within(query, options, within.as_ref());
+        let Some(name) = query.strategy.clone() else {
+            return Ok(answer);
+        };
+        let text = strategies::unnamed(self.sources.text(query.span)).to_owned();
+        // Where the query is not satisfied, the strategy is the environment's.
+        let is_won = answer.verdict == Verdict::Satisfied;
+        let known = is_won.then(|| answer.evidence.strategy.clone()).flatten();
+        let due = (is_won && known.is_none()).then(|| {
+            Box::new(Due {
+                query: query.clone(),
+                options: options.clone(),
+                within,
             })
         });
-        let under = under.map(|strategy| ClosedLoop::new(&network, &strategy));
+        self.keep_strategy(NamedStrategy {
+            due,
+            ..NamedStrategy::new(name, text, known)
+        });
+        Ok(answer)
+    }
+
+    /// Answers a query that is no file operation, under this strategy.
+    fn answer_within(
+        &self,
+        query: &crate::ir::Query,
+        options: &Options,
+        within: Option<&Arc<Under>>,
+    ) -> Answer {
+        let time_limit = within.and_then(|within| within.strategy.time_limit);
+        let network = timing::with_limit(&self.model.network, time_limit);
+        let under = within.map(|within| ClosedLoop::new(&network, &within.strategy));
         let subject = answer::Subject {
             network: &network,
             executor: self.executor(),
             under: under.as_ref(),
-            within: within.as_ref(),
+            within,
             priorities: options.priorities,
         };
-        let Some(name) = &query.strategy else {
-            let mut answer = answer::answer(subject, query, options);
-            if time_limit.is_some() {
-                answer.evidence.forget_last_clock();
-            }
-            return Ok(answer);
-        };
-        let with_strategy = Options {
-            strategy: true,
-            ..options.clone()
-        };
-        let mut answer = answer::answer(subject, query, &with_strategy);
-        let text = self.sources.text(query.span);
-        // Where the query is not satisfied, the strategy is the environment's.
-        let is_won = answer.verdict == Verdict::Satisfied;
-        self.keep_strategy(NamedStrategy {
-            name: name.clone(),
-            query: strategies::unnamed(text).to_owned(),
-            strategy: is_won.then(|| answer.evidence.strategy.clone()).flatten(),
-        });
-        if !options.strategy {
-            answer.evidence.strategy = None;
+        let mut answer = answer::answer(subject, query, options);
+        if time_limit.is_some() && query.strategy.is_none() {
+            answer.evidence.forget_last_clock();
         }
-        Ok(answer)
+        answer
     }
 
     /// What runs the code of the model.

@@ -1,7 +1,8 @@
 //! Strategies that have a name: what queries define, save, load, and are asked under.
 //!
 //! A name stays for all later queries of the same loaded model. Its strategy is missing if the query that defines it did not come
-//! out satisfied; to be asked under such a name is an error. Files lie relative to the folder that [`super::Options`] names, else
+//! out satisfied; to be asked under such a name is an error. Who wins is often known long before the whole strategy is, so unless it is
+//! wanted with the answer, it is made when it is first used. Files lie relative to the folder that [`super::Options`] names, else
 //! to the folder of the model.
 
 use std::fs::File;
@@ -10,9 +11,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::diagnostics::{Diagnostic, Span};
-use crate::game::strategy::Strategy;
+use crate::game::strategy::{Strategy, Under};
+use crate::ir::Query;
 
 use super::answer::{Answer, Evidence, Verdict, new_answer};
+use super::certificate::stop_text;
 use super::{LoadedModel, Options, Rejection, codes, strategy_file};
 
 /// A strategy with the query that it answers.
@@ -22,8 +25,31 @@ pub struct NamedStrategy {
     pub name: String,
     /// The text of the query, without the name.
     pub query: String,
-    /// `None` if the query was not satisfied.
+    /// `None` if the query was not satisfied, or the strategy was not made.
     pub strategy: Option<Arc<Strategy>>,
+    /// How it is made when it is first used.
+    pub(super) due: Option<Box<Due>>,
+}
+
+/// A strategy that is still to be made.
+#[derive(Clone, Debug)]
+pub(super) struct Due {
+    pub(super) query: Query,
+    pub(super) options: Options,
+    /// What the query is asked under.
+    pub(super) within: Option<Arc<Under>>,
+}
+
+impl NamedStrategy {
+    /// A strategy that is known, or known to be missing.
+    pub fn new(name: String, query: String, strategy: Option<Arc<Strategy>>) -> NamedStrategy {
+        NamedStrategy {
+            name,
+            query,
+            strategy,
+            due: None,
+        }
+    }
 }
 
 /// The text of a query without the `strategy S =` before it, if it has one.
@@ -70,31 +96,64 @@ impl LoadedModel {
         self.strategies.push(named);
     }
 
-    /// The strategy that a query is asked under, or that is to be saved.
+    /// The strategy that a query is asked under, or that is to be saved; it is made within these limits if that is due.
     pub(super) fn existing_strategy(
-        &self,
+        &mut self,
         name: &str,
         span: Span,
+        options: &Options,
     ) -> Result<Arc<Strategy>, Rejection> {
+        let due = self.strategy(name).and_then(|one| one.due.clone());
+        let remark = match due {
+            Some(due) => {
+                self.prepare_code(due.options.code, span)?;
+                self.make_strategy(name, *due, options)
+            }
+            None => None,
+        };
         let known = self.strategy(name);
         if let Some(strategy) = known.and_then(|one| one.strategy.clone()) {
             return Ok(strategy);
         }
         let query = known.map_or("", |one| one.query.as_str());
-        let message = format!("there is no strategy '{name}': its query gave none");
+        let remark = remark.unwrap_or_else(|| String::from("its query gave none"));
+        let message = format!("there is no strategy '{name}': {remark}");
         let diagnostic = Diagnostic::new(codes::NO_STRATEGY, span, message)
             .help(format!("the query was {query}"));
         Err(Rejection::new(vec![diagnostic], &self.sources))
     }
 
+    /// Makes a strategy that is due. Returns what is known of why there is none; then it is tried again with the next use.
+    fn make_strategy(&mut self, name: &str, due: Due, options: &Options) -> Option<String> {
+        let with_strategy = Options {
+            strategy: true,
+            limits: options.limits.clone(),
+            ..due.options
+        };
+        let answer = self.answer_within(&due.query, &with_strategy, due.within.as_ref());
+        let strategy = answer.evidence.strategy;
+        if strategy.is_none() {
+            return match answer.verdict {
+                Verdict::Unknown(reason) => Some(stop_text(reason).to_owned()),
+                _ => answer.message,
+            };
+        }
+        let mut named = self.strategies.iter_mut();
+        if let Some(named) = named.find(|one| one.name == name) {
+            named.strategy = strategy;
+            named.due = None;
+        }
+        None
+    }
+
     /// Answers `saveStrategy`.
     pub(super) fn save_strategy(
-        &self,
+        &mut self,
         (file, name): (&str, &str),
         span: Span,
         options: &Options,
     ) -> Result<Answer, Rejection> {
-        let strategy = self.existing_strategy(name, span)?;
+        let strategy = self.existing_strategy(name, span, options)?;
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let text = strategy_file::text(self.network(), &strategy, query);
         let path = self.strategy_path(file, options);
@@ -127,11 +186,8 @@ impl LoadedModel {
         let (query, strategy) = self.read_strategy(&path.display().to_string(), &bytes, span)?;
         let strategy = Arc::new(strategy);
         let states = strategy.states.len();
-        self.keep_strategy(NamedStrategy {
-            name: name.to_owned(),
-            query,
-            strategy: Some(Arc::clone(&strategy)),
-        });
+        let known = Some(Arc::clone(&strategy));
+        self.keep_strategy(NamedStrategy::new(name.to_owned(), query, known));
         let evidence = Evidence {
             strategy: Some(strategy),
             ..Evidence::default()

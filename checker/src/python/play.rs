@@ -183,11 +183,7 @@ impl Strategy {
         let strategy = Some(Arc::clone(&self.inner.strategy));
         let query = self.inner.query.clone();
         self.model.get().with(|model| {
-            model.keep_strategy(NamedStrategy {
-                name: name.to_owned(),
-                query,
-                strategy,
-            });
+            model.keep_strategy(NamedStrategy::new(name.to_owned(), query, strategy));
         });
     }
 

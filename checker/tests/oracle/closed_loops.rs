@@ -385,11 +385,11 @@ fn compare(
     let read = read.map(|(query, strategy)| strategy_file::write(&ir, &strategy, &query));
     prop_assert_eq!(read.as_ref(), Ok(&states), "{}", text);
     let description = format!("{text}\n{states:#}");
-    model.keep_strategy(NamedStrategy {
-        name: "S".to_owned(),
-        query: String::new(),
-        strategy: Some(std::sync::Arc::new(strategy)),
-    });
+    model.keep_strategy(NamedStrategy::new(
+        "S".to_owned(),
+        String::new(),
+        Some(std::sync::Arc::new(strategy)),
+    ));
     let (p_holds, q_holds) = (closed.labels(network, p), closed.labels(network, q));
     let without: Vec<bool> = q_holds.iter().map(|holds| !holds).collect();
     let avoiding = closed.staying(&without);

@@ -199,11 +199,11 @@ fn check_under(
     query: &str,
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
-    model.keep_strategy(NamedStrategy {
-        name: "S".to_owned(),
-        query: String::new(),
-        strategy: Some(strategy),
-    });
+    model.keep_strategy(NamedStrategy::new(
+        "S".to_owned(),
+        String::new(),
+        Some(strategy),
+    ));
     let query = format!("{query} under S");
     let text = model.add_query(&query);
     let options = Options {

@@ -66,11 +66,11 @@ fn compare(
     };
     restrict(&mut graph, &strategy);
     let description = strategy_file::write(model.network(), &strategy, "control: A[] true");
-    model.keep_strategy(NamedStrategy {
-        name: "S".to_owned(),
-        query: "control: A[] true".to_owned(),
-        strategy: Some(Arc::new(strategy)),
-    });
+    model.keep_strategy(NamedStrategy::new(
+        "S".to_owned(),
+        "control: A[] true".to_owned(),
+        Some(Arc::new(strategy)),
+    ));
     for (query, kind) in [
         (format!("control: A<> {goal_text}"), Kind::Reach),
         (
