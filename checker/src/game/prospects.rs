@@ -7,7 +7,7 @@
 //!
 //! Prospects shrink as the graph grows, so each time they are computed anew. That costs as much as all that was computed before, and is
 //! done only if there are several times as many explored states as before, ever more times, and if some node is pressed; in between
-//! the evader uses weak moves as well.
+//! the evader uses weak moves as well. Where the controller seeks a goal they are computed a few times early on.
 //!
 //! Source: the losing states of F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis
 //! of Timed Games", CONCUR 2005. There they are kept beside the winning ones as the graph grows; here they are what lies outside of the
@@ -17,6 +17,7 @@ use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
 use crate::zones::{Federation, Patience};
 
+use super::Player;
 use super::account::{table_bytes, wins_bytes};
 use super::reach::{Solver, Win};
 
@@ -24,6 +25,12 @@ use super::reach::{Solver, Win};
 const FIRST_GROWTH: u64 = 3;
 /// and so many more. Each time they did not end the game, the next ones wait for twice the growth.
 const LEAST_GROWTH: u64 = 16;
+
+/// Where the controller seeks a goal, nothing is held back, and prospects only tell that it has lost. They are computed each time that
+/// there are so many times as many explored states,
+const GROWTH_OF_A_GOAL: u64 = 6;
+/// up to about so many: losing shows early, or rather late, and beside many states they took a third of the time that winning takes.
+const MOST_STATES_OF_A_GOAL: u64 = 1 << 13;
 
 /// How the game goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +82,12 @@ impl Solver<'_, '_, '_> {
 
     /// Whether it is time to compute the prospects although nodes in play wait to be explored.
     pub(super) fn is_prospect_due(&self) -> bool {
-        self.defences.uses_weak && self.graph.explored >= self.schedule.next
+        let explored = self.graph.explored;
+        let is_of_use = match self.seeker {
+            Player::Environment => self.defences.uses_weak,
+            Player::Controller => explored <= MOST_STATES_OF_A_GOAL,
+        };
+        is_of_use && explored >= self.schedule.next
     }
 
     /// Computes the prospects, when all else is computed. If there are none, they count as won afterwards, so that the strategy of the
@@ -85,7 +97,10 @@ impl Solver<'_, '_, '_> {
     /// The model fails in computing what a node wins.
     pub(super) fn look_ahead(&mut self, watch: &mut dyn Watch) -> Result<Outlook, Failure> {
         let explored = self.graph.explored;
-        let growth = self.schedule.growth.max(FIRST_GROWTH);
+        let growth = match self.seeker {
+            Player::Environment => self.schedule.growth.max(FIRST_GROWTH),
+            Player::Controller => GROWTH_OF_A_GOAL,
+        };
         self.schedule.next = growth * explored + LEAST_GROWTH;
         self.schedule.growth = 2 * growth;
         let win = self.win.clone();
@@ -110,6 +125,9 @@ impl Solver<'_, '_, '_> {
         };
         if let Some(reason) = reason {
             return Ok(Outlook::Stopped(reason));
+        }
+        if self.seeker == Player::Controller {
+            return Ok(Outlook::Settled);
         }
         self.hold_back_again();
         let is_in_play = self.wait_for_nodes_in_play();

@@ -276,7 +276,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                     break;
                 }
                 let has_reserve = self.frontier.reserve.is_used;
-                if is_computed && self.is_prospect_due() {
+                if is_computed && extent == Extent::Verdict && self.is_prospect_due() {
                     match self.look_ahead(watch)? {
                         Outlook::Open | Outlook::Settled => {}
                         Outlook::Hopeless => break,
