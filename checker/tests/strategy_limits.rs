@@ -1,6 +1,9 @@
 //! Limits that come while a strategy is made: what is known is answered, and why there is no strategy is said.
 
+use checker::engine::verification::{self, Played};
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::verify::strategy::Outcome;
+use checker::verify::{Effort, GivenUp};
 
 #[path = "common/games.rs"]
 mod games;
@@ -55,4 +58,40 @@ fn memory_ends_a_strategy_and_not_the_answer() {
         }
     }
     assert!((4..=12).contains(&lost), "{lost} of 16 are lost");
+}
+
+#[test]
+fn a_check_of_a_strategy_ends_when_it_is_to() {
+    let text = trains(2, "-u->");
+    let mut model = LoadedModel::load("trains.xta", text.as_bytes()).expect("it is accepted");
+    let query = model.add_query(ONE_ON_THE_BRIDGE);
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        strategy: true,
+        ..Options::default()
+    };
+    let answer = model.check(&query, &options).expect("it is answered");
+    let strategy = answer.evidence.strategy.expect("it is wanted");
+    let decisions = verification::decisions(model.network(), &strategy);
+    let played = Played::new(&strategy, &decisions);
+    let rules = (options.forced, options.priorities);
+    let mut check = |effort: &mut Effort<'_>| {
+        let outcome = model.verify_strategy(&query, played, rules, effort);
+        outcome.expect("the query is right").expect("it is covered")
+    };
+    let Outcome::Verified(whole) = check(&mut Effort::up_to(u64::MAX)) else {
+        panic!("the strategy wins");
+    };
+    let outcome = check(&mut Effort::up_to(whole.regions - 1));
+    assert!(matches!(outcome, Outcome::GivenUp(GivenUp::TooLarge, _)));
+    let mut asked = 0;
+    let mut ends = || {
+        asked += 1;
+        asked > 2
+    };
+    let outcome = check(&mut Effort::up_to(u64::MAX).unless(&mut ends));
+    let Outcome::GivenUp(GivenUp::Ended, coverage) = outcome else {
+        panic!("it was to end");
+    };
+    assert!(coverage.regions < whole.regions, "{whole:?}");
 }

@@ -456,8 +456,9 @@ process Dial() {
   clock x;
   state On { x <= 1 };
   init On;
-  trans On -> On { select to : int[0, 59]; guard x >= 1; assign before = level, level = to, x = 0; },
-        On -u-> On { guard x >= 1; assign level = 0, x = 0; };
+  trans
+  On -> On { select to : int[0, 59]; guard x >= 1; assign before = level, level = to, x = 0; },
+  On -u-> On { guard x >= 1; assign level = 0, x = 0; };
 }
 system Dial;
 """

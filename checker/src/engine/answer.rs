@@ -85,7 +85,7 @@ impl Evidence {
         let strategy = self.verification.iter().map(|check| match check {
             Ok(StrategyCheck::Verified(_)) => Some(true),
             Ok(StrategyCheck::Violated(..)) => Some(false),
-            Ok(StrategyCheck::TooLarge(_)) | Err(_) => None,
+            Ok(StrategyCheck::GivenUp(..)) | Err(_) => None,
         });
         let runs = self.witnesses.iter().filter_map(|one| one.run.as_ref());
         let runs = runs.map(|run| match run {
@@ -235,7 +235,8 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
         }
     };
     drop(armed);
-    if answer.verdict == Verdict::Error(Failure::Interrupted) {
+    // What is known by then does not matter to a user who interrupts.
+    if answer.verdict == Verdict::Error(Failure::Interrupted) || watch.is_interrupted() {
         let counters = answer.counters;
         let verdict = Verdict::Unknown(watch.stop());
         answer = new_answer(verdict, Evidence::default(), counters);

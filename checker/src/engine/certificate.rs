@@ -19,7 +19,7 @@ use crate::search::plain::{Measure, Outcome, Search};
 use crate::verify::certificate::{self, Defect, States};
 use crate::verify::replay::{self, Claim, End, Moment, Run, Shown, Step};
 use crate::verify::strategy::{Constraint, Outcome as StrategyOutcome};
-use crate::verify::{self, Part};
+use crate::verify::{self, Effort, Part};
 
 use super::describe;
 use super::evidence::{Missing, Proof};
@@ -158,7 +158,7 @@ impl Checked {
             holds: match result {
                 Ok(StrategyOutcome::Verified(_)) => Some(true),
                 Ok(StrategyOutcome::Violated(..)) => Some(false),
-                Ok(StrategyOutcome::TooLarge(_)) | Err(_) => None,
+                Ok(StrategyOutcome::GivenUp(..)) | Err(_) => None,
             },
             lines: verification::describe(network, result),
         }
@@ -237,8 +237,8 @@ fn check_strategy(
     };
     let decisions = verification::decisions(network, strategy);
     let played = Played::new(strategy, &decisions);
-    let most = verification::MOST_REGIONS;
-    let result = verification::verify(network, asked, played, rules, most);
+    let effort = &mut Effort::up_to(verification::MOST_REGIONS);
+    let result = verification::verify(network, asked, played, rules, effort);
     Ok(Checked::of_strategy(network, &result))
 }
 

@@ -176,7 +176,8 @@ pub(super) fn fastest(
                             is_cooperative: false,
                             time_optimal: Some((race.limit, race.rest)),
                         };
-                        let verification = games::verified(network, asked, &strategy, options);
+                        let verification =
+                            games::verified(network, asked, &strategy, options, watch);
                         answer.evidence.verification = Some(verification);
                     }
                     remarks.push(match strategy.owner {

@@ -17,6 +17,7 @@ use crate::network::{
     Abstraction, ClockBounds, Failure, LiveVariables, Restriction, Stepper, Symbolic, predicate,
 };
 use crate::search::limits::{Counters, StopReason, Watch};
+use crate::verify::Effort;
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
 use super::attempt::{
@@ -336,7 +337,7 @@ fn played(
                         is_cooperative,
                         time_optimal: None,
                     };
-                    let verification = verified(network, asked, &strategy, options);
+                    let verification = verified(network, asked, &strategy, options, watch);
                     answer.evidence.verification = Some(verification);
                 }
                 answer.evidence.strategy = Some(Arc::new(strategy));
@@ -361,18 +362,25 @@ fn strategy_of(
     }
 }
 
-/// Checks a strategy in closed loop.
+/// Checks a strategy in closed loop, until the watch wants it to end.
 pub(super) fn verified(
     network: &Network,
     asked: Asked<'_>,
     strategy: &Strategy,
     options: &Options,
+    watch: &mut dyn Watch,
 ) -> Verification {
-    let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
+    let mut ends = || watch.look(&Counters::default()).is_some();
     let decisions = verification::decisions(network, strategy);
     let played = Played::new(strategy, &decisions);
     let rules = (options.forced, options.priorities);
-    verification::verify(network, asked, played, rules, most)
+    let effort = &mut effort_of(options).unless(&mut ends);
+    verification::verify(network, asked, played, rules, effort)
+}
+
+/// How much a check may look at.
+pub(super) fn effort_of<'a>(options: &Options) -> Effort<'a> {
+    Effort::up_to(options.limits.states.unwrap_or(verification::MOST_REGIONS))
 }
 
 /// Adds the plans that are wanted to the answer for a solved game.

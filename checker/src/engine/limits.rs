@@ -146,9 +146,17 @@ impl LimitWatch {
 
     /// Why an end was called for, by the limit of time or by the user.
     pub(super) fn stop(&self) -> StopReason {
+        self.last_stop().unwrap_or(StopReason::Interrupted)
+    }
+
+    /// Whether the user called for an end.
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.last_stop() == Some(StopReason::Interrupted)
+    }
+
+    fn last_stop(&self) -> Option<StopReason> {
         let seen = self.patience.seen.lock();
-        let stop = seen.unwrap_or_else(PoisonError::into_inner).stop;
-        stop.unwrap_or(StopReason::Interrupted)
+        seen.unwrap_or_else(PoisonError::into_inner).stop
     }
 }
 

@@ -48,7 +48,7 @@ use crate::syntax::{
     self,
     ast::{QueryText, Template},
 };
-use crate::verify;
+use crate::verify::{self, Effort};
 
 pub use answer::{Answer, Evidence, Verdict};
 pub use limits::Limits;
@@ -428,12 +428,12 @@ impl LoadedModel {
         text: &QueryText,
         strategy: Played<'_>,
         rules: (Forced, Priorities),
-        most_regions: u64,
+        effort: &mut Effort<'_>,
     ) -> Result<Verification, Rejection> {
         let (query, _) = self.compile(text.span)?;
         let network = &self.model.network;
         Ok(match Asked::of(&query.kind) {
-            Some(asked) => verification::verify(network, asked, strategy, rules, most_regions),
+            Some(asked) => verification::verify(network, asked, strategy, rules, effort),
             None => Err(verify::Error::Unsupported("queries other than control")),
         })
     }

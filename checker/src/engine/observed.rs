@@ -10,6 +10,8 @@ use crate::game::strategy::Selection;
 use crate::game::{Forced, Player, Priorities};
 use crate::ir::{ClockAtom, Network, Objective, Predicate, QueryKind};
 use crate::network::{Abstraction, ClockBounds, predicate};
+use crate::search::limits::{Counters, Watch};
+use crate::verify::Effort;
 use crate::verify::observed::{self, MachineState};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
@@ -82,8 +84,9 @@ pub(super) fn game(
                 let machine = machine_file::to_check(&machine);
                 let asked = (objective, observations);
                 let rules = (options.forced, options.priorities);
-                let most = options.limits.states.unwrap_or(verification::MOST_REGIONS);
-                let result = verify(network, asked, &machine, rules, most);
+                let mut ends = || watch.look(&Counters::default()).is_some();
+                let effort = &mut games::effort_of(options).unless(&mut ends);
+                let result = verify(network, asked, &machine, rules, effort);
                 answer.evidence.verification = Some(result);
             }
             answer.evidence.machine = Some(Arc::new(machine));
@@ -103,14 +106,14 @@ pub fn verify(
     (objective, observations): (&Objective, &[Predicate]),
     machine: &[MachineState],
     rules: (Forced, Priorities),
-    most: u64,
+    effort: &mut Effort<'_>,
 ) -> Verification {
     let owner = (Player::Controller, Selection::First);
     let mut claim = verification::claim(objective, owner, rules);
     let (constant, has_differences) = verification::constants(observations.iter());
     claim.constant = claim.constant.max(constant);
     claim.has_differences |= has_differences;
-    observed::verify(network, machine, observations, &claim, most)
+    observed::verify(network, machine, observations, &claim, effort)
 }
 
 /// Checks a machine as read from its file.
@@ -131,7 +134,8 @@ pub(super) fn check_file(
     let machine = machine_file::read(network, file, observations.len())
         .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))?;
     let asked = (objective, &observations[..]);
-    let result = verify(network, asked, &machine, rules, verification::MOST_REGIONS);
+    let effort = &mut Effort::up_to(verification::MOST_REGIONS);
+    let result = verify(network, asked, &machine, rules, effort);
     Ok(Checked::of_strategy(network, &result))
 }
 

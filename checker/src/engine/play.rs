@@ -19,7 +19,7 @@ use crate::verify::play::{self, Ending, Gap, Next, Situation, Timing, Window};
 use crate::verify::replay::{End, Moment, Run, Step};
 use crate::verify::strategy::{Outcome, Owner};
 use crate::verify::timed::{Timed, least_multiple};
-use crate::verify::{self, Part, Semantics};
+use crate::verify::{self, Effort, Part, Semantics};
 
 use super::strategy_file::Mismatch;
 use super::verification::{Asked, Played};
@@ -193,16 +193,16 @@ impl Follower {
         &self,
         model: &mut LoadedModel,
         rules: (Forced, Priorities),
-        most_regions: u64,
+        effort: &mut Effort<'_>,
     ) -> Result<(Option<bool>, Vec<String>), Rejection> {
         let text = model.add_query(&self.query);
         let decisions = verification::decisions(model.network(), &self.strategy);
         let played = Played::new(&self.strategy, &decisions);
-        let result = model.verify_strategy(&text, played, rules, most_regions)?;
+        let result = model.verify_strategy(&text, played, rules, effort)?;
         let holds = match &result {
             Ok(Outcome::Verified(_)) => Some(true),
             Ok(Outcome::Violated(..)) => Some(false),
-            Ok(Outcome::TooLarge(_)) | Err(_) => None,
+            Ok(Outcome::GivenUp(..)) | Err(_) => None,
         };
         Ok((holds, verification::describe(model.network(), &result)))
     }

@@ -11,7 +11,7 @@ use crate::verify::strategy::{
     Violation,
 };
 use crate::verify::timed::Timed;
-use crate::verify::{self, Semantics, State, regions};
+use crate::verify::{self, Effort, GivenUp, Semantics, State, regions};
 use crate::zones::{Bound, Federation, minimal};
 
 use super::{describe, timing};
@@ -99,7 +99,7 @@ pub fn verify(
     asked: Asked<'_>,
     played: Played<'_>,
     rules: (Forced, Priorities),
-    most_regions: u64,
+    effort: &mut Effort<'_>,
 ) -> Verification {
     let violated_at_once = |defect| {
         let violation = Violation {
@@ -140,13 +140,7 @@ pub fn verify(
     if let (Some(under), Some(allowed)) = (played.under, &allowed) {
         claim.under = Some((allowed, under.strategy.selection == Selection::Any));
     }
-    strategy::verify(
-        &game.network,
-        played.decisions,
-        &claim,
-        &start,
-        most_regions,
-    )
+    strategy::verify(&game.network, played.decisions, &claim, &start, effort)
 }
 
 /// The run that a way is, with its states in ticks: on entry of each, and after the last wait; `None` if it is not possible.
@@ -348,8 +342,12 @@ pub fn describe(network: &Network, verification: &Verification) -> Vec<String> {
             "strategy verified: {} regions, {} moves of its own, {} of the opponent, {} ends that are won",
             coverage.regions, coverage.own_moves, coverage.opponent_moves, coverage.goals
         )],
-        Ok(strategy::Outcome::TooLarge(coverage)) => vec![format!(
+        Ok(strategy::Outcome::GivenUp(GivenUp::TooLarge, coverage)) => vec![format!(
             "strategy not verified: more than {} regions; the limit of states (--states) sets another bound",
+            coverage.regions
+        )],
+        Ok(strategy::Outcome::GivenUp(GivenUp::Ended, coverage)) => vec![format!(
+            "strategy not verified: stopped by the limit of time after {} regions",
             coverage.regions
         )],
         Ok(strategy::Outcome::Violated(violation, _)) => violation_lines(network, violation),

@@ -12,7 +12,7 @@ use crate::engine::play::{self as engine, Done, Follower, Refused, Unadvised, pl
 use crate::engine::strategies::{NamedStrategy, unnamed};
 use crate::engine::{LoadedModel, describe, strategy_file, timing, verification};
 use crate::game::strategy::Selection;
-use crate::verify;
+use crate::verify::{self, Effort};
 
 /// A strategy of one of the players.
 #[pyclass(frozen, module = "ntagen._checker")]
@@ -174,8 +174,20 @@ impl Strategy {
         let most = states.unwrap_or(verification::MOST_REGIONS);
         let model = self.model.get();
         let inner = &self.inner;
-        let result = py.detach(|| model.with(|model| inner.verify(model, rules, most)));
-        result.map_err(rejected)
+        let (result, interrupted) = py.detach(|| {
+            let mut interrupted = None;
+            let mut ends = || {
+                interrupted = Python::attach(|py| py.check_signals().err());
+                interrupted.is_some()
+            };
+            let effort = &mut Effort::up_to(most).unless(&mut ends);
+            let result = model.with(|model| inner.verify(model, rules, effort));
+            (result, interrupted)
+        });
+        match interrupted {
+            Some(interrupted) => Err(interrupted),
+            None => result.map_err(rejected),
+        }
     }
 
     /// Lets queries of the model be asked under it by a name.

@@ -3,7 +3,7 @@
 //! Nothing here uses the moves, zones, search or games of the engine. [`concrete`] computes the moves of a state with exact clock
 //! values straight from the definitions, running code on the interpreter; [`regions`] makes the set of valuations finite;
 //! [`strategy`] closes the loop between a strategy and every move of the environment, [`observed`] that of one that goes by
-//! observations, both by the rules of `rules`; [`replay`] follows a single run;
+//! observations, both by the rules of `rules`, with an [`Effort`]; [`replay`] follows a single run;
 //! [`certificate`] checks that a set of states is closed and avoids a predicate;
 //! [`choices`] says what can happen next in a state, for simulating runs; [`play`] the same for playing against a strategy.
 //!
@@ -14,6 +14,7 @@ pub mod certificate;
 pub mod choices;
 mod code;
 pub mod concrete;
+mod effort;
 mod moments;
 pub mod observed;
 pub mod play;
@@ -25,5 +26,6 @@ pub mod timed;
 mod zone;
 
 pub use concrete::{Error, Move, Part, Semantics, State};
+pub use effort::{Effort, GivenUp};
 pub use regions::Regions;
 pub use replay::Violation;

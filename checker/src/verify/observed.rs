@@ -18,6 +18,7 @@ use std::collections::HashMap;
 use crate::ir::{Network, Predicate};
 
 use super::concrete::{Error, Move, State};
+use super::effort::Effort;
 use super::regions::Regions;
 use super::rules::{Aim, Claim, Owner, Rest, Rules};
 use super::strategy::{Coverage, Defect, Outcome, Step, Violation};
@@ -49,14 +50,14 @@ pub struct MachineState {
     pub next: Vec<(Vec<bool>, usize)>,
 }
 
-/// Checks a machine of the controller, who sees `observations`; gives up above `most` pairs. The constants of the observations must be
-/// among those of the claim.
+/// Checks a machine of the controller, who sees `observations`, with this effort: pairs of a state of it and a region count. The
+/// constants of the observations must be among those of the claim.
 pub fn verify(
     network: &Network,
     machine: &[MachineState],
     observations: &[Predicate],
     claim: &Claim<'_>,
-    most: u64,
+    effort: &mut Effort<'_>,
 ) -> Result<Outcome, Error> {
     let mut play = Play {
         rules: Rules::new(network, Regions::ticks_per_unit(network), &[], claim),
@@ -67,7 +68,7 @@ pub fn verify(
         path: Vec::new(),
         coverage: Coverage::default(),
     };
-    play.run(most)
+    play.run(effort)
 }
 
 /// Where play stands: the state of the machine, and the region.
@@ -95,7 +96,7 @@ struct Play<'a> {
 }
 
 impl Play<'_> {
-    fn run(&mut self, most: u64) -> Result<Outcome, Error> {
+    fn run(&mut self, effort: &mut Effort<'_>) -> Result<Outcome, Error> {
         let mut initial = self.rules.semantics.initial()?;
         self.regions.represent_state(&mut initial);
         let first = (!self.machine.is_empty()).then_some(0);
@@ -120,8 +121,8 @@ impl Play<'_> {
                     None => {}
                 }
             }
-            if self.coverage.regions >= most {
-                return Ok(Outcome::TooLarge(self.coverage));
+            if let Some(why) = effort.is_over(self.coverage.regions) {
+                return Ok(Outcome::GivenUp(why, self.coverage));
             }
             if let Some(defect) = self.enter(number, &target)? {
                 return Ok(self.violated(defect));

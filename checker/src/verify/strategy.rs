@@ -27,6 +27,7 @@ use std::collections::{HashMap, HashSet};
 use crate::ir::Network;
 
 use super::concrete::{Error, Move, State};
+use super::effort::{Effort, GivenUp};
 use super::regions::Regions;
 use super::rules::Rules;
 use super::timed::{Timed, least_multiple};
@@ -109,17 +110,17 @@ pub enum Outcome {
     Verified(Coverage),
     /// It does not.
     Violated(Box<Violation>, Coverage),
-    /// More regions than allowed.
-    TooLarge(Coverage),
+    /// There is more than what may be looked at.
+    GivenUp(GivenUp, Coverage),
 }
 
-/// Checks a strategy; gives up above `most_regions`.
+/// Checks a strategy, with this effort.
 pub fn verify(
     network: &Network,
     strategy: &[Decisions],
     claim: &Claim<'_>,
     start: &Origin,
-    most_regions: u64,
+    effort: &mut Effort<'_>,
 ) -> Result<Outcome, Error> {
     let under = claim.under.map_or(&[][..], |(under, _)| under);
     let all = strategy.iter().chain(under);
@@ -159,11 +160,11 @@ pub fn verify(
         coverage: Coverage::default(),
     };
     if *start != Origin::Anywhere {
-        return play.run(vec![first], most_regions);
+        return play.run(vec![first], effort);
     }
-    match play.reachable(first, most_regions)? {
-        Some(regions) => play.run(regions, most_regions),
-        None => Ok(Outcome::TooLarge(play.coverage)),
+    match play.reachable(first, effort)? {
+        Ok(regions) => play.run(regions, effort),
+        Err(why) => Ok(Outcome::GivenUp(why, play.coverage)),
     }
 }
 
@@ -200,8 +201,12 @@ struct Play<'a> {
 }
 
 impl Play<'_> {
-    /// The regions that the model can get to, the last one first; `None` if they are more than allowed.
-    fn reachable(&mut self, first: State, most: u64) -> Result<Option<Vec<State>>, Error> {
+    /// The regions that the model can get to, the last one first, unless they are too many.
+    fn reachable(
+        &mut self,
+        first: State,
+        effort: &mut Effort<'_>,
+    ) -> Result<Result<Vec<State>, GivenUp>, Error> {
         let mut found = HashSet::from([first.clone()]);
         let mut all = vec![first];
         let mut next = 0;
@@ -217,17 +222,18 @@ impl Play<'_> {
                     all.push(target);
                 }
             }
-            if all.len() as u64 > most {
+            if let Some(why) = effort.is_over(all.len() as u64) {
                 self.coverage.regions = all.len() as u64;
-                return Ok(None);
+                return Ok(Err(why));
             }
         }
         all.reverse();
-        Ok(Some(all))
+        effort.begin_anew();
+        Ok(Ok(all))
     }
 
     /// Follows play from these regions, the last one first.
-    fn run(&mut self, mut starts: Vec<State>, most_regions: u64) -> Result<Outcome, Error> {
+    fn run(&mut self, mut starts: Vec<State>, effort: &mut Effort<'_>) -> Result<Outcome, Error> {
         loop {
             let Some(frame) = self.path.last_mut() else {
                 if let Some(start) = starts.pop() {
@@ -264,8 +270,8 @@ impl Play<'_> {
                 }
                 None => {}
             }
-            if self.coverage.regions >= most_regions {
-                return Ok(Outcome::TooLarge(self.coverage));
+            if let Some(why) = effort.is_over(self.coverage.regions) {
+                return Ok(Outcome::GivenUp(why, self.coverage));
             }
             if let Some(defect) = self.enter(&target)? {
                 return self.violated(defect);

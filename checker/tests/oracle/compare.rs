@@ -249,7 +249,7 @@ pub(crate) fn check_strategy(
             count(&tally.verified);
             Ok(())
         }
-        Some(Ok(Outcome::TooLarge(_))) => {
+        Some(Ok(Outcome::GivenUp(..))) => {
             count(&tally.unverified);
             Ok(())
         }

@@ -9,8 +9,8 @@ use checker::engine::verification::{self, Played};
 use checker::game::strategy::{Selection, Start, Strategy};
 use checker::game::{Forced, Player, Priorities};
 use checker::syntax::ast::QueryText;
-use checker::verify::Part;
 use checker::verify::strategy::{Decision, Decisions, Defect, Outcome};
+use checker::verify::{Effort, Part};
 
 use crate::compare;
 
@@ -85,7 +85,7 @@ fn defect_of(
             &solved.query,
             played,
             (Forced::Tiga, Priorities::Ignored),
-            10_000,
+            &mut Effort::up_to(10_000),
         )
         .expect("the query is right");
     match verification.expect("the model can be checked") {
@@ -94,7 +94,7 @@ fn defect_of(
             assert_eq!(violation.states.len(), violation.steps.len() + 1);
             Some(violation.defect)
         }
-        Outcome::TooLarge(_) => panic!("the game is small"),
+        Outcome::GivenUp(..) => panic!("the game is small"),
     }
 }
 

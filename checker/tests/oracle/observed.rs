@@ -11,6 +11,7 @@ use checker::engine::{LoadedModel, Verdict, machine_file, observed};
 use checker::game::observed::Machine;
 use checker::game::{Forced, Priorities};
 use checker::ir::QueryKind;
+use checker::verify::Effort;
 use checker::verify::observed::{Action, MachineState};
 use checker::verify::strategy::Outcome;
 use proptest::collection::vec;
@@ -252,7 +253,13 @@ fn check_machine(
             };
             let asked = (objective, &observations[..]);
             let rules = (forced, Priorities::Ignored);
-            let checked = observed::verify(network, asked, &states, rules, MOST_PLACES);
+            let checked = observed::verify(
+                network,
+                asked,
+                &states,
+                rules,
+                &mut Effort::up_to(MOST_PLACES),
+            );
             let is_right = match checked {
                 Ok(Outcome::Verified(_)) => expected,
                 Ok(Outcome::Violated(..)) => !expected,

@@ -10,7 +10,7 @@ use checker::ir;
 use checker::syntax::ast::QueryText;
 use checker::verify::strategy::{Constraint, Decision, Decisions, Outcome};
 use checker::verify::timed::Timed;
-use checker::verify::{Regions, Semantics};
+use checker::verify::{Effort, Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
@@ -295,11 +295,11 @@ fn compare_query<'g>(
         };
         let played = Played::new(&strategy, &decisions);
         let rules = (forced, Priorities::Kept);
-        let result = model.verify_strategy(query, played, rules, 100_000);
+        let result = model.verify_strategy(query, played, rules, &mut Effort::up_to(100_000));
         let holds = match result.expect("the query is right") {
             Ok(Outcome::Verified(_)) => true,
             Ok(Outcome::Violated(..)) => false,
-            Ok(Outcome::TooLarge(_)) | Err(_) => continue,
+            Ok(Outcome::GivenUp(..)) | Err(_) => continue,
         };
         tally.count(holds);
         prop_assert_eq!(
