@@ -75,7 +75,7 @@ bench: $(INSTALLED) ## Measure the engine: all plans, a thousand syntheses, redu
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
 .PHONY: bench-games
-bench-games: $(INSTALLED) ## Measure how far the solver of games gets: two families, up to 60 s or 4 GiB
+bench-games: $(INSTALLED) ## Measure how far the solver of games gets: seven families, up to 60 s or 4 GiB
 	$(BIN)/python tests/benchmarks/games.py
 
 .PHONY: clean

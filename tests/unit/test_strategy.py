@@ -48,7 +48,10 @@ system P;
 
 COUNTER = """
 int n;
-process P() { state L; init L; trans L -> L { guard n < 30000; assign n++; }, L -u-> L { }; }
+process P() {
+  state L; init L;
+  trans L -> L { guard n < 30000; assign n++; }, L -> L { guard n > 0; assign n--; };
+}
 system P;
 """
 

@@ -131,8 +131,12 @@ extern "C" fn copysign(magnitude: f64, sign: f64) -> f64 {
 /// Distances of points are sums of squares. That of a whole number is exact as a product, and what is exact the library gives too,
 /// but takes ten times as long for it.
 extern "C" fn pow(base: f64, exponent: f64) -> f64 {
-    if exponent - 2.0 == 0.0 && base.abs() <= WHOLE_ROOT && base.fract() == 0.0 {
-        return base * base;
+    if exponent - 2.0 == 0.0 && base.abs() <= WHOLE_ROOT {
+        // Asking for the part behind the point would be a call of the library again.
+        let whole = f64::from(base as i32);
+        if whole - base == 0.0 {
+            return base * base;
+        }
     }
     library::pow(base, exponent)
 }

@@ -199,7 +199,8 @@ def test_synthesis_has_limits(tmp_path: Path, player: Player) -> None:
     model = tmp_path / "counter.xta"
     model.write_text(
         "int n; process P() { state L; init L;"
-        "trans L -> L { guard n < 30000; assign n++; }, L -u-> L { }; } system P;"
+        "trans L -> L { guard n < 30000; assign n++; }, L -> L { guard n > 0; assign n--; }; }"
+        "system P;"
     )
     player(model, "--query", "control: A<> n == 30000", "--states", "100", code=3)
 

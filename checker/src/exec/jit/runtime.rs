@@ -28,6 +28,7 @@ pub(super) struct NativeContext<'call> {
 
 impl<'call> NativeContext<'call> {
     /// The context of a call, and the state's words, which go beside it.
+    #[inline]
     pub(super) fn new(
         constants: &[i32],
         alarm: &'call Alarm,
