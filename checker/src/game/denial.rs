@@ -34,13 +34,9 @@ pub fn extract(
     waiting: Vec<u32>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
-    let (strategy, reason) = solver.patiently(watch, |solver, patience| {
+    solver.unless_stopped(watch, |solver, patience| {
         extract_within(solver, rounds, waiting, patience)
-    });
-    match reason {
-        Some(reason) => Ok(Err(reason)),
-        None => strategy.map(Ok),
-    }
+    })
 }
 
 /// As [`extract`], which is of use unless the patience is over.

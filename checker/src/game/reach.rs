@@ -621,4 +621,20 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let result = work(self, &mut patience);
         (result, reason)
     }
+
+    /// As [`Solver::patiently`]; the inner error is why the result is of no use.
+    ///
+    /// # Errors
+    /// The work fails.
+    pub(super) fn unless_stopped<R>(
+        &mut self,
+        watch: &mut dyn Watch,
+        work: impl FnOnce(&mut Self, &mut Patience<'_>) -> Result<R, Failure>,
+    ) -> Result<Result<R, StopReason>, Failure> {
+        let (result, reason) = self.patiently(watch, work);
+        match reason {
+            Some(reason) => Ok(Err(reason)),
+            None => result.map(Ok),
+        }
+    }
 }

@@ -156,13 +156,9 @@ pub fn extract_from(
     waiting: Vec<u32>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
-    let (strategy, reason) = solver.patiently(watch, |solver, patience| {
+    solver.unless_stopped(watch, |solver, patience| {
         extract_within(solver, owner, waiting, patience)
-    });
-    match reason {
-        Some(reason) => Ok(Err(reason)),
-        None => strategy.map(Ok),
-    }
+    })
 }
 
 /// As [`extract_from`], which is of use unless the patience is over.
