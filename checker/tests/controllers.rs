@@ -5,6 +5,8 @@
 
 #[path = "common/c_programs.rs"]
 mod c_programs;
+#[path = "common/solved.rs"]
+mod solved;
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -17,7 +19,8 @@ use checker::game::closed_loop;
 use checker::game::strategy::{Decision, Selection, Strategy};
 use checker::network::Part;
 
-use c_programs::{compiled, games, in_folder, solved};
+use c_programs::{compiled, games, in_folder};
+use solved::solved;
 
 /// Ticks of a unit of time. Clock values are whole numbers of two of them, so that every bound and the middle between is met.
 const TICKS_PER_UNIT: i64 = 4;

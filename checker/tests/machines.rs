@@ -4,6 +4,8 @@
 
 #[path = "common/c_programs.rs"]
 mod c_programs;
+#[path = "common/solved.rs"]
+mod solved;
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,7 +15,8 @@ use std::sync::Arc;
 use checker::engine::{LoadedModel, machine_controller, machine_file};
 use checker::game::observed::Machine;
 
-use c_programs::{compiled, games, in_folder, solved};
+use c_programs::{compiled, games, in_folder};
+use solved::solved;
 
 /// Writes what each state proposes, and where it goes on, observation by observation.
 const DRIVER: &str = r#"

@@ -6,7 +6,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use checker::engine::{CodeEngine, LoadedModel, Options, strategy_text};
+use checker::engine::strategy_text;
+
+#[path = "common/solved.rs"]
+mod solved;
+
+use solved::solved;
 
 fn games() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/games")
@@ -14,15 +19,7 @@ fn games() -> PathBuf {
 
 /// The text of the winner's strategy.
 fn text_of(path: &Path, query: &str) -> String {
-    let bytes = fs::read(path).expect("the model is there");
-    let mut model = LoadedModel::load("model.xta", &bytes).expect("the model is right");
-    let text = model.add_query(query);
-    let options = Options {
-        code: CodeEngine::Interpreter,
-        strategy: true,
-        ..Options::default()
-    };
-    let answer = model.check(&text, &options).expect("the query is right");
+    let (model, answer) = solved(path, query).expect("the query is right");
     let strategy = answer.evidence.strategy.expect("there is a strategy");
     strategy_text::write(model.network(), &strategy)
 }

@@ -4,8 +4,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options};
-
 /// The games of the corpus, each with one of its queries that begins like this.
 pub(crate) fn games(beginning: &str) -> Vec<(PathBuf, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/games");
@@ -24,20 +22,6 @@ pub(crate) fn games(beginning: &str) -> Vec<(PathBuf, String)> {
         games.extend(wanted.map(|query| (path.clone(), query.to_owned())));
     }
     games
-}
-
-/// The answer to a query, with what the winner does, if the model of the file accepts the query; and the model.
-pub(crate) fn solved(path: &Path, query: &str) -> Option<(LoadedModel, Answer)> {
-    let bytes = fs::read(path).expect("the model is there");
-    let mut model = LoadedModel::load("model.xta", &bytes).expect("the model is right");
-    let text = model.add_query(query);
-    let options = Options {
-        code: CodeEngine::Interpreter,
-        strategy: true,
-        ..Options::default()
-    };
-    let answer = model.check(&text, &options).ok()?;
-    Some((model, answer))
 }
 
 /// Does something with an empty folder of this name, which is gone afterwards.
