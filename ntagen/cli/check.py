@@ -479,9 +479,9 @@ MOVES_SHOWN: Final = 12
 def _way_to_failure(answer: Answer) -> list[str]:
     """The trace to a run-time error in short: transitions, and the state in which it happens."""
     text = answer.trace_json() if answer.verdict == "error" else None
-    if text is None:
+    trace = json.loads(text) if text is not None else {}
+    if not trace.get("states"):
         return []
-    trace = json.loads(text)
     moves, last = trace["transitions"], trace["states"][-1]
     steps = "step" if len(moves) == 1 else "steps"
     lines = [f"the way there, {len(moves)} {steps} (--trace - shows all states):"]

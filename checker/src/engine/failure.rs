@@ -60,6 +60,10 @@ impl LoadedModel {
             let run = evidence::prove(&mut symbolic, network, trace, subject, is_doubtful);
             witness.run = Some(run);
         }
+        if witness.trace.states.is_empty() {
+            // The initial state is where it happens, although nobody can be in it.
+            witness.trace.states.extend(self.symbolic().origin());
+        }
         witness
     }
 

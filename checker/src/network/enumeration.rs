@@ -1,9 +1,11 @@
 //! Which edge instances are enabled, and who synchronises with whom.
 //!
-//! Invariant: the order of the moves is that of processes, then edges, select values, partners, branches.
+//! Invariants:
+//! * The order of the moves is that of processes, then edges, select values, partners, branches.
+//! * Where the guard of an edge does not hold, its channel is not looked at: it may have none.
 
 use crate::exec::{Context, EmittedConstraint, Executor, RunTimeError};
-use crate::ir::{ChannelId, FunctionId, Guard};
+use crate::ir::{ChannelId, FunctionId, Guard, RunTimeErrorKind};
 
 use super::combinations::{Choice, check_count};
 use super::failure::Failure;
@@ -12,6 +14,9 @@ use super::scope::Scope;
 use super::selects::select_values;
 use super::stepper::Stepper;
 use super::tables::EdgeEntry;
+
+/// The number of no channel.
+const NO_CHANNEL: u32 = u32::MAX;
 
 /// One enabled edge instance: a process, an edge, its select values and its clock constraints.
 #[derive(Clone, Copy, Debug)]
@@ -238,12 +243,35 @@ impl<'a> Stepper<'a> {
         channels.clear();
         for select in 0..entry.instances {
             select_values(entry.edge, select, &mut self.arguments);
-            let offset = self.call(self.executor, function, words)?;
-            channels.push(sync.channel.0 + offset as u32);
+            channels.push(match self.call(self.executor, function, words) {
+                Ok(offset) => sync.channel.0 + offset as u32,
+                Err(error) => self.unheard(entry, error, words)?,
+            });
         }
         self.listening[process as usize].learn(index, &channels);
         self.channels = channels;
         Ok(true)
+    }
+
+    /// What an instance of a receiving edge listens to whose channel cannot be computed: nothing if its guard does not hold, for then
+    /// the channel does not count; else it is an error. The select values are in the buffer.
+    fn unheard(
+        &mut self,
+        entry: EdgeEntry<'a>,
+        error: RunTimeError,
+        words: &mut [i32],
+    ) -> Result<u32, RunTimeError> {
+        if let Some(record) = &mut self.record {
+            record.spoil();
+        }
+        let first = self.constraints.len();
+        let is_enabled =
+            error.kind == RunTimeErrorKind::Interrupted || self.guard(&entry.edge.guard, words)?;
+        self.constraints.truncate(first);
+        if is_enabled {
+            return Err(error);
+        }
+        Ok(NO_CHANNEL)
     }
 
     /// Adds every enabled instance of an edge to the candidates.

@@ -110,18 +110,16 @@ impl<'a> Stepper<'a> {
         select_values(entry.edge, select, &mut self.arguments);
         let is_enabled = self.guard(&entry.edge.guard, words).ok()?;
         let mut channel = 0;
-        // Senders evaluate their channel only where the guard holds, receivers always.
-        if let Some(sync) = entry.edge.sync
-            && (is_enabled || !sync.send)
-        {
+        if !is_enabled {
+            return Some(());
+        }
+        if let Some(sync) = entry.edge.sync {
             channel = sync.channel.0;
             if let Some(function) = sync.index {
                 channel += self.call(self.executor, function, words).ok()? as u32;
             }
         }
-        if is_enabled {
-            set.push(channel, select, &self.constraints[first..]);
-        }
+        set.push(channel, select, &self.constraints[first..]);
         Some(())
     }
 

@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
-use crate::ir::{ChannelId, Edge, FunctionId, Network, Update, Urgency};
+use crate::ir::{ChannelId, Edge, FunctionId, Network, RunTimeErrorKind, Update, Urgency};
 
 use super::combinations::{Choice, Group};
 use super::enumeration::Candidate;
@@ -60,6 +60,14 @@ pub struct Stepper<'a> {
     pub(super) offers: Offers,
     /// What is evaluated while moves are put together to be remembered.
     pub(super) record: Option<Record>,
+}
+
+/// What is remembered of the moves of a state.
+enum Found {
+    Offer(OfferId),
+    Nothing,
+    /// A question failed, and so the moves cannot be remembered beside those of the tree.
+    Failure,
 }
 
 impl<'a> Stepper<'a> {
@@ -190,13 +198,16 @@ impl<'a> Stepper<'a> {
         if self.offers.is_worth_asking()
             && let Some(vector) = self.offers.vector(words)
         {
-            if let Some(offer) = self.known_offer(vector, words)? {
-                self.offers.note_found();
-                out.copy_from(self.offers.moves(offer));
-                return Ok(());
-            }
-            if self.offers.is_suited(vector) {
-                return self.remember(vector, words, scope, out).map(|_| ());
+            match self.known_offer(vector, words)? {
+                Found::Offer(offer) => {
+                    self.offers.note_found();
+                    out.copy_from(self.offers.moves(offer));
+                    return Ok(());
+                }
+                Found::Nothing if self.offers.is_suited(vector) => {
+                    return self.remember(vector, words, scope, out).map(|_| ());
+                }
+                Found::Nothing | Found::Failure => {}
             }
         }
         self.put_together(words, scope, out)
@@ -209,37 +220,39 @@ impl<'a> Stepper<'a> {
         vector: VectorId,
         words: &mut [i32],
     ) -> Result<Option<OfferId>, Failure> {
-        if let Some(offer) = self.known_offer(vector, words)? {
-            return Ok(Some(offer));
+        match self.known_offer(vector, words)? {
+            Found::Offer(offer) => Ok(Some(offer)),
+            Found::Nothing if self.offers.is_suited(vector) => {
+                self.remember(vector, words, Scope::Everything, &mut Moves::default())
+            }
+            Found::Nothing | Found::Failure => Ok(None),
         }
-        if !self.offers.is_suited(vector) {
-            return Ok(None);
-        }
-        self.remember(vector, words, Scope::Everything, &mut Moves::default())
     }
 
     /// The moves of a state with this location vector, if they are remembered.
-    fn known_offer(
-        &mut self,
-        vector: VectorId,
-        words: &mut [i32],
-    ) -> Result<Option<OfferId>, Failure> {
+    fn known_offer(&mut self, vector: VectorId, words: &mut [i32]) -> Result<Found, Failure> {
         let Some(mut way) = self.offers.start(vector) else {
-            return Ok(None);
+            return Ok(Found::Nothing);
         };
         loop {
             match self.offers.next(way) {
-                Next::Offer(offer) => return Ok(Some(offer)),
+                Next::Offer(offer) => return Ok(Found::Offer(offer)),
                 Next::Ask(function, arguments) => {
                     let mut context = Context {
                         state: words,
                         constraints: &mut self.constraints,
                         assignments: &mut self.assignments,
                     };
-                    let answer = self.executor.call(function, arguments, &mut context)?;
-                    self.offers.answer(&mut way, answer);
+                    match self.executor.call(function, arguments, &mut context) {
+                        Ok(answer) => self.offers.answer(&mut way, answer),
+                        Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
+                            return Err(error.into());
+                        }
+                        // Whether it counts shows where the moves are put together.
+                        Err(_) => return Ok(Found::Failure),
+                    }
                 }
-                Next::Unknown => return Ok(None),
+                Next::Unknown => return Ok(Found::Nothing),
             }
         }
     }

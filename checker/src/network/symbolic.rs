@@ -202,15 +202,7 @@ impl<'a> Symbolic<'a> {
 
     /// The initial words, the zone before time passes, and the invariants.
     pub fn start(&mut self) -> Result<(Vec<i32>, Zone, Vec<Constraint>), Failure> {
-        let network = self.stepper.network();
-        let mut words = network.initial.clone();
-        let mut zone = Zone::zero(self.dimension);
-        for (clock, &value) in network.initial_clocks.iter().enumerate().skip(1) {
-            if value != 0 {
-                check_limit(value)?;
-                zone.assign(&[Assignment::Value { clock, value }]);
-            }
-        }
+        let (mut words, mut zone) = self.origin()?;
         let Some(invariant) = self.invariant(&mut words)? else {
             return Err(Failure::InitialInvariant);
         };
@@ -218,6 +210,19 @@ impl<'a> Symbolic<'a> {
             return Err(Failure::InitialInvariant);
         }
         Ok((words, zone, invariant))
+    }
+
+    /// The initial words and values of clocks, whether they meet the invariants or not.
+    pub fn origin(&self) -> Result<(Vec<i32>, Zone), Failure> {
+        let network = self.stepper.network();
+        let mut zone = Zone::zero(self.dimension);
+        for (clock, &value) in network.initial_clocks.iter().enumerate().skip(1) {
+            if value != 0 {
+                check_limit(value)?;
+                zone.assign(&[Assignment::Value { clock, value }]);
+            }
+        }
+        Ok((network.initial.clone(), zone))
     }
 
     /// Takes a move on `words`, and gives its effect on clocks; `None` if the target's invariants or the guards forbid it

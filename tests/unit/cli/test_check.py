@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import ntagen
 from ntagen.cli import main
 
 PAPER = Path(__file__).resolve().parents[3] / "examples" / "paper.nsl"
@@ -442,6 +443,32 @@ def test_the_trace_to_an_error_is_written(
     out, _ = check_run(capsys, 4, failing, "--query", query, "--trace", "-")
     assert "Fails in the transitions:\n  P.A->P.B { n == 2, tau, a[n] = 1 / (n - 2) }" in out
     assert "the way there" not in out
+
+
+@pytest.mark.parametrize("query", ["E<> P.B", "A[] not deadlock", "control: A<> P.B"])
+@pytest.mark.parametrize(
+    ("model", "place"),
+    [
+        ("urgent chan c[2];\nprocess P() {{ {} A -> B {{ sync c[k]!; }}; }}", "k"),
+        ("int a[2];\nprocess P() {{ {} A -> B {{ guard a[k] == 0; }}; }}", "k"),
+    ],
+)
+def test_an_error_in_the_initial_state_has_a_way_of_no_steps(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, query: str, model: str, place: str
+) -> None:
+    path = tmp_path / "failing.xta"
+    path.write_text(f"int k = 2; {model.format('state A, B; init A; trans')}\nsystem P;\n")
+    out, _ = check_run(capsys, 4, path, "--query", query, "--trace", tmp_path / "trace.json")
+    column = path.read_text().splitlines()[1].index(f"[{place}]") + 2
+    assert f"array index out of bounds, at {path}:2:{column}: {place}" in out
+    out, _ = check_run(capsys, 4, path, "--query", query)
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert "the way there, 0 steps (--trace - shows all states):" in lines
+    assert "k=2" in lines[lines.index("in the state") + 1]
+    trace = json.loads((tmp_path / "trace.json").read_text())
+    assert [state["locations"] for state in trace["states"]] == [{"P": "A"}]
+    with pytest.raises(ntagen.ModelError, match="array index out of bounds"):
+        ntagen.load(path).simulate(steps=1)
 
 
 def test_an_error_beyond_the_end_of_play_is_none(
