@@ -10,7 +10,7 @@ use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Local, LocalId, Place, Root};
 use super::types::{Size, Type};
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
-use crate::exec::{Context, Interpreter};
+use crate::exec::{Context, EmittedAssignment, Interpreter, RunTimeError};
 use crate::ir::{
     Channel, Clock, Coordinate, Function, FunctionId, Instruction, Network, ProcessId,
     RunTimeErrorKind, Variable,
@@ -325,19 +325,30 @@ impl<'a> Checker<'a> {
         function: FunctionId,
         words: u32,
     ) -> Result<Vec<i32>, RunTimeErrorKind> {
+        let state = vec![0; words as usize];
+        let result = self.run_on(function, state, &mut Vec::new());
+        result.map_err(|error| error.kind)
+    }
+
+    /// Runs a function on the words of a state, and gives them back; what it assigns to clocks is appended.
+    pub(super) fn run_on(
+        &mut self,
+        function: FunctionId,
+        mut state: Vec<i32>,
+        assignments: &mut Vec<EmittedAssignment>,
+    ) -> Result<Vec<i32>, RunTimeError> {
         let network = &self.world.network;
         let functions = excerpt(&network.functions, function);
         let interpreter = Interpreter::new(&functions, &network.constants);
-        let mut state = vec![0; words as usize];
         let mut context = Context {
             state: &mut state,
             constraints: &mut Vec::new(),
-            assignments: &mut Vec::new(),
+            assignments,
         };
         let left = CONSTANT_ROUND_LIMIT.saturating_sub(self.world.constant_rounds);
         let (result, rounds) = interpreter.call_within(left, FunctionId(0), &[], &mut context);
         self.world.constant_rounds += rounds;
-        result.map(|_| state).map_err(|error| error.kind)
+        result.map(|_| state)
     }
 }
 

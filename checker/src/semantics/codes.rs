@@ -149,6 +149,10 @@ codes! {
     STRATEGY_UNKNOWN = "E0275" "strategy-unknown";
     /// A loaded strategy without a name.
     STRATEGY_WITHOUT_NAME = "E0277" "strategy-without-name";
+    /// A function that is called by its name, with parameters or a result.
+    HOOK_SIGNATURE = "E0281" "hook-signature";
+    /// A function that makes the initial state and ends in an error.
+    HOOK_FAILS = "E0282" "hook-fails";
     /// An expression whose value is dropped and that changes nothing.
     EFFECT_MISSING = "W0201" "effect-missing";
     /// An invariant with a strict upper bound.
@@ -163,4 +167,6 @@ codes! {
     HYBRID_CLOCK_IGNORED = "W0206" "hybrid-clock-ignored";
     /// An array without parts.
     ARRAY_EMPTY = "W0207" "array-empty";
+    /// A function that UPPAAL calls after all that a query sees.
+    HOOK_WITHOUT_EFFECT = "W0211" "hook-without-effect";
 }

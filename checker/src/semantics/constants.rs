@@ -107,22 +107,7 @@ impl Checker<'_> {
     }
 
     fn report_failure(&mut self, kind: RunTimeErrorKind, span: Span) {
-        let reason = match kind {
-            RunTimeErrorKind::Overflow => "an overflow of 32 bits",
-            RunTimeErrorKind::DivisionByZero => "a division by zero",
-            RunTimeErrorKind::ShiftDistance => {
-                "a shift by a negative number of bits or by more than 31"
-            }
-            RunTimeErrorKind::NegativeExponent => "a negative exponent",
-            RunTimeErrorKind::OutOfRange => "a value outside its range",
-            RunTimeErrorKind::IndexOutOfBounds => "an index outside its array",
-            RunTimeErrorKind::NotAnInteger => "a double that fits into no integer",
-            RunTimeErrorKind::ClockValue => "a clock value beyond the limits",
-            RunTimeErrorKind::AssertionFailed => "an assertion that does not hold",
-            RunTimeErrorKind::StepLimit | RunTimeErrorKind::Interrupted => {
-                "its loops, with those of all constants before it, take more than ten million rounds"
-            }
-        };
+        let reason = reason(kind);
         self.error(
             codes::CONSTANT_WITHOUT_VALUE,
             span,
@@ -162,6 +147,26 @@ impl Checker<'_> {
             "use an integer expression; fint(…) truncates a double",
         );
         false
+    }
+}
+
+/// What goes wrong, for a sentence.
+pub(super) fn reason(kind: RunTimeErrorKind) -> &'static str {
+    match kind {
+        RunTimeErrorKind::Overflow => "an overflow of 32 bits",
+        RunTimeErrorKind::DivisionByZero => "a division by zero",
+        RunTimeErrorKind::ShiftDistance => {
+            "a shift by a negative number of bits or by more than 31"
+        }
+        RunTimeErrorKind::NegativeExponent => "a negative exponent",
+        RunTimeErrorKind::OutOfRange => "a value outside its range",
+        RunTimeErrorKind::IndexOutOfBounds => "an index outside its array",
+        RunTimeErrorKind::NotAnInteger => "a double that fits into no integer",
+        RunTimeErrorKind::ClockValue => "a clock value beyond the limits",
+        RunTimeErrorKind::AssertionFailed => "an assertion that does not hold",
+        RunTimeErrorKind::StepLimit | RunTimeErrorKind::Interrupted => {
+            "its loops, with those of all constants before it, take more than ten million rounds"
+        }
     }
 }
 

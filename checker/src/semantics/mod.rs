@@ -54,6 +54,8 @@ mod templates;
 
 mod instantiate;
 
+mod hooks;
+
 mod system;
 
 mod members;

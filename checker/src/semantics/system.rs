@@ -39,8 +39,10 @@ impl Checker<'_> {
         self.system_is_open = true;
         self.system(document);
         self.whole_system(document);
+        let relocation = self.finish();
+        self.hooks();
         self.world.query_scopes = std::mem::take(&mut self.scopes);
-        self.finish()
+        relocation
     }
 
     /// Priorities, hooks and progress measures.
