@@ -203,7 +203,7 @@ class Model:
                 model has a run-time error, which may be met before or after what is looked for. In
                 games nothing depends on it.
             seed: For ``search="random"``.
-            forced: What happens where time cannot pass and only the environment can move.
+            forced: When the environment must move because time cannot pass.
             priorities: Whether priorities of channels and processes count in games and under
                 strategies; in all other queries they do.
             engine: What runs the code of the model; answers do not depend on it.
@@ -301,7 +301,7 @@ class Model:
             query: A control query, such as ``control: A<> Gate.Open``.
             search: As in `check`, like all that follow.
             seed: For ``search="random"``.
-            forced: What happens where time cannot pass and only the environment can move.
+            forced: When the environment must move because time cannot pass.
             priorities: Whether priorities of channels and processes count.
             engine: What runs the code of the model.
             states: The search stops after this many stored states.
@@ -398,8 +398,7 @@ class Model:
             text: The file, as `Answer.trace_json`, `Answer.certificate_text` and
                 `Answer.strategy_json` give it.
             path: What to call it in messages.
-            forced: For strategies: what happens where time cannot pass and only the environment
-                can move.
+            forced: For strategies: when the environment must move because time cannot pass.
             priorities: For strategies: whether priorities of channels and processes count.
 
         Raises:

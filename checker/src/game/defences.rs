@@ -147,7 +147,8 @@ impl Solver<'_, '_, '_> {
     /// Whether the controller may have to move somewhere in a node because time stops.
     fn may_be_forced(&mut self, node: u32) -> Result<bool, Failure> {
         let situation = self.situation(node)?;
-        Ok(!self.forced_controller(node, &situation).is_empty())
+        let forced = self.forced_controller(node, &situation, &mut Patience::endless());
+        Ok(!forced.is_empty())
     }
 
     /// Lets the evader use a move that is held back.

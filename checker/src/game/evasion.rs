@@ -96,7 +96,8 @@ fn allowed_waiting(
     let situation = solver.situation(node)?;
     let standstill = solver.standstill(&situation);
     let mut at_rest = standstill.intersection_within(free, patience);
-    at_rest.subtract_within(&solver.forced_controller(node, &situation), patience);
+    let forced = solver.forced_controller(node, &situation, patience);
+    at_rest.subtract_within(&forced, patience);
     if !solver.graph.nodes[node as usize].delays {
         return Ok(at_rest);
     }

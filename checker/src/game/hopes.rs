@@ -4,7 +4,8 @@
 //! hope. A move of the evader gives hope only if it may have to be made:
 //! * if time may stop in the node, since it need not move before,
 //! * if no other move leads the evader from everywhere in the node to one without hope, and
-//! * if the evader is the controller, unless the environment can move everywhere in the node: then it may leave it to that.
+//! * if the evader is the controller and the environment has to move wherever it can ([`Forced::Neutral`]), unless it can everywhere in
+//!   the node: then the controller may leave it to that.
 //!
 //! Nodes without hope are lost: the evader stays among them whatever the seeker does. So if the initial node has none, the game is
 //! over, however much of the graph waits; and what only nodes without hope lead to need not be explored. Clocks are not looked at,
@@ -12,9 +13,9 @@
 //!
 //! Nodes lose hope as the graph grows and never gain it again.
 
-use super::Player;
 use super::graph::{Edge, NONE};
 use super::reach::{Solver, Win};
+use super::{Forced, Player};
 
 impl Solver<'_, '_, '_> {
     /// Finds the nodes with hope anew, and returns whether the initial one is among them. If it is not, all nodes with hope count as
@@ -83,7 +84,7 @@ impl Solver<'_, '_, '_> {
         edges.any(|edge| {
             let is_own = self.seeker.owns(edge.controllable);
             edge.is_total
-                && (is_own && self.seeker == Player::Environment
+                && (is_own && self.seeker == Player::Environment && self.forced == Forced::Neutral
                     || !is_own && !has_hope[edge.target as usize])
         })
     }

@@ -69,7 +69,9 @@ pub enum Priorities {
     Kept,
 }
 
-/// What happens at a point where time cannot pass and the environment has a move.
+/// What happens at a point where time cannot pass and the environment has a move. Where it need not move it may decline, and then play
+/// stops unless the controller moves: that loses a goal that must be reached; where something has only to be kept, the controller
+/// must take a move if it has one, and has lost if each of them loses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Forced {
     /// TIGA's rule: the environment must move if the component whose invariant (or urgent location) stops time has no

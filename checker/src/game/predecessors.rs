@@ -13,7 +13,7 @@ pub(super) struct Situation {
     pub(super) stopped: ClockSet,
     /// Where time cannot pass; see [`super::stops::stops`].
     pub(super) stops: Vec<(Option<u32>, Federation)>,
-    /// The controllable edges, each with the processes that take part in its first move; none if that does not matter.
+    /// See [`Solver::controllable_movers`].
     pub(super) movers: Vec<(Vec<u32>, usize)>,
 }
 
@@ -40,7 +40,7 @@ impl Solver<'_, '_, '_> {
         };
         if stops_matter {
             situation.stops = self.stops(node, &mut words)?;
-            if self.seeker == Player::Controller {
+            if !situation.stops.is_empty() {
                 situation.movers = self.controllable_movers(node, &mut words)?;
             }
         }
@@ -134,7 +134,7 @@ impl Solver<'_, '_, '_> {
             }
         }
         now.subtract_within(&goal, patience);
-        let mut good = self.forced_controller(node, situation);
+        let mut good = self.forced_controller(node, situation, patience);
         good.subtract_within(&escape, patience);
         good.unite_within(&now, patience);
         good.unite_within(&self.known(node), patience);

@@ -13,12 +13,12 @@
 //! win    = Pred_t(good ∪ forced, bad)              wait into good without meeting bad
 //! ```
 //!
-//! For the environment, which is faster, and whose opponent must move where time stops and only the controller can:
+//! For the environment, which is faster, and whose opponent must move where time stops and the environment need not:
 //!
 //! ```text
 //! now    = broken ∪ ⋃ Pre_u(win), less goal        what the environment has at once, whatever the controller does
 //! escape = ⋃ Pre_c(not win), less now              where the controller gets away
-//! held   = stop ∩ ⋃ enabled_c, less ⋃ enabled_u and escape
+//! held   = stop ∩ ⋃ enabled_c, less escape and less where the environment must move (see Forced)
 //! win    = Pred_t(now ∪ held, escape ∪ goal)
 //! ```
 //!

@@ -225,7 +225,7 @@ pub(super) fn leave(
     }
     back.subtract_within(&out, patience);
     let situation = solver.situation(node)?;
-    let mut held = solver.forced_controller(node, &situation);
+    let mut held = solver.forced_controller(node, &situation, patience);
     held.subtract_within(&back, patience);
     out.unite_within(&held, patience);
     Ok(solver.safe_past(node, out, &back, &situation, patience))

@@ -4,18 +4,21 @@
 //! win first is computed once. It hangs on nothing but what the key of such a case holds:
 //! * the zone of the node, whether time may pass, which clocks stand still, and where invariants stop time;
 //! * of each edge what it does to clocks, who owns it, the zone of its target, and whether all of the target is won or nothing,
-//!   and whether the evader holds it back.
+//!   and whether the evader holds it back;
+//! * if that may decide whether the environment is forced to move ([`super::stops`]): which processes stop time, and which take part in
+//!   the moves of the controller.
 //!
 //! Other nodes are no such cases: those in which the goal or what must be kept hang on clocks, or time is cut short, those of which
-//! something is won or that lead to nodes of which a part is; and those in which it matters which processes move, because the
-//! environment may be forced to ([`super::stops`]).
+//! something is won or that lead to nodes of which a part is; and those in which it matters which processes move, if there are more than
+//! [`Edge::movers`](super::graph::Edge::movers) tells apart.
 
 use rustc_hash::FxHashMap;
 
+use crate::ir::Urgency;
 use crate::network::Failure;
 use crate::zones::federation::block_bytes;
 
-use super::Player;
+use super::Forced;
 use super::account::table_bytes;
 use super::defences::Defence;
 use super::gains::Gained;
@@ -95,25 +98,39 @@ impl Solver<'_, '_, '_> {
         {
             return false;
         }
-        let mut has_part = false;
-        let mut movers = [false; 2];
+        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let has_part = edges.any(|edge| matches!(self.win[edge.target as usize], Win::Part(_)));
+        let processes = &self.graph.symbolic.stepper.network().processes;
+        !has_part && (processes.len() <= u32::BITS as usize || !self.hangs_on_movers(node))
+    }
+
+    /// Whether it may matter which processes move in a node: the environment may be forced to move because of them.
+    fn hangs_on_movers(&self, node: u32) -> bool {
+        let mut has_owner = [false; 2];
         for edge in &self.graph.edges[self.graph.edges_of(node)] {
-            has_part |= matches!(self.win[edge.target as usize], Win::Part(_));
-            movers[usize::from(edge.controllable)] = true;
+            has_owner[usize::from(edge.controllable)] = true;
         }
-        !has_part && (self.seeker == Player::Environment || movers != [true; 2])
+        self.forced == Forced::Tiga && has_owner == [true; 2]
     }
 
     fn make_key(&mut self, node: u32) -> Result<(), Failure> {
         let mut key = std::mem::take(&mut self.repeats.key);
         key.clear();
+        let hangs_on_movers = self.hangs_on_movers(node);
         let mut words = std::mem::take(&mut self.words);
         self.graph.load(node, &mut words);
         let symbolic = &mut *self.graph.symbolic;
         let locations = symbolic.stepper.network().processes.iter().zip(&words);
-        let is_urgent = locations
-            .map(|(process, &location)| process.locations[location as usize].urgency)
-            .any(|urgency| urgency != crate::ir::Urgency::Normal);
+        let mut is_urgent = false;
+        for (index, (process, &location)) in locations.enumerate() {
+            if process.locations[location as usize].urgency != Urgency::Normal {
+                is_urgent = true;
+                if hangs_on_movers {
+                    key.push(index as u32);
+                }
+            }
+        }
+        key.push(u32::MAX);
         let bounds = symbolic.upper_bounds(&mut words);
         let stopped = symbolic.stopped(&words);
         self.words = words;
@@ -125,8 +142,11 @@ impl Solver<'_, '_, '_> {
             key.push(clock as u32);
         }
         key.push(u32::MAX);
-        for (_, bound) in bounds? {
+        for (process, bound) in bounds? {
             key.extend([bound.left as u32, bound.bound.raw().cast_unsigned()]);
+            if hangs_on_movers {
+                key.push(process);
+            }
         }
         for index in self.graph.edges_of(node) {
             let edge = &self.graph.edges[index];
@@ -137,6 +157,9 @@ impl Solver<'_, '_, '_> {
             let flags = flags.iter().fold(1, |all, one| all * 2 + u32::from(*one));
             let target = self.graph.nodes[edge.target as usize].zone;
             key.extend([edge.program.0, target.0, flags]);
+            if hangs_on_movers && edge.controllable {
+                key.push(edge.movers);
+            }
         }
         self.repeats.key = key;
         Ok(())

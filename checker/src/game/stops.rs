@@ -8,7 +8,8 @@ use super::reach::Solver;
 use super::{Forced, Player};
 
 impl Solver<'_, '_, '_> {
-    /// The valuations in which time stops, the environment has a move, and must take one.
+    /// The valuations in which time stops, the environment has a move, and must take one; those that are bad for the controller are
+    /// left out.
     pub(super) fn forced_environment(
         &self,
         node: u32,
@@ -43,12 +44,21 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The valuations in which the controller must move: where it is obliged to, and where time stops, it has a move, and the
-    /// environment has none.
-    pub(super) fn forced_controller(&self, node: u32, situation: &Situation) -> Federation {
+    /// environment need not move.
+    pub(super) fn forced_controller(
+        &self,
+        node: u32,
+        situation: &Situation,
+        patience: &mut Patience<'_>,
+    ) -> Federation {
         let mut forced = self.enabled_moves(node, Player::Controller);
         if !forced.is_empty() {
-            forced = forced.intersection(&self.standstill(situation));
-            forced.subtract(&self.enabled_moves(node, Player::Environment));
+            forced = forced.intersection_within(&self.standstill(situation), patience);
+        }
+        if !forced.is_empty() {
+            let nothing = Federation::empty(self.graph.dimension());
+            let others = self.forced_environment(node, &nothing, situation, patience);
+            forced.subtract_within(&others, patience);
         }
         if let Some(urgent) = self.graph.urgent(node) {
             forced.unite(&urgent.obliged.intersection(&urgent.reached));
@@ -99,12 +109,20 @@ impl Solver<'_, '_, '_> {
         Ok(stops)
     }
 
-    /// The controllable edges of a node, each with the processes that take part in its first move.
+    /// The controllable edges of a node, each with the processes that take part in its first move; none if they do not matter, since
+    /// the environment has no move there, or must move whatever the controller can do.
     pub(super) fn controllable_movers(
         &mut self,
         node: u32,
         words: &mut [i32],
     ) -> Result<Vec<(Vec<u32>, usize)>, Failure> {
+        let mut has_owner = [false; 2];
+        for edge in &self.graph.edges[self.graph.edges_of(node)] {
+            has_owner[usize::from(edge.controllable)] = true;
+        }
+        if has_owner != [true; 2] || self.forced == Forced::Neutral {
+            return Ok(Vec::new());
+        }
         let mut moves = crate::network::Moves::default();
         self.graph.symbolic.remembered_moves(words, &mut moves)?;
         let edges = self

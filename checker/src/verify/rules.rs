@@ -271,16 +271,13 @@ impl<'a> Rules<'a> {
             Aim::Recur if self.is_goal(state)? => Aim::Keep,
             other => other,
         };
+        if has_other && self.is_forced(state, later, moves, possible)? {
+            return Ok(Rest::Must(Owner::Environment));
+        }
         Ok(match aim {
-            Aim::Keep if has_own && !has_other => Rest::Must(Owner::Controller),
+            Aim::Keep if has_own => Rest::Must(Owner::Controller),
             Aim::Keep => Rest::Won(Owner::Controller),
-            Aim::Reach | Aim::Recur => {
-                if has_other && self.is_forced(state, later, moves, possible)? {
-                    Rest::Must(Owner::Environment)
-                } else {
-                    Rest::Won(Owner::Environment)
-                }
-            }
+            Aim::Reach | Aim::Recur => Rest::Won(Owner::Environment),
         })
     }
 

@@ -7,7 +7,7 @@
 //! * every region that is met before the goal satisfies what must be kept and has a decision;
 //! * every action is one of the moves of the state, is the controller's, and its target satisfies the invariants;
 //! * where it waits and time cannot pass, the environment has a move and must take it (see [`Forcing`]); if it has only to keep
-//!   something, play may also stop there, unless only the controller can move;
+//!   something, play may also stop there, if the controller has no move;
 //! * if it has to reach the goal, no play goes on for ever without: the graph up to the goals has no cycle, not even a region
 //!   without end; if the goal is to recur, the same from each goal on.
 //!

@@ -261,11 +261,8 @@ fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule
     if node.later.is_some() {
         return false;
     }
-    if must_reach {
-        !others.is_empty() && is_forced(&node.stoppers, &own, rule)
-    } else {
-        own.is_empty() || !others.is_empty()
-    }
+    // Where the environment may decline, the controller has to move if there is something to keep.
+    !others.is_empty() && is_forced(&node.stoppers, &own, rule) || !must_reach && own.is_empty()
 }
 
 /// Whether the environment must move where time is stopped: something stops time to which the controller has no move.

@@ -71,8 +71,7 @@ fn compare(
             Kind::Recur,
         ),
     ] {
-        let has_rule = matches!(kind, Kind::Reach | Kind::Until | Kind::Recur);
-        for (rule, forced) in RULES.into_iter().take(if has_rule { 3 } else { 1 }) {
+        for (rule, forced) in RULES {
             let wins = match &graph {
                 Ok(graph) => Ok(wins(network, (goal, keep), graph, kind, rule)),
                 Err(error) => Err(*error),

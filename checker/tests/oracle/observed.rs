@@ -82,13 +82,9 @@ impl Game<'_> {
             match node.later {
                 _ if is_possible => {}
                 Some(later) => next.push(later),
-                None if must_reach => {
-                    let has_move = others.count() > 0;
-                    if !has_move || !explicit::is_forced(&node.stoppers, &controllable, self.rule) {
-                        return None;
-                    }
-                }
-                None if !controllable.is_empty() && others.count() == 0 => return None,
+                None if others.count() > 0
+                    && explicit::is_forced(&node.stoppers, &controllable, self.rule) => {}
+                None if must_reach || !controllable.is_empty() => return None,
                 None => {}
             }
             let mut edges = Vec::new();

@@ -232,13 +232,13 @@ impl Explorer<'_, '_, '_> {
             return Ok(false);
         }
         let others = self.enabled(place, &at_rest, |one| one.is_none())?;
-        if self.question.must_reach {
-            at_rest.subtract(&self.forced(place, &at_rest, &others)?);
-        } else {
+        let forced = self.forced(place, &at_rest, &others)?;
+        if !self.question.must_reach {
+            // Play may stop where the controller has no move.
             let controller = self.enabled(place, &at_rest, |one| one.is_some())?;
             at_rest = at_rest.intersection(&controller);
-            at_rest.subtract(&others);
         }
+        at_rest.subtract(&forced);
         Ok(!at_rest.is_empty())
     }
 

@@ -11,7 +11,7 @@
 //! * if what must be kept may be broken on the way;
 //! * if the goal must be reached, and play may stay in the observation for ever without: by waiting, where time stops and nobody
 //!   has to move, or by moves without end, however little time they take;
-//! * if time may stop where the controller alone has moves, and does not propose one of them.
+//! * if time may stop where the controller has moves, does not propose one of them, and the environment need not move.
 //!
 //! Runs that meet the goal are won there and leave the set, whether the controller sees it or not, so a goal need not be an
 //! observation. What is left is a finite game of two players, who choose the action and the next observation ([`solver`]).
