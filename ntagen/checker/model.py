@@ -15,6 +15,7 @@ from ntagen.checker.edges import EdgeEntry
 from ntagen.checker.errors import failing, rejecting
 from ntagen.checker.states import Simulation, SymbolicState, symbolic_states
 from ntagen.errors import InputError, LimitError, ModelError, NtagenError
+from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file
 from ntagen.model.facts import (
     Channel,
     Clock,
@@ -158,7 +159,7 @@ class Model:
             OSError: The file cannot be read.
         """
         with rejecting():
-            entries = self._raw.read_queries_json(str(path), path.read_bytes())
+            entries = self._raw.read_queries_json(str(path), read_file(path, MODEL_BYTES))
         return queries_from(json.loads(entries))
 
     def check(
@@ -379,7 +380,7 @@ class Model:
             RejectedError: It is no strategy, or does not fit the model.
             OSError: The file cannot be read.
         """
-        data = Path(path).read_bytes()
+        data = read_file(os.fspath(path), EVIDENCE_BYTES)
         with rejecting():
             raw = _checker.Strategy.read(self._raw, os.fspath(path), data)
         return Strategy(raw, forced, priorities)
@@ -508,7 +509,7 @@ def load_file(path: Path) -> Model:
         RejectedError: The engine does not accept it.
         OSError: The file cannot be read.
     """
-    return _load(str(path), path.read_bytes())
+    return _load(str(path), read_file(path, MODEL_BYTES))
 
 
 def diagnostic_pages() -> list[tuple[str, str, str, str]]:

@@ -182,7 +182,9 @@ def _with_severity(message: str) -> str:
 def _describe(error: OSError) -> str:
     """What the operating system said, and about which file."""
     reason = (error.strerror or str(error) or type(error).__name__).lower()
-    return f"{os.fsdecode(error.filename)}: {reason}" if error.filename else reason
+    # An error about something that is open has its number for a name.
+    named = isinstance(error.filename, str | bytes | os.PathLike) and error.filename
+    return f"{os.fsdecode(named)}: {reason}" if named else reason
 
 
 def _internal(error: BaseException) -> str:

@@ -23,7 +23,7 @@ from ntagen.cli.models import (
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError
-from ntagen.files import write_files
+from ntagen.files import require_apart, write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
@@ -300,11 +300,14 @@ def command(
         raise click.UsageError(f"two files of queries: {query_file} and {second_path}")
     _check_ranking(ranking)
     outputs = _Outputs(trace, certificate, strategy, controller, plans, ranking)
+    query_path = query_file or second_path
+    inputs = {"model": model_path} | ({"queries": query_path} if query_path else {})
+    require_apart(outputs.wanted(), inputs)
     worst = 0
     with pointing_to_explanations(not as_json):
         loaded = load_model(model_path)
         shown_already = len(loaded.model.warnings)
-        todo = _queries(loaded.model, asked, query_file or second_path)
+        todo = _queries(loaded.model, asked, query_path)
         show_warnings(loaded.model.warnings[shown_already:])
         _say_idle_options([query.text for query in todo], is_environment=loaded.scene is not None)
         if not as_json:

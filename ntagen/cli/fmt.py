@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ntagen.errors import InputError
+from ntagen.files import write_files
 
 _STDIN = "-"
 
@@ -19,8 +19,9 @@ _STDIN = "-"
 def command(ctx: click.Context, files: tuple[str, ...], check: bool) -> None:
     """Lay out environment files canonically, in place.
 
-    Comments stay and the meaning does not change. A file with mistakes of form is left as it is.
-    A single - reads standard input and writes to standard output.
+    Comments stay and the meaning does not change. A file with mistakes of form is left as it is,
+    and each is written completely or not at all. A single - reads standard input and writes to
+    standard output.
 
     \b
     Example:
@@ -42,7 +43,7 @@ def command(ctx: click.Context, files: tuple[str, ...], check: bool) -> None:
         if name == _STDIN and not check:
             click.echo(after, nl=False)
         elif before != after and not check:
-            _write(name, after)
+            write_files({Path(name): after})
     for name in changed:
         if name != _STDIN or check:
             click.echo(f"{'would reformat' if check else 'reformatted'} {name}", err=True)
@@ -72,15 +73,3 @@ def _formatted(name: str) -> tuple[str, str]:
     if source is None:
         raise SourceError(reporter.diagnostics)
     return source.text, format_text(source.text, source.path)
-
-
-def _write(name: str, text: str) -> None:
-    """Replaces the text of a file.
-
-    Raises:
-        InputError: Writing it is not permitted or fails.
-    """
-    try:
-        Path(name).write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise InputError(f"{name}: error: the file cannot be written: {error.strerror}") from error

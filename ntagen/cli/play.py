@@ -19,7 +19,7 @@ from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError, NtagenError
-from ntagen.files import write_files
+from ntagen.files import require_apart, write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Model
@@ -131,6 +131,8 @@ def command(
     if strategy_path:
         idle = {"states": "--states", "memory": "--memory", "timeout": "--timeout"}
         say_idle(idle, "with --strategy: nothing is synthesised")
+    inputs = {"model": model_path} | ({"strategy": strategy_path} if strategy_path else {})
+    require_apart({"--log": log}, inputs)
     with pointing_to_explanations(True):
         model = load_model(model_path).model
         if strategy_path:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.files import open_file, require_apart
 
 if TYPE_CHECKING:
     from ntagen.plot.picture import Picture
@@ -67,6 +69,7 @@ def command(source: Path, output: Path | None, shown: int, ranking: str) -> None
         say_idle({"ranking": "--rank"}, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
     format_of(path)
+    require_apart({"-o": path}, {"source": source})
     picture = _of_run(source, shown) if _is_log(source) else _of_scene(source, shown, criteria)
     # Matplotlib takes half a second: it is asked for when everything else is right.
     from ntagen.plot.picture import draw
@@ -76,12 +79,14 @@ def command(source: Path, output: Path | None, shown: int, ranking: str) -> None
 
 
 def _is_log(source: Path) -> bool:
-    """Whether a file is a log, by its first bytes or, if it is empty, its name."""
-    try:
-        with source.open("rb") as file:
-            return file.read(len(_MCAP_MAGIC)) == _MCAP_MAGIC or source.suffix == ".mcap"
-    except OSError:
-        return source.suffix == ".mcap"
+    """Whether a file is a log, by its name or its first bytes."""
+    if source.suffix == ".mcap":
+        return True
+    # What a pipe holds can be read once only: its name decides.
+    if not source.is_file():
+        return False
+    with open_file(source, sys.maxsize) as file:
+        return file.read(len(_MCAP_MAGIC)) == _MCAP_MAGIC
 
 
 def _of_run(source: Path, shown: int) -> Picture:

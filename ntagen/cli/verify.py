@@ -12,6 +12,7 @@ from ntagen.cli.effects import say_idle
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.errors import InputError
+from ntagen.files import EVIDENCE_BYTES, read_file
 
 VIOLATED: Final = 1
 """Exit code of evidence that does not hold."""
@@ -71,6 +72,6 @@ def command(
 
 def _read(file: Path) -> str:
     try:
-        return file.read_text(encoding="utf-8")
+        return read_file(file, EVIDENCE_BYTES).decode()
     except UnicodeDecodeError as error:
         raise InputError(f"{file}: it is no text: {error.reason}") from None

@@ -21,10 +21,9 @@ to 1 MiB back.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Any, Final, cast
 
 from google.protobuf.message import Message
 from mcap.writer import Writer
@@ -35,7 +34,7 @@ from ntagen.drive.records import Ended, Learned, Record, Transition
 from ntagen.drive.scene_json import scene_to_json
 from ntagen.drive.states import ABORTS, Event
 from ntagen.drive.viewing import TOPICS, show_plan, show_record, show_scene
-from ntagen.errors import InputError
+from ntagen.files import GrowingFile
 from ntagen.plan.document import document
 from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
@@ -61,20 +60,21 @@ class Log:
     """A journal that writes MCAP; use it as a context manager.
 
     Args:
-        path: The file; an existing one is replaced.
+        path: The file; an existing one is replaced. Nobody else can write it meanwhile.
         metadata: What is to be known of the run; texts.
         attachments: Files to be kept with it, by name.
 
     Raises:
-        InputError: The file cannot be written.
+        InputError: The file cannot be written, also while the run goes on, or another run is being
+            written into it.
     """
 
     def __init__(
         self, path: Path, metadata: Mapping[str, str], attachments: Mapping[str, bytes]
     ) -> None:
-        self._path = path
-        self._file = _opened(path)
-        self._writer = Writer(self._file, chunk_size=1 << 16)
+        self._file = GrowingFile(path)
+        # The file is a stream as far as the writer needs one.
+        self._writer = Writer(cast("IO[bytes]", self._file), chunk_size=1 << 16)
         self._writer.start(profile="", library="ntagen")
         self._sequence = 0
         self._time_ns = 0
@@ -89,8 +89,12 @@ class Log:
     def __enter__(self) -> Log:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None or issubclass(kind, Exception):
+            self.close()
+        else:
+            # Somebody wants an end at once, perhaps in the middle of a record.
+            self._file.close()
 
     def started(self, scene: Scene) -> None:
         """Writes the a-priori scene."""
@@ -125,8 +129,7 @@ class Log:
         if self._file.closed:
             return
         self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        self._file.acknowledge(to_disk=True)
         self._file.close()
 
     def _channel(self, topic: str, kind: type[Message]) -> int:
@@ -156,20 +159,7 @@ class Log:
 
     def _acknowledge(self, *, to_disk: bool) -> None:
         self._writer.flush()  # type: ignore[no-untyped-call]
-        self._file.flush()
-        if to_disk:
-            os.fsync(self._file.fileno())
-
-
-def _opened(path: Path) -> IO[bytes]:
-    if path.is_dir():
-        raise InputError(f"cannot write {path}: it is a folder")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return path.open("wb")
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError(f"cannot write {path}: {reason}\nhint: choose another --log") from error
+        self._file.acknowledge(to_disk=to_disk)
 
 
 def metadata_of(values: Mapping[str, Any]) -> dict[str, str]:

@@ -3,16 +3,26 @@
 The file is read from front to back and never through its index: a writer that was killed leaves no
 index, and everything before the tear is good. What is behind the tear is nothing that was ever
 acknowledged.
+
+A log comes from anybody: what is packed in it is unpacked piece by piece, and never to more than a
+multiple of the file (`_Budget`).
 """
 
 from __future__ import annotations
 
+import io
 import json
+import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Final, cast
 
-from mcap.records import Attachment, Channel, Footer, McapRecord, Metadata, Schema
+import lz4.frame  # type: ignore[import-untyped]
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Metadata, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
@@ -22,7 +32,27 @@ from ntagen.drive.records import Record
 from ntagen.drive.scene_json import scene_from_json
 from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
+from ntagen.files import open_file
 from ntagen.scene import Scene
+
+MAX_LOG_BYTES: Final = 512 * 2**20
+"""The largest file; a run of a minute takes less than one MiB."""
+
+MAX_RECORD_BYTES: Final = 64 * 2**20
+"""The largest record of a file, packed; the model of a thousand regions takes less than one MiB."""
+
+_SPARE_BYTES: Final = 8 * 2**20
+_LARGEST_RATIO: Final = 32
+_KEPT_BYTES: Final = 400
+"""About what a record takes in memory, beside its message."""
+
+_PIECE_BYTES: Final = 2**16
+
+_HEAD: Final = struct.Struct("<BQ")
+"""How a record begins: its kind, and the length of the rest."""
+
+_LARGEST_WINDOW_BYTES: Final = 8 * 2**20
+"""How far back what is packed may refer; more than any common setting needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,15 +110,15 @@ def read_log(path: Path) -> RunLog:
     Raises:
         InputError: The file cannot be read, is no MCAP, or is no log of a run.
     """
-    if path.is_dir():
-        raise InputError(f"cannot read {path}: it is a folder")
     try:
-        file = path.open("rb")
+        file = open_file(path, MAX_LOG_BYTES)
     except OSError as error:
         raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
     with file:
+        file_bytes = file.seek(0, io.SEEK_END)
+        file.seek(0)
         collected = _Collected()
-        torn_at_byte = _read(file, collected)
+        torn_at_byte = _read(file, collected, _Budget(path, file_bytes))
     if METADATA not in collected.metadata:
         raise InputError(
             f"{path}: not the log of a run\nhint: give a file that `ntagen drive --log` wrote"
@@ -127,16 +157,20 @@ class _Collected:
                     self.records.append(decode(name, item.data))
 
 
-def _read(file: IO[bytes], collected: _Collected) -> int | None:
+def _read(file: IO[bytes], collected: _Collected, budget: _Budget) -> int | None:
     """Reads what is readable; where it stops being so, or None if the file is whole."""
     good_byte = 0
-    items: Any = iter(StreamReader(file, record_size_limit=1 << 30).records)
+    reader = StreamReader(file, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES)
+    items: Any = iter(reader.records)
     while True:
         try:
             item = next(items)
-            collected.add(item)
+            for one in _unpacked(item, budget) if isinstance(item, Chunk) else (item,):
+                collected.add(one)
         except StopIteration:
             return good_byte
+        except (InputError, MemoryError):
+            raise
         except Exception:
             # At a tear the libraries raise whatever their parsers stumble on: errors of their own,
             # of struct, of the decompressor. All of them mean that the file is good up to here.
@@ -144,3 +178,83 @@ def _read(file: IO[bytes], collected: _Collected) -> int | None:
         if isinstance(item, Footer):
             return None
         good_byte = file.tell()
+
+
+class _Budget:
+    """How many bytes may still be unpacked and kept.
+
+    A few kilobytes can be packed such that they unpack to gigabytes. What a run writes shrinks to
+    half, and to a tenth if it is packed anew as a whole.
+    """
+
+    def __init__(self, path: Path, file_bytes: int) -> None:
+        self._path = path
+        self._all = self._left = _SPARE_BYTES + _LARGEST_RATIO * file_bytes
+
+    def take(self, count: int) -> None:
+        """Takes from it.
+
+        Raises:
+            InputError: There is not so much left.
+        """
+        self._left -= count
+        if self._left < 0:
+            raise InputError(
+                f"{self._path}: not the log of a run: it unpacks to more than "
+                f"{self._all // 2**20:,} MiB"
+            )
+
+
+class _Unpacking:
+    """A stream of what a chunk holds, unpacked as it is read."""
+
+    def __init__(self, chunk: Chunk, budget: _Budget) -> None:
+        self._budget = budget
+        self._stream: IO[bytes]
+        match chunk.compression:
+            case "zstd":
+                zstd = zstandard.ZstdDecompressor(max_window_size=_LARGEST_WINDOW_BYTES)
+                self._stream = cast("IO[bytes]", zstd.stream_reader(chunk.data))
+            case "lz4":
+                self._stream = lz4.frame.LZ4FrameFile(io.BytesIO(chunk.data))
+            case _:
+                self._stream = io.BytesIO(chunk.data)
+
+    def read(self, size: int) -> bytes:
+        """So many bytes; none at the end.
+
+        Raises:
+            EOFError: The stream ends within them.
+            InputError: They are more than the budget allows.
+        """
+        pieces, missing = [], size
+        # A length may be wrong, too: only what is there counts.
+        while missing and (piece := self._stream.read(min(missing, _PIECE_BYTES))):
+            self._budget.take(len(piece))
+            pieces.append(piece)
+            missing -= len(piece)
+        if missing and pieces:
+            raise EOFError(f"{missing} bytes are missing")
+        return b"".join(pieces)
+
+
+def _unpacked(chunk: Chunk, budget: _Budget) -> Iterator[McapRecord]:
+    """The records of a chunk, one after the other.
+
+    Raises:
+        InputError: They are more than the budget allows.
+    """
+    unpacking = _Unpacking(chunk, budget)
+    stream = ReadDataStream(cast("io.BytesIO", unpacking))
+    while head := unpacking.read(_HEAD.size):
+        opcode, length = _HEAD.unpack(head)
+        match opcode:
+            case Opcode.SCHEMA:
+                yield Schema.read(stream)
+            case Opcode.CHANNEL:
+                yield Channel.read(stream)
+            case Opcode.MESSAGE:
+                budget.take(_KEPT_BYTES)
+                yield McapMessage.read(stream, length)
+            case _:
+                stream.read(length)

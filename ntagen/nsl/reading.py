@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
+from ntagen.files import read_file
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.source import MAX_SOURCE_BYTES, Source, Span
 
@@ -23,17 +24,19 @@ def read_source(path: str, reporter: Reporter, included_at: Span | None = None) 
     """
     report = _Report(path, reporter, included_at)
     try:
-        if Path(path).is_dir():
-            report("file-unreadable", "it is a folder", "name a file in it")
-            return None
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_SOURCE_BYTES + 1)
+        data = read_file(path, MAX_SOURCE_BYTES)
     except FileNotFoundError:
         report("file-missing", "there is no such file", _nearby(path))
         return None
+    except IsADirectoryError:
+        report("file-unreadable", "it is a folder", "name a file in it")
+        return None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        report("file-unreadable", f"the file cannot be read: {reason.lower()}")
+        if isinstance(error, OSError) and error.errno == errno.EFBIG:
+            report("file-too-large", reason)
+        else:
+            report("file-unreadable", f"the file cannot be read: {reason.lower()}")
         return None
     return _decoded(path, data, report)
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from ntagen.errors import InputError
+from ntagen.files import write_files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,16 +39,7 @@ def save(figure: Figure, path: Path) -> None:
     kind = format_of(path)
     # Fixed salt and no dates: the same picture is the same file, byte for byte.
     metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
-    part = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.is_dir():
-            raise InputError(f"cannot write {path}: it is a folder")
-        with mpl.rc_context({"svg.hashsalt": "ntagen"}):
-            figure.savefig(part, format=kind, metadata=metadata[kind])
-        part.replace(path)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError(f"cannot write {path}: {reason}\nhint: choose another -o") from error
-    finally:
-        part.unlink(missing_ok=True)
+    picture = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "ntagen"}):
+        figure.savefig(picture, format=kind, metadata=metadata[kind])
+    write_files({path: picture.getvalue()})

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import resource
+import subprocess
+import sys
 from pathlib import Path
 from typing import get_args, get_type_hints
 
+import lz4.frame
 import pytest
+import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
 
+from ntagen.cli import main
 from ntagen.drive.log import ACTUAL, Log, metadata_of, topic_of
 from ntagen.drive.messages import KINDS, decode, encode
 from ntagen.drive.reading import read_log
@@ -25,6 +36,8 @@ from ntagen.needle.kinematics import bending_axis
 from ntagen.scene import Pose, Scene
 from tests.scenes import poses
 from tests.steering import PAPER, scene
+
+ROOT = Path(__file__).parents[3]
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -153,3 +166,119 @@ def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
         read_log(tmp_path)
     with pytest.raises(InputError, match="folder"):
         Log(tmp_path, {}, {})
+
+
+MESSAGE = bytes([Opcode.MESSAGE]) + (22).to_bytes(8, "little") + bytes(22)
+BOMB_BYTES = 1 << 30
+
+
+def packed(compression: str) -> bytes:
+    """A GiB of empty messages, packed."""
+    piece = MESSAGE * 100_000
+    pieces = BOMB_BYTES // len(piece)
+    if compression == "zstd":
+        zstd = zstandard.ZstdCompressor(level=3, write_content_size=False).compressobj()
+        return b"".join([*(zstd.compress(piece) for _ in range(pieces)), zstd.flush()])
+    lz4_ = lz4.frame.LZ4FrameCompressor()
+    return b"".join([lz4_.begin(), *(lz4_.compress(piece) for _ in range(pieces)), lz4_.flush()])
+
+
+def bomb(path: Path, compression: str) -> Path:
+    """A log with a chunk that says a small size and unpacks to a GiB."""
+    data = packed(compression)
+    chunk = RecordBuilder()
+    Chunk(compression, data, 0, 0, 0, 1000).write(chunk)
+    good = written(path).read_bytes()
+    # After the good start, before anything that is known only at the end.
+    end = good.index(bytes([Opcode.DATA_END]) + (4).to_bytes(8, "little"))
+    path.write_bytes(good[:end] + chunk.end())
+    return path
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_log_that_unpacks_to_gigabytes_is_refused_in_little_memory(
+    tmp_path: Path, compression: str
+) -> None:
+    path = bomb(tmp_path / "run.mcap", compression)
+    assert path.stat().st_size < BOMB_BYTES / 100
+    command = [sys.executable, "-c", MEASURED, str(path)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 2
+    assert "it unpacks to more than" in run.stderr
+    assert int(run.stdout) < 200_000
+
+
+MEASURED = """
+import resource, sys
+from ntagen.cli import main
+code = main(["replay", sys.argv[1]])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+sys.exit(code)
+"""
+"""Replays a log; prints the largest size of the process in KiB."""
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_logs_that_were_packed_anew_are_read(tmp_path: Path, compression: CompressionType) -> None:
+    path = written(tmp_path / "run.mcap")
+    expected = read_log(path)
+    anew = tmp_path / "anew.mcap"
+    with path.open("rb") as file, anew.open("wb") as out:
+        writer = Writer(out, compression=compression)
+        writer.start()
+        for item in StreamReader(file).records:
+            match item:
+                case Schema():
+                    writer.register_schema(item.name, item.encoding, item.data)
+                case Channel():
+                    writer.register_channel(item.topic, item.message_encoding, item.schema_id)
+                case Metadata():
+                    writer.add_metadata(item.name, item.metadata)
+                case Attachment():
+                    times = (item.create_time, item.log_time)
+                    writer.add_attachment(*times, item.name, item.media_type, item.data)
+                case Message():
+                    writer.add_message(
+                        item.channel_id, item.log_time, item.data, item.publish_time, item.sequence
+                    )
+                case DataEnd():
+                    break
+        writer.finish()
+    assert read_log(anew) == expected
+
+
+def test_a_second_run_into_the_same_log_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run.mcap"
+    with filled(path):
+        before = path.read_bytes()
+        code = main(["drive", str(ROOT / "examples" / "paper.nsl"), "--log", str(path)])
+        assert path.read_bytes() == before
+    assert code == 2
+    assert "another run is being written into it" in capsys.readouterr().err
+    assert read_log(path).records == (*MANY, ALARM)
+
+
+def test_a_full_disk_ends_the_log_with_a_whole_record(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    old = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, old[1]))
+    log = filled(path)
+    written_s: list[float] = []
+
+    def go_on() -> None:
+        while True:
+            log.record(Command(20.0 + len(written_s), "push", 0.25))
+            written_s.append(20.0 + len(written_s))
+
+    try:
+        with pytest.raises(InputError, match=r"cannot write .*run\.mcap"):
+            go_on()
+        log.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, old)
+    read = read_log(path)
+    assert written_s
+    assert [record.time_s for record in read.records[len(MANY) + 1 :]] == written_s
+    assert read.torn_at_byte == path.stat().st_size

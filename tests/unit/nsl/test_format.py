@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import pytest
@@ -135,10 +136,16 @@ def test_command_says_when_it_cannot_write(tmp_path: Path, monkeypatch: pytest.M
     path = tmp_path / "env.nsl"
     path.write_text("let  b = 3\n")
 
-    def refuse(*_: object, **__: object) -> None:
-        raise PermissionError(13, "Permission denied")
+    def refuse(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_text", refuse)
+    monkeypatch.setattr("ntagen.files.os.fsync", refuse)
     result = CliRunner().invoke(command, [str(path)])
     assert isinstance(result.exception, InputError)
     assert str(path) in str(result.exception)
+    assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [
+        ("env.nsl", "let  b = 3\n")
+    ]
+    assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [
+        ("env.nsl", "let  b = 3\n")
+    ]
