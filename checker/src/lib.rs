@@ -3,6 +3,7 @@
 //! The modules stand in reading order; each may use the ones above it and none below
 //! (`checker/ARCHITECTURE.md` says what each must not know, and a test enforces it).
 
+pub mod cancellation;
 pub mod diagnostics;
 pub mod syntax;
 

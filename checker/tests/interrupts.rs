@@ -1,11 +1,13 @@
-//! Time limits and interruptions in the middle of one call of the model's code, or of one enumeration of moves.
+//! Limits and interruptions in the middle of one call of the model's code, of one enumeration of moves, or of one operation on zones.
 //!
-//! What runs there would end in an error of the model if nothing ended it before, so that no test measures time.
+//! What runs there would end in an error of the model, or take more memory than there is, if nothing ended it before, so that no test
+//! measures time.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::game::Priorities;
 use checker::search::StopReason;
 
 /// An update that runs for too many rounds.
@@ -31,6 +33,16 @@ const CROWD: &str = "
       trans A -> A { sync go?; assign n = me % 4; }, A -> A { sync go?; assign n = (n * 3) % 4; }; }
     system S, R;";
 
+/// Where one sender has priority, what is left for the other one is cut out of all valuations, in as many zones as there are sets of
+/// receivers that abstain.
+const CUTTING: &str = "
+    broadcast chan go, first; chan priority go < first; int[0,3] n;
+    process S() { state S; init S; trans S -> S { sync go!; assign n = 1; }, S -> S { sync first!; assign n = 2; }; }
+    process P(const int[1,30] me) {
+      clock x; state S, T; init S;
+      trans S -> T { guard x > 3 && x <= 5; sync first?; }, S -> S { guard x > 8; assign n = 3; }; }
+    system S, P;";
+
 const ENGINES: [CodeEngine; 2] = [
     CodeEngine::Interpreter,
     #[cfg(feature = "jit")]
@@ -54,6 +66,10 @@ fn limits_of(stop: StopReason) -> Limits {
             timeout: Some(Duration::from_millis(5)),
             ..Limits::default()
         },
+        StopReason::Memory => Limits {
+            memory_bytes: Some(32 << 20),
+            ..Limits::default()
+        },
         _ => Limits {
             observer: Some(Arc::new(|_| true)),
             ..Limits::default()
@@ -70,6 +86,7 @@ fn check_stops(text: &str, queries: &[&str], stops: &[StopReason]) {
                         limits: limits_of(stop),
                         code,
                         threads,
+                        priorities: Priorities::Kept,
                         ..Options::default()
                     };
                     let answer = check(text, query, &options);
@@ -130,6 +147,16 @@ fn one_enumeration_of_moves_ends() {
         &["E<> n == 5", "sup: n", "control: A<> n == 2"],
         &[StopReason::Time],
     );
+}
+
+#[test]
+fn one_operation_on_zones_ends() {
+    let all = [
+        StopReason::Time,
+        StopReason::Memory,
+        StopReason::Interrupted,
+    ];
+    check_stops(CUTTING, &["E<> P(1).T", "A[] n != 3", "sup: n"], &all);
 }
 
 #[test]

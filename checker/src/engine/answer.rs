@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::cancellation;
 use crate::exec::Executor;
 use crate::game::Priorities;
 use crate::game::closed_loop::ClosedLoop;
@@ -23,7 +24,7 @@ use crate::verify::strategy::Outcome as StrategyCheck;
 
 use super::certificate::Certificate;
 use super::endless::{always, leads_to};
-use super::evidence::{self, Kind, Proof, Shows, Takes, Witness};
+use super::evidence::{self, Kind, Missing, Proof, Shows, Takes, Witness};
 use super::fastest::{Race, fastest};
 use super::limits::LimitWatch;
 use super::reachable::reachable;
@@ -157,31 +158,55 @@ impl<'a> Subject<'a> {
 
 /// Answers a query that [`super::LoadedModel`] has accepted.
 pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> Answer {
+    let start = Instant::now();
+    let mut watch = LimitWatch::new(options.limits.clone());
+    let result = watch.bound(|watch| answer_within(subject, query, options, watch));
+    let mut answer = result.unwrap_or_else(|(reason, counters)| {
+        new_answer(Verdict::Unknown(reason), Evidence::default(), counters)
+    });
+    // What is known by then does not matter to a user who interrupts.
+    if answer.verdict == Verdict::Error(Failure::Interrupted) || watch.is_interrupted() {
+        let counters = answer.counters;
+        let verdict = Verdict::Unknown(watch.stop());
+        answer = new_answer(verdict, Evidence::default(), counters);
+    }
+    if options.plans != PlansWanted::No {
+        games::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());
+    }
+    answer.seconds = start.elapsed().as_secs_f64();
+    answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
+    answer
+}
+
+/// The same, within the limits.
+fn answer_within(
+    subject: Subject<'_>,
+    query: &Query,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
     let Subject {
         network, executor, ..
     } = subject;
-    let start = Instant::now();
-    let mut watch = LimitWatch::new(options.limits.clone());
-    let armed = watch.arm(executor.alarm());
-    let mut answer = match &query.kind {
+    match &query.kind {
         QueryKind::Reachable(goal) => reduced(subject, options, |symmetry| {
-            reachable(subject, goal, options, symmetry, &mut watch)
+            reachable(subject, goal, options, symmetry, watch)
         }),
         QueryKind::Invariantly(invariant) => {
             let broken = negation(invariant);
             negated(reduced(subject, options, |symmetry| {
-                reachable(subject, &broken, options, symmetry, &mut watch)
+                reachable(subject, &broken, options, symmetry, watch)
             }))
         }
-        QueryKind::PotentiallyAlways(keep) => always(subject, keep, options, &mut watch),
+        QueryKind::PotentiallyAlways(keep) => always(subject, keep, options, watch),
         QueryKind::Eventually(goal) => {
             let keep = negation(goal);
-            negated(always(subject, &keep, options, &mut watch))
+            negated(always(subject, &keep, options, watch))
         }
         QueryKind::LeadsTo(cause, effect) => {
             let open = Predicate::And(vec![cause.clone(), negation(effect)]);
             let keep = negation(effect);
-            leads_to(subject, (&open, &keep), options, &mut watch)
+            leads_to(subject, (&open, &keep), options, watch)
         }
         QueryKind::Extremum {
             least,
@@ -197,7 +222,7 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
                 further: subject.atoms(),
             };
             reduced(subject, options, |symmetry| {
-                extremum(subject, question, options, symmetry, &mut watch)
+                extremum(subject, question, options, symmetry, watch)
             })
         }
         QueryKind::Control {
@@ -211,7 +236,7 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
                 limit,
                 rest,
             };
-            fastest(network, executor, &race, options, &mut watch)
+            fastest(network, executor, &race, options, watch)
         }
         QueryKind::Control {
             objective,
@@ -219,7 +244,7 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
             ..
         } => {
             let asked = (objective, &observations[..]);
-            observed::game(network, executor, asked, options, &mut watch)
+            observed::game(network, executor, asked, options, watch)
         }
         QueryKind::Control {
             objective,
@@ -228,25 +253,12 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
         } => {
             let asked = (objective, *cooperative);
             let under = subject.under.zip(subject.within);
-            games::game((network, under), executor, asked, options, &mut watch)
+            games::game((network, under), executor, asked, options, watch)
         }
         QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
             unreachable!("strategies are saved and loaded elsewhere")
         }
-    };
-    drop(armed);
-    // What is known by then does not matter to a user who interrupts.
-    if answer.verdict == Verdict::Error(Failure::Interrupted) || watch.is_interrupted() {
-        let counters = answer.counters;
-        let verdict = Verdict::Unknown(watch.stop());
-        answer = new_answer(verdict, Evidence::default(), counters);
     }
-    if options.plans != PlansWanted::No {
-        games::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());
-    }
-    answer.seconds = start.elapsed().as_secs_f64();
-    answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
-    answer
 }
 
 /// Answers with a search that takes states that differ only by exchanged members of scalar sets for the same, if that is
@@ -462,7 +474,10 @@ impl<'w, 'a> Witnesses<'w, 'a> {
             let is_doubtful = self.is_doubtful || self.symbolic.is_approximate();
             let subject = (ending, shows);
             let trace = &witness.trace;
-            let proof = evidence::prove(self.symbolic, network, trace, subject, is_doubtful);
+            let symbolic = &mut *self.symbolic;
+            let prove = || evidence::prove(symbolic, network, trace, subject, is_doubtful);
+            let proof = cancellation::unless_cut(prove);
+            let proof = proof.unwrap_or(Proof::Missing(Missing::Stopped));
             is_replayed = matches!(proof, Proof::Replayed(..));
             witness.run = self.has_runs.then_some(proof);
         }

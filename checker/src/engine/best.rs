@@ -10,7 +10,7 @@ use crate::zones::Bound;
 
 use super::answer::{Subject, symbolic};
 use super::certificate::stop_text;
-use super::limits::LimitWatch;
+use super::limits::{LimitWatch, cut_as_interrupted};
 use super::timing::with_time;
 use super::{Options, TraceWanted};
 
@@ -46,7 +46,8 @@ pub(super) fn best(
     let way = match options.trace {
         TraceWanted::Any => return Ok(None),
         TraceWanted::Shortest => {
-            plain::Search::new(zones, &*target, plain::Measure::Moves, none).run(watch)
+            let mut search = plain::Search::new(zones, &*target, plain::Measure::Moves, none);
+            cut_as_interrupted(|| search.run(watch))
         }
         TraceWanted::Fastest if subject.under.is_some() => {
             return Err("there is none for fastest traces under a strategy".to_owned());
@@ -59,7 +60,9 @@ pub(super) fn best(
             };
             atoms.push(time_atom(clock));
             let mut zones = symbolic(subject, &[predicate], &atoms, Abstraction::LowerUpper);
-            plain::Search::new(&mut zones, &*target, plain::Measure::Time(clock), none).run(watch)
+            let measure = plain::Measure::Time(clock);
+            let mut search = plain::Search::new(&mut zones, &*target, measure, none);
+            cut_as_interrupted(|| search.run(watch))
         }
     };
     match way {

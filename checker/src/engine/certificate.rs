@@ -12,7 +12,7 @@ use serde_json::{Value as Json, json};
 use crate::game::strategy::Strategy;
 use crate::game::{Forced, Priorities};
 use crate::ir::{Network, Objective, Predicate, QueryKind};
-use crate::network::Symbolic;
+use crate::network::{Failure, Symbolic};
 use crate::search::StopReason;
 use crate::search::limits::{Counters, Watch};
 use crate::search::plain::{Measure, Outcome, Search};
@@ -23,6 +23,7 @@ use crate::verify::{self, Effort, Part};
 
 use super::describe;
 use super::evidence::{Missing, Proof};
+use super::limits::cut_as_interrupted;
 use super::verification::{Asked, Played, Verification};
 use super::{LoadedModel, Rejection, json, machine_file, observed, strategy_file, verification};
 
@@ -66,7 +67,7 @@ pub(super) fn reached(
     let variables = &symbolic.stepper.network().layout.variables;
     let has_meta = variables.iter().any(|variable| variable.meta);
     let mut search = Search::new(symbolic, &avoided, Measure::Moves, before);
-    match search.run(watch) {
+    match cut_as_interrupted(|| search.run(watch)) {
         Ok(Outcome::Exhausted) => {}
         Ok(Outcome::Found(_)) if has_meta => {
             let why = "a search for it, in which states that differ in meta variables alone are not the same, finds a state";
@@ -74,6 +75,10 @@ pub(super) fn reached(
         }
         Ok(Outcome::Found(_)) => return Err("a search without short cuts finds a state".to_owned()),
         Ok(Outcome::Stopped(reason)) => return Err(stop_text(reason).to_owned()),
+        Err(Failure::Interrupted) => {
+            let reason = watch.look(&search.counters());
+            return Err(stop_text(reason.unwrap_or(StopReason::Interrupted)).to_owned());
+        }
         Err(_) => return Err("the model fails".to_owned()),
     }
     let states = search.into_reached().into_iter().map(|(words, zones)| {

@@ -378,6 +378,7 @@ pub fn missing_text(missing: Missing) -> String {
         Missing::Meta => "states that differ in meta variables alone count as the same, but other moves may be possible in them".to_owned(),
         Missing::TooHard => "too many ways to choose between".to_owned(),
         Missing::OpenLoop => "the loop was not found to close exactly".to_owned(),
+        Missing::Stopped => "the search for them was stopped by a limit".to_owned(),
         Missing::Failed(_) => "the model fails on the way".to_owned(),
         Missing::NotCovered(verify::Error::Unsupported(what)) => {
             format!("the replay does not cover {what}")

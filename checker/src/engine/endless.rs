@@ -15,7 +15,7 @@ use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, negated, new_a
 use super::best::not_the_best;
 use super::certificate::stop_text;
 use super::evidence::Shows;
-use super::limits::LimitWatch;
+use super::limits::{LimitWatch, cut_as_interrupted};
 use super::{Options, TraceWanted};
 
 /// What a search in coarser zones came to, unless it found something that may not be there; else that of the same search in exact ones.
@@ -158,7 +158,8 @@ fn best(
     if witnesses.is_doubtful() {
         return Err("where clocks stand still, what has the fewest moves may be no run".to_owned());
     }
-    match endless::Search::new(witnesses.symbolic, wanted).run(watch) {
+    let search = endless::Search::new(witnesses.symbolic, wanted);
+    match cut_as_interrupted(|| search.run(watch)) {
         Ok(endless::Outcome::Found(run, start)) => Ok(Some((run.trace, run.ending, start))),
         Ok(endless::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
         Ok(endless::Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),

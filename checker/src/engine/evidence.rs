@@ -87,6 +87,8 @@ pub enum Missing {
     TooHard,
     /// No two states on the loop were found that lie in the same region.
     OpenLoop,
+    /// A limit came first, or the user interrupted.
+    Stopped,
     /// The model failed.
     Failed(Failure),
     /// The replay does not cover the model or query.
@@ -204,6 +206,7 @@ impl From<Unscheduled> for Missing {
         match unscheduled {
             Unscheduled::Impossible => Missing::Approximate,
             Unscheduled::TooHard => Missing::TooHard,
+            Unscheduled::Failed(Failure::Interrupted) => Missing::Stopped,
             Unscheduled::Failed(failure) => Missing::Failed(failure),
         }
     }

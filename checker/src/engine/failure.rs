@@ -140,13 +140,14 @@ impl LoadedModel {
         let mut probe = Probe { predicates };
         let order = Order::BreadthFirst;
         let watch = &mut LimitWatch::new(limits);
-        let armed = watch.arm(self.executor().alarm());
-        let report = reach::search(&mut symbolic, &mut probe, order, watch);
-        drop(armed);
-        let (failure, trace) = report.outcome.err()?;
-        let is_one = failure != Failure::Interrupted;
-        (is_one && !is_over_before_the_end(&mut symbolic, objective, &trace))
-            .then_some((failure, trace))
+        let looked_for = watch.bound(|watch| {
+            let report = reach::search(&mut symbolic, &mut probe, order, watch);
+            let (failure, trace) = report.outcome.err()?;
+            let is_one = failure != Failure::Interrupted;
+            (is_one && !is_over_before_the_end(&mut symbolic, objective, &trace))
+                .then_some((failure, trace))
+        });
+        looked_for.ok().flatten()
     }
 }
 

@@ -29,7 +29,7 @@ use super::answer::{Answer, Evidence, Values, Verdict, has_differences, new_answ
 use super::attempt::{IN_DISCRETE_STATES, STATES_BEFORE_CROWD};
 use super::certificate::stop_text;
 use super::games::{self, objective_atoms};
-use super::limits::LimitWatch;
+use super::limits::{LimitWatch, cut_as_interrupted};
 use super::timing::{TIME, with_time};
 use super::verification::Asked;
 use super::{MOST_THREADS, Options};
@@ -168,7 +168,7 @@ pub(super) fn fastest(
             _ => None,
         };
         if let Some(limit) = limit.filter(|_| is_strategy_wanted) {
-            match game.strategy(limit, watch) {
+            match cut_as_interrupted(|| game.strategy(limit, watch)) {
                 Ok(Ok(strategy)) => {
                     if options.verify {
                         let asked = Asked {

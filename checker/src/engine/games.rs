@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::cancellation::{self, Cut};
 use crate::exec::Executor;
 use crate::game::allowance::Allowance;
 use crate::game::closed_loop::ClosedLoop;
@@ -26,7 +27,7 @@ use super::attempt::{
 };
 use super::certificate::stop_text;
 use super::cooperation;
-use super::limits::LimitWatch;
+use super::limits::{LimitWatch, cut_as_interrupted};
 use super::verification::{self, Asked, Played, Verification};
 use super::{MOST_THREADS, Options, PlansWanted};
 /// What is said of a game whose model has priorities.
@@ -293,22 +294,24 @@ fn played(
         answer.message = Some(IGNORED_PRIORITIES.to_owned());
     }
     if is_planned {
-        add_plans(&mut answer, &mut solver, options);
+        add_plans(&mut answer, &mut solver, options, watch);
     }
     if is_strategy_wanted {
         let strategy = if is_cooperative {
             let denied = is_recurring.then_some(&rounds[..]);
             let zones = &mut zones_for_ways;
-            cooperation::strategy(&mut solver, (winner, denied), zones, options, watch)
+            cut_as_interrupted(|| {
+                cooperation::strategy(&mut solver, (winner, denied), zones, options, watch)
+            })
         } else {
-            let explored = solver.explore_dead_ends(watch);
+            let explored = cut_as_interrupted(|| solver.explore_dead_ends(watch));
             answer.counters = solver.counters();
             if solver.has_given_up {
                 return (answer, true);
             }
             let denied = (winner == Player::Environment && is_recurring).then_some(&rounds[..]);
             let strategy = match explored {
-                Ok(None) => strategy_of(&mut solver, denied, watch),
+                Ok(None) => cut_as_interrupted(|| strategy_of(&mut solver, denied, watch)),
                 Ok(Some(reason)) => Ok(Err(reason)),
                 Err(failure) => Err(failure),
             };
@@ -384,7 +387,12 @@ pub(super) fn effort_of<'a>(options: &Options) -> Effort<'a> {
 }
 
 /// Adds the plans that are wanted to the answer for a solved game.
-fn add_plans(answer: &mut Answer, solver: &mut Solver<'_, '_, '_>, options: &Options) {
+fn add_plans(
+    answer: &mut Answer,
+    solver: &mut Solver<'_, '_, '_>,
+    options: &Options,
+    watch: &mut dyn Watch,
+) {
     let most = match options.plans {
         PlansWanted::No => return,
         _ if answer.verdict == Verdict::NotSatisfied => {
@@ -395,9 +403,14 @@ fn add_plans(answer: &mut Answer, solver: &mut Solver<'_, '_, '_>, options: &Opt
         PlansWanted::All(most) => most,
     };
     match plans(solver, most) {
-        Ok(Ok((plans, has_more))) => {
+        Ok(Ok((plans, end))) => {
             answer.evidence.plans = Some(plans);
-            answer.evidence.has_more_plans = has_more;
+            answer.evidence.has_more_plans = end != EndOfPlans::All;
+            if end == EndOfPlans::Stopped {
+                let reason = watch.look(&solver.counters());
+                let reason = stop_text(reason.unwrap_or(StopReason::Interrupted));
+                answer.message = Some(format!("there may be more plans: {reason}"));
+            }
         }
         Ok(Err(NoPlans::EnvironmentChooses)) => {
             let message = "the environment has choices, so the strategy is no list of plans";
@@ -407,25 +420,54 @@ fn add_plans(answer: &mut Answer, solver: &mut Solver<'_, '_, '_>, options: &Opt
     }
 }
 
-/// At most this many plans, and whether there are more. After a single one nobody looks for another, so there may be.
+/// What follows the plans that are listed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum EndOfPlans {
+    /// None.
+    All,
+    /// More than are wanted, or, after a single one, nobody looked.
+    More,
+    /// A limit came first.
+    Stopped,
+}
+
+/// Plans between two looks at the memory that they take.
+const PLANS_BETWEEN_LOOKS: usize = 256;
+
+/// At most this many plans, and what follows them.
 fn plans(
     solver: &mut Solver<'_, '_, '_>,
     most: usize,
-) -> Result<Result<(Vec<Plan>, bool), NoPlans>, Failure> {
+) -> Result<Result<(Vec<Plan>, EndOfPlans), NoPlans>, Failure> {
     let mut paths = match Plans::new(solver) {
         Ok(paths) => paths,
         Err(reason) => return Ok(Err(reason)),
     };
     let mut plans = Vec::new();
-    while let Some(path) = paths.next_path() {
-        if plans.len() == most {
-            return Ok(Ok((plans, true)));
+    let mut bytes = 0;
+    loop {
+        if plans.len().is_multiple_of(PLANS_BETWEEN_LOOKS) && bytes > 0 {
+            match cancellation::unless_cut(|| cancellation::ask_for(bytes)) {
+                Ok(()) => {}
+                Err(Cut) => return Ok(Ok((plans, EndOfPlans::Stopped))),
+            }
         }
-        let path = path.to_vec();
-        plans.push(paths.spell(&path)?);
+        let next = cut_as_interrupted(|| match paths.next_path().map(<[u32]>::to_vec) {
+            Some(path) => paths.spell(&path).map(Some),
+            None => Ok(None),
+        });
+        match next {
+            Ok(None) => return Ok(Ok((plans, EndOfPlans::All))),
+            Ok(Some(_)) if plans.len() == most => return Ok(Ok((plans, EndOfPlans::More))),
+            Ok(Some(plan)) => {
+                bytes += plan.heap_bytes();
+                plans.push(plan);
+            }
+            Err(Failure::Interrupted) => return Ok(Ok((plans, EndOfPlans::Stopped))),
+            Err(failure) => return Err(failure),
+        }
         if most == 1 {
-            return Ok(Ok((plans, true)));
+            return Ok(Ok((plans, EndOfPlans::More)));
         }
     }
-    Ok(Ok((plans, false)))
 }

@@ -1,10 +1,11 @@
 //! Limits of one query: states, memory, time, and the user's interruption.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
-use crate::exec::{Alarm, Look};
+use crate::cancellation::{self, Cut, Look};
+use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
 
 /// Is shown the counters now and then; true ends the search.
@@ -56,6 +57,7 @@ pub(super) struct LimitWatch {
 struct Patience {
     start: Instant,
     timeout: Option<Duration>,
+    memory_bytes: Option<u64>,
     observer: Option<Observer>,
     /// The thread that asked: the observer is called by it alone.
     owner: ThreadId,
@@ -73,26 +75,36 @@ struct Seen {
 }
 
 impl Patience {
-    fn look(&self, counters: Option<&Counters>) -> Option<StopReason> {
-        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(&counters) = counters {
-            seen.counters = counters;
-        }
+    fn look(&self, counters: &Counters) -> Option<StopReason> {
+        self.seen().counters = *counters;
+        self.look_beside(0)
+    }
+
+    /// Looks, when so many bytes are about to be allocated beside those that were counted last.
+    fn look_beside(&self, bytes: u64) -> Option<StopReason> {
+        let mut seen = self.seen();
+        let memory = seen.counters.bytes.saturating_add(bytes);
         let now = Instant::now();
         if self.timeout.is_some_and(|limit| now - self.start >= limit) {
             seen.stop = Some(StopReason::Time);
+        } else if bytes > 0 && self.memory_bytes.is_some_and(|limit| memory >= limit) {
+            seen.stop = Some(StopReason::Memory);
         } else if now - seen.shown >= SHOW_EVERY && thread::current().id() == self.owner {
             seen.shown = now;
             let counters = seen.counters;
             // Others that look meanwhile need not wait for what is shown.
             drop(seen);
             let ends = self.observer.as_ref().is_some_and(|show| show(&counters));
-            seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+            seen = self.seen();
             if ends {
                 seen.stop = Some(StopReason::Interrupted);
             }
         }
         seen.stop
+    }
+
+    fn seen(&self) -> MutexGuard<'_, Seen> {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -103,15 +115,6 @@ impl std::fmt::Debug for Patience {
             .field("timeout", &self.timeout)
             .field("seen", &self.seen)
             .finish_non_exhaustive()
-    }
-}
-
-/// Takes the alarm back when it is dropped.
-pub(super) struct Armed<'a>(&'a Alarm);
-
-impl Drop for Armed<'_> {
-    fn drop(&mut self) {
-        self.0.set(None);
     }
 }
 
@@ -127,6 +130,7 @@ impl LimitWatch {
             patience: Arc::new(Patience {
                 start: now,
                 timeout: limits.timeout,
+                memory_bytes: limits.memory_bytes,
                 observer: limits.observer.clone(),
                 owner: thread::current().id(),
                 seen: Mutex::new(seen),
@@ -136,12 +140,18 @@ impl LimitWatch {
         }
     }
 
-    /// Lets the limit of time and the user end calls of the model's code too, as long as the value lives.
-    pub(super) fn arm<'a>(&self, alarm: &'a Alarm) -> Armed<'a> {
+    /// Does work that the limits and the user end in the middle of operations, too.
+    ///
+    /// # Errors
+    /// It was ended there; gives what was counted last.
+    pub(super) fn bound<R>(
+        &mut self,
+        run: impl FnOnce(&mut LimitWatch) -> R,
+    ) -> Result<R, (StopReason, Counters)> {
         let patience = Arc::clone(&self.patience);
-        let look: Look = Arc::new(move || patience.look(None).is_some());
-        alarm.set(Some(look));
-        Armed(alarm)
+        let look: Look = Arc::new(move |bytes| patience.look_beside(bytes).is_some());
+        let result = cancellation::within(look, || run(self));
+        result.map_err(|Cut| (self.stop(), self.patience.seen().counters))
     }
 
     /// Why an end was called for, by the limit of time or by the user.
@@ -155,9 +165,18 @@ impl LimitWatch {
     }
 
     fn last_stop(&self) -> Option<StopReason> {
-        let seen = self.patience.seen.lock();
-        seen.unwrap_or_else(PoisonError::into_inner).stop
+        self.patience.seen().stop
     }
+}
+
+/// Does work that may be cut off in the middle of an operation without what was found before: then it fails as interrupted.
+///
+/// # Errors
+/// The work fails, or was cut off.
+pub(super) fn cut_as_interrupted<R>(
+    run: impl FnOnce() -> Result<R, Failure>,
+) -> Result<R, Failure> {
+    cancellation::unless_cut(run).unwrap_or(Err(Failure::Interrupted))
 }
 
 impl Watch for LimitWatch {
@@ -177,6 +196,6 @@ impl Watch for LimitWatch {
         {
             return Some(StopReason::Memory);
         }
-        self.patience.look(Some(counters))
+        self.patience.look(counters)
     }
 }

@@ -87,15 +87,13 @@ impl LoadedModel {
         let nothing = &Predicate::Constant(false);
         let most = limits.states.map_or(usize::MAX, |most| most as usize);
         let mut watch = LimitWatch::new(limits);
-        let armed = watch.arm(self.executor().alarm());
         let mut search = Search::new(&mut symbolic, &nothing, Measure::Moves, Counters::default());
-        let stop = match search.run(&mut watch) {
-            Ok(Outcome::Stopped(reason)) => Some(reason),
-            Ok(Outcome::Found(_) | Outcome::Exhausted) => None,
-            Err(Failure::Interrupted) => Some(watch.stop()),
-            Err(failure) => return Err(failure),
+        let stop = match watch.bound(|watch| search.run(watch)) {
+            Ok(Ok(Outcome::Stopped(reason))) | Err((reason, _)) => Some(reason),
+            Ok(Ok(Outcome::Found(_) | Outcome::Exhausted)) => None,
+            Ok(Err(Failure::Interrupted)) => Some(watch.stop()),
+            Ok(Err(failure)) => return Err(failure),
         };
-        drop(armed);
         // The search looks at its limits now and then only, so that it may have met more.
         let is_cut = search.counters().stored > most as u64;
         let states = search.into_met(most)?;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::cancellation;
 use crate::ir::{ClockAtom, Measure};
 use crate::network::{Abstraction, Symbolic, Symmetry, predicate};
 use crate::search::extremum::{self, Extreme, Extremes, Question};
@@ -146,7 +147,8 @@ impl Runs<'_> {
         watch: &mut LimitWatch,
     ) -> Option<Verdict> {
         let options = self.options;
-        let report = reach::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
+        let search = || reach::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
+        let report = cancellation::unless_cut(search).ok()?;
         let Ok(Outcome::Found(trace)) = report.outcome else {
             return None;
         };

@@ -8,24 +8,25 @@
 //! Cost: some nanoseconds an instruction.
 
 use std::cell::RefCell;
-use std::sync::Arc;
 
+use crate::cancellation;
 use crate::ir::{
     Address, Base, Block, CLOCK_LIMIT, ClockId, ClockOperand, Function, FunctionId, Instruction,
     MathFunction, Register, RegisterType, RunTimeErrorKind, Terminator,
 };
 
-use super::alarm::{Alarm, ROUNDS_BETWEEN_LOOKS};
 use super::math::{self, MathCode};
 use super::rounds::{ROUND_LIMIT, count_rounds};
-use super::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError, arithmetic};
+use super::{
+    Context, EmittedAssignment, EmittedConstraint, Executor, ROUNDS_BETWEEN_LOOKS, RunTimeError,
+    arithmetic,
+};
 
 /// Runs functions by walking over their instructions.
 #[derive(Clone, Debug, Default)]
 pub struct Interpreter {
     functions: Vec<Function>,
     constants: Vec<i32>,
-    alarm: Arc<Alarm>,
 }
 
 impl Interpreter {
@@ -88,10 +89,6 @@ impl Executor for Interpreter {
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
         self.measure(ROUND_LIMIT, function, arguments, context).0
-    }
-
-    fn alarm(&self) -> &Alarm {
-        &self.alarm
     }
 }
 
@@ -454,8 +451,7 @@ impl<'run> Run<'run, '_> {
                 if self.effort.rounds > self.round_limit {
                     return Err(RunTimeErrorKind::StepLimit);
                 }
-                if self.effort.rounds.is_multiple_of(ROUNDS_BETWEEN_LOOKS)
-                    && self.program.alarm.is_due()
+                if self.effort.rounds.is_multiple_of(ROUNDS_BETWEEN_LOOKS) && cancellation::is_due()
                 {
                     return Err(RunTimeErrorKind::Interrupted);
                 }

@@ -6,7 +6,6 @@
 pub(crate) mod arithmetic;
 pub(crate) mod math;
 
-mod alarm;
 mod rounds;
 
 mod interpreter;
@@ -17,7 +16,6 @@ mod validate;
 #[cfg(feature = "jit")]
 mod jit;
 
-pub use alarm::{Alarm, Look};
 pub use interpreter::Interpreter;
 #[cfg(feature = "jit")]
 pub use jit::{Jit, JitError};
@@ -92,7 +90,8 @@ pub trait Executor: Send + Sync {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError>;
-
-    /// What ends calls that run long.
-    fn alarm(&self) -> &Alarm;
 }
+
+/// Rounds of loops between two looks whether to end ([`crate::cancellation::is_due`]); a call that is ended so fails with
+/// [`crate::ir::RunTimeErrorKind::Interrupted`].
+const ROUNDS_BETWEEN_LOOKS: u64 = 1 << 16;

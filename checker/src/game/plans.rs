@@ -6,8 +6,10 @@
 //!
 //! Cost: proportional to the nodes on winning paths; plans are found one after the other and never held all at once here.
 
+use crate::cancellation;
 use crate::network::{Failure, Moves, Part};
 use crate::zones::Zone;
+use crate::zones::federation::block_bytes;
 
 use super::graph::Standing;
 use super::reach::{Solver, Win};
@@ -30,12 +32,26 @@ pub struct Plan {
     pub end: Vec<i32>,
 }
 
+impl Plan {
+    /// The bytes that it takes, those of the value itself among them.
+    pub fn heap_bytes(&self) -> usize {
+        let parts = self.steps.iter().map(|step| size_of_val(&*step.parts));
+        size_of::<Plan>()
+            + block_bytes(size_of_val(&*self.steps))
+            + block_bytes(size_of_val(&*self.end))
+            + parts.map(block_bytes).sum::<usize>()
+    }
+}
+
 /// Why there is no list of plans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoPlans {
     /// The environment has a choice, so a strategy is no list of plans.
     EnvironmentChooses,
 }
+
+/// What it takes to follow an edge, beside its zones: see [`cancellation::work`].
+const UNITS_FOR_STEP: usize = 256;
 
 /// A node on the path that is being followed.
 struct Level {
@@ -121,6 +137,8 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
         let urgent = graph.urgent(edge.target);
         let delays = graph.nodes[edge.target as usize].delays && urgent.is_none();
         let level = self.path.last()?;
+        let bounds = level.zones.len() * graph.dimension().pow(2);
+        cancellation::work(UNITS_FOR_STEP + bounds);
         let images = level
             .zones
             .iter()

@@ -44,7 +44,7 @@ use std::collections::VecDeque;
 use rustc_hash::FxHashMap;
 
 use crate::network::Failure;
-use crate::search::limits::{Counters, StopReason, Watch};
+use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
 use crate::zones::{Federation, Patience};
 
 use super::allowance::Allowance;
@@ -253,7 +253,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
 
     /// Solves the game.
     pub fn solve(&mut self, extent: Extent, watch: &mut dyn Watch) -> Result<Answer, Failure> {
-        let mut next_look = LOOK_EVERY;
+        let look_every = states_between_looks(LOOK_EVERY, self.graph.dimension());
+        let mut next_look = look_every;
         let zones_between_looks = (ZONE_BYTES_BETWEEN_LOOKS / self.zone_bytes()) as usize;
         let mut zones_at_look = self.graph.zones.len() + zones_between_looks;
         let (mut next_hope, mut next_crowd) = (1, 1);
@@ -327,7 +328,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             }
             self.expand(node)?;
             if self.graph.explored >= next_look || self.graph.zones.len() >= zones_at_look {
-                next_look = self.graph.explored + LOOK_EVERY;
+                next_look = self.graph.explored + look_every;
                 zones_at_look = self.graph.zones.len() + zones_between_looks;
                 if let Some(reason) = self.look(watch) {
                     return Ok(Answer::Stopped(reason));

@@ -11,7 +11,7 @@
 use std::collections::VecDeque;
 
 use crate::network::Failure;
-use crate::search::limits::{StopReason, Watch};
+use crate::search::limits::{StopReason, Watch, states_between_looks};
 
 use super::graph::{Graph, NONE};
 use super::reach::{Answer, LOOK_EVERY, MOST_TASKS, Solver, Win};
@@ -86,7 +86,8 @@ impl Solver<'_, '_, '_> {
 
     /// Expands all nodes that can be reached, and computes nothing of what they win.
     pub(super) fn explore(&mut self, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
-        let mut next_look = LOOK_EVERY;
+        let look_every = states_between_looks(LOOK_EVERY, self.graph.dimension());
+        let mut next_look = look_every;
         while let Some(node) = self.next_waiting() {
             if self.graph.nodes[node as usize].is_expanded {
                 continue;
@@ -97,7 +98,7 @@ impl Solver<'_, '_, '_> {
                 return Ok(Some(StopReason::States));
             }
             if self.graph.explored >= next_look {
-                next_look = self.graph.explored + LOOK_EVERY;
+                next_look = self.graph.explored + look_every;
                 if let Some(reason) = self.look(watch) {
                     return Ok(Some(reason));
                 }

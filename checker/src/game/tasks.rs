@@ -9,6 +9,7 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::Duration;
 
+use crate::cancellation;
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::Patience;
 use crate::zones::federation::block_bytes;
@@ -148,6 +149,7 @@ impl Solver<'_, '_, '_> {
             let helpers: Vec<_> = (1..progress.zones.len())
                 .filter_map(|index| {
                     let over = over.clone();
+                    let look = cancellation::current();
                     let work = move || {
                         let zones = &progress.zones[index];
                         let mut goes_on = |count: usize| {
@@ -161,7 +163,8 @@ impl Solver<'_, '_, '_> {
                     };
                     // Who cannot be started is not missed: the others do its tasks.
                     let thread = thread::Builder::new().stack_size(STACK_BYTES);
-                    thread.spawn_scoped(scope, work).ok()
+                    let run = move || cancellation::looking_at(look, work);
+                    thread.spawn_scoped(scope, run).ok()
                 })
                 .collect();
             drop(over);

@@ -6,6 +6,7 @@
 //! Cost: without a scope as many steps as there are combinations; within a zone every choice that is looked at leads to a
 //! combination that is possible, or is the last that is looked at.
 
+use crate::cancellation;
 use crate::exec::EmittedConstraint;
 use crate::ir::Network;
 
@@ -18,8 +19,11 @@ use super::stepper::Stepper;
 /// The most moves of a state: receivers of a broadcast that have a choice each multiply.
 const MOST_MOVES: usize = 1 << 20;
 
-/// So many moves are put together between two looks at the alarm.
-const MOVES_BETWEEN_LOOKS: usize = 1 << 12;
+/// After so many moves it is asked whether there may be more.
+const MANY_MOVES: usize = 1 << 12;
+
+/// What it takes to put a move together, beside what is done with zones for it.
+const UNITS_FOR_MOVE: usize = 256;
 
 /// The greatest rank, of what no scope would come to the end of.
 const MOST_RANKS: u64 = 1 << 62;
@@ -182,8 +186,10 @@ impl Stepper<'_> {
             } else if !needs_committed || self.has_committed_choice(words) {
                 self.emit(is_possible, out);
                 check_count(out)?;
-                if out.len().is_multiple_of(MOVES_BETWEEN_LOOKS) && self.executor.alarm().is_due() {
-                    return Err(Failure::Interrupted);
+                cancellation::work(UNITS_FOR_MOVE);
+                if out.len().is_multiple_of(MANY_MOVES) {
+                    // The lists are about to grow to more than this, and may double.
+                    cancellation::ask_for(2 * out.heap_bytes());
                 }
             } else {
                 self.rank += ways;

@@ -21,7 +21,7 @@ pub enum Failure {
     Moves(usize),
     /// The initial state breaks an invariant.
     InitialInvariant,
-    /// None of the model: the alarm ended a call, or the enumeration of moves ([`crate::exec::Alarm`]).
+    /// None of the model: a call of its code, or the enumeration of moves, was ended ([`crate::cancellation`]).
     Interrupted,
 }
 

@@ -10,6 +10,7 @@
 
 use std::sync::Arc;
 
+use crate::cancellation;
 use crate::exec::{EmittedAssignment, EmittedConstraint};
 use crate::ir::ClockId;
 use crate::zones::clocks::{self, Assignment};
@@ -24,6 +25,9 @@ use super::zone_memo::ZoneMemo;
 use super::{
     Failure, LiveVariables, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, Symmetry,
 };
+
+/// From this dimension on a move takes long enough to count.
+const MANY_CLOCKS: usize = 16;
 
 /// Zones on top of the moves of a network. One per thread.
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
@@ -243,6 +247,10 @@ impl<'a> Symbolic<'a> {
         words: &mut [i32],
         effect: &mut ClockEffect,
     ) -> Result<bool, Failure> {
+        if self.dimension >= MANY_CLOCKS {
+            // The zones that are made of what is said here are to come.
+            cancellation::work(self.dimension * self.dimension);
+        }
         effect.excluded.clear();
         effect.assignments.clear();
         if !add_constraints(one.constraints, &mut effect.guard)? {

@@ -19,13 +19,13 @@ use crate::zones::dbm::{self, Constraint};
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Zone};
 
-use super::limits::{Counters, StopReason, Watch};
+use super::limits::{Counters, StopReason, Watch, states_between_looks};
 use super::liveness::{Ending, Run, push_state};
 use super::reach::Trace;
 use super::staying::Inside;
 use super::store::{DiscreteId, StateStore};
 
-/// Steps between two looks at the limits.
+/// Steps between two looks at the limits, at most.
 const LOOK_EVERY: u64 = 256;
 
 /// Rounds of a loop after which its zones have settled, or it is given up.
@@ -157,7 +157,8 @@ impl<'s, 'a> Search<'s, 'a> {
 
     fn look(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
         self.steps += 1;
-        if self.steps.is_multiple_of(LOOK_EVERY) {
+        let look_every = states_between_looks(LOOK_EVERY, self.symbolic.dimension());
+        if self.steps.is_multiple_of(look_every) {
             watch.look(&self.counters())
         } else {
             None

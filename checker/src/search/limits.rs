@@ -47,6 +47,20 @@ pub trait Watch {
     fn look(&mut self, counters: &Counters) -> Option<StopReason>;
 }
 
+/// States that a search may explore between two looks, of as many at most, at zones of this dimension: what a state takes grows with the
+/// third power of it, and what its successors take with that, too, where clocks have a process each.
+pub(crate) fn states_between_looks(most: u64, dimension: usize) -> u64 {
+    (UNITS_BETWEEN_LOOKS / (dimension as u64).pow(3)).clamp(1, most)
+}
+
+/// Moves that a search may take between two looks.
+pub(crate) fn moves_between_looks(most: u64, dimension: usize) -> u64 {
+    (UNITS_BETWEEN_LOOKS / (dimension as u64).pow(2)).clamp(1, most)
+}
+
+/// Bounds that the zones of states and moves may have between two looks, about.
+const UNITS_BETWEEN_LOOKS: u64 = 1 << 19;
+
 /// Never stops a search.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unlimited;

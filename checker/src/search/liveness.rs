@@ -24,12 +24,12 @@ use crate::zones::Zone;
 use crate::zones::dbm;
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 
-use super::limits::{Counters, StopReason, Watch};
+use super::limits::{Counters, StopReason, Watch, states_between_looks};
 use super::reach::Trace;
 use super::staying::Inside;
 use super::store::{DiscreteId, StateStore};
 
-/// States between two looks at the limits.
+/// States between two looks at the limits, at most.
 const LOOK_EVERY: u64 = 256;
 
 /// No node.
@@ -126,7 +126,7 @@ impl<'p> Liveness<'p> {
             heads: Vec::new(),
             frames: Vec::new(),
             explored: 0,
-            next_look: LOOK_EVERY,
+            next_look: states_between_looks(LOOK_EVERY, symbolic.dimension()),
             is_coarse: false,
         }
     }
@@ -211,7 +211,8 @@ impl<'p> Liveness<'p> {
                     return Ok(Outcome::Found(self.found(ending)));
                 }
                 if self.explored >= self.next_look {
-                    self.next_look = self.explored + LOOK_EVERY;
+                    let dimension = symbolic.dimension();
+                    self.next_look = self.explored + states_between_looks(LOOK_EVERY, dimension);
                     if let Some(reason) = watch.look(&(self.counters() + before)) {
                         return Ok(Outcome::Stopped(reason));
                     }

@@ -23,12 +23,13 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::thread::{self, Scope, ScopedJoinHandle};
 use std::time::Duration;
 
+use crate::cancellation;
 use crate::network::{Failure, Symbolic};
 use crate::zones::Bound;
 
 use super::explore::{self, Explorer, Scene, Visit};
 use super::goal::{Goal, Look, SharedGoal};
-use super::limits::{Counters, Unlimited, Watch};
+use super::limits::{Counters, Unlimited, Watch, moves_between_looks};
 use super::reach::{Outcome, Report, Trace};
 use super::retrace;
 use super::shard::{Mail, Shard};
@@ -43,6 +44,8 @@ const PULSE: Duration = Duration::from_millis(20);
 const FEWEST_MOVES: u64 = 1 << 10;
 /// at most so many.
 const MOST_MOVES: u64 = 1 << 15;
+/// The zones of the states that a worker comes to in a round have so many bounds at most.
+const MOST_BOUNDS: u64 = 1 << 22;
 /// A worker that has collected so many bytes for others ends its round: what they then look through should still be in a cache.
 const MOST_MAIL_BYTES: usize = 1 << 18;
 
@@ -66,6 +69,7 @@ pub(super) fn search<G: SharedGoal>(
         (1..=tree::MOST_SHARDS).contains(&threads),
         "the number of threads lies in the range"
     );
+    let dimension = symbolic.dimension();
     let mut others: Vec<_> = (1..threads)
         .map(|_| (symbolic.another(), goal.fork()))
         .collect();
@@ -77,6 +81,7 @@ pub(super) fn search<G: SharedGoal>(
     });
     let mut search = Search {
         workers: workers.collect(),
+        dimension,
         watch,
     };
     let report = search.run();
@@ -173,13 +178,14 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         mut moves: u64,
         is_cut: &mut dyn FnMut() -> bool,
     ) -> Result<Option<Ending>, Failure> {
-        let mut until_pulse = PULSE_MOVES;
+        let pulse_moves = moves_between_looks(PULSE_MOVES, self.symbolic.dimension());
+        let mut until_pulse = pulse_moves;
         while moves > 0 && self.shard.sent_bytes < MOST_MAIL_BYTES {
             if until_pulse == 0 {
                 if is_cut() {
                     return Ok(Some(Ending::Cut));
                 }
-                until_pulse = PULSE_MOVES;
+                until_pulse = pulse_moves;
             }
             if !self.is_busy && !self.begin()? {
                 break;
@@ -239,6 +245,7 @@ type Place<'s, 'a, G> = Option<Box<Worker<'s, 'a, G>>>;
 struct Search<'s, 'a, 'w, G> {
     /// Each is in its place except while a thread has it.
     workers: Vec<Place<'s, 'a, G>>,
+    dimension: usize,
     watch: &'w mut dyn Watch,
 }
 
@@ -337,9 +344,12 @@ impl<'s, 'a, G: SharedGoal> Search<'s, 'a, '_, G> {
             return None;
         }
         let advances = is_level_over && now == 0;
+        // The memory is looked at between rounds.
+        let zone = self.dimension.pow(2) as u64;
+        let most_moves = (MOST_BOUNDS / zone).clamp(1, MOST_MOVES);
         let task = Task {
             advances,
-            most_moves: explored.clamp(FEWEST_MOVES, MOST_MOVES),
+            most_moves: explored.clamp(FEWEST_MOVES.min(most_moves), most_moves),
         };
         Some((task, sent + if advances { next } else { now }))
     }
@@ -445,7 +455,8 @@ impl<'t, 'e, 's: 'e, 'a: 'e, G: SharedGoal + 'e> Crew<'t, 'e, 's, 'a, G> {
         let (jobs, tasks) = mpsc::channel::<(Box<Worker<'s, 'a, G>>, Task)>();
         let (results, done) = mpsc::channel();
         let is_cut = self.is_cut;
-        let run = move || {
+        let look = cancellation::current();
+        let serve = move || {
             while let Ok((mut worker, task)) = tasks.recv() {
                 worker.work(task, &mut || is_cut.load(Ordering::Relaxed));
                 if results.send(worker).is_err() {
@@ -453,6 +464,7 @@ impl<'t, 'e, 's: 'e, 'a: 'e, G: SharedGoal + 'e> Crew<'t, 'e, 's, 'a, G> {
                 }
             }
         };
+        let run = move || cancellation::looking_at(look, serve);
         let builder = thread::Builder::new()
             .name(format!("search-{index}"))
             .stack_size(STACK_BYTES);

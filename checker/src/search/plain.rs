@@ -21,12 +21,12 @@ use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::{Bound, Zone, dbm};
 
 use super::goal::{Goal, Target};
-use super::limits::{Counters, StopReason, Watch};
+use super::limits::{Counters, StopReason, Watch, states_between_looks};
 use super::reach::Trace;
 use super::retrace::{self, Step};
 use super::store::{DiscreteId, StateStore};
 
-/// States between two looks at the limits.
+/// States between two looks at the limits, at most.
 const LOOK_EVERY: u64 = 256;
 
 /// No node.
@@ -151,14 +151,15 @@ impl<'s, 'a> Search<'s, 'a> {
         self.symbolic
             .let_time_pass(&mut words, &invariant, &mut zones)?;
         self.enter(&mut words, &mut zones, NONE, 0)?;
-        let mut next_look = LOOK_EVERY;
+        let look_every = states_between_looks(LOOK_EVERY, self.symbolic.dimension());
+        let mut next_look = look_every;
         while let Some(Reverse((cost, is_goal, node))) = self.waiting.pop() {
             if is_goal {
                 return Ok(Outcome::Found(self.way(node, cost)));
             }
             self.explore(node)?;
             if self.explored >= next_look {
-                next_look = self.explored + LOOK_EVERY;
+                next_look = self.explored + look_every;
                 if let Some(reason) = watch.look(&self.counters()) {
                     return Ok(Outcome::Stopped(reason));
                 }

@@ -15,16 +15,16 @@ use crate::zones::{Bound, Zone};
 
 use super::explore::{self, Explorer, Scene, Sink, Visit};
 use super::goal::{Goal, Look, SharedGoal};
-use super::limits::{Counters, StopReason, Watch};
+use super::limits::{Counters, StopReason, Watch, moves_between_looks, states_between_looks};
 use super::packed_zones::Kept;
 use super::parallel;
 use super::passed::Stored;
 use super::retrace::{self, Step};
 use super::tree::{self, MOST_SHARDS, Origin, Tree};
 
-/// States between two looks at the limits.
+/// States between two looks at the limits, at most.
 const LOOK_EVERY: u64 = 256;
-/// Moves between two looks at the limits below one stored state.
+/// Moves between two looks at the limits, at most.
 const LOOK_EVERY_MOVES: u64 = 1 << 12;
 
 /// In which order states are explored.
@@ -200,7 +200,10 @@ impl<'s, 'a> Search<'s, 'a> {
             Look::Found => return Ok(Outcome::Found(self.trace(true))),
             Look::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
         }
-        let mut next_look = LOOK_EVERY;
+        let dimension = self.symbolic.dimension();
+        let look_every = states_between_looks(LOOK_EVERY, dimension);
+        let mut next_look = look_every;
+        let mut moves = moves_between_looks(LOOK_EVERY_MOVES, dimension);
         while let Some(stored) = self.next_waiting() {
             if self.store.tree.passed.is_covered(stored) {
                 continue;
@@ -210,14 +213,14 @@ impl<'s, 'a> Search<'s, 'a> {
                 node: stored.node,
             };
             let first = self.store.waiting.len();
-            match self.visit(stored)? {
+            match self.visit(stored, &mut moves)? {
                 Visit::Found => return Ok(Outcome::Found(self.trace(true))),
                 Visit::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
                 Visit::Done | Visit::Paused => {}
             }
             self.shuffle_from(first);
             if self.explorer.explored() >= next_look {
-                next_look = self.explorer.explored() + LOOK_EVERY;
+                next_look = self.explorer.explored() + look_every;
                 let counters = self.counters();
                 if let Some(reason) = self.watch.look(&counters) {
                     return Ok(Outcome::Stopped(reason));
@@ -262,8 +265,8 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    /// Explores a stored state to the end.
-    fn visit(&mut self, stored: Stored) -> Result<Visit, Failure> {
+    /// Explores a stored state to the end. So many moves may be taken until the next look.
+    fn visit(&mut self, stored: Stored, moves: &mut u64) -> Result<Visit, Failure> {
         let counters = self.own_counters();
         let passed = &self.store.tree.passed;
         let load = |words: &mut [i32], zone: &mut [Bound]| passed.load(stored, words, zone);
@@ -276,9 +279,9 @@ impl<'s, 'a> Search<'s, 'a> {
                 watch: self.watch,
                 sink: &mut self.store,
             };
-            let mut moves = LOOK_EVERY_MOVES;
-            match self.explorer.explore(&mut scene, &mut moves)? {
+            match self.explorer.explore(&mut scene, moves)? {
                 Visit::Paused => {
+                    *moves = moves_between_looks(LOOK_EVERY_MOVES, self.symbolic.dimension());
                     let counters = self.counters();
                     if let Some(reason) = self.watch.look(&counters) {
                         return Ok(Visit::Stopped(reason));

@@ -15,10 +15,21 @@
 //! Cost: one zone minus another makes at most as many zones as the other has minimal constraints; the difference of
 //! federations is exponential in the worst case, and reduced after each step.
 
+use crate::cancellation;
+
 use super::clocks::{self, Assignment};
 use super::dbm::{self, Constraint, Relation};
 use super::rows::rows;
 use super::{Bound, ClockSet, Patience, Zone, minimal};
+
+/// What it takes to find out that a zone is not in another, as a rule: see [`cancellation::work`].
+const UNITS_FOR_COMPARISON: usize = 16;
+
+/// So much work on zones of a federation is counted at once.
+const UNITS_AT_ONCE: usize = 1 << 16;
+
+/// Before a federation takes this many bytes, it is asked whether it may.
+const LARGE_BYTES: usize = 1 << 20;
 
 /// A finite union of zones of the same dimension.
 #[derive(Clone, Debug)]
@@ -81,19 +92,25 @@ impl Federation {
     /// Adds a zone, which may be empty, without looking whether it was there.
     pub fn push(&mut self, zone: &[Bound]) {
         if !dbm::is_empty(zone) {
-            self.bounds.extend_from_slice(zone);
+            self.append(zone);
         }
+    }
+
+    fn append(&mut self, zone: &[Bound]) {
+        make_room(&mut self.bounds, zone.len());
+        self.bounds.extend_from_slice(zone);
     }
 
     /// Adds a zone, which may be empty, unless one zone contains it; removes the zones that it contains.
     ///
     /// Returns whether the zone was not contained in a single zone.
     pub fn add(&mut self, zone: &[Bound]) -> bool {
+        cancellation::work(self.zone_count() * UNITS_FOR_COMPARISON);
         if dbm::is_empty(zone) || self.zones().any(|other| dbm::is_subset(zone, other)) {
             return false;
         }
         self.retain(|other| !dbm::is_subset(other, zone));
-        self.bounds.extend_from_slice(zone);
+        self.append(zone);
         true
     }
 
@@ -175,6 +192,7 @@ impl Federation {
         self.retain(|minuend| {
             let is_kept = is_apart(minuend);
             if !is_kept {
+                make_room(&mut cut, minuend.len());
                 cut.extend_from_slice(minuend);
             }
             is_kept
@@ -184,6 +202,8 @@ impl Federation {
         for minuend in cut.chunks_exact(size) {
             // The parts of one zone are disjoint.
             let others = self.bounds.len();
+            let comparisons = subtrahend.constraints.len() * self.zone_count();
+            cancellation::work(comparisons * UNITS_FOR_COMPARISON);
             subtrahend.subtract_from(minuend, &mut |part| {
                 let mut others = self.bounds[..others].chunks_exact(size);
                 if !others.any(|other| dbm::is_subset(part, other)) {
@@ -214,14 +234,17 @@ impl Federation {
             let minuend = &self.bounds[start..start + size];
             let meets = |one: &Constraint| dbm::satisfies(minuend, dimension, one);
             if !constraints.iter().all(meets) {
+                make_room(&mut self.bounds, size);
                 self.bounds.extend_from_within(start..start + size);
                 continue;
             }
+            cancellation::work(size * (constraints.len() + 1));
             loop {
                 let rest = &self.bounds[start..start + size];
                 let Some(cut) = deepest_cut(rest, dimension, constraints) else {
                     break;
                 };
+                make_room(&mut self.bounds, size);
                 let part = self.bounds.len();
                 self.bounds.extend_from_within(start..start + size);
                 let outside = cut.negated();
@@ -298,8 +321,10 @@ impl Federation {
             !dbm::are_apart(zone, other, self.dimension)
                 && dbm::intersect(&mut scratch, other, self.dimension)
         };
-        self.zones()
-            .any(|zone| other.zones().any(|other| meets(zone, other)))
+        self.zones().any(|zone| {
+            cancellation::work(other.bounds.len());
+            other.zones().any(|other| meets(zone, other))
+        })
     }
 
     /// Lets any time pass while the clocks of `stopped` keep their values; see [`clocks::up_stopped`].
@@ -378,6 +403,7 @@ impl Federation {
             if patience.ends_with(self.zone_count()) {
                 return;
             }
+            cancellation::work(self.zone_count() * self.dimension);
             entering.copy_from_slice(zone);
             while let Some(index) = self
                 .zones()
@@ -465,14 +491,35 @@ impl Federation {
     /// Changes every zone in place and drops those for which the change returns false.
     fn update(&mut self, mut change: impl FnMut(&mut [Bound]) -> bool) {
         let size = self.size();
-        let mut kept = 0;
+        let (mut kept, mut units) = (0, 0);
         for start in (0..self.bounds.len()).step_by(size) {
+            units += size;
+            if units >= UNITS_AT_ONCE {
+                cancellation::work(std::mem::take(&mut units));
+            }
             if change(&mut self.bounds[start..start + size]) {
                 self.bounds.copy_within(start..start + size, kept);
                 kept += size;
             }
         }
         self.bounds.truncate(kept);
+        cancellation::work(units);
+    }
+}
+
+/// Makes room for so many more bounds; asks before, where that takes much memory. Long lists grow by a quarter, so that they do not come
+/// to a limit of memory with half of it free.
+#[inline]
+fn make_room(bounds: &mut Vec<Bound>, more: usize) {
+    if bounds.capacity() - bounds.len() < more {
+        let least = bounds.len() + more;
+        let bytes = least * size_of::<Bound>();
+        if bytes >= LARGE_BYTES {
+            cancellation::ask_for(bytes + bytes / 4);
+            bounds.reserve_exact(more.max(least / 4));
+        } else {
+            bounds.reserve(more);
+        }
     }
 }
 
@@ -494,6 +541,7 @@ struct Subtrahend<'a> {
 impl<'a> Subtrahend<'a> {
     fn new(zone: &'a [Bound], dimension: usize) -> Subtrahend<'a> {
         let mut constraints = Vec::new();
+        cancellation::work(dimension * dimension * dimension / 4);
         minimal::for_each_minimal(zone, dimension, |constraint| constraints.push(constraint));
         Subtrahend {
             zone,
@@ -508,6 +556,7 @@ impl<'a> Subtrahend<'a> {
         if dbm::are_apart(minuend, self.zone, dimension) {
             return visit(minuend);
         }
+        cancellation::work(minuend.len() * (self.constraints.len() + 1));
         let mut rest = minuend.to_vec();
         let mut part = minuend.to_vec();
         while let Some(cut) = deepest_cut(&rest, dimension, &self.constraints) {

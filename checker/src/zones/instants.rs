@@ -8,6 +8,8 @@
 //!
 //! Cost: one closing for each zone.
 
+use crate::cancellation;
+
 use super::federation::Federation;
 use super::{Bound, ClockSet, Patience, dbm};
 
@@ -73,6 +75,7 @@ fn moved(
         if patience.ends_through(result.zone_count() + 1) {
             break;
         }
+        cancellation::work(dimension * dimension * dimension / 4);
         moved.clear();
         moved.extend_from_slice(zone);
         for running in (1..dimension).filter(|clock| !stopped.contains(*clock)) {

@@ -674,7 +674,8 @@ fn an_endless_loop_ends_at_the_limit_of_rounds() {
 }
 
 #[test]
-fn an_alarm_ends_a_call_that_runs_long() {
+fn a_look_ends_a_call_that_runs_long() {
+    use checker::cancellation::{self, Look};
     use checker::ir::{Block, BlockId, Function, Terminator};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU32, Ordering};
@@ -698,16 +699,11 @@ fn an_alarm_ends_a_call_that_runs_long() {
     for (name, engine) in engines(&functions, &[]) {
         let looks = Arc::new(AtomicU32::new(0));
         let seen = Arc::clone(&looks);
-        engine.alarm().set(Some(Arc::new(move || {
-            seen.fetch_add(1, Ordering::Relaxed) == 2
-        })));
-        let outcome = run(&*engine, FunctionId(0), &[], &[]);
-        assert_eq!(outcome.result, error(Kind::Interrupted), "{name}");
+        let look: Look = Arc::new(move |_| seen.fetch_add(1, Ordering::Relaxed) == 2);
+        let outcome = cancellation::within(look, || run(&*engine, FunctionId(0), &[], &[]));
+        let result = outcome.map(|outcome| outcome.result);
+        assert_eq!(result, Ok(error(Kind::Interrupted)), "{name}");
         assert_eq!(looks.load(Ordering::Relaxed), 3, "{name}");
-        // It stays raised until it is set anew.
-        let outcome = run(&*engine, FunctionId(0), &[], &[]);
-        assert_eq!(outcome.result, error(Kind::Interrupted), "{name}");
-        engine.alarm().set(None);
         let outcome = run(&*engine, FunctionId(0), &[], &[]);
         assert_eq!(outcome.result, error(Kind::StepLimit), "{name}");
     }

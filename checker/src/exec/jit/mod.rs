@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
 use crate::ir::{Function, FunctionId};
 
-use super::{Alarm, Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, validate};
+use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, validate};
 
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};
@@ -217,10 +217,6 @@ impl Executor for Jit {
             self.call_native(code, frames.as_mut_ptr(), arguments, context)
         })
     }
-
-    fn alarm(&self) -> &Alarm {
-        self.interpreter.alarm()
-    }
 }
 
 thread_local! {
@@ -243,7 +239,7 @@ impl Jit {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
-        let (mut native, state) = NativeContext::new(&self.constants, self.alarm(), context);
+        let (mut native, state) = NativeContext::new(&self.constants, context);
         let state = state.as_mut_ptr();
         // SAFETY: `code` was made by the compiler of the engine that is borrowed for this call, for a function with as many
         // parameters as there are arguments (a precondition of `Executor::call`), with the signature of an entry if there are

@@ -4,10 +4,10 @@
 //! The status of a call is 64 bits: negative for a run-time error (its kind and site in the lower bits), else the integer
 //! that the function returned, or 0. A double or an address is returned beside the status.
 
-use crate::exec::alarm::ROUNDS_BETWEEN_LOOKS;
+use crate::cancellation;
 use crate::exec::{
-    Alarm, Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, RunTimeError, arithmetic,
-    math,
+    Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, ROUNDS_BETWEEN_LOOKS, RunTimeError,
+    arithmetic, math,
 };
 use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
 
@@ -21,7 +21,6 @@ pub(super) struct NativeContext<'call> {
     pub(super) constants: *const i32,
     /// How many rounds it may take beyond these.
     rounds_beyond: u64,
-    alarm: &'call Alarm,
     constraints: &'call mut Vec<EmittedConstraint>,
     assignments: &'call mut Vec<EmittedAssignment>,
 }
@@ -31,13 +30,11 @@ impl<'call> NativeContext<'call> {
     #[inline]
     pub(super) fn new(
         constants: &[i32],
-        alarm: &'call Alarm,
         context: &'call mut Context<'_>,
     ) -> (NativeContext<'call>, &'call mut [i32]) {
         let native = NativeContext {
             rounds_left: ROUNDS_BETWEEN_LOOKS,
             rounds_beyond: ROUND_LIMIT - ROUNDS_BETWEEN_LOOKS,
-            alarm,
             constants: constants.as_ptr(),
             constraints: context.constraints,
             assignments: context.assignments,
@@ -83,7 +80,7 @@ pub(super) extern "C" fn more_rounds(context: &mut NativeContext<'_>, site: u32)
     if context.rounds_beyond == 0 {
         return failure_status(RunTimeErrorKind::StepLimit, SiteId(site));
     }
-    if context.alarm.is_due() {
+    if cancellation::is_due() {
         return failure_status(RunTimeErrorKind::Interrupted, SiteId(site));
     }
     context.rounds_left = context.rounds_beyond.min(ROUNDS_BETWEEN_LOOKS);
