@@ -7,6 +7,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper that panics is a failed test")]
 
+use std::collections::BTreeSet;
+
 use checker::zones::clocks::{self, Assignment};
 use checker::zones::dbm::{self, Constraint};
 use checker::zones::extrapolate::{self, Ceilings};
@@ -594,7 +596,7 @@ proptest! {
         let inside: Vec<Point> = points(dimension, 0).into_iter().filter(|point| contains(&past, point)).collect();
         let earlier = |point: &Point| {
             let point = point.clone();
-            let times = delays(dimension).map(move |delay| delayed(&point, -delay, &stopped));
+            let times = delays(dimension).map(|delay| delayed(&point, -delay, &stopped));
             times.take(200).take_while(|point| point.iter().all(|value| *value >= 0)).collect::<Vec<_>>()
         };
         let exact: Vec<Point> = inside.iter().flat_map(earlier).collect();
@@ -1000,9 +1002,34 @@ fn clock_set_lists_its_clocks_in_order() {
     let set: ClockSet = [200, 3, 64, 0].into_iter().collect();
     assert_eq!(set.iter().collect::<Vec<_>>(), [0, 3, 64, 200]);
     assert_eq!(set.len(), 4);
-    assert!(set.contains(64) && !set.contains(65) && !set.contains(ClockSet::CAPACITY));
+    assert!(set.contains(64) && !set.contains(65) && !set.contains(100_000));
     assert_eq!(
         set.intersection(&ClockSet::all(65)),
         [3, 64].into_iter().collect()
     );
+}
+
+proptest! {
+    #![proptest_config(configuration())]
+
+    /// A set of any clocks is what a tree of numbers is; the first 256 and those beyond lie in different places.
+    #[test]
+    fn clock_sets_are_sets_of_numbers(
+        left in prop::collection::btree_set(0_usize..1500, 0..40),
+        right in prop::collection::btree_set(0_usize..1500, 0..40),
+        removed in prop::collection::vec(0_usize..1500, 0..40),
+    ) {
+        let of = |numbers: &BTreeSet<usize>| numbers.iter().copied().collect::<ClockSet>();
+        let (mut set, mut numbers) = (of(&left), left.clone());
+        prop_assert_eq!(set.union(&of(&right)), of(&(&left | &right)));
+        prop_assert_eq!(set.intersection(&of(&right)), of(&(&left & &right)));
+        for clock in removed.into_iter().chain(left.iter().copied().rev().take(30)) {
+            set.remove(clock);
+            numbers.remove(&clock);
+            prop_assert_eq!(&set, &of(&numbers));
+        }
+        prop_assert_eq!(set.iter().collect::<Vec<_>>(), numbers.iter().copied().collect::<Vec<_>>());
+        prop_assert_eq!((set.len(), set.is_empty()), (numbers.len(), numbers.is_empty()));
+        prop_assert!((0..1600).all(|clock| set.contains(clock) == numbers.contains(&clock)));
+    }
 }

@@ -488,13 +488,13 @@ impl Effects {
 
     fn add_constraints(&mut self, emitted: &[EmittedConstraint]) {
         for one in emitted {
-            let clocks = one.left.0 | one.right.0 << 8 | u32::from(one.strict) << 16;
+            let clocks = packed(one.left, one.right) | u32::from(one.strict) << 31;
             self.key.extend([clocks, one.bound.cast_unsigned()]);
         }
     }
 
     fn add_assignment(&mut self, one: EmittedAssignment) {
-        let clocks = one.target.0 | one.source.0 << 8;
+        let clocks = packed(one.target, one.source);
         self.key.extend([clocks, one.value.cast_unsigned()]);
     }
 
@@ -516,8 +516,8 @@ impl Effects {
         pairs
             .iter()
             .map(|&[clocks, value]| EmittedAssignment {
-                target: ClockId(clocks & 0xff),
-                source: ClockId(clocks >> 8),
+                target: ClockId(clocks & MOST_CLOCKS),
+                source: ClockId(clocks >> CLOCK_BITS),
                 value: value.cast_signed(),
             })
             .collect()
@@ -558,12 +558,23 @@ impl Effects {
     }
 }
 
+/// The bits that a clock takes in a word of an effect: the limit of clocks is far below.
+const CLOCK_BITS: u32 = 15;
+/// The greatest clock that fits.
+const MOST_CLOCKS: u32 = (1 << CLOCK_BITS) - 1;
+
+/// Two clocks in the lower 30 bits of a word.
+fn packed(first: ClockId, second: ClockId) -> u32 {
+    debug_assert!(first.0.max(second.0) <= MOST_CLOCKS);
+    first.0 | second.0 << CLOCK_BITS
+}
+
 fn to_constraint([clocks, bound]: [u32; 2]) -> EmittedConstraint {
     EmittedConstraint {
-        left: ClockId(clocks & 0xff),
-        right: ClockId(clocks >> 8 & 0xff),
+        left: ClockId(clocks & MOST_CLOCKS),
+        right: ClockId(clocks >> CLOCK_BITS & MOST_CLOCKS),
         bound: bound.cast_signed(),
-        strict: clocks >> 16 != 0,
+        strict: clocks >> 31 != 0,
     }
 }
 

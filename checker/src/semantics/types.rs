@@ -21,8 +21,8 @@ pub(super) const SIZE_LIMIT: u64 = 1 << 24;
 /// The most channels of a model: each has a name of its own.
 pub(super) const CHANNEL_LIMIT: u64 = 1 << 20;
 
-/// The most clocks of a model: `zones` has room for 256, the reference clock included.
-pub(super) const CLOCK_LIMIT: u64 = 255;
+/// The most clocks of a model: one zone of so many takes 64 MiB.
+pub(super) const CLOCK_LIMIT: u64 = 4095;
 
 /// A type.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,18 +1,23 @@
-//! A set of clocks in a fixed number of machine words, so that operations on zones need no allocation.
+//! A set of clocks as a bit set: the first 256 in machine words of its own, so that operations on zones of few clocks need no
+//! allocation, those beyond in a list.
 
-/// A set of clock indices below [`ClockSet::CAPACITY`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+/// How many machine words lie in the set itself.
+const INLINE_WORDS: usize = 4;
+
+/// A set of clock indices.
+///
+/// Invariant: the last word beyond the inline ones is not 0, so that equal sets have equal fields.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ClockSet {
-    words: [u64; ClockSet::WORDS],
+    words: [u64; INLINE_WORDS],
+    more: Vec<u64>,
 }
 
 impl ClockSet {
-    const WORDS: usize = 4;
-    /// The greatest dimension of a zone, the reference clock included; a model with more clocks is to be refused.
-    pub const CAPACITY: usize = 64 * ClockSet::WORDS;
     /// The set without clocks.
     pub const EMPTY: ClockSet = ClockSet {
-        words: [0; ClockSet::WORDS],
+        words: [0; INLINE_WORDS],
+        more: Vec::new(),
     };
 
     /// The clocks `1..dimension`, without the reference clock.
@@ -21,63 +26,91 @@ impl ClockSet {
     }
 
     /// Adds a clock.
-    ///
-    /// # Panics
-    /// If the index is not below [`ClockSet::CAPACITY`].
     pub fn insert(&mut self, clock: usize) {
-        self.words[clock / 64] |= 1 << (clock % 64);
+        let index = clock / 64;
+        let word = match self.words.get_mut(index) {
+            Some(word) => word,
+            None => {
+                let index = index - INLINE_WORDS;
+                if self.more.len() <= index {
+                    self.more.resize(index + 1, 0);
+                }
+                &mut self.more[index]
+            }
+        };
+        *word |= 1 << (clock % 64);
     }
 
     /// Takes a clock out.
-    ///
-    /// # Panics
-    /// If the index is not below [`ClockSet::CAPACITY`].
     pub fn remove(&mut self, clock: usize) {
-        self.words[clock / 64] &= !(1 << (clock % 64));
+        let mut words = self.words.iter_mut().chain(&mut self.more);
+        if let Some(word) = words.nth(clock / 64) {
+            *word &= !(1 << (clock % 64));
+        }
+        self.trim();
     }
 
-    /// Whether the clock is in the set; an index beyond the capacity is not.
+    /// Whether the clock is in the set.
     pub fn contains(&self, clock: usize) -> bool {
-        self.words
-            .get(clock / 64)
-            .is_some_and(|word| word >> (clock % 64) & 1 == 1)
+        self.word(clock / 64) >> (clock % 64) & 1 == 1
     }
 
     /// Whether the set has no clocks.
     pub fn is_empty(&self) -> bool {
-        self.words == [0; ClockSet::WORDS]
+        self.words == [0; INLINE_WORDS] && self.more.is_empty()
     }
 
     /// The number of clocks.
     pub fn len(&self) -> usize {
-        self.words
-            .iter()
-            .map(|word| word.count_ones() as usize)
-            .sum()
+        let words = self.words.iter().chain(&self.more);
+        words.map(|word| word.count_ones() as usize).sum()
     }
 
     /// The clocks that are in both sets.
     #[must_use]
     pub fn intersection(&self, other: &ClockSet) -> ClockSet {
-        ClockSet {
+        let more = self.more.iter().zip(&other.more).map(|(a, b)| a & b);
+        let mut both = ClockSet {
             words: std::array::from_fn(|word| self.words[word] & other.words[word]),
-        }
+            more: more.collect(),
+        };
+        both.trim();
+        both
     }
 
     /// The clocks that are in one of the sets.
     #[must_use]
     pub fn union(&self, other: &ClockSet) -> ClockSet {
+        let length = self.more.len().max(other.more.len());
+        let more = (INLINE_WORDS..INLINE_WORDS + length).map(|at| self.word(at) | other.word(at));
         ClockSet {
             words: std::array::from_fn(|word| self.words[word] | other.words[word]),
+            more: more.collect(),
         }
     }
 
     /// The clocks in ascending order.
     #[inline]
-    pub fn iter(&self) -> Clocks {
+    pub fn iter(&self) -> Clocks<'_> {
         Clocks {
             words: self.words,
+            more: &self.more,
             index: 0,
+        }
+    }
+
+    /// The word with this index; 0 beyond the last.
+    #[inline]
+    fn word(&self, index: usize) -> u64 {
+        match self.words.get(index) {
+            Some(word) => *word,
+            None => self.more.get(index - INLINE_WORDS).copied().unwrap_or(0),
+        }
+    }
+
+    fn trim(&mut self) {
+        while self.more.last() == Some(&0) {
+            self.more.pop();
         }
     }
 }
@@ -92,37 +125,44 @@ impl FromIterator<usize> for ClockSet {
     }
 }
 
-impl IntoIterator for &ClockSet {
+impl<'s> IntoIterator for &'s ClockSet {
     type Item = usize;
-    type IntoIter = Clocks;
+    type IntoIter = Clocks<'s>;
 
     #[inline]
-    fn into_iter(self) -> Clocks {
+    fn into_iter(self) -> Clocks<'s> {
         self.iter()
     }
 }
 
 /// The clocks of a set in ascending order.
 #[derive(Clone, Debug)]
-pub struct Clocks {
-    /// What is left of each word; the words before `index` are used up.
-    words: [u64; ClockSet::WORDS],
+pub struct Clocks<'s> {
+    /// What is left of each inline word, and of the first four after those that are used up; the words before `index` are used up.
+    words: [u64; INLINE_WORDS],
+    more: &'s [u64],
     index: usize,
 }
 
-impl Iterator for Clocks {
+impl Iterator for Clocks<'_> {
     type Item = usize;
 
     #[inline]
     fn next(&mut self) -> Option<usize> {
         loop {
-            let word = self.words.get_mut(self.index)?;
-            if *word != 0 {
+            if let Some(word) = self.words.get_mut(self.index % INLINE_WORDS)
+                && *word != 0
+            {
                 let bit = word.trailing_zeros() as usize;
                 *word &= *word - 1;
                 return Some(64 * self.index + bit);
             }
             self.index += 1;
+            if self.index >= INLINE_WORDS {
+                // The place of a word that is used up takes one that comes later.
+                let next = *self.more.get(self.index - INLINE_WORDS)?;
+                self.words[self.index % INLINE_WORDS] = next;
+            }
         }
     }
 }

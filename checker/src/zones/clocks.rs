@@ -18,7 +18,7 @@
 )]
 
 use super::dbm::{Constraint, constrain, is_empty, least_sum, set_empty, upper_bounds};
-use super::rows::{for_small_dimension, rows, rows_mut};
+use super::rows::{for_small_dimension, rows, rows_mut, with_row};
 use super::{Bound, ClockSet};
 
 /// So few upper bounds are looked at one after the other for each clock, more as a row of bounds on all clocks.
@@ -73,9 +73,10 @@ pub fn up_within(zone: &mut [Bound], dimension: usize, constraints: &[Constraint
         }
         return;
     }
-    let mut buffer = [Bound::INFINITY; ClockSet::CAPACITY];
-    let upper_bounds = upper_bounds(constraints, &mut buffer[..dimension]);
-    for_small_dimension!(dimension, delay_below(zone, upper_bounds));
+    with_row(dimension, |row| {
+        let upper_bounds = upper_bounds(constraints, row);
+        for_small_dimension!(dimension, delay_below(zone, upper_bounds));
+    });
 }
 
 #[inline(always)]

@@ -26,7 +26,7 @@
 
 use std::cmp::Ordering;
 
-use super::rows::{for_small_dimension, relax_row, rows, rows_mut};
+use super::rows::{for_small_dimension, relax_row, rows, rows_mut, with_row};
 use super::{Bound, ClockSet};
 
 /// How two zones of the same dimension lie to each other.
@@ -210,9 +210,10 @@ fn constrain_by(zone: &mut [Bound], dimension: usize, constraint: &Constraint) -
 /// All the new bounds lead to the reference clock, so a path that uses two of them passes it twice and is no shorter than
 /// without what lies between. Each row is closed again by its new upper bound and the lower bounds.
 fn constrain_above(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) -> bool {
-    let mut buffer = [Bound::INFINITY; ClockSet::CAPACITY];
-    let upper_bounds = upper_bounds(constraints, &mut buffer[..dimension]);
-    for_small_dimension!(dimension, tighten_above(zone, upper_bounds))
+    with_row(dimension, |row| {
+        let upper_bounds = upper_bounds(constraints, row);
+        for_small_dimension!(dimension, tighten_above(zone, upper_bounds))
+    })
 }
 
 #[inline(always)]

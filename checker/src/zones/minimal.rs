@@ -16,7 +16,7 @@
 //! Cost: reduction O(n^3), inclusion linear in the number of constraints, unpacking that of closing.
 
 use super::dbm::{self, Constraint};
-use super::rows::{relax_row, rows};
+use super::rows::{relax_row, rows, with_row};
 use super::{Bound, ClockSet};
 
 /// One constraint of a stored zone in eight bytes.
@@ -28,9 +28,12 @@ pub struct StoredConstraint {
 }
 
 impl From<Constraint> for StoredConstraint {
-    /// Packs a constraint; its clocks must be below [`ClockSet::CAPACITY`].
+    /// Packs a constraint.
+    ///
+    /// # Panics
+    /// If a clock is beyond 2^16 - 1, which no model has.
     fn from(constraint: Constraint) -> StoredConstraint {
-        let pack = |clock: usize| u16::try_from(clock).expect("the capacity of a clock set fits");
+        let pack = |clock: usize| u16::try_from(clock).expect("a zone has fewer clocks");
         StoredConstraint {
             left: pack(constraint.left),
             right: pack(constraint.right),
@@ -55,11 +58,21 @@ pub fn append_minimal(zone: &[Bound], dimension: usize, target: &mut Vec<StoredC
 }
 
 /// Calls `visit` with the minimal constraints of a zone that is not empty, row by row.
-pub fn for_each_minimal(zone: &[Bound], dimension: usize, mut visit: impl FnMut(Constraint)) {
+pub fn for_each_minimal(zone: &[Bound], dimension: usize, visit: impl FnMut(Constraint)) {
+    with_row(dimension, |detours| {
+        visit_minimal(zone, dimension, detours, visit);
+    });
+}
+
+/// As [`for_each_minimal`], with room for a row.
+fn visit_minimal(
+    zone: &[Bound],
+    dimension: usize,
+    detours: &mut [Bound],
+    mut visit: impl FnMut(Constraint),
+) {
     let representatives = representatives(zone, dimension);
     let has_ties = representatives.len() < dimension;
-    let mut detours = [Bound::INFINITY; ClockSet::CAPACITY];
-    let detours = &mut detours[..dimension];
     for (left, row) in rows(zone, dimension).enumerate() {
         let is_representative = representatives.contains(left);
         let successor = if has_ties {

@@ -55,6 +55,20 @@ pub(super) fn rows(matrix: &[Bound], dimension: usize) -> impl Iterator<Item = &
     })
 }
 
+/// Dimensions up to which a row for a moment needs no allocation.
+const MOST_ON_STACK: usize = 256;
+
+/// Calls `action` with a row of infinite bounds, which lasts as long as the call.
+#[inline(always)]
+pub(super) fn with_row<R>(dimension: usize, action: impl FnOnce(&mut [Bound]) -> R) -> R {
+    if dimension <= MOST_ON_STACK {
+        let mut row = [Bound::INFINITY; MOST_ON_STACK];
+        action(&mut row[..dimension])
+    } else {
+        action(&mut vec![Bound::INFINITY; dimension])
+    }
+}
+
 /// Tightens every entry of `target` to the sum of `via` and the entry of `source`, where that is less.
 #[inline(always)]
 pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
