@@ -253,3 +253,37 @@ fn certificate_that_hangs_on_meta_variables_is_refused() {
         "{message}"
     );
 }
+
+/// Whoever listens for long enough hears the call: each listener has a clock of its own, so that without zones any set of them
+/// might hear it.
+fn listeners(count: usize) -> String {
+    format!(
+        "broadcast chan call; process Caller() {{ clock t; state S {{ t <= 40 }}, Done; init S; trans S -> Done {{ sync call!; }}; }}
+process Listener(const int[0,{last}] id) {{ clock x; state Deaf, Heard; init Deaf;
+  trans Deaf -> Heard {{ guard x >= id; sync call?; }}; }}
+system Caller, Listener;",
+        last = count - 1
+    )
+}
+
+#[test]
+fn receivers_of_a_broadcast_are_put_together_within_zones() {
+    let query = "E<> Listener(20).Heard and Listener(3).Deaf";
+    let (mut model, answer) = certified(&listeners(30), query);
+    let Certificate { states } = answer.evidence.certificate.expect("it is not satisfied");
+    let avoided = avoided(&mut model, query);
+    let checked = verify(model.network(), &states, &avoided);
+    assert_eq!(checked.holds, Some(true), "{:?}", checked.lines);
+}
+
+#[test]
+fn many_clocks_are_checked() {
+    let text = "clock x[200]; process P() { state A { x[199] <= 5 }, B { x[199] <= 5 }; init A;
+        trans A -> B { guard x[199] >= 3; }; } system P;";
+    let query = "A[] x[199] <= 5";
+    let (mut model, answer) = certified(text, query);
+    let Certificate { states } = answer.evidence.certificate.expect("it is satisfied");
+    let avoided = avoided(&mut model, query);
+    let checked = verify(model.network(), &states, &avoided);
+    assert_eq!(checked.holds, Some(true), "{:?}", checked.lines);
+}

@@ -23,9 +23,9 @@
 use std::collections::HashMap;
 
 use crate::exec::EmittedAssignment;
-use crate::ir::{ClockChoice, ClockId, Network, Predicate, Urgency};
+use crate::ir::{ClockChoice, ClockId, FixedConstraint, Network, Predicate, Urgency};
 
-use super::code::{Code, Combination};
+use super::code::{Candidate, Code, Combination};
 use super::concrete::{Error, Part};
 use super::strategy::Constraint;
 use super::zone::{Comparison, Zone, is_exact};
@@ -195,12 +195,15 @@ impl Check<'_> {
 
     /// What is wrong with the states with these words.
     fn defect(&mut self, words: &[i32], avoided: &Predicate) -> Result<Option<Defect>, Error> {
-        let (combinations, barriers) = self.combinations(words)?;
         let Some(invariant) = self.invariant(words)? else {
             // No state has these words: the zones stand for nothing, and claim nothing.
             return Ok(None);
         };
         let network = self.code.network();
+        let mut candidates = Vec::new();
+        for process in 0..network.processes.len() {
+            candidates.push(self.code.candidates(process, words, &|_| true)?);
+        }
         let is_urgent = (0..network.processes.len())
             .any(|process| self.code.urgency(process, words) != Urgency::Normal);
         let stopped = self.code.stopped(words)?;
@@ -210,6 +213,13 @@ impl Check<'_> {
             if zone.is_empty() {
                 continue;
             }
+            // All that can be waited for, and possibly more.
+            let around = if is_urgent {
+                zone.clone()
+            } else {
+                within_all(&zone.future(&stopped), &invariant)
+            };
+            let (combinations, barriers) = self.combinations(&candidates, words, &around)?;
             if !is_urgent {
                 for later in futures(&zone, &stopped, &barriers) {
                     let later = later.within(invariant.iter().copied());
@@ -227,7 +237,8 @@ impl Check<'_> {
             let state = Looked {
                 words,
                 possible: &possible,
-                invariant: &invariant,
+                combinations: &combinations,
+                around: &around,
                 may_wait: !is_urgent,
                 stopped: &stopped,
                 barriers: &barriers,
@@ -249,20 +260,26 @@ impl Check<'_> {
         Ok(None)
     }
 
-    /// The combinations of edges as far as words decide, and where an urgent one stops time.
-    fn combinations(&self, words: &[i32]) -> Result<(Vec<Combination>, Vec<Zone>), Error> {
+    /// The combinations of edges that are possible somewhere in a zone as far as words and guards decide, and where an urgent one
+    /// stops time.
+    fn combinations(
+        &self,
+        candidates: &[Vec<Candidate>],
+        words: &[i32],
+        zone: &Zone,
+    ) -> Result<(Vec<Combination>, Vec<Zone>), Error> {
         let network = self.code.network();
-        let mut candidates = Vec::new();
-        for process in 0..network.processes.len() {
-            candidates.push(self.code.candidates(process, words, &|_| true)?);
-        }
-        let combinations = self.code.combinations(&candidates, words);
-        let universe = Zone::universe(self.clocks);
+        let is_possible = |guard: &[FixedConstraint], excluded: &[Vec<FixedConstraint>]| {
+            !guarded(guard, excluded, zone).is_empty()
+        };
+        let combinations = self.code.combinations(candidates, words, &is_possible)?;
         let is_urgent = |channel: u32| network.channels[channel as usize].urgent;
         let urgent = combinations
             .iter()
             .filter(|one| one.channel.is_some_and(is_urgent));
-        let barriers = urgent.flat_map(|one| guarded(one, &universe)).collect();
+        let barriers = urgent
+            .flat_map(|one| guarded(&one.guard, &one.excluded, zone))
+            .collect();
         Ok((combinations, barriers))
     }
 
@@ -275,7 +292,7 @@ impl Check<'_> {
     ) -> Result<Vec<Possible>, Error> {
         let mut found = Vec::new();
         for one in combinations {
-            let guard = guarded(one, zone);
+            let guard = guarded(&one.guard, &one.excluded, zone);
             if guard.is_empty() {
                 continue;
             }
@@ -400,10 +417,8 @@ impl Check<'_> {
             }
             return Ok(now(state.possible));
         }
-        // What is possible later need not be possible in the zone: all that the invariants allow counts.
-        let later = within_all(&Zone::universe(self.clocks), state.invariant);
-        let (combinations, _) = self.combinations(state.words)?;
-        let possible = self.possible(&combinations, state.words, &later)?;
+        // What is possible later need not be possible in the zone.
+        let possible = self.possible(state.combinations, state.words, state.around)?;
         let enabled = now(&possible);
         Ok(enabled.iter().map(|one| one.past(state.stopped)).collect())
     }
@@ -423,7 +438,10 @@ impl Check<'_> {
 struct Looked<'l> {
     words: &'l [i32],
     possible: &'l [Possible],
-    invariant: &'l [Comparison],
+    /// What is possible in the zone or after a wait, as far as words and guards decide.
+    combinations: &'l [Combination],
+    /// What can be waited for in the zone, and possibly more.
+    around: &'l Zone,
     may_wait: bool,
     stopped: &'l [bool],
     barriers: &'l [Zone],
@@ -442,12 +460,11 @@ fn without_all(mut zones: Vec<Zone>, others: &[Zone]) -> Vec<Zone> {
 }
 
 /// The part of a zone in which the guards hold and nobody abstains who may not.
-fn guarded(one: &Combination, zone: &Zone) -> Vec<Zone> {
-    let guard = one.guard.iter().map(Comparison::from);
-    let within = zone.within(guard);
+fn guarded(guard: &[FixedConstraint], excluded: &[Vec<FixedConstraint>], zone: &Zone) -> Vec<Zone> {
+    let within = zone.within(guard.iter().map(Comparison::from));
     let mut parts = vec![within];
     parts.retain(|part| !part.is_empty());
-    for conjunction in &one.excluded {
+    for conjunction in excluded {
         let excluded = zone.within(conjunction.iter().map(Comparison::from));
         parts = without_all(parts, std::slice::from_ref(&excluded));
     }

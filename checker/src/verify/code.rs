@@ -51,6 +51,25 @@ pub(super) struct Combination {
     pub(super) channel: Option<u32>,
 }
 
+/// Whether clocks may satisfy what participants ask while none of the conjunctions holds.
+pub(super) type IsPossible<'p> = dyn Fn(&[FixedConstraint], &[Vec<FixedConstraint>]) -> bool + 'p;
+
+/// A state with more moves is not checked: the search for it ends in an error too.
+const MOST_MOVES: usize = 1 << 20;
+
+fn few_enough(moves: usize) -> Result<(), Error> {
+    if moves > MOST_MOVES {
+        return Err(Error::Unsupported("states with more than 1048576 moves"));
+    }
+    Ok(())
+}
+
+/// What the guards of participants ask of the clocks.
+fn guards(participants: &[&Candidate]) -> Vec<FixedConstraint> {
+    let guards = participants.iter().flat_map(|one| &one.guard);
+    guards.copied().collect()
+}
+
 impl<'a> Code<'a> {
     pub(super) fn new(network: &'a Network) -> Code<'a> {
         Code {
@@ -175,19 +194,22 @@ impl<'a> Code<'a> {
         Ok(found)
     }
 
-    /// All combinations of candidates, given by process, that make a move.
+    /// All combinations of candidates, given by process, that make a move. Those of a broadcast are put
+    /// together receiver by receiver, and given up where `is_possible` says no.
     pub(super) fn combinations(
         &self,
         candidates: &[Vec<Candidate>],
         words: &[i32],
-    ) -> Vec<Combination> {
+        is_possible: &IsPossible<'_>,
+    ) -> Result<Vec<Combination>, Error> {
         let mut found = Vec::new();
         for (process, edges) in candidates.iter().enumerate() {
             for one in edges {
                 match one.sync {
-                    None => self.push(&[one], &[], &mut found),
+                    None => self.push(&[one], &[], &mut found)?,
                     Some((channel, true)) => {
-                        self.synchronise(process, one, channel, candidates, &mut found);
+                        let sender = (process, one, channel);
+                        self.synchronise(sender, candidates, is_possible, &mut found)?;
                     }
                     Some((_, false)) => {}
                 }
@@ -200,17 +222,16 @@ impl<'a> Code<'a> {
                 parts.any(|part| is_committed(part.process as usize))
             });
         }
-        found
+        Ok(found)
     }
 
     fn synchronise(
         &self,
-        sender: usize,
-        send: &Candidate,
-        channel: u32,
+        (sender, send, channel): (usize, &Candidate, u32),
         candidates: &[Vec<Candidate>],
+        is_possible: &IsPossible<'_>,
         found: &mut Vec<Combination>,
-    ) {
+    ) -> Result<(), Error> {
         let receiving = |process: usize| -> Vec<&Candidate> {
             let edges = candidates[process].iter();
             edges
@@ -220,9 +241,9 @@ impl<'a> Code<'a> {
         let others = (0..candidates.len()).filter(|&process| process != sender);
         if !self.network.channels[channel as usize].broadcast {
             for receive in others.flat_map(receiving) {
-                self.push(&[send, receive], &[], found);
+                self.push(&[send, receive], &[], found)?;
             }
-            return;
+            return Ok(());
         }
         let mut open = vec![(vec![send], Vec::new())];
         for choices in others.map(receiving).filter(|choices| !choices.is_empty()) {
@@ -240,11 +261,14 @@ impl<'a> Code<'a> {
                     next.push((taken, excluded));
                 }
             }
+            next.retain(|(taken, excluded)| is_possible(&guards(taken), excluded));
+            few_enough(next.len())?;
             open = next;
         }
         for (taken, excluded) in open {
-            self.push(&taken, &excluded, found);
+            self.push(&taken, &excluded, found)?;
         }
+        Ok(())
     }
 
     /// Adds a combination for each choice of branches, the last participant's fastest.
@@ -253,7 +277,7 @@ impl<'a> Code<'a> {
         participants: &[&Candidate],
         excluded: &[Vec<FixedConstraint>],
         found: &mut Vec<Combination>,
-    ) {
+    ) -> Result<(), Error> {
         let mut choices: Vec<Vec<Part>> = vec![Vec::new()];
         for one in participants {
             let branches = 0..self.edge(one.part).branches.len() as u32;
@@ -267,17 +291,16 @@ impl<'a> Code<'a> {
                     })
                 })
                 .collect();
+            few_enough(found.len() + choices.len())?;
         }
-        let guard: Vec<_> = participants
-            .iter()
-            .flat_map(|one| one.guard.clone())
-            .collect();
+        let guard = guards(participants);
         found.extend(choices.into_iter().map(|parts| Combination {
             parts,
             guard: guard.clone(),
             excluded: excluded.to_vec(),
             channel: participants[0].sync.map(|(channel, _)| channel),
         }));
+        Ok(())
     }
 
     /// Takes a move on words; what it assigns to clocks, in order.

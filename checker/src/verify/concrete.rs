@@ -180,7 +180,8 @@ impl<'a> Semantics<'a> {
             }
             enabled.push(edges);
         }
-        Ok(self.code.combinations(&enabled, &state.words))
+        // What is enabled has no guards left that could exclude each other.
+        self.code.combinations(&enabled, &state.words, &|_, _| true)
     }
 
     fn to_move(&self, one: Combination) -> Move {

@@ -1,7 +1,7 @@
 //! Convex sets of clock values, for checking certificates: plain and slow on purpose.
 //!
-//! A zone is a matrix of bounds on all differences, closed by shortest paths after every change. It shares nothing with the zones of
-//! the engine.
+//! A zone is a matrix of bounds on all differences. It shares nothing with the zones of the engine. After every change it is closed by
+//! shortest paths: over the one bound that became tighter, or over all.
 //!
 //! Invariant: the matrix is closed, or the zone is empty and marked so.
 
@@ -46,6 +46,13 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
+    fn limit(self) -> Limit {
+        Limit {
+            value: self.bound,
+            is_weak: !self.is_strict,
+        }
+    }
+
     /// The comparison that holds where this one fails.
     pub(super) fn negated(self) -> Comparison {
         Comparison {
@@ -142,24 +149,41 @@ impl Zone {
         self.is_empty |= (0..self.clocks).any(|clock| self.get(clock, clock) < ZERO);
     }
 
+    /// Tightens every bound by the least sum that goes through one bound that was made tighter in a closed zone.
+    fn close_over(&mut self, one: Comparison) {
+        for left in 0..self.clocks {
+            let to = sum(self.get(left, one.left), self.get(one.left, one.right));
+            if to == NONE {
+                continue;
+            }
+            for right in 0..self.clocks {
+                let detour = sum(to, self.get(one.right, right));
+                if detour < self.get(left, right) {
+                    *self.at(left, right) = detour;
+                }
+            }
+        }
+        self.is_empty |= (0..self.clocks).any(|clock| self.get(clock, clock) < ZERO);
+    }
+
     /// The part in which all comparisons hold.
     pub(super) fn within(&self, comparisons: impl IntoIterator<Item = Comparison>) -> Zone {
         let mut part = self.clone();
-        let mut has_changed = false;
         for one in comparisons {
-            let limit = Limit {
-                value: one.bound,
-                is_weak: !one.is_strict,
-            };
-            if limit < part.get(one.left, one.right) {
-                *part.at(one.left, one.right) = limit;
-                has_changed = true;
+            if part.is_empty {
+                break;
+            }
+            if one.limit() < part.get(one.left, one.right) {
+                *part.at(one.left, one.right) = one.limit();
+                part.close_over(one);
             }
         }
-        if has_changed && !part.is_empty {
-            part.close();
-        }
         part
+    }
+
+    /// Whether a comparison holds everywhere in it.
+    fn implies(&self, one: Comparison) -> bool {
+        self.is_empty || self.get(one.left, one.right) <= one.limit()
     }
 
     /// The bounds that say something, as comparisons.
@@ -197,9 +221,8 @@ impl Zone {
         }
         let mut rest = self.clone();
         for one in other.comparisons() {
-            let part = rest.within([one.negated()]);
-            if !part.is_empty {
-                parts.push(part);
+            if !rest.implies(one) {
+                parts.push(rest.within([one.negated()]));
                 rest = rest.within([one]);
             }
         }
