@@ -1,4 +1,4 @@
-//! Hostile inputs: whatever is read, loading and asking end in a value or in a diagnostic, and soon.
+//! Hostile inputs: whatever is read, loading, asking and checking end in a value or in a diagnostic, and soon.
 //!
 //! Inputs are made from those of the corpus by mutation, one from each number, so that a failure is found again by its
 //! number. A panic, and an input that takes longer than [`SLOW`], fails the test; a stack overflow ends it.
@@ -7,7 +7,9 @@
 //! * `FUZZ_FIRST`: the number of the first one.
 //! * `FUZZ_SEEDS`: folders with more inputs to begin from, separated by colons.
 //! * `FUZZ_KIND`: one of the kinds of [`Kind`] only.
+//! * `FUZZ_SHOW`: say the number of each input before it is tried, to find one that never ends (with `--nocapture`).
 
+mod evidence;
 mod mutate;
 mod seeds;
 mod targets;
@@ -24,6 +26,16 @@ const SLOW: Duration = Duration::from_secs(1);
 
 fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).map_or(otherwise, |text| text.parse().expect("a number is wanted"))
+}
+
+#[expect(
+    clippy::print_stderr,
+    reason = "it is asked for, and a test that never ends reports nothing"
+)]
+fn show(case: u64) {
+    if std::env::var_os("FUZZ_SHOW").is_some() {
+        eprintln!("case {case}");
+    }
 }
 
 #[test]
@@ -45,7 +57,8 @@ fn hostile_inputs_do_no_harm() {
         }
         let input = mutate::mutated(&seeds, kind, &mut random);
         let begin = Instant::now();
-        let ended = catch_unwind(AssertUnwindSafe(|| targets.run(kind, &input)));
+        show(case);
+        let ended = catch_unwind(AssertUnwindSafe(|| targets.run(kind, &input, &seeds)));
         let is_slow = begin.elapsed() > SLOW && !cfg!(debug_assertions);
         if ended.is_err() || is_slow {
             let what = if is_slow { "is slow" } else { "panics" };

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use checker::diagnostics::SourceMap;
 use checker::syntax;
 
+use super::evidence::Evidence;
 use super::targets::Kind;
 
 /// Larger files take too long to be worth it.
@@ -15,6 +16,7 @@ const MOST_BYTES: usize = 20_000;
 pub(crate) struct Seeds {
     by_kind: Vec<Vec<Vec<u8>>>,
     pub(crate) words: Vec<Vec<u8>>,
+    pub(crate) evidence: Evidence,
 }
 
 impl Seeds {
@@ -29,6 +31,7 @@ impl Seeds {
         let mut seeds = Seeds {
             by_kind: vec![Vec::new(); Kind::ALL.len()],
             words: words(),
+            evidence: Evidence::default(),
         };
         for file in files {
             // Models at the limits take as long as the limits allow.
@@ -41,6 +44,7 @@ impl Seeds {
                 seeds.add_file(&file, bytes);
             }
         }
+        seeds.by_kind[Kind::Evidence as usize].clone_from(&seeds.evidence.inputs);
         for texts in &mut seeds.by_kind {
             texts.sort();
             texts.dedup();
@@ -85,6 +89,11 @@ impl Seeds {
             let text = String::from_utf8_lossy(&bytes);
             let declarations = text.split("process").next().unwrap_or("");
             self.add(Kind::Declarations, declarations.as_bytes());
+            let of_file = text
+                .lines()
+                .filter_map(|line| line.strip_prefix("// query: "));
+            let queries: Vec<String> = of_file.map(str::to_owned).collect();
+            self.evidence.add_model(&bytes, &queries);
             for line in text.lines() {
                 if let Some((_, query)) = line.split_once(": ") {
                     self.add(Kind::Query, query.as_bytes());

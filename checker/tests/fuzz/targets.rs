@@ -1,9 +1,11 @@
-//! What is done with an input: it is loaded, asked a query, and walked through for a few moves.
+//! What is done with an input: it is loaded, asked a query, and walked through for a few moves; evidence is checked.
 
 use std::time::Duration;
 
 use checker::engine::simulation::Point;
 use checker::engine::{CodeEngine, LoadedModel, Options};
+
+use super::seeds::Seeds;
 
 /// What an input is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,16 +16,18 @@ pub(crate) enum Kind {
     Expression,
     Query,
     QueryFile,
+    Evidence,
 }
 
 impl Kind {
-    pub(crate) const ALL: [Kind; 6] = [
+    pub(crate) const ALL: [Kind; 7] = [
         Kind::Xml,
         Kind::Xta,
         Kind::Declarations,
         Kind::Expression,
         Kind::Query,
         Kind::QueryFile,
+        Kind::Evidence,
     ];
 }
 
@@ -59,7 +63,7 @@ impl Targets {
         Targets { model, queries: 0 }
     }
 
-    pub(crate) fn run(&mut self, kind: Kind, input: &[u8]) {
+    pub(crate) fn run(&mut self, kind: Kind, input: &[u8], seeds: &Seeds) {
         match kind {
             Kind::Xml | Kind::Xta => whole(input),
             Kind::Declarations => {
@@ -67,6 +71,7 @@ impl Targets {
                 whole(&[input, system].concat());
             }
             Kind::Expression => whole(&with_expression(input)),
+            Kind::Evidence => seeds.evidence.run(input),
             Kind::Query => self.query(&String::from_utf8_lossy(input)),
             Kind::QueryFile => {
                 if let Ok(queries) = self.model.read_queries("queries.q", input) {
