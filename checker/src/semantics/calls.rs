@@ -124,7 +124,9 @@ impl Checker<'_> {
         if !parameter.constant && !self.expect_mutable(&argument) {
             return None;
         }
-        if !(parameter.constant || argument.ty.is_equivalent(&parameter.ty)) {
+        let fits =
+            argument.ty.is_equivalent(&parameter.ty) && parameter.ty.accepts_channel(&argument.ty);
+        if !(parameter.constant || fits) {
             self.report(
                 Diagnostic::new(
                     codes::REFERENCE_MISMATCHED,
@@ -136,7 +138,7 @@ impl Checker<'_> {
                         argument.ty.described()
                     ),
                 )
-                .help("a reference needs a variable of the very same type, range included"),
+                .help("a reference needs a variable of the very same type, range included, and a channel that is as free as the parameter"),
             );
             return None;
         }

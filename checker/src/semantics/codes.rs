@@ -153,6 +153,10 @@ codes! {
     HOOK_SIGNATURE = "E0281" "hook-signature";
     /// A function that makes the initial state and ends in an error.
     HOOK_FAILS = "E0282" "hook-fails";
+    /// A channel, or a condition on clocks, where something is to be done.
+    NOT_A_STATEMENT = "E0291" "not-a-statement";
+    /// A channel that is chosen by `?:`.
+    CHANNEL_CHOSEN = "E0292" "channel-chosen";
     /// An expression whose value is dropped and that changes nothing.
     EFFECT_MISSING = "W0201" "effect-missing";
     /// An invariant with a strict upper bound.

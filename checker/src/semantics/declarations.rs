@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::checker::Checker;
 use super::clock_expressions::integral_double;
 use super::codes;
-use super::scope::Entity;
+use super::scope::{Carried, Entity};
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{self, DEFAULT_INT, Index, SIZE_LIMIT, Size, StructType, Type};
 use crate::diagnostics::{Diagnostic, Span};
@@ -44,8 +44,27 @@ impl Checker<'_> {
 
     /// A `typedef`. `const` and `meta` in it say nothing: they belong to variables.
     pub(super) fn typedef(&mut self, ty: &TypeExpr, name: &Name, dimensions: &[Dimension]) {
+        let carried = self.carried(ty);
         let ty = self.dimensioned(ty, dimensions);
-        self.declare(name, Entity::Type(ty));
+        self.declare(name, Entity::Type(ty, carried));
+    }
+
+    /// The prefixes of a type, those that come with its name included.
+    pub(super) fn carried(&mut self, ty: &TypeExpr) -> Carried {
+        let named = match &ty.kind {
+            TypeKind::Named(name) => self.lookup(&name.text),
+            _ => None,
+        };
+        let Some(Entity::Type(_, carried)) = named else {
+            return Carried {
+                constant: ty.prefixes.constant,
+                meta: ty.prefixes.meta,
+            };
+        };
+        Carried {
+            constant: ty.prefixes.constant || carried.constant,
+            meta: ty.prefixes.meta || carried.meta,
+        }
     }
 
     fn misplaced_prefix(&mut self, span: Span, message: &str) {
@@ -197,7 +216,7 @@ impl Checker<'_> {
 
     fn size(&mut self, expr: &ast::Expr) -> Option<Index> {
         if let ast::ExprKind::Name(name) = &expr.kind
-            && let Some(Entity::Type(ty)) = self.lookup(name)
+            && let Some(Entity::Type(ty, _)) = self.lookup(name)
         {
             return self.index_of(&ty, expr.span);
         }
@@ -355,7 +374,7 @@ impl Checker<'_> {
 
     fn named_type(&mut self, name: &Name) -> Type {
         match self.lookup(&name.text) {
-            Some(Entity::Type(ty)) => ty,
+            Some(Entity::Type(ty, _)) => ty,
             Some(Entity::Broken) => Type::Error,
             Some(entity) => {
                 self.error(
@@ -380,9 +399,11 @@ impl Checker<'_> {
     /// The type and the least and greatest value that a `select`, a quantifier or a range-for runs over.
     pub(super) fn iterated(&mut self, ty: &TypeExpr) -> Option<(Type, (i32, i32))> {
         let resolved = self.type_of(ty);
+        // `const int` is the type of every integer, which has no bounds.
+        let is_unbounded = resolved == Type::ANY_INT && self.carried(ty).constant;
         match resolved {
             Type::Error => None,
-            Type::Int { .. } | Type::Scalar { .. } => {
+            Type::Int { .. } | Type::Scalar { .. } if !is_unbounded => {
                 let bounds = resolved.bounds();
                 Some((resolved, bounds))
             }
@@ -404,21 +425,22 @@ impl Checker<'_> {
     /// A variable, constant, clock or channel outside functions.
     fn variable_declaration(&mut self, variable: &ast::Variable) {
         let outer = std::mem::take(&mut self.free_parameter_seen);
+        let carried = self.carried(&variable.ty);
         let ty = self.dimensioned(&variable.ty, &variable.dimensions);
         let parts = variable
             .initialiser
             .as_ref()
             .map(|initialiser| self.initialiser(initialiser, &ty));
-        if matches!(ty, Type::Void) || (ty == Type::String && !variable.ty.prefixes.constant) {
+        if matches!(ty, Type::Void) || (ty == Type::String && !carried.constant) {
             self.misplaced_type(variable.ty.span, &ty);
         }
         self.expect_values(&ty, variable.ty.span);
         let entity = if ty.is_error() || ty == Type::Void || ty == Type::String {
             Entity::Broken
-        } else if variable.ty.prefixes.constant {
+        } else if carried.constant {
             self.constant(variable, &ty, parts)
         } else {
-            self.state_variable(variable, &ty, parts)
+            self.state_variable(variable, &ty, carried.meta, parts)
         };
         self.free_parameter_seen = outer;
         self.declare(&variable.name, entity);
@@ -498,6 +520,7 @@ impl Checker<'_> {
         &mut self,
         variable: &ast::Variable,
         ty: &Type,
+        meta: bool,
         parts: Option<Vec<InitialPart>>,
     ) -> Entity {
         if !self.has_room_for(ty, variable.name.span) {
@@ -505,7 +528,6 @@ impl Checker<'_> {
         }
         let parts = parts.unwrap_or_default();
         let words = self.initial_words(&parts, ty);
-        let meta = variable.ty.prefixes.meta;
         self.warn_of_doubles(variable, ty, meta);
         if ty.any(&|part| *part == Type::Clock { hybrid: true }) {
             let name = variable.name.text.clone();

@@ -634,7 +634,7 @@ impl Checker<'_> {
 /// What an entity that is no value is.
 pub(super) fn entity_kind(entity: &Entity) -> &'static str {
     match entity {
-        Entity::Type(_) => "a type",
+        Entity::Type(..) => "a type",
         Entity::Function(..) | Entity::OpenFunction => "a function",
         Entity::Template(_) => "a template",
         Entity::Instantiation(_) => "a process",

@@ -110,7 +110,7 @@ impl Checker<'_> {
         self.check_parameter_type(parameter, &ty);
         let local = self.new_local(ty.clone());
         self.locals[local.0 as usize].reference = parameter.reference;
-        let constant = parameter.ty.prefixes.constant;
+        let constant = self.carried(&parameter.ty).constant;
         let place = Place {
             root: Root::Local(local),
             base: Size::default(),
@@ -193,7 +193,7 @@ impl Checker<'_> {
             .as_ref()
             .map(|initialiser| self.initialiser(initialiser, &ty));
         self.expect_values(&ty, variable.ty.span);
-        let prefixes = variable.ty.prefixes;
+        let prefixes = self.carried(&variable.ty);
         let size = ty.size();
         if size.clocks + size.channels > 0
             || prefixes.meta
@@ -255,7 +255,7 @@ impl Checker<'_> {
         let place = Place {
             root,
             base: Size::default(),
-            mutable: !variable.ty.prefixes.constant,
+            mutable: !self.carried(&variable.ty).constant,
         };
         self.declare(&variable.name, Entity::Variable { place, ty });
         Statement::Declare(local, assignments)
@@ -323,7 +323,9 @@ impl Checker<'_> {
                 self.return_statement(value.as_ref(), *span, result)
             }
             ast::Statement::Assert(condition, span) => {
-                Statement::Assert(self.condition(condition), *span)
+                let condition = self.condition(condition);
+                self.expect_pure(&condition, "an assertion");
+                Statement::Assert(condition, *span)
             }
         }
     }
@@ -366,6 +368,15 @@ impl Checker<'_> {
     pub(super) fn effect_expression(&mut self, expr: &ast::Expr) -> Expr {
         let before = self.unknowns.len();
         let checked = self.expression(expr);
+        if matches!(checked.ty, Type::Channel { .. } | Type::Constraint(_)) {
+            self.error(
+                codes::NOT_A_STATEMENT,
+                checked.span,
+                format!("{} is no statement", checked.ty.described()),
+                "write an assignment or a call; channels stand in synchronisations, conditions in guards",
+            );
+            return Expr::error(checked.span);
+        }
         self.warn_without_effect(&checked);
         let is_call =
             matches!(&checked.kind, Kind::Call { signature, .. } if signature.unknown.is_some());

@@ -336,7 +336,7 @@ impl Checker<'_> {
     fn own_parameters(&mut self, template: &ast::Template, mut scope: Scope) -> Scope {
         let assigned = assigned_names(template);
         for formal in &template.parameters {
-            let is_own = !formal.reference && !formal.ty.prefixes.constant;
+            let is_own = !formal.reference && !self.carried(&formal.ty).constant;
             if !is_own || !assigned.contains(&formal.name.text) {
                 continue;
             }
@@ -404,7 +404,7 @@ impl Checker<'_> {
             return None;
         }
         self.expect_pure(&argument, "an argument of a template");
-        let constant = formal.ty.prefixes.constant;
+        let constant = self.carried(&formal.ty).constant;
         if !formal.reference || (constant && !is_fixed_place(&argument)) {
             let free = self.free_parameter_seen;
             let span = argument.span;

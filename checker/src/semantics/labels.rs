@@ -118,6 +118,17 @@ impl Checker<'_> {
         if channel.is_error() {
             return None;
         }
+        if matches!(channel.ty, Type::Channel { .. })
+            && channel.any(&|e| matches!(e.kind, Kind::Ternary(..)))
+        {
+            self.error(
+                codes::CHANNEL_CHOSEN,
+                channel.span,
+                "the channel of a synchronisation cannot be chosen by ?:",
+                "write an edge for each channel and the choice into their guards, or put the channels into an array: c[i]!",
+            );
+            return None;
+        }
         if !matches!(channel.ty, Type::Channel { .. }) || channel.variable().is_none() {
             self.error(
                 codes::CHANNEL_EXPECTED,

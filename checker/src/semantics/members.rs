@@ -166,6 +166,7 @@ impl Checker<'_> {
         let first = member.group.first;
         let process = known_process(member);
         let entity = self.entity_of(process.unwrap_or(first), &name.text);
+        let entity = entity.or_else(|| self.unnamed_location(first, &name.text));
         match entity {
             None if name.text == "location" => self.location_number(member, process, span),
             Some(Entity::Location(location)) => {
@@ -203,6 +204,15 @@ impl Checker<'_> {
                 Expr::error(span)
             }
         }
+    }
+
+    /// The location without a name that `_` and its id mean, as UPPAAL calls it.
+    fn unnamed_location(&self, process: u32, name: &str) -> Option<Entity> {
+        let locations = &self.world.network.processes[process as usize].locations;
+        let found = locations
+            .iter()
+            .position(|one| name.starts_with('_') && one.name == name)?;
+        Some(Entity::Location(found as u32))
     }
 
     fn unroll_members(&mut self, span: Span) -> Expr {

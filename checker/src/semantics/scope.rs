@@ -20,8 +20,8 @@ pub(super) enum Entity {
     Constant { value: Expr, free: bool },
     /// A variable, clock or channel, or an array or struct of any.
     Variable { place: Place, ty: Type },
-    /// A type.
-    Type(Type),
+    /// A type, and which prefixes come with it.
+    Type(Type, Carried),
     /// A function.
     Function(FunctionId, Arc<Signature>),
     /// The function whose body is being checked.
@@ -34,6 +34,15 @@ pub(super) enum Entity {
     Location(u32),
     /// Something about which a mistake was reported, or of which nothing is known.
     Broken,
+}
+
+/// The prefixes that a name given by `typedef` passes on to what is declared with it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Carried {
+    /// `const`
+    pub(super) constant: bool,
+    /// `meta`
+    pub(super) meta: bool,
 }
 
 /// The names of one scope.

@@ -8,7 +8,7 @@ use super::labels::Select;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, LocalId, Place, Root};
 use super::types::{Class, Size, Type};
-use crate::diagnostics::Span;
+use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationId, Urgency};
 use crate::syntax::ast;
 
@@ -34,6 +34,7 @@ impl Checker<'_> {
                 self.declare(name, Entity::Location(i as u32));
             }
         }
+        self.expect_different_branchpoints(template);
         let nodes = nodes(template);
         let mut locations: Vec<ir::Location> = template
             .locations
@@ -87,6 +88,29 @@ impl Checker<'_> {
         }
     }
 
+    /// Refuses branch points that edges cannot tell from one another or from a location.
+    fn expect_different_branchpoints(&mut self, template: &ast::Template) {
+        let locations = template.locations.iter();
+        let mut ids: FxHashMap<&str, Span> = locations
+            .map(|location| (location.id.as_str(), location.span))
+            .collect();
+        for branchpoint in &template.branchpoints {
+            let Some(first) = ids.insert(&branchpoint.id, branchpoint.span) else {
+                continue;
+            };
+            let place = self.sources.position(first);
+            self.report(
+                Diagnostic::new(
+                    codes::NAME_DECLARED_TWICE,
+                    branchpoint.span,
+                    format!("the branch point '{}' is declared twice", branchpoint.id),
+                )
+                .note(format!("first declared in line {}", place.line))
+                .help("give it another name"),
+            );
+        }
+    }
+
     fn node(&mut self, nodes: &FxHashMap<&str, Node>, name: &ast::Name) -> Option<Node> {
         let node = nodes.get(name.text.as_str()).copied();
         if node.is_none() {
@@ -121,6 +145,14 @@ impl Checker<'_> {
             let before = self.unknowns.len();
             let rate = self.expression(rate);
             self.expect_number(&rate, "an exponential rate");
+            if rate.ty.is_clock() {
+                self.error(
+                    codes::NUMBER_EXPECTED,
+                    rate.span,
+                    "an exponential rate must be a number, but this is a clock",
+                    "use a number",
+                );
+            }
             self.unknowns.truncate(before);
         }
         ir::Location {
@@ -335,17 +367,19 @@ impl Checker<'_> {
             codes::BRANCH_REFUSED,
             span,
             message,
-            "legs have updates and weights only, and end in locations",
+            "legs have updates and weights only, and end in locations: guard and synchronise on the edge before or behind",
         );
     }
 
     /// The updates of a leg: one for each combination of the values of its `select` bindings.
     fn leg(&mut self, leg: &ast::Edge, parameters: usize, place: &str) -> Vec<ir::Update> {
-        if leg.guard.is_some() || leg.sync.is_some() {
-            self.leg_refused(
-                leg.span,
-                "a leg of a branch point has no guard and no synchronisation",
-            );
+        if let Some(guard) = &leg.guard {
+            let message = "guards on the legs of branch points are not supported";
+            self.leg_refused(guard.span, message);
+        }
+        if let Some(sync) = &leg.sync {
+            let message = "synchronisations on the legs of branch points are not supported";
+            self.leg_refused(sync.span, message);
         }
         let mut ranges = Vec::new();
         for (name, ty) in &leg.select {
@@ -394,6 +428,14 @@ impl Checker<'_> {
             let before = self.unknowns.len();
             let weight = self.expression(weight);
             self.expect_number(&weight, "a weight");
+            if weight.ty == Type::Bool {
+                self.error(
+                    codes::NUMBER_EXPECTED,
+                    weight.span,
+                    "a weight must be a number, but this is a truth value",
+                    "write the weight as an integer or a double",
+                );
+            }
             self.unknowns.truncate(before);
         }
         self.update(

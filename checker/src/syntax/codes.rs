@@ -65,6 +65,8 @@ codes! {
     BUILT_IN_AS_NAME = "W0103" "built-in-as-name";
     /// Two labels of one kind on one edge or location; the last one counts.
     DUPLICATE_LABEL = "W0104" "duplicate-label";
+    /// An `IO` line, which only queries look at that are not supported.
+    INTERFACE_IGNORED = "W0107" "interface-ignored";
     /// Bytes that are not UTF-8 in a file that names no other encoding; they are read as Latin-1.
     NOT_UTF8 = "W0106" "not-utf8";
     /// An expected verdict that is written in no known way.

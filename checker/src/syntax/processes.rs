@@ -47,6 +47,7 @@ impl Parser<'_> {
                 }
                 "progress" if has_system => self.progress_measures(&mut document.system),
                 "gantt" if has_system => self.gantt(),
+                "IO" if has_system => self.interface(),
                 "query" if has_system => queries.extend(self.query_block()),
                 _ if has_system => {
                     self.expected("the end of the model after the system line");
@@ -160,6 +161,37 @@ impl Parser<'_> {
             self.end_of_declaration("after the progress measure", before);
         }
         self.closing(TokenKind::RightBrace, "after the progress measures");
+    }
+
+    /// `IO P(1) { a!, b? }`: which channels are a process's outputs and inputs. Only Ecdar's queries look at it, so the tree does not
+    /// keep it.
+    fn interface(&mut self) {
+        let start = self.here();
+        self.bump();
+        self.name("the name of a process");
+        if self.at(TokenKind::LeftParenthesis) {
+            self.arguments();
+        }
+        self.report_behind(
+            Diagnostic::new(
+                codes::INTERFACE_IGNORED,
+                self.since(start),
+                "the interface of a process (`IO`) is read and has no effect",
+            )
+            .note("only queries of Ecdar, such as `refinement:`, look at it, and they are not supported"),
+        );
+        self.expect(TokenKind::LeftBrace, "after `IO` and the process");
+        while !self.at_end() && !self.at(TokenKind::RightBrace) {
+            // Not a whole expression: `?` would begin a choice.
+            self.expression_at(super::expressions::level::POSTFIX);
+            if !self.eat(TokenKind::Exclamation) {
+                self.eat(TokenKind::Question);
+            }
+            if !self.eat(TokenKind::Comma) {
+                break;
+            }
+        }
+        self.closing(TokenKind::RightBrace, "after the channels");
     }
 
     /// `gantt { … }`: only drawn by the editor, so the tree does not keep it.
@@ -509,7 +541,8 @@ impl Parser<'_> {
         if send || self.at(TokenKind::Question) {
             self.bump();
         } else if self.at_end() || self.at(TokenKind::Semicolon) {
-            let message = "this synchronisation has no direction";
+            let message =
+                "this synchronisation has no direction (CSP synchronisation is not supported)";
             self.report(
                 Diagnostic::new(codes::MISSING_DIRECTION, channel.span, message)
                     .help("write `!` behind the channel to send, `?` to receive"),

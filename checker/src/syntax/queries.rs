@@ -128,6 +128,15 @@ impl Parser<'_> {
             "acontrol" if is_prefix => self.unsupported_query("acontrol (approximate control)"),
             "minE" | "maxE" | "minPr" | "maxPr" => self.unsupported_query("learning"),
             "Pr" | "Pmax" | "simulate" => self.unsupported_query("statistical model checking"),
+            "refinement" | "consistency" | "specification" | "implementation" | "determinism"
+            | "prune" | "reachability"
+                if next == TokenKind::Colon =>
+            {
+                self.unsupported_query("Ecdar's")
+            }
+            "get" | "bisim" if next == TokenKind::Minus && self.at_dashed_word() => {
+                self.unsupported_query("Ecdar's")
+            }
             "sat" => self.unsupported_query("live sequence chart scenario"),
             "E" if next == TokenKind::LeftBracket && self.at_expected_value() => {
                 self.unsupported_query("statistical model checking")
@@ -135,6 +144,11 @@ impl Parser<'_> {
             "A" if next == TokenKind::LeftBracket => self.until_or_leads_to(),
             _ => self.leads_to(),
         }
+    }
+
+    /// `get-component:` or `bisim-minim:`
+    fn at_dashed_word(&self) -> bool {
+        matches!(self.word_at(2), "component" | "minim") && self.peek(3).kind == TokenKind::Colon
     }
 
     /// The rest up to `under` is not read.
