@@ -177,3 +177,26 @@ def test_only_the_command_line_prints_or_exits() -> None:
 def test_the_compiled_engine_has_one_door(module: str) -> None:
     users = {item.room for item in imports() if item.module.startswith(module)}
     assert users <= {"checker", "strategy", "play"}
+
+
+def test_commands_print_by_the_terminal_module_only() -> None:
+    """Its functions show control characters from files by their numbers."""
+    wrong = []
+    for path, tree in trees():
+        if room_of(path) != "cli" or path.name == "terminal.py":
+            continue
+        for node in ast.walk(tree):
+            match node:
+                case ast.Attribute(value=ast.Name(id="click"), attr="echo" | "secho" | "style"):
+                    wrong.append(f"{path.relative_to(PACKAGE)}:{node.lineno}: click.{node.attr}")
+                case ast.Call(func=ast.Name(id="print")):
+                    wrong.append(f"{path.relative_to(PACKAGE)}:{node.lineno}: print")
+                case ast.Call(
+                    func=ast.Attribute(value=ast.Name(id="console"), attr="print"), args=[first, *_]
+                ) if not isinstance(first, ast.Name) and not (
+                    isinstance(first, ast.Call)
+                    and isinstance(first.func, ast.Name)
+                    and first.func.id == "safe"
+                ):
+                    wrong.append(f"{path.relative_to(PACKAGE)}:{node.lineno}: console.print")
+    assert wrong == []

@@ -6,6 +6,8 @@
 //! * A source knows how its bytes map back to the file (entities such as `&lt;` make the two differ), so a diagnostic can
 //!   always be given as file, line and column, and in words ("template Gate, edge Free → Occ, guard").
 //! * Diagnostics are values. They are collected, sorted by position and reported together; nothing here prints.
+//! * Rendered text has no control character but line feeds and tabs, and nothing that turns the direction of writing, whatever stands in
+//!   a file: a terminal would obey it.
 
 use std::fmt;
 use std::ops::Range;
@@ -256,11 +258,32 @@ impl Diagnostic {
 
     /// The diagnostic as text: a header line with file, line and column, the source line with a caret, notes and help.
     pub fn render(&self, sources: &SourceMap) -> String {
-        Rendered {
+        let rendered = Rendered {
             diagnostic: self,
             sources,
-        }
-        .to_string()
+        };
+        visible(&rendered.to_string())
+    }
+}
+
+/// The text with a visible character for each that a terminal would obey, so that columns stay where they are.
+pub fn visible(text: &str) -> String {
+    text.chars().map(visible_char).collect()
+}
+
+fn visible_char(one: char) -> char {
+    match one {
+        '\n' | '\t' => one,
+        // The pictures of control characters stand in their order.
+        '\0'..='\x1f' => char::from_u32(0x2400 + u32::from(one)).unwrap_or('\u{fffd}'),
+        '\x7f' => '\u{2421}',
+        '\u{80}'..='\u{9f}'
+        | '\u{61c}'
+        | '\u{200e}'
+        | '\u{200f}'
+        | '\u{2028}'..='\u{202e}'
+        | '\u{2066}'..='\u{2069}' => '\u{fffd}',
+        _ => one,
     }
 }
 
@@ -318,5 +341,43 @@ impl fmt::Display for Rendered<'_> {
             writeln!(f, "  help: {help}")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rendered_text_commands_no_terminal() {
+        let mut sources = SourceMap::default();
+        let text = "\u{9b}31m\u{202e}E<> \x1b]0;x\x07P.Z \x7f\r\n";
+        let source = sources.add(Source {
+            path: "a\x1b[2J.q".into(),
+            place: "query \u{2066}".to_owned(),
+            text: text.to_owned(),
+            ..Source::default()
+        });
+        let code = Code {
+            code: "E0000",
+            name: "test",
+        };
+        let span = Span {
+            source,
+            start: 16,
+            end: 19,
+        };
+        let diagnostic = Diagnostic::new(code, span, "unknown \x1b[31m'P'").note("\u{85}");
+        let rendered = diagnostic.help("\x08").render(&sources);
+        let is_safe = |one: char| one == '\n' || (!one.is_control() && visible_char(one) == one);
+        assert!(rendered.chars().all(is_safe), "{rendered:?}");
+        // Each character takes one column, so that the caret stands where it did.
+        let lines: Vec<&str> = rendered.lines().collect();
+        let column = |line: &str| line.chars().position(|one| one == '^');
+        assert_eq!(
+            lines[2].chars().count(),
+            "  | ".len() + text.trim_end().chars().count()
+        );
+        assert!(column(lines[3]).is_some(), "{rendered}");
     }
 }

@@ -23,6 +23,7 @@ from typing import Final
 
 import click
 
+from ntagen.cli.terminal import echo
 from ntagen.errors import InputError, NtagenError
 
 __all__ = ["main"]
@@ -78,7 +79,7 @@ def _show_version(ctx: click.Context, _option: click.Parameter, wanted: bool) ->
             number = version("ntagen")
         except PackageNotFoundError:
             number = "(not installed)"
-        click.echo(f"ntagen {number}")
+        echo(f"ntagen {number}")
         ctx.exit()
 
 
@@ -200,9 +201,8 @@ def _internal(error: BaseException) -> str:
 
 def _say(message: str) -> None:
     """Prints to standard error, if there is still somebody to read it."""
-    # A file name may hold bytes that are no text; they are shown as escapes.
     with contextlib.suppress(OSError):
-        click.echo(message.encode(errors="backslashreplace").decode(), err=True)
+        echo(message, err=True)
 
 
 def _abandon_output() -> None:

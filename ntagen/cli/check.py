@@ -22,6 +22,7 @@ from ntagen.cli.models import (
 )
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, priority_rule
+from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart, write_files
 
@@ -342,19 +343,19 @@ def command(
                 if len(todo) == 1:
                     raise
                 # The others may be all right, and their answers are wanted.
-                click.echo(str(error) if as_json else with_pointer(str(error)), err=True)
+                echo(str(error) if as_json else with_pointer(str(error)), err=True)
                 if not as_json:
                     _line(REJECTED_MARK, query)
                 worst = InputError.exit_code
                 continue
             if answer.verified is False:
-                click.echo("\n".join([query.text, *answer.verification]), err=True)
+                echo("\n".join([query.text, *answer.verification]), err=True)
                 return INTERNAL_ERROR
             show_warnings(answer.warnings)
             covered = answer.verification if verify else ()
             notes = [*covered, *_write_evidence(answer, query, outputs, loaded.scene)]
             if as_json:
-                click.echo(json.dumps(_record(answer, query)))
+                echo(json.dumps(_record(answer, query)))
             else:
                 _row(answer, query, notes, trace_is_written=trace is not None)
             worst = max(worst, _severity(answer), key=_SEVERITIES.index)
@@ -447,13 +448,13 @@ def _record(answer: Answer, query: _Asked) -> dict[str, object]:
 
 
 def _header(path: Path, model: Model) -> None:
-    click.echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
+    echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
 
 
 def _line(mark: tuple[str, str], query: _Asked) -> None:
     """The first line of a query's row: what came of it, with its colour, and what was asked."""
     label = f"{query.name}: {query.text}" if query.name else query.text
-    click.echo(f"  {click.style(f'{mark[0]:<8}', fg=mark[1], bold=True)}{label}")
+    echo("  ", Styled(f"{mark[0]:<8}", fg=mark[1], bold=True), label)
 
 
 def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_written: bool) -> None:
@@ -472,7 +473,7 @@ def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_writte
         *way,
         *notes,
     ]:
-        click.echo(f"          {line}")
+        echo(f"          {line}")
 
 
 MOVES_SHOWN: Final = 12
@@ -545,7 +546,7 @@ def _write_evidence(
 
 def _write_trace(answer: Answer, query: _Asked, target: str, text: str) -> list[str]:
     if target == "-":
-        click.echo(text)
+        echo(text)
         return []
     path = Path(target)
     as_json = answer.trace_json() if path.suffix == ".json" else None
@@ -564,7 +565,7 @@ def _strategy_text(answer: Answer, query: _Asked, target: str) -> str | None:
 
 def _write_strategy(answer: Answer, target: str, text: str) -> list[str]:
     if target == "-":
-        click.echo(text, nl=False)
+        echo(text, nl=False)
         return []
     write_files({Path(target): text})
     whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ntagen.cli.terminal import echo
 from ntagen.files import write_files
 
 
@@ -38,9 +39,9 @@ def command(environment: Path, folder: Path) -> None:
 
     scene, warnings = load_with_warnings(environment)
     for warning in warnings:
-        click.echo(warning.render(), err=True)
+        echo(warning.render(), err=True)
     name = environment.stem or environment.name
     model = folder / f"{name}.xml"
     queries = folder / f"{name}.q"
     write_files({model: render(scene, source=environment.name), queries: render_queries(scene)})
-    click.echo(f"wrote {model} and {queries}")
+    echo(f"wrote {model} and {queries}")

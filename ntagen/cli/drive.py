@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.terminal import echo
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -144,14 +145,14 @@ def command(
         say_idle({"quiet": "--quiet"}, "with --json")
     scene, warnings = load_with_warnings(environment)
     for warning in warnings:
-        click.echo(warning.render(), err=True)
+        echo(warning.render(), err=True)
     errors = Errors(noise_mm=noise_mm, roll_rad=rad_from_deg(roll_error_deg))
     settings = settings_for(Settings(timeout_s=timeout_s, ranking=parse_ranking(ranking)), errors)
     speaks = not (as_json or quiet)
     with _log(log_path, environment, scene, settings, errors, seed, known) as log:
         result = _drive(scene, settings, errors, seed, known, log, speaks)
     if as_json:
-        click.echo(json.dumps(_summary(result, seed, noise_mm, roll_error_deg, known, log_path)))
+        echo(json.dumps(_summary(result, seed, noise_mm, roll_error_deg, known, log_path)))
     else:
         _report(result, scene, log_path, short=quiet)
     return _exit_code(result.ended.outcome)
@@ -253,7 +254,7 @@ class _Lines:
 
         line = tell(record)
         if line is not None:
-            click.echo(line)
+            echo(line)
         if self._status is None:
             return
         if isinstance(record, Transition):
@@ -266,7 +267,7 @@ class _Lines:
 
     def started(self, scene: Scene) -> None:
         """Says what is driven, and what the driver knows."""
-        click.echo(
+        echo(
             f"{scene.name}: {len(scene.targets)} target(s), "
             f"{len(scene.criticals)} critical region(s) known"
         )
@@ -319,21 +320,19 @@ def _summary(
 def _report(result: Result, scene: Scene, log_path: Path | None, *, short: bool) -> None:
     ended = result.ended
     if short:
-        click.echo(f"{ended.outcome}: {ended.reason}")
+        echo(f"{ended.outcome}: {ended.reason}")
         return
     clearance_mm, target_mm = result.clearance_mm, result.target_distance_mm
     where = "inside" if target_mm <= 0.0 else "outside of"
-    click.echo(
-        f"truly, the tip is {abs(target_mm):.2f} mm {where} {scene.targets[-1].name}", nl=False
-    )
+    echo(f"truly, the tip is {abs(target_mm):.2f} mm {where} {scene.targets[-1].name}", nl=False)
     if math.isfinite(clearance_mm):
-        click.echo(f", and all that was pierced is {clearance_mm:.2f} mm from critical regions")
+        echo(f", and all that was pierced is {clearance_mm:.2f} mm from critical regions")
     else:
-        click.echo("")
+        echo("")
     count = f"{ended.syntheses} syntheses, {ended.adjustments} adjustments"
-    click.echo(f"{count}, {ended.time_s:.1f} s, {ended.depth_mm:.1f} mm deep")
+    echo(f"{count}, {ended.time_s:.1f} s, {ended.depth_mm:.1f} mm deep")
     if log_path is not None:
-        click.echo(f"wrote {log_path}")
+        echo(f"wrote {log_path}")
 
 
 def _exit_code(outcome: str) -> int:

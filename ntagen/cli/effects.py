@@ -9,6 +9,8 @@ from typing import Final
 
 import click
 
+from ntagen.cli.terminal import echo
+
 _SYMBOLIC_ONLY: Final = {
     "symmetry": "--symmetry has no effect here: games tell all members of scalar sets apart",
     "partial_order": "--partial-order has no effect here: games take moves in all orders",
@@ -110,7 +112,7 @@ def say_idle(options: Mapping[str, str], why: str) -> None:
 def say(notes: Sequence[str]) -> None:
     """Says something about the command line, on standard error."""
     for note in notes:
-        click.echo(f"note: {note}", err=True)
+        echo(f"note: {note}", err=True)
 
 
 def unwritten(wanted: Mapping[str, str | Path | None], written: Collection[str]) -> list[str]:

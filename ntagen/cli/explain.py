@@ -8,6 +8,7 @@ from typing import Final
 
 import click
 
+from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
 
 _CAPTIONS: Final = {"model": "The model:", "wrong": "Wrong:", "right": "Mended:"}
@@ -32,7 +33,7 @@ def command(code: str | None) -> None:
     pages = explanations()
     if code is None:
         for explanation in pages.values():
-            click.echo(f"{explanation.code}  {explanation.severity:<8} {explanation.name}")
+            echo(f"{explanation.code}  {explanation.severity:<8} {explanation.name}")
         return
     wanted = code.strip().strip("[]")
     by_name = {explanation.name: explanation for explanation in pages.values()}
@@ -42,9 +43,9 @@ def command(code: str | None) -> None:
         close += difflib.get_close_matches(wanted.lower(), by_name, 1)
         hint = f"did you mean {close[0]}?" if close else "`ntagen explain` lists all codes"
         raise InputError(f"there is no diagnostic {wanted}\nhint: {hint}")
-    click.secho(f"{found.severity}[{found.code}]: {found.name}", bold=True)
-    click.echo()
-    click.echo(_shown(found.page))
+    echo(Styled(f"{found.severity}[{found.code}]: {found.name}", bold=True))
+    echo("")
+    echo(_shown(found.page))
 
 
 def _shown(page: str) -> str:

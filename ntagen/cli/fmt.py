@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from ntagen.cli.terminal import echo, echo_exactly
 from ntagen.files import write_files
 
 _STDIN = "-"
@@ -41,12 +42,12 @@ def command(ctx: click.Context, files: tuple[str, ...], check: bool) -> None:
         if before != after:
             changed.append(name)
         if name == _STDIN and not check:
-            click.echo(after, nl=False)
+            echo_exactly(after, nl=False)
         elif before != after and not check:
             write_files({Path(name): after})
     for name in changed:
         if name != _STDIN or check:
-            click.echo(f"{'would reformat' if check else 'reformatted'} {name}", err=True)
+            echo(f"{'would reformat' if check else 'reformatted'} {name}", err=True)
     if mistakes:
         raise SourceError(mistakes)
     if check and changed:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.cli.terminal import echo, safe
 from ntagen.files import write_files
 
 if TYPE_CHECKING:
@@ -68,11 +69,11 @@ def command(path: Path, as_json: bool, folder: Path | None) -> None:
     if folder is not None:
         write_files(_pictures(model.templates, folder))
     if as_json:
-        click.echo(model.facts_json())
+        echo(model.facts_json())
         return
     _show(path, model)
     if folder is not None:
-        click.echo(f"{_count(len(model.templates), 'picture')} written to {folder}")
+        echo(f"{_count(len(model.templates), 'picture')} written to {folder}")
 
 
 def _pictures(templates: Sequence[Template], folder: Path) -> dict[Path, str]:
@@ -85,31 +86,33 @@ def _show(path: Path, model: Model) -> None:
     # Without a terminal there is no width to fit into, and a folded cell cannot be searched.
     width = None if sys.stdout.isatty() else _UNBOUNDED_WIDTH
     console = Console(highlight=False, markup=False, width=width)
-    console.print(
+
+    def say(line: str) -> None:
+        console.print(safe(line), soft_wrap=True)
+
+    say(
         f"{path}: {_count(len(model.processes), 'process', 'processes')} of "
         f"{_count(len(model.templates), 'template')}, "
         f"{_count(len(model.variables), 'variable')}, {_count(len(model.clocks), 'clock')}, "
-        f"{_count(len(model.channels), 'channel')}; loaded in {1000 * model.load_seconds:.1f} ms",
-        soft_wrap=True,
+        f"{_count(len(model.channels), 'channel')}; loaded in {1000 * model.load_seconds:.1f} ms"
     )
     words = [f"{model.state.location_words} for locations"]
     words.append(f"{model.state.variable_words} for variables")
     if model.state.meta_words:
         words.append(f"{model.state.meta_words} for meta variables")
-    console.print(
+    say(
         f"state: {_count(model.state_words, 'word')} of 32 bits ({', '.join(words)}), "
-        f"and a zone of {_count(len(model.clocks), 'clock')}",
-        soft_wrap=True,
+        f"and a zone of {_count(len(model.clocks), 'clock')}"
     )
     features = ", ".join(feature.replace("-", " ") for feature in model.features)
-    console.print(f"features: {features or 'plain timed automata'}", soft_wrap=True)
+    say(f"features: {features or 'plain timed automata'}")
     for one in model.scalar_sets:
         if one.reduced:
             reduction = "symmetry reduction exchanges its members"
         else:
             where = "" if one.place is None else f", at {one.place}: {one.at}"
             reduction = f"no symmetry reduction: {one.obstacle}{where}"
-        console.print(f"scalar set of {_count(one.size, 'member')}: {reduction}", soft_wrap=True)
+        say(f"scalar set of {_count(one.size, 'member')}: {reduction}")
     for table in _tables(model):
         console.print()
         console.print(table)
@@ -142,7 +145,7 @@ def _table(first: str, rows: Iterable[Sequence[str]], *columns: str) -> Table:
         is_number = headings[i] in {"locations", "edges", "words", "priority"}
         table.add_column(headings[i], justify="right" if is_number else "left", overflow="fold")
     for row in shown[:ROWS_SHOWN]:
-        table.add_row(*(Text(row[i]) for i in used))
+        table.add_row(*(Text(safe(row[i])) for i in used))
     if len(shown) > ROWS_SHOWN:
         table.add_row(Text(f"… {len(shown) - ROWS_SHOWN} more (all of them: --json)"))
     return table

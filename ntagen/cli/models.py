@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import click
-
+from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,10 +35,10 @@ def load_model(path: Path) -> Loaded:
 def show_warnings(warnings: Sequence[str]) -> None:
     """Prints warnings to standard error."""
     for warning in warnings[:WARNINGS_SHOWN]:
-        click.echo(warning.rstrip(), err=True)
+        echo(warning.rstrip(), err=True)
     if len(warnings) > WARNINGS_SHOWN:
         rest = len(warnings) - WARNINGS_SHOWN
-        click.echo(f"… and {rest} more warning{'s' * (rest > 1)}", err=True)
+        echo(f"… and {rest} more warning{'s' * (rest > 1)}", err=True)
 
 
 @contextlib.contextmanager

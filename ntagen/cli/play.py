@@ -18,6 +18,7 @@ from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, priority_rule
+from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError, NtagenError
 from ntagen.files import require_apart, write_files
 
@@ -187,14 +188,14 @@ def _reader() -> Callable[[], str | None]:
         try:
             return input("> ")
         except EOFError:
-            click.echo()
+            echo("")
             return None
 
     def piped() -> str | None:
         line = sys.stdin.readline()
         if line:
             # Shown, so that the output can be read on its own.
-            click.echo(f"> {line.rstrip()}")
+            echo(f"> {line.rstrip()}")
         return line.rstrip() if line else None
 
     return typed if sys.stdin.isatty() else piped
@@ -221,19 +222,19 @@ class _Session:
         self._ending: str | None = None
         self._silent = 0
         self.is_defeated = False
-        click.echo(strategy.query)
-        click.echo(
+        echo(strategy.query)
+        echo(
             f"The strategy is the {strategy.owner}'s; you are the {self._rival}."
             + ("" if strategy.winning else " The controller cannot win: see why.")
         )
 
     def converse(self, read: Callable[[], str | None]) -> None:
         """Plays with the user until the end of the input or of their patience."""
-        click.echo("Type ? for help.")
+        echo("Type ? for help.")
         while True:
             situation = self._play.situation()
             if self._is_over(situation):
-                click.echo(f"{self._ending} (u undo, r restart, q quit)")
+                echo(f"{self._ending} (u undo, r restart, q quit)")
             elif self._goes_on_silently(situation):
                 self._follow(situation)
                 continue
@@ -258,7 +259,7 @@ class _Session:
                 break
         self._is_over(self._play.situation())
         self._show_state()
-        click.echo(self._ending or f"{steps} steps are played; nothing is decided.")
+        echo(self._ending or f"{steps} steps are played; nothing is decided.")
 
     def write(self, path: Path) -> None:
         """Writes the play as a trace."""
@@ -266,7 +267,7 @@ class _Session:
         if text is None:
             raise InputError("the times of this play are too fine for a trace")
         write_files({path: f"{text}\n"})
-        click.echo(f"play written to {path}")
+        echo(f"play written to {path}")
 
     def _is_over(self, situation: Situation) -> bool:
         """Whether play has ended; notes how."""
@@ -303,8 +304,8 @@ class _Session:
         self._silent = 0
         self._show_state()
         if situation.goal:
-            click.echo("  the goal holds now")
-        click.echo(f"  {self._forecast(situation)}")
+            echo("  the goal holds now")
+        echo(f"  {self._forecast(situation)}")
         self._show_moves(situation, CHOICES_SHOWN)
 
     def _show_state(self, whole: bool = False) -> None:
@@ -322,10 +323,10 @@ class _Session:
             ]
             variables = variables if whole else _changed(variables, changed, before)
         clocks = [f"{name}={value}" for name, value in state.clocks.items()]
-        click.secho(f"[{len(self._play)}] time {self._time}", bold=True)
+        echo(Styled(f"[{len(self._play)}] time {self._time}", bold=True))
         for line in (locations, variables, clocks):
             if line:
-                click.echo(f"  {' '.join(line)}")
+                echo(f"  {' '.join(line)}")
         self._shown = state
 
     def _forecast(self, situation: Situation) -> str:
@@ -350,9 +351,9 @@ class _Session:
     def _show_moves(self, situation: Situation, most: int | None) -> None:
         self._list(situation.replies, "", most)
         if not situation.replies:
-            click.echo("  you have no move; Enter goes on")
+            echo("  you have no move; Enter goes on")
         if situation.allowed:
-            click.echo(f"  the {self._strategy.owner} may also")
+            echo(f"  the {self._strategy.owner} may also")
             self._list(situation.allowed, "+", most)
 
     def _list(self, moves: Sequence[Reply], sign: str, most: int | None) -> None:
@@ -361,10 +362,10 @@ class _Session:
             name = names[index]
             if names.count(name) > 1:
                 name += _labels(one.edges)
-            number = click.style(f"{sign}{index + 1}".rjust(3), bold=True)
-            click.echo(f"  {number}  {name}   {', or '.join(map(str, one.windows))}")
+            number = Styled(f"{sign}{index + 1}".rjust(3), bold=True)
+            echo("  ", number, f"  {name}   {', or '.join(map(str, one.windows))}")
         if most is not None and len(moves) > most:
-            click.echo(f"  … {len(moves) - most} more: m shows all")
+            echo(f"  … {len(moves) - most} more: m shows all")
 
     def _obey(self, read: Callable[[], str | None], situation: Situation) -> bool:
         """Reads commands until one changes the play; false at the end."""
@@ -378,7 +379,7 @@ class _Session:
                 case "q" | "quit" | "exit":
                     return False
                 case "?" | "h" | "help":
-                    click.echo(HELP)
+                    echo(HELP)
                 case "s":
                     self._show_state(whole=True)
                 case "m":
@@ -389,7 +390,7 @@ class _Session:
                     self._back(everything=name == "r")
                     return True
                 case _ if self._ending is not None:
-                    click.echo("play is over: u undo, r restart, q quit")
+                    echo("play is over: u undo, r restart, q quit")
                 case _:
                     if _said(self._step, situation, words):
                         return True
@@ -425,13 +426,13 @@ class _Session:
             self._play.allow(situation.allowed.index(move), delay)
             who = f"the {self._strategy.owner} takes"
         self._time += delay
-        click.echo(f"  · {_after(delay)}{who} {_move(move.edges)}")
+        echo(f"  · {_after(delay)}{who} {_move(move.edges)}")
 
     def _pass(self, delay: Fraction) -> None:
         self._play.wait(delay)
         self._time += delay
         if delay:
-            click.echo(f"  · {delay} passes")
+            echo(f"  · {delay} passes")
 
     def _wait(self, situation: Situation) -> None:
         """Waits until something happens."""
@@ -457,7 +458,7 @@ class _Session:
         delay = then.delay or Fraction(0)
         self._time += delay
         self._silent += 1
-        click.echo(f"  · {_after(delay)}the {self._strategy.owner} takes {_move(then.edges)}")
+        echo(f"  · {_after(delay)}the {self._strategy.owner} takes {_move(then.edges)}")
 
     def _back(self, everything: bool) -> None:
         if everything:
@@ -477,7 +478,7 @@ def _said(action: Callable[_P, None], *given: _P.args, **named: _P.kwargs) -> bo
     try:
         action(*given, **named)
     except NtagenError as error:
-        click.echo(str(error))
+        echo(str(error))
         return False
     return True
 

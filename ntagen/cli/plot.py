@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def command(source: Path, output: Path | None, shown: int, ranking: str) -> None
     from ntagen.plot.picture import draw
 
     save(draw(picture), path)
-    click.echo(f"wrote {path}")
+    echo(f"wrote {path}")
 
 
 def _is_log(source: Path) -> bool:
@@ -103,6 +104,6 @@ def _of_scene(source: Path, shown: int, ranking: tuple[str, ...]) -> Picture:
 
     scene, warnings = load_with_warnings(source)
     for warning in warnings:
-        click.echo(warning.render(), err=True)
+        echo(warning.render(), err=True)
     candidates = EngineSynthesiser(ranking=ranking)(scene).candidates if shown > 0 else ()
     return picture_of_plans(scene, candidates, shown)

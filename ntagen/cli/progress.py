@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-import click
+from ntagen.cli.terminal import echo
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,5 +61,5 @@ def shown_progress(query: str, quiet: bool) -> Iterator[Callable[[int, int, int,
             yield report
     except KeyboardInterrupt:
         done = "nothing is counted yet" if last is None else str(last)
-        click.echo(f"{query}\n  {done}", err=True)
+        echo(f"{query}\n  {done}", err=True)
         raise

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ntagen.cli.terminal import echo
+
 if TYPE_CHECKING:
     from ntagen.drive.reading import RunLog
     from ntagen.drive.records import Record
@@ -44,7 +46,7 @@ def command(log: Path, as_json: bool) -> int:
         _tell(run, log)
     comparison = replay(run, synthesise)
     if as_json:
-        click.echo(json.dumps(_summary(run, comparison)))
+        echo(json.dumps(_summary(run, comparison)))
     else:
         _report(comparison)
     return 0 if comparison.is_same else 1
@@ -54,14 +56,14 @@ def _tell(run: RunLog, log: Path) -> None:
     from ntagen.drive.story import tell
 
     known = ("program", "environment", "seed", "known", "noise_mm", "roll_error_rad")
-    click.echo(", ".join(f"{name} {run.metadata[name]}" for name in known if name in run.metadata))
+    echo(", ".join(f"{name} {run.metadata[name]}" for name in known if name in run.metadata))
     for record in run.records:
         line = tell(record)
         if line is not None:
-            click.echo(line)
+            echo(line)
     if run.torn_at_byte is not None:
         last_s = run.records[-1].time_s if run.records else 0.0
-        click.echo(
+        echo(
             f"{log} is torn: it can be read up to byte {run.torn_at_byte}, "
             f"{len(run.records)} records, {last_s:.2f} s"
         )
@@ -70,11 +72,11 @@ def _tell(run: RunLog, log: Path) -> None:
 def _report(comparison: Comparison) -> None:
     if comparison.is_same:
         extent = "all" if comparison.complete else "all that were logged"
-        click.echo(f"the same decisions again: {extent}, {comparison.compared} of them")
+        echo(f"the same decisions again: {extent}, {comparison.compared} of them")
         return
-    click.echo(f"a different decision, after {comparison.compared} equal ones")
-    click.echo(f"  logged: {_shown(comparison.logged)}")
-    click.echo(f"  now:    {_shown(comparison.decided)}")
+    echo(f"a different decision, after {comparison.compared} equal ones")
+    echo(f"  logged: {_shown(comparison.logged)}")
+    echo(f"  now:    {_shown(comparison.decided)}")
 
 
 def _shown(record: Record | None) -> str:

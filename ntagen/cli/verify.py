@@ -11,6 +11,7 @@ import click
 from ntagen.cli.effects import say_idle
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.rules import forced_rule, priority_rule
+from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import EVIDENCE_BYTES, read_file
 
@@ -66,7 +67,7 @@ def command(
         idle = {"forced": "--forced", "priorities": "--priorities"}
         say_idle(idle, f"here: it is a rule for strategies, and this is a {kind[1]}")
     for line in checked.lines:
-        click.echo(line)
+        echo(line)
     return {True: 0, False: VIOLATED, None: NOT_COVERED}[checked.holds]
 
 
