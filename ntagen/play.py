@@ -176,7 +176,8 @@ class Play:
     """A play against a strategy; it begins in the initial state.
 
     The caller is the opponent of the strategy: `reply` and `wait` are its steps, `follow` lets the
-    strategy act. A permissive strategy waits as long as it may, unless `allow` lets it move.
+    strategy act. A permissive strategy waits as long as it may, unless `allow` lets it move. Where
+    the controller's strategy takes an edge to a branch point, its legs are among the replies.
     """
 
     def __init__(self, raw: _checker.Play) -> None:
@@ -247,7 +248,7 @@ class Play:
         self._step(delay)
 
     def follow(self) -> None:
-        """Lets time pass until the strategy acts, and lets it act.
+        """Lets time pass until the strategy acts, and lets it act, by the first possible leg.
 
         Raises:
             IndexError: It does not act next.

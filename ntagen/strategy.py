@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
@@ -94,7 +94,8 @@ class Decision:
     Attributes:
         zones: Where it applies: in one of these, each a list of constraints that all hold, such as
             ``x <= 3``; the empty list always holds.
-        edges: The edges that are taken together, the sender's first; empty is to wait.
+        edges: The edges that are taken together, the sender's first; empty is to wait. Of an edge
+            of the controller to a branch point this is one leg, and the environment picks any.
         rank: As of `Advice`.
     """
 
@@ -117,12 +118,15 @@ class StrategyState:
         is_goal: Whether play has ended here, won, whatever the clocks say.
         decisions: What to do. The first that applies counts; of a permissive strategy each is
             allowed.
+        legs: The legs of the controller's moves that the environment picks, if it is its strategy:
+            of those of the same edges the first that applies.
     """
 
     locations: dict[str, str] = field(hash=False)
     variables: dict[str, int | float] = field(hash=False)
     is_goal: bool
     decisions: tuple[Decision, ...]
+    legs: tuple[Decision, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -431,10 +435,19 @@ def _advice(decision: dict[str, Any], waiting: dict[str, Any] | None) -> Advice:
 
 
 def _state(raw: dict[str, Any]) -> StrategyState:
-    decisions = (
+    return StrategyState(
+        raw["locations"],
+        raw["variables"],
+        raw["goal"],
+        _decisions(raw["decisions"]),
+        _decisions(raw.get("legs", ())),
+    )
+
+
+def _decisions(raw: Iterable[dict[str, Any]]) -> tuple[Decision, ...]:
+    return tuple(
         Decision(
             zones=tuple(map(tuple, one["zones"])), edges=_edges(one["action"]), rank=one["rank"]
         )
-        for one in raw["decisions"]
+        for one in raw
     )
-    return StrategyState(raw["locations"], raw["variables"], raw["goal"], tuple(decisions))

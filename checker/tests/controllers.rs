@@ -14,10 +14,10 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use checker::engine::{controller, timing};
-use checker::game::closed_loop;
+use checker::engine::{controller, describe, timing};
 use checker::game::strategy::{Decision, Selection, Strategy};
-use checker::network::Part;
+use checker::game::{Player, closed_loop};
+use checker::network::{Part, is_same_entry};
 
 use c_programs::{compiled, games, in_folder};
 use solved::solved;
@@ -61,8 +61,8 @@ struct Case {
     name: String,
     text: String,
     strategy: Strategy,
-    /// By the words that make a state: whether play has ended there, and the decisions.
-    decided: HashMap<Vec<i32>, (bool, Vec<Decision>)>,
+    /// By the words that make a state: whether play has ended there, the decisions, and the legs.
+    decided: HashMap<Vec<i32>, (bool, Vec<Decision>, Vec<Decision>)>,
     words: usize,
     clocks: usize,
     /// By number of the controller, the text of its edges.
@@ -85,9 +85,10 @@ fn solve(path: &Path, query: &str) -> Option<Case> {
     let network = timing::network_of(model.network(), &strategy).into_owned();
     let words = network.layout.identity_words as usize;
     let decided = closed_loop::joined(&network, &strategy).into_iter();
-    let decided = decided.map(|(state, is_goal, decisions)| {
-        let decisions = decisions.into_iter().cloned().collect();
-        (state[..words].to_vec(), (is_goal, decisions))
+    let decided = decided.map(|one| {
+        let decisions = one.decisions.into_iter().cloned().collect();
+        let legs = one.legs.into_iter().cloned().collect();
+        (one.words[..words].to_vec(), (one.is_goal, decisions, legs))
     });
     Some(Case {
         decided: decided.collect(),
@@ -107,15 +108,18 @@ struct Expected<'s> {
     is_goal: bool,
     /// The decisions that apply.
     decisions: Vec<&'s Decision>,
+    /// The legs that are picked.
+    legs: Vec<&'s [Part]>,
 }
 
 impl Case {
     fn at(&self, words: &[i32], clocks: &[i64]) -> Expected<'_> {
-        let Some((is_goal, decisions)) = self.decided.get(&words[..self.words]) else {
+        let Some((is_goal, decisions, legs)) = self.decided.get(&words[..self.words]) else {
             return Expected {
                 is_known: false,
                 is_goal: false,
                 decisions: Vec::new(),
+                legs: Vec::new(),
             };
         };
         let most = match self.strategy.selection {
@@ -127,10 +131,20 @@ impl Case {
         let applies = decisions
             .iter()
             .filter(|one| one.zones.contains(&values, TICKS_PER_UNIT));
+        let mut picked: Vec<&[Part]> = Vec::new();
+        for leg in legs {
+            let parts = leg.action.as_deref().expect("a leg is a move");
+            if leg.zones.contains(&values, TICKS_PER_UNIT)
+                && !picked.iter().any(|one| is_same_entry(one, parts))
+            {
+                picked.push(parts);
+            }
+        }
         Expected {
             is_known: true,
             is_goal: *is_goal,
             decisions: applies.take(most).collect(),
+            legs: picked,
         }
     }
 
@@ -141,9 +155,10 @@ impl Case {
     }
 
     fn number(&self, parts: &[Part]) -> i64 {
-        let edges = parts
-            .iter()
-            .map(|&part| checker::engine::describe::part_text(&self.network, part));
+        let edges = parts.iter().map(|&part| match self.strategy.owner {
+            Player::Controller => describe::entry_text(&self.network, part),
+            Player::Environment => describe::part_text(&self.network, part),
+        });
         let text = edges.collect::<Vec<_>>().join(" ");
         let number = self.actions.iter().position(|one| *one == text);
         number.unwrap_or_else(|| panic!("{}: no {text}", self.name)) as i64
@@ -176,7 +191,9 @@ impl Case {
                 None => action == -1,
                 Some(parts) => action == self.number(parts),
             });
-            assert_eq!(is_allowed == 1, wanted, "{place}: {action}");
+            let mut legs = expected.legs.iter().filter(|_| !expected.is_goal);
+            let is_picked = legs.any(|leg| action == self.number(leg));
+            assert_eq!(is_allowed == 1, wanted || is_picked, "{place}: {action}");
         }
         if action == -1 {
             // Every bound is a whole number of ticks, so looking at each tick and between is enough.
@@ -211,7 +228,8 @@ impl Case {
             (random % limit as u64) as i64
         };
         let mut points = Vec::new();
-        for (words, _, _) in closed_loop::joined(&self.network, &self.strategy) {
+        for one in closed_loop::joined(&self.network, &self.strategy) {
+            let words = one.words;
             let mut beside = words.to_vec();
             let word = below(self.words as i64) as usize;
             beside[word] = beside[word].wrapping_add(below(5) as i32 - 2);

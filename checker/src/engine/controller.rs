@@ -103,12 +103,14 @@ impl Span {
 type Comparison = (usize, usize, i32, bool);
 
 struct Tables {
+    owner: Player,
     is_permissive: bool,
     spans: Vec<Span>,
     /// The packed states with the numbers of their rows, ascending by key.
     states: Vec<(Vec<u32>, usize)>,
-    /// Rules by zone and action; 0 is to wait. The first row stands for the end of play.
-    rows: Pool<Vec<(usize, usize)>>,
+    /// Rules by zone and action; 0 is to wait. Behind them the legs that are picked, from this index on. The first row stands for the
+    /// end of play.
+    rows: Pool<(Vec<(usize, usize)>, usize)>,
     /// Zones as lists of constraints.
     zones: Pool<Vec<usize>>,
     constraints: Pool<Comparison>,
@@ -127,6 +129,7 @@ impl Tables {
             }
         });
         let mut tables = Tables {
+            owner: strategy.owner,
             is_permissive: strategy.selection == Selection::Any,
             spans: spans.collect(),
             states: Vec::new(),
@@ -135,7 +138,7 @@ impl Tables {
             constraints: Pool::new(),
             actions: Pool::new(),
         };
-        tables.rows.number(Vec::new());
+        tables.rows.number((Vec::new(), 0));
         for entry in entries {
             let key = tables.key(entry.words);
             let row = tables.row(entry);
@@ -183,7 +186,14 @@ impl Tables {
                 None => decided = Some(own),
             }
         }
-        self.rows.number(row)
+        let own = row.len();
+        for Rule { action, zones } in entry.legs {
+            let action = action.map_or(0, |parts| 1 + self.actions.number(parts));
+            for bounds in zones.zones() {
+                row.push((self.zone(bounds, zones.dimension()), action));
+            }
+        }
+        self.rows.number((row, own))
     }
 
     fn zone(&mut self, bounds: &[Bound], dimension: usize) -> usize {
@@ -243,9 +253,13 @@ impl Tables {
         array(
             text,
             "controller_row_starts",
-            starts(rows.clone().map(Vec::len)),
+            starts(rows.clone().map(|row| row.0.len())),
         );
-        let rules = || self.rows.all.iter().flatten();
+        if self.has_legs() {
+            let own = rows.clone().map(|row| row.1 as i64);
+            array(text, "controller_row_owns", own.collect());
+        }
+        let rules = || self.rows.all.iter().flat_map(|row| &row.0);
         array(
             text,
             "controller_rule_zones",
@@ -262,6 +276,11 @@ impl Tables {
         self.write_keys(text);
     }
 
+    /// Whether the strategy picks legs of moves of the controller.
+    fn has_legs(&self) -> bool {
+        self.rows.all.iter().any(|row| row.1 < row.0.len())
+    }
+
     /// The texts of the actions, which a program may leave out.
     fn write_actions(&self, network: &Network, text: &mut String) {
         let count = self.actions.all.len();
@@ -270,7 +289,10 @@ impl Tables {
             "#ifndef CONTROLLER_WITHOUT_TEXTS\nconst char *const controller_texts[] = {\n",
         );
         for parts in &self.actions.all {
-            let parts = parts.iter().map(|&part| describe::part_text(network, part));
+            let parts = parts.iter().map(|&part| match self.owner {
+                Player::Controller => describe::entry_text(network, part),
+                Player::Environment => describe::part_text(network, part),
+            });
             let _ = writeln!(
                 text,
                 "    {},",
@@ -337,7 +359,16 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
          \x20*   CONTROLLER_OVER  play has ended here\n\
          \x20*   CONTROLLER_NONE  the strategy says nothing: play does not come here\n\
          \x20* controller_allows(state, clocks, action) says whether an action, or CONTROLLER_WAIT, is allowed.\n\
-         \x20*\n\
+         \x20*\n"
+    );
+    if tables.has_legs() {
+        text.push_str(
+            " * Behind branch points of edges that the controller takes, the environment picks the leg: an action that is one of these is\n\
+             \x20* allowed where it is picked, and never decided.\n *\n",
+        );
+    }
+    text.push_str(
+        "\
          \x20* Times are of the type CONTROLLER_TIME, a signed number; CONTROLLER_UNIT of them are one unit of time of the model.\n\
          \x20* Define both before including this file to count ticks in integers.\n *\n",
     );
@@ -395,6 +426,7 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
          #define CONTROLLER_STATE_WORDS {words}\n\
          #define CONTROLLER_CLOCKS {}\n\
          #define CONTROLLER_IS_PERMISSIVE {}\n\
+         #define CONTROLLER_HAS_LEGS {}\n\
          #define CONTROLLER_GOAL_ROW 0\n\n\
          typedef CONTROLLER_TIME controller_time;\n\n\
          typedef struct {{\n\
@@ -406,6 +438,7 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
          int controller_allows(const int32_t *state, const controller_time *clocks, int action);\n\n",
         network.clocks.len().saturating_sub(1),
         i32::from(tables.is_permissive),
+        i32::from(tables.has_legs()),
     );
     text
 }

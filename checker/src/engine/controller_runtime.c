@@ -101,7 +101,11 @@ controller_decision controller_decide(const int32_t *state, const controller_tim
         return decision;
     }
     first = controller_row_starts[row];
+#if CONTROLLER_HAS_LEGS
+    last = first + controller_row_owns[row];
+#else
     last = controller_row_starts[row + 1];
+#endif
     for (rule = first; rule < last; rule++) {
         if (controller_zone_holds(controller_rule_zones[rule], clocks)) {
             decision.action = (int)controller_rule_actions[rule] - 1;
@@ -133,6 +137,17 @@ int controller_allows(const int32_t *state, const controller_time *clocks, int a
     }
     return 0;
 #else
+#if CONTROLLER_HAS_LEGS
+    long row = controller_row(state);
+    if (row > CONTROLLER_GOAL_ROW) {
+        size_t rule = controller_row_starts[row] + controller_row_owns[row];
+        for (; rule < controller_row_starts[row + 1]; rule++) {
+            if ((int)controller_rule_actions[rule] - 1 == action
+                && controller_zone_holds(controller_rule_zones[rule], clocks))
+                return 1;
+        }
+    }
+#endif
     return controller_decide(state, clocks).action == action;
 #endif
 }

@@ -33,15 +33,18 @@ pub struct Entry<'s> {
     /// What is done: waiting first, then moves in the order of their ranks. Of a strategy of which the first decision counts, rules
     /// have no clock values in common.
     pub rules: Vec<Rule>,
+    /// If the strategy is the environment's: the legs that it picks, in no particular order; those of one entry have no clock values in common.
+    pub legs: Vec<Rule>,
 }
 
 /// The table of a strategy of this network, which has the clock that measures time if the strategy looks at it: the states about which it says something, in its order.
 pub fn entries<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Entry<'s>> {
     let dimension = network.clocks.len().max(1);
     let joined = closed_loop::joined(network, strategy).into_iter();
-    let entries = joined.map(|(words, is_goal, decisions)| {
+    let entries = joined.map(|joined| {
+        let (words, is_goal) = (joined.words, joined.is_goal);
         let mut rules: Vec<Rule> = Vec::new();
-        let counting = closed_loop::counting(&decisions, strategy.selection, dimension);
+        let counting = closed_loop::counting(&joined.decisions, strategy.selection, dimension);
         let counting = if is_goal { Vec::new() } else { counting };
         for (decision, part) in counting {
             match rules.iter_mut().find(|one| one.action == decision.action) {
@@ -57,14 +60,23 @@ pub fn entries<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Entry<'s>> 
         for rule in &mut rules {
             simplify(&mut rule.zones);
         }
+        let picked = closed_loop::picked(&joined.legs, dimension).into_iter();
+        let legs = picked.filter(|_| !is_goal).map(|(parts, mut zones)| {
+            simplify(&mut zones);
+            Rule {
+                action: Some(parts.to_vec()),
+                zones,
+            }
+        });
         Entry {
             words,
             is_goal,
             rules,
+            legs: legs.collect(),
         }
     });
     entries
-        .filter(|entry| entry.is_goal || !entry.rules.is_empty())
+        .filter(|entry| entry.is_goal || !entry.rules.is_empty() || !entry.legs.is_empty())
         .collect()
 }
 

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use super::LoadedModel;
 use super::evidence::{Missing, Proof, Witness};
-use crate::ir::{EdgeLabels, Network, RunTimeErrorKind, Shape};
+use crate::ir::{Branch, Edge, EdgeLabels, Network, RunTimeErrorKind, Shape};
 use crate::network::selects::{select_count, select_values};
 use crate::network::{Failure, Part};
 use crate::search::liveness::Ending;
@@ -178,14 +178,38 @@ pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
 
 /// An edge as `P.a->P.b { guard, sync, update }`, with the select values.
 pub fn part_text(network: &Network, part: Part) -> String {
+    let edge = edge_of(network, part);
+    edge_text(network, part, &edge.branches[part.branch as usize..][..1])
+}
+
+/// An edge with all the legs of its branch point, as `P.a->(P.b|P.c) { guard, sync, update }`.
+pub fn entry_text(network: &Network, part: Part) -> String {
+    edge_text(network, part, &edge_of(network, part).branches)
+}
+
+fn edge_of(network: &Network, part: Part) -> &Edge {
+    &network.processes[part.process as usize].edges[part.edge as usize]
+}
+
+fn edge_text(network: &Network, part: Part, branches: &[Branch]) -> String {
     let process = &network.processes[part.process as usize];
-    let edge = &process.edges[part.edge as usize];
-    let target = edge.branches[part.branch as usize].target;
+    let edge = edge_of(network, part);
     let name = |location: u32| {
         format!(
             "{}.{}",
             process.name, process.locations[location as usize].name
         )
+    };
+    let mut targets: Vec<String> = Vec::new();
+    for branch in branches {
+        let target = name(branch.target.0);
+        if !targets.contains(&target) {
+            targets.push(target);
+        }
+    }
+    let target = match &targets[..] {
+        [target] => target.clone(),
+        targets => format!("({})", targets.join("|")),
     };
     let EdgeLabels {
         guard,
@@ -203,7 +227,7 @@ pub fn part_text(network: &Network, part: Part) -> String {
     let mut text = format!(
         "{}->{} {{ {}, {}, {} }}",
         name(edge.source.0),
-        name(target.0),
+        target,
         or(guard, "1"),
         or(sync, "tau"),
         or(update, "1")

@@ -154,10 +154,11 @@ impl Follower {
         let words = strategy_file::read_words(network, state)?;
         let part = self.at(network, &words);
         let joined = closed_loop::joined(network, &part);
-        let Some((_, is_end, ranked)) = joined.first() else {
+        let Some(joined) = joined.first() else {
             return Err(Unadvised::UnknownState);
         };
-        if *is_end {
+        let ranked = &joined.decisions;
+        if joined.is_goal {
             return Ok(json!({ "over": true, "now": [] }));
         }
         let timed = read_timed(network, state, words)?;
@@ -461,7 +462,8 @@ impl Play {
     ///
     /// `replies` are the moves of the strategy's opponent: of each the `edges` and the `windows` in which it is possible. A window is
     /// a list: where it begins, whether it begins only after that, where it ends (null: never), and whether it ends before that. It may
-    /// wait within `waits`. `allowed` are likewise the moves that a permissive strategy allows its owner. `next` is what happens after `ticks` (null: never) if it does not move: `kind` "acts" with the `edges` of the
+    /// wait within `waits`. Where the strategy takes an edge to a branch point, its opponent picks the leg: then the legs are replies at the
+    /// moment of `next`. `allowed` are likewise the moves that a permissive strategy allows its owner. `next` is what happens after `ticks` (null: never) if it does not move: `kind` "acts" with the `edges` of the
     /// strategy; "won" with the `winner`, and `by` "goal", "broken", "stopped" or "endless"; "must", if it has to move before; "fails", if the
     /// strategy does not say how to go on, with `gap`. All times are in ticks of which `ticks_per_unit` make a unit of time. `goal` is
     /// whether the goal holds now.
@@ -478,7 +480,9 @@ impl Play {
             moves.collect::<Vec<_>>()
         };
         let next = match &situation.next {
-            Next::Acts(parts) => json!({ "kind": "acts", "edges": edges(network, parts) }),
+            Next::Acts { action, .. } => {
+                json!({ "kind": "acts", "edges": edges(network, action) })
+            }
             Next::Won(winner, ending) => json!({
                 "kind": "won",
                 "winner": owner_name(*winner),
@@ -546,12 +550,15 @@ impl Play {
         self.step(network, &now, wait, parts)
     }
 
-    /// The strategy goes on: time passes until it acts, and then it does.
+    /// The strategy goes on: time passes until it acts, and then it does, by the first leg that is possible.
     pub fn follow(&mut self, network: &Network) -> Result<(), Refused> {
         let now = self.now().clone();
         let situation = self.look(network, &now)?;
         match (situation.next, situation.half_ticks) {
-            (Next::Acts(parts), Some(wait)) => self.step(network, &now, wait, parts),
+            (Next::Acts { legs, .. }, Some(wait)) => {
+                let first = legs.into_iter().next().ok_or(Refused::Impossible)?;
+                self.step(network, &now, wait, first)
+            }
             _ => Err(Refused::Impossible),
         }
     }

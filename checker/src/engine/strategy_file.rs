@@ -1,16 +1,17 @@
 //! Strategies as files: written as JSON, and read again for a model.
 //!
 //! The format is described in `docs/strategy.md`. In short: an object with `format` "ntagen-strategy", `version` 1, the `query`,
-//! the `owner`, the `selection`, and `states`, each with `locations` by process, `variables` by name, `goal`, and `decisions` with the
-//! `zones` where they apply. Reading looks names up in the model and refuses what is not in it, so a file fits
+//! the `owner`, the `selection`, and `states`, each with `locations` by process, `variables` by name, `goal`, `decisions` with the
+//! `zones` where they apply, and `legs` if the environment picks some. Reading looks names up in the model and refuses what is not in it, so a file fits
 //! every model with the same processes, locations, variables, clocks and edges.
 
 use std::sync::Arc;
 
 use serde_json::{Map, Value as Json, json};
 
+use crate::game::Player;
+use crate::game::closed_loop::{self, Joined};
 use crate::game::strategy::{Decision, Selection, Start, Strategy, StrategyState, Under, Way};
-use crate::game::{Player, closed_loop};
 use crate::ir::{EdgeId, Network, Shape};
 use crate::network::Part;
 use crate::network::selects::{select_count, select_values};
@@ -87,14 +88,21 @@ const NO_STATES: &str = "\"states\":[]";
 const NO_UNDER: &str = "\"under\":null";
 
 /// A discrete state with its joined decisions.
-fn state(network: &Network, (words, is_goal, decisions): &(&[i32], bool, Vec<&Decision>)) -> Json {
-    let decisions: Vec<Json> = decisions.iter().map(|one| decision(network, one)).collect();
-    json!({
-        "locations": json::locations(network, words),
-        "variables": json::variables(network, words),
-        "goal": is_goal,
-        "decisions": decisions,
-    })
+fn state(network: &Network, joined: &Joined<'_>) -> Json {
+    let all = |decisions: &[&Decision]| -> Vec<Json> {
+        let decisions = decisions.iter();
+        decisions.map(|one| decision(network, one)).collect()
+    };
+    let mut state = json!({
+        "locations": json::locations(network, joined.words),
+        "variables": json::variables(network, joined.words),
+        "goal": joined.is_goal,
+        "decisions": all(&joined.decisions),
+    });
+    if !joined.legs.is_empty() {
+        state["legs"] = all(&joined.legs).into();
+    }
+    state
 }
 
 /// The JSON of a strategy without its states, and without the strategy that it is played under.
@@ -415,11 +423,29 @@ impl Reader<'_> {
         self.variables(state, &mut words)?;
         let mut decisions = Vec::new();
         for decision in state.list("decisions")? {
-            decisions.push(self.decision(&decision, &words)?);
+            decisions.push(self.decision(&decision, &words, self.owner)?);
+        }
+        let mut legs = Vec::new();
+        if state.0.get("legs").is_some_and(|legs| !legs.is_null()) {
+            if self.owner == Player::Controller {
+                let help = "a strategy of the controller names the edge, and the environment picks the leg";
+                return Err(state
+                    .field("legs")?
+                    .wrong("the controller picks no legs", help));
+            }
+            for leg in state.list("legs")? {
+                let picked = self.decision(&leg, &words, Player::Controller)?;
+                if picked.action.is_none() {
+                    let help = "name the edges with the branches that are picked";
+                    return Err(leg.field("action")?.wrong("a leg is no waiting", help));
+                }
+                legs.push(picked);
+            }
         }
         Ok(StrategyState {
             words,
             decisions,
+            legs,
             is_goal: state.typed("goal", "truth value", Json::as_bool)?,
         })
     }
@@ -480,7 +506,13 @@ impl Reader<'_> {
         }
     }
 
-    fn decision(&self, decision: &At<'_>, words: &[i32]) -> Result<Decision, Mismatch> {
+    /// A decision whose move is the `owner`'s.
+    fn decision(
+        &self,
+        decision: &At<'_>,
+        words: &[i32],
+        owner: Player,
+    ) -> Result<Decision, Mismatch> {
         let dimension = self.network.clocks.len().max(1);
         let mut zones = Federation::empty(dimension);
         for zone in decision.list("zones")? {
@@ -506,8 +538,12 @@ impl Reader<'_> {
                 let process = &self.network.processes[part.process as usize];
                 process.edges[part.edge as usize].controllable
             };
-            if !self.owner.owns(parts.iter().all(is_controllable)) {
-                let message = "the move is not one of the player who owns the strategy";
+            if !owner.owns(parts.iter().all(is_controllable)) {
+                let message = if owner == self.owner {
+                    "the move is not one of the player who owns the strategy"
+                } else {
+                    "the move is not one of the controller, whose legs the environment picks"
+                };
                 return Err(action.wrong(message, OTHER_MODEL));
             }
             Some(parts)

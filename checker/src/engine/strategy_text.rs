@@ -45,7 +45,10 @@ pub fn write(network: &Network, strategy: &Strategy) -> String {
             text.push_str("Play has ended here.\n");
         }
         for rule in &entry.rules {
-            text.push_str(&line(network, rule));
+            text.push_str(&line(network, strategy.owner, rule));
+        }
+        for leg in &entry.legs {
+            text.push_str(&leg_line(network, leg));
         }
     }
     text
@@ -66,15 +69,31 @@ pub(super) fn way_lines(network: &Network, way: &Way) -> String {
 }
 
 /// What a rule says, as a line.
-fn line(network: &Network, rule: &Rule) -> String {
+fn line(network: &Network, owner: Player, rule: &Rule) -> String {
     let zones = zones(network, &rule.zones);
     let Some(parts) = &rule.action else {
         return format!("While you are in\t{zones}, wait.\n");
     };
-    let parts = parts.iter().map(|&one| describe::part_text(network, one));
+    let parts = parts.iter().map(|&one| match owner {
+        Player::Controller => describe::entry_text(network, one),
+        Player::Environment => describe::part_text(network, one),
+    });
     let parts: Vec<String> = parts.collect();
     format!(
         "When you are in {zones}, take transition {}\n",
+        parts.join(" ")
+    )
+}
+
+/// Which leg the environment picks, as a line.
+fn leg_line(network: &Network, leg: &Rule) -> String {
+    let parts = leg.action.iter().flatten();
+    let parts: Vec<String> = parts
+        .map(|&one| describe::part_text(network, one))
+        .collect();
+    format!(
+        "When the controller moves in {}, pick leg {}\n",
+        zones(network, &leg.zones),
         parts.join(" ")
     )
 }

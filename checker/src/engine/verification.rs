@@ -274,13 +274,16 @@ pub(super) fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> 
 /// in which it has not is found.
 pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
     let states = closed_loop::joined(network, strategy).into_iter();
-    let states = states.map(|(words, is_goal, decisions)| Decisions {
-        words: words.to_vec(),
-        decisions: if is_goal {
-            Vec::new()
-        } else {
-            decisions.into_iter().map(decision).collect()
-        },
+    let states = states.map(|joined| {
+        let all = |decisions: Vec<&Decision>| -> Vec<strategy::Decision> {
+            let counting = decisions.into_iter().filter(|_| !joined.is_goal);
+            counting.map(decision).collect()
+        };
+        Decisions {
+            words: joined.words.to_vec(),
+            decisions: all(joined.decisions),
+            legs: all(joined.legs),
+        }
     });
     states.collect()
 }

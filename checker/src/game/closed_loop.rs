@@ -6,7 +6,7 @@
 //! everything is allowed. So the closed loop holds every run of every player that follows the strategy.
 
 use crate::ir::{ClockAtom, ClockId, ClockRange, Network};
-use crate::network::{Allowed, Part, Restriction};
+use crate::network::{Allowed, Part, Restriction, is_same_entry};
 use crate::search::StateStore;
 use crate::zones::future::Barriers;
 use crate::zones::{Bound, Federation};
@@ -31,12 +31,15 @@ impl ClosedLoop {
         let mut store = StateStore::new(network);
         let mut atoms = Vec::new();
         let mut states = Vec::new();
-        for (words, is_goal, decisions) in joined(network, strategy) {
-            store.intern(words);
-            for decision in &decisions {
+        for one in joined(network, strategy) {
+            store.intern(one.words);
+            for decision in one.decisions.iter().chain(&one.legs) {
                 collect_atoms(&decision.zones, &mut atoms);
             }
-            states.push((!is_goal).then(|| allowed(&decisions, strategy.selection, dimension)));
+            states.push(
+                (!one.is_goal)
+                    .then(|| allowed(&one, (strategy.owner, strategy.selection), dimension)),
+            );
         }
         atoms.sort_by_key(|one| (one.left.first, one.right.first, one.low, one.strict));
         atoms.dedup();
@@ -64,27 +67,66 @@ impl Restriction for ClosedLoop {
     }
 }
 
-/// The decisions of a strategy by words, in the order in which they apply, with whether play has ended.
-pub fn joined<'s>(
-    network: &Network,
-    strategy: &'s Strategy,
-) -> Vec<(&'s [i32], bool, Vec<&'s Decision>)> {
+/// What a strategy says of the states with some words.
+#[derive(Debug)]
+pub struct Joined<'s> {
+    /// The words.
+    pub words: &'s [i32],
+    /// Whether play has ended.
+    pub is_goal: bool,
+    /// The decisions, in the order in which they apply.
+    pub decisions: Vec<&'s Decision>,
+    /// The legs that are picked, in the order in which they apply.
+    pub legs: Vec<&'s Decision>,
+}
+
+/// A strategy by words.
+pub fn joined<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Joined<'s>> {
     let mut store = StateStore::new(network);
-    let mut joined: Vec<(&[i32], bool, Vec<&Decision>)> = Vec::new();
+    let mut joined: Vec<Joined<'_>> = Vec::new();
     for state in &strategy.states {
         let (id, is_new) = store.intern(&state.words);
         if is_new {
-            joined.push((&state.words, true, Vec::new()));
+            joined.push(Joined {
+                words: &state.words,
+                is_goal: true,
+                decisions: Vec::new(),
+                legs: Vec::new(),
+            });
         }
         let entry = &mut joined[id.0 as usize];
         // Where the goal depends on clocks, only some of the states with these words are in it.
-        entry.1 &= state.is_goal;
-        entry.2.extend(&state.decisions);
+        entry.is_goal &= state.is_goal;
+        entry.decisions.extend(&state.decisions);
+        entry.legs.extend(&state.legs);
     }
-    for (_, _, decisions) in &mut joined {
-        decisions.sort_by_key(|decision| decision.rank);
+    for one in &mut joined {
+        one.decisions.sort_by_key(|decision| decision.rank);
+        one.legs.sort_by_key(|leg| leg.rank);
     }
     joined
+}
+
+/// The parts of the legs in which they are picked: of those with the same entry the first.
+pub fn picked<'d>(legs: &[&'d Decision], dimension: usize) -> Vec<(&'d [Part], Federation)> {
+    let mut picked: Vec<(&[Part], Federation)> = Vec::new();
+    for leg in legs {
+        let parts = leg.action.as_deref().unwrap_or_default();
+        let mut part = leg.zones.clone();
+        let before = picked.iter().filter(|one| is_same_entry(one.0, parts));
+        let before = before.fold(Federation::empty(dimension), |mut all, one| {
+            all.unite(&one.1);
+            all
+        });
+        part.subtract(&before);
+        part.reduce();
+        match picked.iter_mut().find(|one| one.0 == parts) {
+            Some(one) => _ = one.1.unite(&part),
+            None => picked.push((parts, part)),
+        }
+    }
+    picked.retain(|one| !one.1.is_empty());
+    picked
 }
 
 /// The parts of the decisions in which they count.
@@ -106,8 +148,12 @@ pub fn counting<'d>(
     parts.collect()
 }
 
-fn allowed(decisions: &[&Decision], selection: Selection, dimension: usize) -> Allowed {
-    let counting = counting(decisions, selection, dimension);
+fn allowed(
+    joined: &Joined<'_>,
+    (owner, selection): (Player, Selection),
+    dimension: usize,
+) -> Allowed {
+    let counting = counting(&joined.decisions, selection, dimension);
     let mut decided = Federation::empty(dimension);
     let mut waiting = Federation::empty(dimension);
     for (decision, part) in &counting {
@@ -122,7 +168,12 @@ fn allowed(decisions: &[&Decision], selection: Selection, dimension: usize) -> A
         let Some(parts) = &decision.action else {
             continue;
         };
-        match moves.iter_mut().find(|one| &one.0 == parts) {
+        // Moves of the controller are known by their entries, of which there may be two names.
+        let is_it = |one: &[Part]| match owner {
+            Player::Controller => is_same_entry(one, parts),
+            Player::Environment => one == parts,
+        };
+        match moves.iter_mut().find(|one| is_it(&one.0)) {
             Some(one) => _ = one.1.unite(&part),
             None => moves.push((parts.clone(), part.clone())),
         }
@@ -140,10 +191,13 @@ fn allowed(decisions: &[&Decision], selection: Selection, dimension: usize) -> A
         forbidden.reduce();
         (parts, forbidden)
     });
+    let legs = picked(&joined.legs, dimension).into_iter();
+    let legs = legs.map(|(parts, here)| (parts.to_vec(), here));
     Allowed {
         barriers,
         forbidden: forbidden.collect(),
         others: decided,
+        legs: legs.collect(),
     }
 }
 

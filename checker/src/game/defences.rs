@@ -125,6 +125,7 @@ impl Solver<'_, '_, '_> {
             || !self.frontier.reserve.is_kept
             || !self.graph.nodes[node as usize].delays
             || self.graph.urgent(node).is_some()
+            || !self.graph.chances.of(node).is_empty()
             || self.graph.symbolic.stepper.network().features.stopwatches
             || !own.any(|edge| !self.seeker.owns(edge.controllable))
             || self.may_stop(node) && self.may_be_forced(node)?

@@ -8,6 +8,8 @@
 //! * Elsewhere in X without Y it evades: it takes moves that stay outside Y wherever there are any, and else waits. So play never
 //!   gets to a goal from which the controller could go on inside X.
 //!
+//! Where the controller moves to a branch point, it picks a leg that leaves X, or stays outside Y.
+//!
 //! Along a play the rank never grows. A goal that is met is one from which play leaves X, so that the rank falls: there are no more
 //! goals than ranks, and after the last one the goal does not come again.
 
@@ -21,7 +23,8 @@ use super::graph::{Edge, Standing};
 use super::reach::{Solver, Win};
 use super::recurrence::{leave, to_federation};
 use super::strategy::{
-    Decision, Selection, Start, Strategy, StrategyState, keep, moves_of, walk, whole_or_part,
+    Choices, Decision, Selection, Start, Strategy, StrategyState, keep, moves_of, walk,
+    whole_or_part,
 };
 
 /// Reads the strategy of the environment, which wins from these nodes, from the rounds of the solution.
@@ -65,14 +68,19 @@ fn extract_within(
         let known = strategy.states.len();
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);
-        let (decisions, taken) = decisions(solver, node, rounds, patience)?;
+        let Choices {
+            decisions,
+            legs,
+            taken,
+        } = choices(solver, node, rounds, patience)?;
         strategy.states.push(StrategyState {
             words: words.clone(),
             decisions,
+            legs,
             is_goal: solver.graph.nodes[node as usize].standing == Standing::Broken,
         });
         for edge in taken {
-            let edge = solver.graph.edges[edge];
+            let edge = solver.graph.edges[edge as usize];
             let inner = inner_states(solver, &edge, &words, rounds, patience)?;
             strategy.states.extend(inner);
             if !std::mem::replace(&mut seen[edge.target as usize], true) {
@@ -84,15 +92,19 @@ fn extract_within(
     Ok(strategy)
 }
 
-/// The decisions in a node, and the edges that play may take from it.
-fn decisions(
+/// What the environment chooses in a node.
+fn choices(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
     rounds: &[Vec<Win>],
     patience: &mut Patience<'_>,
-) -> Result<(Vec<Decision>, Vec<usize>), Failure> {
-    let mut decisions = Vec::new();
-    let mut taken = Vec::new();
+) -> Result<Choices, Failure> {
+    let mut chosen = Choices::default();
+    let Choices {
+        decisions,
+        legs,
+        taken,
+    } = &mut chosen;
     let moves = moves_of(solver, node)?;
     for (after, before) in (1..rounds.len()).zip(rounds) {
         let mut lost = to_federation(solver, node, &before[node as usize]);
@@ -118,22 +130,28 @@ fn decisions(
                 if !acting.is_empty() {
                     waiting.subtract_within(&acting, patience);
                     let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
-                    push(&mut decisions, (acting, action, after), patience);
-                    taken.push(index);
+                    push(decisions, (acting, action, after), patience);
+                    taken.push(index as u32);
                 }
             }
-            push(&mut decisions, (waiting, None, after), patience);
+            push(decisions, (waiting, None, after), patience);
+            let mut picked = |solver: &Solver<'_, '_, '_>, leg, patience: &mut Patience<'_>| {
+                let edge = &solver.graph.edges[leg as usize];
+                solver.missing(edge, (&kept[edge.target as usize], None), patience)
+            };
+            let chosen = (&mut *legs, &mut *taken);
+            solver.pick_legs(node, (&part, after as u32), &mut picked, chosen, patience)?;
         }
         for index in solver.graph.edges_of(node) {
             let edge = solver.graph.edges[index];
-            if edge.controllable && solver.enabled(&edge).intersects(&lost) {
-                taken.push(index);
+            if edge.controllable && !edge.is_leg && solver.enabled(&edge).intersects(&lost) {
+                taken.push(index as u32);
             }
         }
     }
     taken.sort_unstable();
     taken.dedup();
-    Ok((decisions, taken))
+    Ok(chosen)
 }
 
 fn push(
@@ -198,6 +216,7 @@ fn inner_states(
         .map(|(inner, decisions)| StrategyState {
             words: inner.words,
             decisions,
+            legs: Vec::new(),
             is_goal: false,
         })
         .collect())

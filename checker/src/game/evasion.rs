@@ -9,25 +9,34 @@ use crate::zones::{ClockSet, Federation, Patience, Zone, instants, past};
 use super::Player;
 use super::graph::Standing;
 use super::reach::{Solver, Win};
-use super::strategy::{Decision, Inner, Strategy, StrategyState, moves_of, walk, whole_or_part};
+use super::strategy::{
+    Choices, Decision, Inner, Strategy, StrategyState, moves_of, named, walk, whole_or_part,
+};
 
-/// The decisions of the evader in a node, and the edges that play may take from it.
-pub(super) fn decisions(
+/// What the evader chooses in a node.
+pub(super) fn choices(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
     patience: &mut Patience<'_>,
-) -> Result<(Vec<Decision>, Vec<u32>), Failure> {
-    let mut decisions = Vec::new();
-    let mut taken = Vec::new();
+) -> Result<Choices, Failure> {
+    let mut chosen = Choices::default();
+    let Choices {
+        decisions,
+        legs,
+        taken,
+    } = &mut chosen;
     let mut free = rest_of(solver, node);
     free.subtract_within(&ended(solver, node), patience);
     if free.is_empty() {
-        return Ok((decisions, taken));
+        return Ok(chosen);
     }
     let moves = moves_of(solver, node)?;
     let mut acting = Federation::empty(solver.graph.dimension());
     for index in solver.graph.edges_of(node) {
         let edge = solver.graph.edges[index];
+        if edge.is_leg {
+            continue;
+        }
         if solver.seeker.owns(edge.controllable) {
             if solver.enabled(&edge).intersects(&free) {
                 taken.push(index as u32);
@@ -38,10 +47,27 @@ pub(super) fn decisions(
         let zones = spoiling.intersection_within(&free, patience);
         if !zones.is_empty() {
             acting.unite_within(&zones, patience);
-            let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
+            let action = Some(named(solver, &moves, &edge));
             decisions.push(new_decision(zones, action));
             taken.push(index as u32);
         }
+    }
+    if solver.seeker == Player::Environment {
+        for entry in solver.graph.chances.of(node) {
+            let spoiling = solver.spoiling_all(entry, patience);
+            let zones = spoiling.intersection_within(&free, patience);
+            if !zones.is_empty() {
+                acting.unite_within(&zones, patience);
+                let first = &solver.graph.edges[entry[0] as usize];
+                decisions.push(new_decision(zones, Some(named(solver, &moves, first))));
+                taken.extend(entry);
+            }
+        }
+    } else {
+        let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32, patience: &mut Patience<'_>| {
+            solver.spoiling(&solver.graph.edges[leg as usize], patience)
+        };
+        solver.pick_legs(node, (&free, 0), &mut picked, (legs, taken), patience)?;
     }
     let mut waiting = match solver.seeker {
         Player::Controller => {
@@ -54,7 +80,7 @@ pub(super) fn decisions(
         waiting.reduce_within(patience);
         decisions.push(new_decision(waiting, None));
     }
-    Ok((decisions, taken))
+    Ok(chosen)
 }
 
 pub(super) fn new_decision(zones: Federation, action: Option<Vec<Part>>) -> Decision {
@@ -179,6 +205,7 @@ pub(super) fn inner_states(
         states.push(StrategyState {
             words: inner.words,
             decisions,
+            legs: Vec::new(),
             is_goal: false,
         });
     }

@@ -7,6 +7,8 @@
 //!   kept everywhere, and time cannot pass in it, or (if waiting never helps the controller) the one move is the
 //!   controller's. Nothing of the inside is stored. The winning valuations of the inside follow from those of the end,
 //!   since nobody has a choice.
+//! * Where a move of the controller leads to a branch point, its edges are the *legs* of one entry ([`super::chance`]): the controller
+//!   chooses among entries only.
 //! * An edge leads to a node whose zone contains the zone that the moves reach.
 //! * In a graph of discrete states ([`Graph::of_discrete_states`]) there is one node for each discrete state, whose zone is all that its
 //!   invariants allow. Who wins from a valuation does not hang on how it is reached, so the answer is the same. There may be far
@@ -28,6 +30,7 @@ use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Federation, Zone, clocks};
 
 use super::account::table_bytes;
+use super::chance::Chances;
 use super::dead_ends::DeadEnds;
 pub use super::deadlines::Deadline;
 use super::programs::{ProgramId, ProgramStep, Programs};
@@ -106,6 +109,8 @@ pub struct Edge {
     pub controllable: bool,
     /// Whether it leads from every valuation of the source into the target.
     pub is_total: bool,
+    /// Whether it is one of several legs of an entry that the controller owns.
+    pub is_leg: bool,
 }
 
 /// What is to be reached and kept.
@@ -157,6 +162,7 @@ pub struct Graph<'s, 'a> {
     pub(super) entries: Vec<Zone>,
     pub(super) chains_delays: bool,
     pub(super) trails: Trails,
+    pub(super) chances: Chances,
     /// Whether there is one node for each discrete state.
     has_discrete_nodes: bool,
     pub(super) dead_ends: DeadEnds,
@@ -245,6 +251,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             entries: Vec::new(),
             chains_delays: objective.must_progress && !network.features.stopwatches,
             trails: Trails::new(symbolic.is_fixed(), &objective),
+            chances: Chances::new(network),
             has_discrete_nodes: false,
             dead_ends: if objective.leaves_dead_ends {
                 DeadEnds::new(network, &objective)
@@ -314,6 +321,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             + self.zones.bytes()
             + self.programs.bytes()
             + self.trails.bytes()
+            + self.chances.bytes()
             + self.symbolic.bytes()
             + nodes
             + size_of_val(&*self.edges)
@@ -506,6 +514,8 @@ impl<'s, 'a> Graph<'s, 'a> {
             self.target = target;
             result?;
         }
+        self.chances
+            .find(node, (&mut self.edges, first as usize), moves);
         let node = &mut self.nodes[node as usize];
         node.edges = (first, self.edges.len() as u32);
         node.delays = delays;
@@ -734,6 +744,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             length: length as u8,
             controllable,
             is_total,
+            is_leg: false,
         });
     }
 }

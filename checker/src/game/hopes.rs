@@ -84,6 +84,7 @@ impl Solver<'_, '_, '_> {
         edges.any(|edge| {
             let is_own = self.seeker.owns(edge.controllable);
             edge.is_total
+                && !edge.is_leg
                 && (is_own && self.seeker == Player::Environment && self.forced == Forced::Neutral
                     || !is_own && !has_hope[edge.target as usize])
         })

@@ -1,10 +1,12 @@
 //! Timed games: on-the-fly solving, strategies and plans.
 //!
 //! The controller owns a move if all participating edges are controllable; all other moves are the environment's. The
-//! environment is faster: where both can move at the same instant, it may.
+//! environment is faster: where both can move at the same instant, it may. It also picks the leg behind a branch point, whoever owns the
+//! edge that leads there.
 
 mod account;
 pub mod allowance;
+mod chance;
 mod choices;
 pub mod closed_loop;
 pub mod cooperation;

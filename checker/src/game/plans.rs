@@ -181,6 +181,6 @@ fn has_opponent_choice(solver: &Solver<'_, '_, '_>, node: u32) -> bool {
     let count = range.len();
     let has_opponent = range
         .into_iter()
-        .any(|edge| !solver.graph.edges[edge].controllable);
+        .any(|edge| !solver.graph.edges[edge].controllable || solver.graph.edges[edge].is_leg);
     has_opponent && (count > 1 || solver.graph.nodes[node as usize].delays)
 }

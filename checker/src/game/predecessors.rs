@@ -93,6 +93,9 @@ impl Solver<'_, '_, '_> {
         let mut bad = self.broken(node);
         for index in self.graph.edges_of(node) {
             let edge = self.graph.edges[index];
+            if edge.is_leg {
+                continue;
+            }
             if edge.controllable {
                 let before = self.before(&edge, &self.win[edge.target as usize]);
                 good.unite_within(&before, patience);
@@ -100,6 +103,10 @@ impl Solver<'_, '_, '_> {
                 let spoiling = self.spoiling(&edge, patience);
                 bad.unite_within(&spoiling, patience);
             }
+        }
+        for legs in self.graph.chances.of(node) {
+            let legs = self.targets_of(legs, &self.win);
+            good.unite_within(&self.before_all(legs, patience), patience);
         }
         bad.subtract_within(&goal, patience);
         let forced = self.forced_environment(node, &bad, situation, patience);
@@ -122,7 +129,7 @@ impl Solver<'_, '_, '_> {
         let mut escape = Federation::empty(self.graph.dimension());
         for index in self.graph.edges_of(node) {
             let edge = self.graph.edges[index];
-            if held.contains(&index) {
+            if edge.is_leg || held.contains(&index) {
                 continue;
             }
             if edge.controllable {
@@ -132,6 +139,9 @@ impl Solver<'_, '_, '_> {
                 let before = self.before(&edge, &self.win[edge.target as usize]);
                 now.unite_within(&before, patience);
             }
+        }
+        for legs in self.graph.chances.of(node) {
+            escape.unite_within(&self.spoiling_all(legs, patience), patience);
         }
         now.subtract_within(&goal, patience);
         let mut good = self.forced_controller(node, situation, patience);

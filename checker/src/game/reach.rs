@@ -7,7 +7,7 @@
 //! node from which the seeker wins are computed anew when those of a successor have grown. For the controller as the seeker:
 //!
 //! ```text
-//! good   = goal ∪ ⋃ Pre_c(win)                     what the controller can reach by a move
+//! good   = goal ∪ ⋃ Pre_c(win)                     what the controller can reach by a move, whichever leg of it is picked
 //! bad    = ⋃ Pre_u(not win) ∪ broken, less goal    what the environment can spoil
 //! forced = stop ∩ ⋃ enabled_u, less bad and less where the controller could move (see Forced)
 //! win    = Pred_t(good ∪ forced, bad)              wait into good without meeting bad
@@ -17,7 +17,7 @@
 //!
 //! ```text
 //! now    = broken ∪ ⋃ Pre_u(win), less goal        what the environment has at once, whatever the controller does
-//! escape = ⋃ Pre_c(not win), less now              where the controller gets away
+//! escape = ⋃ Pre_c(not win), less now              where the controller gets away, whichever leg is picked
 //! held   = stop ∩ ⋃ enabled_c, less escape and less where the environment must move (see Forced)
 //! win    = Pred_t(now ∪ held, escape ∪ goal)
 //! ```
@@ -562,7 +562,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             let is_own = self.seeker.owns(edge.controllable);
             match (&self.win[edge.target as usize], is_own) {
                 (Win::Part(_), _) => return None,
-                (Win::Everything, true) => can_move |= edge.is_total,
+                (Win::Everything, true) => can_move |= edge.is_total && !edge.is_leg,
                 (Win::Nothing, true) => {}
                 (Win::Everything, false) if edge.length > 1 && !edge.is_total => return None,
                 (Win::Everything, false) => has_evader = true,
@@ -586,6 +586,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         if !is_open {
             return None;
         }
+        can_move |= self.wins_by_an_entry(node);
         if can_move && (!is_spoiled || self.seeker == Player::Environment) {
             return Some(true);
         }

@@ -216,12 +216,19 @@ pub(super) fn leave(
     for index in solver.graph.edges_of(node) {
         let edge = solver.graph.edges[index];
         let kept = &kept[edge.target as usize];
+        if edge.is_leg {
+            continue;
+        }
         if edge.controllable {
             back.unite_within(&solver.before(&edge, kept), patience);
         } else {
             let missing = solver.missing(&edge, (kept, None), patience);
             out.unite_within(&missing, patience);
         }
+    }
+    for legs in solver.graph.chances.of(node) {
+        let legs = solver.targets_of(legs, kept);
+        back.unite_within(&solver.before_all(legs, patience), patience);
     }
     back.subtract_within(&out, patience);
     let situation = solver.situation(node)?;

@@ -153,7 +153,14 @@ impl Solver<'_, '_, '_> {
             let is_held = self.defences.holds(index);
             let is_won = matches!(self.win[edge.target as usize], Win::Everything);
             let is_one = edge.length == 1;
-            let flags = [edge.controllable, edge.is_total, is_one, is_won, is_held];
+            let flags = [
+                edge.controllable,
+                edge.is_total,
+                is_one,
+                is_won,
+                is_held,
+                edge.is_leg,
+            ];
             let flags = flags.iter().fold(1, |all, one| all * 2 + u32::from(*one));
             let target = self.graph.nodes[edge.target as usize].zone;
             key.extend([edge.program.0, target.0, flags]);

@@ -1,8 +1,9 @@
 //! Strategies: what a player does, state by state.
 //!
 //! A strategy lists, for each discrete state that play under it can reach, decisions. A decision is a move of its owner, or to
-//! wait: let time pass as long as the zones of the decision go, and leave moving to the opponent. States inside chains of forced
-//! moves are listed too, so that a strategy can be followed, and checked, move by move. Where play has ended there is nothing to
+//! wait: let time pass as long as the zones of the decision go, and leave moving to the opponent. A decision of the controller names the
+//! edges that it takes, and the environment picks the legs of branch points behind them: a strategy of the environment lists which. States
+//! inside chains of forced moves are listed too, so that a strategy can be followed, and checked, move by move. Where play has ended there is nothing to
 //! decide.
 //!
 //! There are six kinds, by who wins and how:
@@ -29,6 +30,7 @@ use crate::zones::federation::block_bytes;
 use crate::zones::{ClockSet, Federation, Patience};
 
 use super::Player;
+use super::chance::entry_of;
 use super::evasion;
 use super::graph::{Edge, Standing};
 use super::reach::{Gain, Solver, Win};
@@ -38,7 +40,7 @@ use super::reach::{Gain, Solver, Win};
 pub struct Decision {
     /// Where it applies.
     pub zones: Federation,
-    /// The move to take; `None` is to wait.
+    /// The move to take, where its owner is the controller with whichever branches; `None` is to wait.
     pub action: Option<Vec<Part>>,
     /// The rank of the valuations: all moves lead to smaller ones, also inside chains. 0 is where what was sought is reached, and
     /// everywhere in a strategy that only has to avoid.
@@ -52,6 +54,9 @@ pub struct StrategyState {
     pub words: Vec<i32>,
     /// The decisions, in order.
     pub decisions: Vec<Decision>,
+    /// If the owner is the environment: the legs that it picks, as moves of the controller. Of those with the same entry the first
+    /// that applies is picked.
+    pub legs: Vec<Decision>,
     /// Whether play has ended here, won, whatever the clocks say.
     pub is_goal: bool,
 }
@@ -59,14 +64,15 @@ pub struct StrategyState {
 impl StrategyState {
     /// The bytes that it takes.
     fn bytes(&self) -> u64 {
-        let decisions = self.decisions.iter().map(|decision| {
+        let decisions = self.decisions.iter().chain(&self.legs).map(|decision| {
             let action = decision.action.as_ref();
             let parts = action.map_or(0, |parts| block_bytes(size_of_val(&**parts)));
             decision.zones.heap_bytes() + parts
         });
         let own = size_of::<StrategyState>()
             + block_bytes(size_of_val(&*self.words))
-            + block_bytes(self.decisions.capacity() * size_of::<Decision>());
+            + block_bytes(self.decisions.capacity() * size_of::<Decision>())
+            + block_bytes(self.legs.capacity() * size_of::<Decision>());
         (own + decisions.sum::<usize>()) as u64
     }
 }
@@ -192,16 +198,21 @@ fn extract_within(
         let known = strategy.states.len();
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);
-        let (decisions, taken) = if is_seeking {
-            decisions(solver, node, patience)?
+        let Choices {
+            decisions,
+            legs,
+            taken,
+        } = if is_seeking {
+            choices(solver, node, patience)?
         } else {
-            evasion::decisions(solver, node, patience)?
+            evasion::choices(solver, node, patience)?
         };
         let standing = solver.graph.nodes[node as usize].standing;
         let source = words.clone();
         strategy.states.push(StrategyState {
             words,
             decisions,
+            legs,
             is_goal: standing == won_standing(owner)
                 && solver.targets.is_none()
                 && !hangs_on_time(solver, owner),
@@ -243,13 +254,16 @@ pub(super) fn keep(
 fn rank_chains(strategy: &mut Strategy, steps_to_end: &[u32]) {
     let states = strategy.states.iter().zip(steps_to_end);
     let mut ranks: Vec<(u32, u32)> = states
-        .flat_map(|(state, &steps)| state.decisions.iter().map(move |one| (one.rank, steps)))
+        .flat_map(|(state, &steps)| {
+            let decisions = state.decisions.iter().chain(&state.legs);
+            decisions.map(move |one| (one.rank, steps))
+        })
         .chain([(0, 0)])
         .collect();
     ranks.sort_unstable();
     ranks.dedup();
     for (state, &steps) in strategy.states.iter_mut().zip(steps_to_end) {
-        for decision in &mut state.decisions {
+        for decision in state.decisions.iter_mut().chain(&mut state.legs) {
             let rank = ranks.partition_point(|&rank| rank < (decision.rank, steps));
             decision.rank = rank as u32;
         }
@@ -269,47 +283,74 @@ fn won_standing(owner: Player) -> Standing {
     }
 }
 
-/// The decisions in a node, and the edges that play may take from it.
-fn decisions(
+/// What is chosen in a node.
+#[derive(Default)]
+pub(super) struct Choices {
+    pub(super) decisions: Vec<Decision>,
+    /// See [`StrategyState::legs`].
+    pub(super) legs: Vec<Decision>,
+    /// The edges that play may take from it.
+    pub(super) taken: Vec<u32>,
+}
+
+/// What the seeker chooses in a node.
+fn choices(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
     patience: &mut Patience<'_>,
-) -> Result<(Vec<Decision>, Vec<u32>), Failure> {
-    let mut decisions = Vec::new();
-    let mut taken = Vec::new();
+) -> Result<Choices, Failure> {
+    let mut chosen = Choices::default();
     let is_over = solver.graph.nodes[node as usize].standing == won_standing(solver.seeker);
     let is_ever_over = solver.targets.is_none() && !hangs_on_time(solver, solver.seeker);
     if is_over && is_ever_over {
-        return Ok((decisions, taken));
+        return Ok(chosen);
     }
+    let Choices {
+        decisions,
+        legs,
+        taken,
+    } = &mut chosen;
     let moves = moves_of(solver, node)?;
     for gain in solver.gains[node as usize].clone() {
         let mut rest = whole_or_part(solver, node, gain.part.as_ref());
         // Where what is sought is to come again and again, play goes on from there into anything that is won.
         let goes_on = solver.targets.is_some();
+        let earlier = |solver: &Solver<'_, '_, '_>, edge: u32, patience: &mut Patience<'_>| {
+            let target = solver.graph.edges[edge as usize].target;
+            if gain.stamp > 0 {
+                won_before(solver, target, gain.stamp, patience)
+            } else {
+                solver.win[target as usize].clone()
+            }
+        };
         if gain.stamp > 0 || goes_on {
-            for edge in solver.graph.edges_of(node) {
-                let edge_data = solver.graph.edges[edge];
-                if !solver.seeker.owns(edge_data.controllable) {
-                    continue;
-                }
-                let earlier = if gain.stamp > 0 {
-                    won_before(solver, edge_data.target, gain.stamp, patience)
-                } else {
-                    solver.win[edge_data.target as usize].clone()
+            for edges in own_choices(solver, node) {
+                let first = solver.graph.edges[edges[0] as usize];
+                let wins = edges.iter().map(|&edge| earlier(solver, edge, patience));
+                let wins: Vec<Win> = wins.collect();
+                let zones = match &wins[..] {
+                    [win] => solver.before(&first, win),
+                    wins => solver.before_all(edges.iter().copied().zip(wins), patience),
                 };
-                let mut zones = solver.before(&edge_data, &earlier);
-                zones = zones.intersection_within(&rest, patience);
+                let zones = zones.intersection_within(&rest, patience);
                 if !zones.is_empty() {
                     rest.subtract_within(&zones, patience);
-                    let action = Some(moves.get(edge_data.ordinal as usize).parts.to_vec());
                     decisions.push(Decision {
                         zones,
-                        action,
+                        action: Some(named(solver, &moves, &first)),
                         rank: gain.stamp,
                     });
-                    taken.push(edge as u32);
+                    taken.extend(edges);
                 }
+            }
+            if solver.seeker == Player::Environment {
+                let whole = whole_or_part(solver, node, gain.part.as_ref());
+                let mut picked =
+                    |solver: &Solver<'_, '_, '_>, leg: u32, patience: &mut Patience<'_>| {
+                        solver.won_by_leg(leg, &earlier(solver, leg, patience))
+                    };
+                let chosen = (&mut *legs, &mut *taken);
+                solver.pick_legs(node, (&whole, gain.stamp), &mut picked, chosen, patience)?;
             }
         }
         if !rest.is_empty() {
@@ -320,12 +361,36 @@ fn decisions(
             });
         }
     }
-    let opponent = solver
-        .graph
-        .edges_of(node)
-        .filter(|&edge| !solver.seeker.owns(solver.graph.edges[edge].controllable));
+    let opponent = solver.graph.edges_of(node).filter(|&edge| {
+        let edge = &solver.graph.edges[edge];
+        !edge.is_leg && !solver.seeker.owns(edge.controllable)
+    });
     taken.extend(opponent.map(|edge| edge as u32));
-    Ok((decisions, taken))
+    Ok(chosen)
+}
+
+/// What the seeker can choose in a node: edges, each alone unless they are the legs of an entry.
+fn own_choices(solver: &Solver<'_, '_, '_>, node: u32) -> Vec<Vec<u32>> {
+    let edges = solver.graph.edges_of(node).filter(|&edge| {
+        let edge = &solver.graph.edges[edge];
+        !edge.is_leg && solver.seeker.owns(edge.controllable)
+    });
+    let mut choices: Vec<Vec<u32>> = edges.map(|edge| vec![edge as u32]).collect();
+    if solver.seeker == Player::Controller {
+        choices.extend_from_slice(solver.graph.chances.of(node));
+        choices.sort_unstable();
+    }
+    choices
+}
+
+/// How a strategy names the first move of an edge, of a node with these moves, if the player who owns the move takes it.
+pub(super) fn named(solver: &Solver<'_, '_, '_>, moves: &Moves, edge: &Edge) -> Vec<Part> {
+    let parts = moves.get(edge.ordinal as usize).parts;
+    if solver.graph.chances.is_possible() && edge.controllable {
+        entry_of(parts)
+    } else {
+        parts.to_vec()
+    }
 }
 
 pub(super) fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Moves, Failure> {
@@ -429,6 +494,7 @@ fn inner_states(
         strategy.states.push(StrategyState {
             words: inner.words,
             decisions,
+            legs: Vec::new(),
             is_goal: false,
         });
     }

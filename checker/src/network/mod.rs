@@ -46,7 +46,7 @@ pub use bounds::{Abstraction, ClockBounds};
 pub use failure::Failure;
 pub use fixed::FixedMove;
 pub use live::LiveVariables;
-pub use moves::{MoveRef, Moves, Part};
+pub use moves::{MoveRef, Moves, Part, is_same_entry};
 pub use offers::{OfferId, VectorId};
 pub use orbits::Obstacle;
 pub use predicate::Extent;

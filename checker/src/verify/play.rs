@@ -10,7 +10,7 @@ use crate::ir::{Network, Predicate};
 
 use super::concrete::{Error, Part, Semantics, State};
 use super::moments::{Moments, Stretch};
-use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules};
+use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules, is_same_entry};
 use super::timed::Timed;
 
 /// What a strategy does in a state, as long as nothing else happens.
@@ -94,7 +94,8 @@ fn soon(stretch: &Stretch) -> i64 {
 
 /// The constants that tell the decisions for some words apart.
 fn constants_of(network: &Network, decisions: &Decisions) -> Moments {
-    let zones = decisions.decisions.iter().flat_map(|one| &one.zones);
+    let decisions = decisions.decisions.iter().chain(&decisions.legs);
+    let zones = decisions.flat_map(|one| &one.zones);
     let constraints: Vec<_> = zones.flatten().collect();
     let constants = constraints.iter().flat_map(|one| {
         let bound = i64::from(one.bound);
@@ -183,7 +184,12 @@ pub enum Gap {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Next {
     /// The strategy acts.
-    Acts(Vec<Part>),
+    Acts {
+        /// What it says.
+        action: Vec<Part>,
+        /// The moves that this may be: several if the opponent picks among branches. These are replies too then.
+        legs: Vec<Vec<Part>>,
+    },
     /// Play is over, and this player has won.
     Won(Owner, Ending),
     /// The opponent has to move before.
@@ -329,11 +335,25 @@ impl View<'_> {
             self.situation.next = match action {
                 None => Next::Fails(Gap::NoDecision),
                 Some(action) => {
-                    let mut own = possible.iter().filter(|(one, _)| self.rules.is_own(one));
-                    if own.any(|(one, _)| one.parts == *action) {
-                        Next::Acts(action.clone())
-                    } else {
+                    let meant = self.rules.meant(action, &possible).into_iter();
+                    let legs: Vec<Vec<Part>> = meant.map(|(one, _)| one.parts.clone()).collect();
+                    if legs.is_empty() {
                         Next::Fails(Gap::ImpossibleAction)
+                    } else {
+                        if legs.len() > 1 {
+                            let at_moment = Window {
+                                first: moment,
+                                is_first_open: false,
+                                ..window
+                            };
+                            for leg in &legs {
+                                add(&mut self.situation.replies, leg, at_moment);
+                            }
+                        }
+                        Next::Acts {
+                            action: action.clone(),
+                            legs,
+                        }
                     }
                 }
             };
@@ -342,18 +362,27 @@ impl View<'_> {
             let actions = decisions.iter().filter_map(|one| one.action.as_ref());
             let actions: Vec<&Vec<Part>> = actions.collect();
             for (index, action) in actions.iter().enumerate() {
-                let is_new = !actions[..index].contains(action);
-                if is_new && possible.iter().any(|(one, _)| one.parts == **action) {
-                    add(&mut self.situation.allowed, action, window);
+                let mut before = actions[..index].iter();
+                if before.all(|one| !is_same_entry(one, action)) {
+                    for (one, _) in self.rules.meant(action, &possible) {
+                        add(&mut self.situation.allowed, &one.parts, window);
+                    }
                 }
             }
         }
         // Where the environment acts the controller comes too late.
         let is_late = !waits && action.is_some() && self.rules.claim.owner == Owner::Environment;
         if !is_late {
-            let others = possible.iter().filter(|(one, _)| !self.rules.is_own(one));
-            for (one, _) in others {
-                add(&mut self.situation.replies, &one.parts, window);
+            match self.rules.others(&here.now, &possible) {
+                Some(others) => {
+                    for (one, _) in others {
+                        add(&mut self.situation.replies, &one.parts, window);
+                    }
+                }
+                None => {
+                    self.situation.next = Next::Fails(Gap::ImpossibleAction);
+                    return Ok(true);
+                }
             }
         }
         Ok(!waits)

@@ -23,8 +23,29 @@ pub struct Constraint {
 pub struct Decision {
     /// Where it applies: in one of these conjunctions.
     pub zones: Vec<Vec<Constraint>>,
-    /// The move to take; `None` is to wait.
+    /// The move to take; `None` is to wait. Of one of the controller only the edges and their `select` values count: the environment picks
+    /// the branches.
     pub action: Option<Vec<Part>>,
+}
+
+impl Decision {
+    /// Whether its zones contain clock values in ticks.
+    fn applies(&self, clocks: &[i64], ticks_per_unit: i64) -> bool {
+        let holds = |one: &Constraint| {
+            let difference = clocks[one.left] - clocks[one.right];
+            let bound = i64::from(one.bound) * ticks_per_unit;
+            difference < bound || (!one.strict && difference == bound)
+        };
+        self.zones.iter().any(|zone| zone.iter().all(holds))
+    }
+}
+
+/// Whether two moves take the same edges with the same `select` values, so that they differ in branches only.
+pub(super) fn is_same_entry(one: &[Part], other: &[Part]) -> bool {
+    let is_same = |(one, other): (&Part, &Part)| {
+        (one.process, one.edge, one.select) == (other.process, other.edge, other.select)
+    };
+    one.len() == other.len() && one.iter().zip(other).all(is_same)
 }
 
 /// The decisions of the states with some words, in order: the first whose zones contain the clock values applies.
@@ -34,6 +55,9 @@ pub struct Decisions {
     pub words: Vec<i32>,
     /// The decisions.
     pub decisions: Vec<Decision>,
+    /// The moves of the controller whose branches the environment picks, if the strategy is its: of those with the same edges and `select`
+    /// values the first that applies. Without one it picks any.
+    pub legs: Vec<Decision>,
 }
 
 impl Decisions {
@@ -44,15 +68,8 @@ impl Decisions {
         ticks_per_unit: i64,
         is_permissive: bool,
     ) -> Vec<usize> {
-        let holds = |one: &Constraint| {
-            let difference = clocks[one.left] - clocks[one.right];
-            let bound = i64::from(one.bound) * ticks_per_unit;
-            difference < bound || (!one.strict && difference == bound)
-        };
-        let applies =
-            |decision: &Decision| decision.zones.iter().any(|zone| zone.iter().all(holds));
         let decisions = self.decisions.iter().enumerate();
-        let applying = decisions.filter(|(_, decision)| applies(decision));
+        let applying = decisions.filter(|(_, decision)| decision.applies(clocks, ticks_per_unit));
         let most = if is_permissive { usize::MAX } else { 1 };
         applying.map(|(index, _)| index).take(most).collect()
     }
@@ -200,7 +217,8 @@ impl<'a> Rules<'a> {
             let is_allowed = |one: &Move| {
                 allowed
                     .iter()
-                    .any(|decision| decision.action.as_ref() == Some(&one.parts))
+                    .filter_map(|decision| decision.action.as_ref())
+                    .any(|action| is_same_entry(action, &one.parts))
             };
             possible.retain(|(one, _)| !one.controllable || is_allowed(one));
         }
@@ -235,6 +253,58 @@ impl<'a> Rules<'a> {
     /// Whether the owner of the strategy makes the move.
     pub(super) fn is_own(&self, one: &Move) -> bool {
         one.controllable == (self.claim.owner == Owner::Controller)
+    }
+
+    /// The possible moves that an action of the owner stands for: of the controller's all with the same edges, since the environment picks
+    /// the branches.
+    pub(super) fn meant<'m, 'p>(
+        &self,
+        action: &[Part],
+        possible: &'p [(&'m Move, State)],
+    ) -> Vec<&'p (&'m Move, State)> {
+        let is_meant = |one: &Move| match self.claim.owner {
+            Owner::Controller => is_same_entry(action, &one.parts),
+            Owner::Environment => action == one.parts,
+        };
+        let own = possible.iter().filter(|(one, _)| self.is_own(one));
+        own.filter(|(one, _)| is_meant(one)).collect()
+    }
+
+    /// The possible moves of the opponent, where the owner picks their branches those that it picks; `None` if it picks one that is
+    /// not possible.
+    pub(super) fn others<'m, 'p>(
+        &self,
+        state: &State,
+        possible: &'p [(&'m Move, State)],
+    ) -> Option<Vec<&'p (&'m Move, State)>> {
+        let others = possible.iter().filter(|(one, _)| !self.is_own(one));
+        let others: Vec<_> = others.collect();
+        let legs = self
+            .decisions_of(state)
+            .map_or(&[][..], |decisions| &decisions.legs);
+        if legs.is_empty() || self.claim.owner == Owner::Controller {
+            return Some(others);
+        }
+        let unit = self.semantics.ticks_per_unit();
+        let picked = |one: &Move| {
+            let mut legs = legs.iter().filter_map(|leg| {
+                let action = leg.action.as_ref()?;
+                let is_meant =
+                    is_same_entry(action, &one.parts) && leg.applies(&state.clocks, unit);
+                is_meant.then_some(action)
+            });
+            legs.next()
+        };
+        let mut left = Vec::new();
+        for other in &others {
+            match picked(other.0) {
+                None => left.push(*other),
+                Some(leg) if *leg == other.0.parts => left.push(*other),
+                Some(leg) if others.iter().any(|(one, _)| one.parts == *leg) => {}
+                Some(_) => return None,
+            }
+        }
+        Some(left)
     }
 
     /// Whether the owner may wait in a state in which time cannot pass.

@@ -5,13 +5,14 @@
 //! next region. Where the controller acts, the environment may still be first; where the environment acts, it is first. A strategy
 //! of the controller is right if
 //! * every region that is met before the goal satisfies what must be kept and has a decision;
-//! * every action is one of the moves of the state, is the controller's, and its target satisfies the invariants;
+//! * every action is one of the moves of the state, is the controller's, and its target satisfies the invariants; whichever branches of
+//!   its edges the environment picks, play goes on right;
 //! * where it waits and time cannot pass, the environment has a move and must take it (see [`Forcing`]); if it has only to keep
 //!   something, play may also stop there, if the controller has no move;
 //! * if it has to reach the goal, no play goes on for ever without: the graph up to the goals has no cycle, not even a region
 //!   without end; if the goal is to recur, the same from each goal on.
 //!
-//! One of the environment is right if no play meets the goal before what must be kept is broken, every decision is there and
+//! One of the environment, which may say which branches of the controller's edges it picks, is right if no play meets the goal before what must be kept is broken, every decision is there and
 //! possible, and
 //! * against a controller that has to reach the goal, it never waits where it must move;
 //! * against one that has to keep something, every play ends in a region in which that is broken;
@@ -124,7 +125,7 @@ pub fn verify(
 ) -> Result<Outcome, Error> {
     let under = claim.under.map_or(&[][..], |(under, _)| under);
     let all = strategy.iter().chain(under);
-    let all = all.flat_map(|state| &state.decisions);
+    let all = all.flat_map(|state| state.decisions.iter().chain(&state.legs));
     let zones = all.flat_map(|decision| decision.zones.iter().flatten());
     let constants = zones.clone().map(|one| i64::from(one.bound).abs());
     let constant = constants.max().unwrap_or(0).max(claim.constant);
@@ -424,20 +425,24 @@ impl Play<'_> {
         if decisions.is_empty() {
             return Ok(Err(Defect::NoDecision));
         }
-        let is_own = |one: &Move| self.rules.is_own(one);
         let mut successors: Vec<(Step, State)> = Vec::new();
         let mut acts_first = false;
         for action in decisions.iter().filter_map(|one| one.action.as_ref()) {
-            let mut own = possible.iter().filter(|(one, _)| is_own(one));
-            let Some((one, target)) = own.find(|(one, _)| one.parts == *action) else {
+            let meant = self.rules.meant(action, &possible);
+            if meant.is_empty() {
                 return Ok(Err(Defect::ImpossibleAction));
-            };
+            }
             self.coverage.own_moves += 1;
             acts_first = self.rules.claim.owner == Owner::Environment;
-            successors.push((Step::Move((*one).clone()), target.clone()));
+            let legs = meant.into_iter();
+            successors
+                .extend(legs.map(|(one, target)| (Step::Move((*one).clone()), target.clone())));
         }
         if !acts_first {
-            let others = possible.iter().filter(|(one, _)| !is_own(one));
+            let Some(others) = self.rules.others(state, &possible) else {
+                return Ok(Err(Defect::ImpossibleAction));
+            };
+            let others = others.into_iter();
             let others = others.map(|(one, target)| (Step::Move((*one).clone()), target.clone()));
             let before = successors.len();
             successors.extend(others);

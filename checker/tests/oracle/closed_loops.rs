@@ -107,15 +107,46 @@ impl Random {
             strategy.states.push(StrategyState {
                 words: words.clone(),
                 decisions: decisions.collect(),
+                legs: Vec::new(),
                 is_goal: self.chance(5),
             });
         }
         strategy
     }
+
+    /// Legs of the moves of the controller, for some states of a strategy of the environment.
+    fn pick_legs(
+        &mut self,
+        strategy: &mut Strategy,
+        words: &[(Vec<i32>, Vec<Vec<Part>>)],
+        dimension: usize,
+    ) {
+        for state in &mut strategy.states {
+            let moves = words.iter().find(|one| one.0 == state.words);
+            let Some((_, moves)) = moves.filter(|one| !one.1.is_empty()) else {
+                continue;
+            };
+            let legs = (0..self.below(4)).map(|rank| Decision {
+                zones: self.zones(dimension),
+                action: Some(moves[self.below(moves.len())].clone()),
+                rank: rank as u32,
+            });
+            state.legs = legs.collect();
+        }
+    }
 }
 
-/// What the strategy says in a state: the decisions that count; `None` is nothing, so that everything is allowed.
-pub(crate) struct Said<'s>(Option<Vec<Counting<'s>>>);
+/// The edges of a move, with their select values.
+fn entry(parts: &[Part]) -> Vec<(u32, u32, u32)> {
+    let parts = parts.iter();
+    parts
+        .map(|part| (part.process, part.edge, part.select))
+        .collect()
+}
+
+/// What the strategy says in a state: the decisions that count; `None` is nothing, so that everything is allowed. Then whose strategy it
+/// is, and the legs that apply, in order.
+pub(crate) struct Said<'s>(Option<Vec<Counting<'s>>>, Player, Vec<&'s [Part]>);
 
 /// A decision by its index, with what it does.
 type Counting<'s> = (usize, &'s Option<Vec<Part>>);
@@ -124,8 +155,11 @@ impl<'s> Said<'s> {
     pub(crate) fn new(strategy: &'s Strategy, state: &State, ticks: i64) -> Said<'s> {
         let same = |one: &&StrategyState| one.words == state.words;
         let Some(known) = strategy.states.iter().find(same).filter(|one| !one.is_goal) else {
-            return Said(None);
+            return Said(None, strategy.owner, Vec::new());
         };
+        let legs = known.legs.iter();
+        let legs = legs.filter(|one| one.zones.contains(&state.clocks, ticks));
+        let legs = legs.filter_map(|one| one.action.as_deref()).collect();
         let decisions = known.decisions.iter().enumerate();
         let counting = decisions.filter(|one| one.1.zones.contains(&state.clocks, ticks));
         let counting = counting.map(|(index, one)| (index, &one.action));
@@ -133,7 +167,8 @@ impl<'s> Said<'s> {
             Selection::First => counting.take(1).collect(),
             Selection::Any => counting.collect(),
         };
-        Said((!counting.is_empty()).then_some(counting))
+        let counting = (!counting.is_empty()).then_some(counting);
+        Said(counting, strategy.owner, legs)
     }
 
     pub(crate) fn allows_waiting(&self) -> bool {
@@ -143,7 +178,18 @@ impl<'s> Said<'s> {
 
     pub(crate) fn allows(&self, parts: &[Part]) -> bool {
         let mut counting = self.0.iter().flatten();
-        self.0.is_none() || counting.any(|one| one.1.as_deref() == Some(parts))
+        let is_it = |action: &[Part]| match self.1 {
+            Player::Controller => entry(action) == entry(parts),
+            Player::Environment => action == parts,
+        };
+        self.0.is_none() || counting.any(|one| one.1.as_deref().is_some_and(is_it))
+    }
+
+    /// Whether a move of the other player is the one that is picked of those with the same edges.
+    fn picks(&self, parts: &[Part]) -> bool {
+        let mut legs = self.2.iter();
+        legs.find(|leg| entry(leg) == entry(parts))
+            .is_none_or(|leg| *leg == parts)
     }
 
     /// The decisions that act.
@@ -221,7 +267,12 @@ fn close(semantics: &Semantics<'_>, regions: &Regions, strategy: &Strategy) -> O
         let mut steps = Vec::new();
         for one in &moves {
             let parts: Vec<Part> = one.parts.iter().map(|&part| part.into()).collect();
-            if strategy.owner.owns(one.controllable) && !now.allows(&parts) {
+            let is_allowed = if strategy.owner.owns(one.controllable) {
+                now.allows(&parts)
+            } else {
+                now.picks(&parts)
+            };
+            if !is_allowed {
                 continue;
             }
             if let Some(mut target) = semantics.take(&state, &one.parts).ok()? {
@@ -374,7 +425,11 @@ fn compare(
         Player::Environment
     };
     let words = own_moves(&semantics, &graph, owner);
-    let strategy = random.strategy(owner, &words, dimension);
+    let mut strategy = random.strategy(owner, &words, dimension);
+    if owner == Player::Environment {
+        let others = own_moves(&semantics, &graph, Player::Controller);
+        random.pick_legs(&mut strategy, &others, dimension);
+    }
     let regions = Regions::new(&ir, i64::from(SHAPE.constant), true);
     let regions = regions.expect("the networks have no stopwatches");
     let Some(closed) = close(&semantics, &regions, &strategy) else {

@@ -1,6 +1,6 @@
 //! The graph of regions of a network, and games on it by fixpoints.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use checker::verify::{Error, Part, Regions, Semantics, State};
 
@@ -17,6 +17,19 @@ impl Step {
     fn takes_part(&self, process: u32) -> bool {
         self.parts.iter().any(|part| part.process == process)
     }
+
+    /// The edges that it takes, without the branches: the controller chooses among these only.
+    pub(crate) fn entry(&self) -> Vec<(u32, u32, u32)> {
+        entry(&self.parts)
+    }
+}
+
+/// The edges of a move, with their select values.
+pub(crate) fn entry(parts: &[Part]) -> Vec<(u32, u32, u32)> {
+    let parts = parts.iter();
+    parts
+        .map(|part| (part.process, part.edge, part.select))
+        .collect()
 }
 
 /// What tells controllable moves apart under partial observation: the channel, else the edge with its select values.
@@ -252,10 +265,16 @@ fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule
     if others.iter().any(|step| !win[step.target]) {
         return false;
     }
-    if node.is_obliged {
-        return own.iter().any(|step| win[step.target]);
+    // The environment picks the branch.
+    let mut entries: BTreeMap<Vec<(u32, u32, u32)>, bool> = BTreeMap::new();
+    for step in &own {
+        *entries.entry(step.entry()).or_insert(true) &= win[step.target];
     }
-    if own.iter().any(|step| win[step.target]) || node.later.is_some_and(|later| win[later]) {
+    let wins_by_moving = entries.values().any(|wins| *wins);
+    if node.is_obliged {
+        return wins_by_moving;
+    }
+    if wins_by_moving || node.later.is_some_and(|later| win[later]) {
         return true;
     }
     if node.later.is_some() {

@@ -74,8 +74,8 @@ enum Invariant {
 pub(crate) struct Edge {
     source: usize,
     target: usize,
-    /// A second target behind a branch point.
-    branch: Option<usize>,
+    /// A second target behind a branch point, with the updates of that leg.
+    branch: Option<(usize, Vec<Update>)>,
     select: bool,
     sync: Sync,
     guards: Vec<Atom>,
@@ -329,7 +329,7 @@ fn edge(shape: Shape) -> impl Strategy<Value = Edge> {
     let owner = if shape.uncontrollable { 0.5 } else { 1.0 };
     (
         (any_index(), any_index()),
-        prop::option::weighted(0.05, any_index()),
+        prop::option::weighted(0.15, (any_index(), vec(update(shape), 0..=1))),
         prop::bool::weighted(0.1),
         sync(),
         vec(atom(shape), 0..=2),
@@ -502,10 +502,17 @@ impl Network {
             let source = format!("L{}", edge.source % count);
             let target = format!("L{}", edge.target % count);
             let labels = self.labels(edge);
-            if let Some(branch) = edge.branch {
+            if let Some((branch, updates)) = &edge.branch {
                 edges.push(format!("{source} {arrow} B{index} {{ {labels} }}"));
                 edges.push(format!("B{index} -> {target} {{ }}"));
-                edges.push(format!("B{index} -> L{} {{ }}", branch % count));
+                let updates = updates.iter().map(|update| self.update(update, false));
+                let updates: Vec<String> = updates.collect();
+                let label = if updates.is_empty() {
+                    String::new()
+                } else {
+                    format!("assign {}; ", updates.join(", "))
+                };
+                edges.push(format!("B{index} -> L{} {{ {label}}}", branch % count));
             } else {
                 edges.push(format!("{source} {arrow} {target} {{ {labels} }}"));
             }

@@ -44,6 +44,17 @@ process P() {
 system P;
 ";
 
+/// The controller throws, the environment says what falls. From Low there is a way on.
+const DIE: &str = "
+process P() {
+  state Hand, High, Low, Moved, Stolen;
+  branchpoint Falls;
+  init Hand;
+  trans Hand -> Falls { }, Falls -> High { }, Falls -> Low { }, Low -> Moved { }, Low -u-> Stolen { };
+}
+system P;
+";
+
 /// A game, with the strategy of its winner.
 struct Solved {
     model: LoadedModel,
@@ -71,13 +82,22 @@ fn solved(game: &str, query: &str) -> Solved {
 
 /// The defect of a strategy after `mutate`, which is given the decisions of a location.
 fn defect_of(
-    mut solved: Solved,
+    solved: Solved,
     location: i32,
     mutate: impl Fn(&mut Vec<Decision>),
 ) -> Option<Defect> {
+    defect_of_state(solved, location, |state| mutate(&mut state.decisions))
+}
+
+/// The defect of a strategy after `mutate`, which is given all that it says in a location.
+fn defect_of_state(
+    mut solved: Solved,
+    location: i32,
+    mutate: impl Fn(&mut Decisions),
+) -> Option<Defect> {
     let mut states = solved.decisions.iter_mut();
     let state = states.find(|state| state.words[0] == location);
-    mutate(&mut state.expect("play gets there").decisions);
+    mutate(state.expect("play gets there"));
     let played = Played::new(&solved.strategy, &solved.decisions);
     let verification = solved
         .model
@@ -117,6 +137,60 @@ fn acts(decisions: &mut [Decision]) -> &mut Decision {
     let mut decisions = decisions.iter_mut();
     let found = decisions.find(|decision| decision.action.is_some());
     found.expect("the strategy acts here")
+}
+
+#[test]
+fn every_leg_that_may_be_picked_is_followed() {
+    let solved = || solved(DIE, "control: A[] not P.Stolen");
+    assert_eq!(solved().strategy.owner, Player::Controller);
+    assert_eq!(defect_of(solved(), 0, |_| {}), None);
+    for branch in 0..2 {
+        let throws = |decisions: &mut Vec<Decision>| {
+            let entry = Part {
+                process: 0,
+                edge: 0,
+                branch,
+                select: 0,
+            };
+            decisions.clear();
+            everywhere(decisions, Some(vec![entry]));
+        };
+        // It says nothing of Low, whichever branch names the edge.
+        assert_eq!(defect_of(solved(), 0, throws), Some(Defect::NoDecision));
+    }
+}
+
+#[test]
+fn a_leg_that_loses_is_caught() {
+    let solved = || solved(DIE, "control: A<> P.High");
+    assert_eq!(solved().strategy.owner, Player::Environment);
+    assert_eq!(defect_of_state(solved(), 0, |_| {}), None);
+    let picks = |leg: u32| {
+        move |state: &mut Decisions| {
+            for one in &mut state.legs {
+                one.action.as_mut().expect("a leg is a move")[0].branch = leg;
+            }
+        }
+    };
+    assert_eq!(defect_of_state(solved(), 0, picks(1)), None);
+    assert_eq!(
+        defect_of_state(solved(), 0, picks(0)),
+        Some(Defect::GoalReached)
+    );
+    // Without a leg either may be picked.
+    assert_eq!(
+        defect_of_state(solved(), 0, |state| state.legs.clear()),
+        Some(Defect::GoalReached)
+    );
+    let impossible = |state: &mut Decisions| {
+        for one in &mut state.legs {
+            one.action.as_mut().expect("a leg is a move")[0].branch = 2;
+        }
+    };
+    assert_eq!(
+        defect_of_state(solved(), 0, impossible),
+        Some(Defect::ImpossibleAction)
+    );
 }
 
 #[test]

@@ -10,12 +10,12 @@ use checker::ir;
 use checker::syntax::ast::QueryText;
 use checker::verify::strategy::{Constraint, Decision, Decisions, Outcome};
 use checker::verify::timed::Timed;
-use checker::verify::{Effort, Regions, Semantics};
+use checker::verify::{Effort, Part, Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
 use crate::compare::{self, Tally};
-use crate::explicit::{Graph, Node, Rule, Step, is_forced};
+use crate::explicit::{Graph, Node, Rule, Step, entry, is_forced};
 use crate::games::{Kind, RULES, SHAPE, labels, seeded_games};
 use crate::generate::{Formula, Network};
 use crate::random::Random;
@@ -41,19 +41,36 @@ enum Said {
 }
 
 impl Closed<'_> {
-    fn applying(&self, node: &Node) -> Vec<&Decision> {
+    fn known(&self, node: &Node) -> Option<&Decisions> {
+        let mut known = self.decisions.iter();
+        known.find(|one| one.words == node.state.words)
+    }
+
+    fn applies(&self, node: &Node, decision: &Decision) -> bool {
         let ticks = self.graph.ticks;
         let holds = |one: &Constraint| {
             let difference = node.state.clocks[one.left] - node.state.clocks[one.right];
             let bound = i64::from(one.bound) * ticks;
             difference < bound || !one.strict && difference == bound
         };
-        let mut known = self.decisions.iter();
-        let known = known.find(|one| one.words == node.state.words);
-        let all = known.into_iter().flat_map(|one| &one.decisions);
-        let applying = all.filter(|one| one.zones.iter().any(|zone| zone.iter().all(holds)));
+        decision.zones.iter().any(|zone| zone.iter().all(holds))
+    }
+
+    fn applying(&self, node: &Node) -> Vec<&Decision> {
+        let all = self.known(node).into_iter().flat_map(|one| &one.decisions);
+        let applying = all.filter(|one| self.applies(node, one));
         let most = if self.is_permissive { usize::MAX } else { 1 };
         applying.take(most).collect()
+    }
+
+    /// The leg that the environment picks of those that a move of the controller may take.
+    fn picked(&self, node: &Node, step: &Step) -> Option<&[Part]> {
+        let mut legs = self.known(node).into_iter().flat_map(|one| &one.legs);
+        let leg = legs.find(|leg| {
+            let parts = leg.action.as_deref().unwrap_or_default();
+            entry(parts) == step.entry() && self.applies(node, leg)
+        });
+        leg.and_then(|leg| leg.action.as_deref())
     }
 
     fn says(&self, index: usize) -> Said {
@@ -69,22 +86,35 @@ impl Closed<'_> {
         let mut targets = Vec::new();
         let mut is_first = false;
         for action in decisions.iter().filter_map(|one| one.action.as_ref()) {
-            let mut own = node
+            let own = node
                 .steps
                 .iter()
                 .filter(|one| self.owner.owns(one.controllable));
-            let Some(step) = own.find(|one| one.parts == *action) else {
+            let meant = own.filter(|one| {
+                one.parts == *action || controller && one.entry() == entry(action)
+            });
+            let before = targets.len();
+            targets.extend(meant.map(|one| one.target));
+            if targets.len() == before {
                 return Said::Over(false);
-            };
-            targets.push(step.target);
+            }
             is_first = !controller;
         }
         if !is_first {
-            let others = node
+            let others: Vec<&Step> = node
                 .steps
                 .iter()
-                .filter(|one| !self.owner.owns(one.controllable));
-            targets.extend(others.map(|one| one.target));
+                .filter(|one| !self.owner.owns(one.controllable))
+                .collect();
+            for step in &others {
+                match self.picked(node, step).filter(|_| !controller) {
+                    Some(leg) if !others.iter().any(|one| one.parts == leg) => {
+                        return Said::Over(false);
+                    }
+                    Some(leg) if leg != step.parts => {}
+                    _ => targets.push(step.target),
+                }
+            }
         }
         if decisions.iter().any(|one| one.action.is_none()) {
             match node.later {
@@ -109,12 +139,11 @@ impl Closed<'_> {
             Kind::Recur => self.goal[index],
             Kind::Reach | Kind::Until => false,
         };
-        if has_to_keep {
-            let must_move = !own.is_empty() && others.is_empty();
-            return controller != must_move;
+        if !others.is_empty() && is_forced(&node.stoppers, &own, self.rule) {
+            return controller;
         }
-        let must_move = !others.is_empty() && is_forced(&node.stoppers, &own, self.rule);
-        controller == must_move
+        // Play stops, unless the controller has to move.
+        controller == (has_to_keep && own.is_empty())
     }
 
     /// By region: whether the owner wins from it.
@@ -173,7 +202,12 @@ fn mutate(decisions: &mut [Decisions], random: &mut Random) {
     }
     for _ in 0..=random.below(2) {
         let state = random.below(decisions.len());
-        let here = &mut decisions[state].decisions;
+        let has_legs = !decisions[state].legs.is_empty();
+        let here = if has_legs && random.chance(30) {
+            &mut decisions[state].legs
+        } else {
+            &mut decisions[state].decisions
+        };
         if here.is_empty() {
             continue;
         }

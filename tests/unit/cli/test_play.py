@@ -220,3 +220,36 @@ def test_game_is_found_by_name_or_alone(tmp_path: Path, player: Player) -> None:
     player(model, "--query", "E<> P.A", code=2)
     player(model, "--query", "control: A<> P.A", "--strategy", "x.json", code=2)
     player(model, "--strategy", tmp_path / "none.json", code=2)
+
+
+DIE = """
+process P() {
+  state Hand, High, Low, Done;
+  branchpoint Falls;
+  init Hand;
+  trans Hand -> Falls { }, Falls -> High { }, Falls -> Low { },
+        Low -> Done { }, High -> Done { };
+}
+system P;
+"""
+
+
+def test_the_environment_picks_the_leg(player: Player, tmp_path: Path) -> None:
+    model = tmp_path / "die.xta"
+    model.write_text(DIE)
+    shown = player(model, "--query", "control: A<> P.Done", lines="2\n")
+    assert "takes P.Hand→P.High" in shown
+    assert "  1  P.Hand→P.High" in shown
+    assert "  2  P.Hand→P.Low" in shown
+    assert "P.Low" in shown.split("> 2")[1]
+    assert "the controller has won" in shown
+    first = player(model, "--query", "control: A<> P.Done", lines="\n")
+    assert "P.High" in first.split("> ")[1]
+
+
+def test_the_strategy_of_the_environment_picks_the_leg(player: Player, tmp_path: Path) -> None:
+    model = tmp_path / "die.xta"
+    model.write_text(DIE)
+    shown = player(model, "--query", "control: A<> P.High", lines="q\n")
+    assert "P.Hand→P.Low" in shown
+    assert "P.Hand→P.High" not in shown
