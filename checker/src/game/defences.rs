@@ -1,7 +1,7 @@
 //! Which moves the evader defends itself with where time passes: as few as it needs, as far as known.
 //!
-//! Where time passes, the evader may wait, and as long as the seeker has no way to win it needs no move. So in a safety game for a
-//! verdict its moves are *held back*, and what they lead to is not explored, until the seeker *threatens* to win something more: if
+//! Where time passes, the evader may wait, and as long as the seeker has no way to win it needs no move, but for one wherever it must move because
+//! time stops. So in a safety game for a verdict its other moves are *held back*, and what they lead to is not explored, until the seeker *threatens* to win something more: if
 //! the evader did not use the held moves, it would win valuations that it has not won. Then those of them that help are taken, one
 //! after the other: first such in which a process takes part that also takes part in the attack. Moves that share no process with the
 //! attack are *weak*. They rather put things off, and there may be many of them, so a node against which nothing else helps is left
@@ -128,28 +128,37 @@ impl Solver<'_, '_, '_> {
             || !self.graph.chances.of(node).is_empty()
             || self.graph.symbolic.stepper.network().features.stopwatches
             || !own.any(|edge| !self.seeker.owns(edge.controllable))
-            || self.may_stop(node) && self.may_be_forced(node)?
         {
             return Ok(false);
+        }
+        let mut forced = Federation::empty(self.graph.dimension());
+        if self.may_stop(node) {
+            let situation = self.situation(node)?;
+            forced = self.forced_controller(node, &situation, &mut Patience::endless());
         }
         self.frontier.reserve.is_used = true;
         let holds = &mut self.defences.holds;
         holds.resize(edges.start, Hold::None);
-        for edge in &self.graph.edges[edges] {
+        for edge in &self.graph.edges[edges.clone()] {
             holds.push(if self.seeker.owns(edge.controllable) {
                 Hold::None
             } else {
                 Hold::Held
             });
         }
+        // Where it must move because time stops, it needs one of the moves at once.
+        for index in edges {
+            let edge = self.graph.edges[index];
+            if forced.is_empty() {
+                break;
+            }
+            let enabled = self.enabled(&edge);
+            if self.defences.holds(index) && enabled.intersects(&forced) {
+                forced.subtract(&enabled);
+                self.use_move(index);
+            }
+        }
         Ok(true)
-    }
-
-    /// Whether the controller may have to move somewhere in a node because time stops.
-    fn may_be_forced(&mut self, node: u32) -> Result<bool, Failure> {
-        let situation = self.situation(node)?;
-        let forced = self.forced_controller(node, &situation, &mut Patience::endless());
-        Ok(!forced.is_empty())
     }
 
     /// Lets the evader use a move that is held back.

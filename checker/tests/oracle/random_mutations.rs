@@ -90,9 +90,8 @@ impl Closed<'_> {
                 .steps
                 .iter()
                 .filter(|one| self.owner.owns(one.controllable));
-            let meant = own.filter(|one| {
-                one.parts == *action || controller && one.entry() == entry(action)
-            });
+            let meant = own
+                .filter(|one| one.parts == *action || controller && one.entry() == entry(action));
             let before = targets.len();
             targets.extend(meant.map(|one| one.target));
             if targets.len() == before {

@@ -238,18 +238,18 @@ def test_the_environment_picks_the_leg(player: Player, tmp_path: Path) -> None:
     model = tmp_path / "die.xta"
     model.write_text(DIE)
     shown = player(model, "--query", "control: A<> P.Done", lines="2\n")
-    assert "takes P.Hand→P.High" in shown
-    assert "  1  P.Hand→P.High" in shown
-    assert "  2  P.Hand→P.Low" in shown
+    assert "takes P.Hand -> High" in shown
+    assert "  1  P.Hand -> High" in shown
+    assert "  2  P.Hand -> Low" in shown
     assert "P.Low" in shown.split("> 2")[1]
     assert "the controller has won" in shown
     first = player(model, "--query", "control: A<> P.Done", lines="\n")
-    assert "P.High" in first.split("> ")[1]
+    assert "P.High" in first.rsplit("> ", 1)[1]
 
 
 def test_the_strategy_of_the_environment_picks_the_leg(player: Player, tmp_path: Path) -> None:
     model = tmp_path / "die.xta"
     model.write_text(DIE)
     shown = player(model, "--query", "control: A<> P.High", lines="q\n")
-    assert "P.Hand→P.Low" in shown
-    assert "P.Hand→P.High" not in shown
+    assert "P.Hand -> Low" in shown
+    assert "P.Hand -> High" not in shown
