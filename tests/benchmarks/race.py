@@ -6,9 +6,11 @@
 With ``--tchecker`` the same automata, made by the example generators of TChecker's sources (found
 beside the program, or by ``--examples``), are explored in the same run by ``tck-reach -a
 covreach`` (``aLU-covreach`` where that is faster), in turn with the engine; without it the
-figures of a run elsewhere stand in, in brackets. ``--models`` names a folder with the public
-models whose counts by UPPAAL are published (DynamicExtrapolation benchmarks, without type ranges);
-without it they are left out.
+figures of a run elsewhere stand in, in brackets. ``--models`` names a folder with the artefact of
+"Dynamic Extrapolation in Extended Timed Automata" (ICFEM 2023): models and, as CSV, how many
+states UPPAAL stores of each with the bounds L and U, computed beforehand and along the way; without
+it they are left out. The counts belong to the files of the artefact: models published elsewhere
+under the same names have other guards and invariants, and other counts.
 
 Every exploration has a process of its own. Seconds are user CPU seconds, of the engine those of
 the check alone, its code's compilation included; memory is the growth of the resident set from
@@ -22,6 +24,7 @@ are of the clock on the wall, so the machine must have as many cores that nobody
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import os
 import resource
@@ -69,14 +72,13 @@ RACES = (
 )
 
 PUBLISHED = {
-    "gossip-dyn-5": 1_657_823,
-    "gossip-smart-dyn-5": 625_533,
-    "leader-election-3N": 85_626,
-    "printing-projects-2-8": 638_977,
-    "tcp-aimd-3": 5_007_512,
-    "firefly-sync-W2-H1-N4": 167_359,
+    "models-dyn": "230424-with-type-ranges",
+    "models-dyn-no-ranges": "230512-without-type-ranges",
 }
-"""What UPPAAL stores with LU extrapolation: artefact of "Dynamic Extrapolation", ICFEM 2023."""
+"""By folder of models in the artefact: the folder of their counts in ``results``."""
+
+MOST_STORED = 2_000_000
+"""Models of which UPPAAL stores more states are left out unless they are asked for by name."""
 
 UNTIMED_PROCESSES = 5
 """Processes of Peterson's algorithm; in every state each of them has exactly one transition."""
@@ -184,7 +186,7 @@ def _race(race: Race, arguments: argparse.Namespace, folder: Path) -> None:
 
 
 def _count(name: str, path: Path, runs: int, published: int | None) -> Measured:
-    """Explores a model whose counts are known and prints how it went."""
+    """Explores a model, perhaps with a published count of stored states, and prints how it went."""
     mine = _median([_run_engine(path) for _ in range(runs)])
     against = f"{published:>9}" if published is not None else " " * 9
     print(
@@ -214,11 +216,23 @@ def _made(folder: Path) -> Iterator[tuple[str, Path]]:
 
 
 def _published(folder: Path | None) -> Iterator[tuple[str, Path, int]]:
-    """The public models in the folder with their names and published counts."""
-    for name, published in PUBLISHED.items():
-        found = sorted(folder.rglob(f"{name}.xml")) if folder else []
-        if found:
-            yield name, found[0], published
+    """The models of the artefact with their names and the fewest states that UPPAAL stores."""
+    if folder is None:
+        return
+    for models_folder, results in PUBLISHED.items():
+        least: dict[str, int] = {}
+        for abstraction in ("LU", "DynLU"):
+            path = folder / "results" / results / f"{abstraction}.csv"
+            with path.open(encoding="utf-8", newline="") as table:
+                for row in csv.DictReader(table, delimiter=";"):
+                    # A search that did not end counts nothing.
+                    if row["formula"] == QUERY and (stored := int(row["stored"])):
+                        least[row["model"]] = min(stored, least.get(row["model"], stored))
+        for name, stored in sorted(least.items()):
+            path = folder / models_folder / f"{name}.xml"
+            if path.exists():
+                # Without ranges all variables are plain `int`.
+                yield name if models_folder == "models-dyn" else f"{name} int", path, stored
 
 
 def _share(name: str, path: Path, arguments: argparse.Namespace) -> None:
@@ -246,7 +260,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="models to explore; default all")
     parser.add_argument("--tchecker", type=Path, help="the program tck-reach, a release build")
     parser.add_argument("--examples", type=Path, help="its folder of example generators")
-    parser.add_argument("--models", type=Path, help="folder of the public models with counts")
+    parser.add_argument("--models", type=Path, help="folder of the artefact with counts")
     parser.add_argument("--runs", type=int, default=3, help="the median is of so many runs")
     parser.add_argument("--folder", type=Path, default=Path("build/race"), help="for made models")
     parser.add_argument("--threads", type=int, default=1, help="compare one thread and so many")
@@ -263,7 +277,11 @@ def main() -> None:
 
     if arguments.threads > 1:
         print(f"One thread and {arguments.threads}:")
-        public = ((name, path) for name, path, _ in _published(arguments.models))
+        public = (
+            (name, path)
+            for name, path, published in _published(arguments.models)
+            if arguments.names or published <= MOST_STORED
+        )
         for name, path in filter(lambda one: is_wanted(one[0]), chain(_made(folder), public)):
             _share(name, path, arguments)
         return
@@ -278,7 +296,7 @@ def main() -> None:
     if arguments.models:
         print("Against published counts of UPPAAL (ours first):")
         for name, path, published in _published(arguments.models):
-            if is_wanted(name):
+            if is_wanted(name) and (arguments.names or published <= MOST_STORED):
                 _count(name, path, arguments.runs, published)
 
 
