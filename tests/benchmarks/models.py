@@ -343,3 +343,35 @@ process P(const int[0, N - 1] me) {{
 }}
 system Beat, P;
 """
+
+
+def roll_call(sensors: int, window: int = 10, cycle: int = 1500) -> str:
+    """Sensors that each call a centre in a window of their own, and all begin again at one time."""
+    return f"""
+const int N = {sensors};
+const int WINDOW = {window};
+const int CYCLE = {cycle};
+chan alive, ack;
+
+process Sensor(const int[0, N - 1] id) {{
+    clock x;
+    state before {{ x <= WINDOW * id + 1 }}, calling {{ x <= WINDOW * id + 6 }},
+        listening {{ x <= WINDOW * id + WINDOW - 1 }}, resting {{ x <= CYCLE }};
+    init before;
+    trans
+        before -> calling {{ guard x >= WINDOW * id + 1; }},
+        calling -> listening {{ sync alive!; }},
+        listening -> resting {{ sync ack?; }},
+        listening -> resting {{ guard x >= WINDOW * id + WINDOW - 1; }},
+        resting -> before {{ guard x >= CYCLE; assign x = 0; }};
+}}
+
+process Centre() {{
+    state on;
+    init on;
+    trans
+        on -> on {{ sync alive?; }},
+        on -> on {{ sync ack!; }};
+}}
+system Sensor, Centre;
+"""

@@ -75,8 +75,8 @@ fn ends_in(symbolic: &mut Symbolic<'_>, goal: &Predicate, trace: &Trace) -> bool
     let is_whole = trace.states.len() == trace.moves.len() + 1;
     is_whole
         && symbolic
-            .extent(goal, &mut words.clone(), zone.bounds())
-            .is_ok_and(|extent| extent.is_somewhere())
+            .holds_somewhere(goal, &mut words.clone(), zone.bounds())
+            .is_ok_and(|holds| holds)
 }
 
 /// The answer that the report of a search for the goal amounts to.

@@ -10,6 +10,7 @@
 
 pub mod bounds;
 mod combinations;
+mod deadlocks;
 pub mod differences;
 mod enumeration;
 mod exposure;

@@ -6,10 +6,9 @@
 use crate::ir::{
     ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, FunctionId, Network, Predicate,
 };
-use crate::zones::future::{self, Barriers};
 use crate::zones::{Bound, Federation, Zone};
 
-use super::{Failure, Moves, Symbolic};
+use super::{Failure, Symbolic};
 
 /// Where in a zone a predicate holds.
 #[derive(Clone, Debug)]
@@ -23,7 +22,7 @@ pub enum Extent {
 }
 
 impl Extent {
-    fn of(part: Federation, zone: &Federation) -> Extent {
+    pub(super) fn of(part: Federation, zone: &Federation) -> Extent {
         if part.is_empty() {
             Extent::Nowhere
         } else if zone.is_subset(&part) {
@@ -84,6 +83,49 @@ impl Symbolic<'_> {
             Predicate::Or(parts) => self.disjunction(parts, words, zone),
             Predicate::Clock(clock) => self.clock_extent(clock, words, zone),
             Predicate::Deadlock => self.deadlock_extent(words, zone),
+        }
+    }
+
+    /// Whether the predicate holds somewhere in the zone: what [`Symbolic::extent`] says, without computing where if that is dear.
+    pub fn holds_somewhere(
+        &mut self,
+        predicate: &Predicate,
+        words: &mut [i32],
+        zone: &[Bound],
+    ) -> Result<bool, Failure> {
+        match predicate {
+            Predicate::Deadlock => self.has_deadlock(words, zone),
+            Predicate::Not(inner) if let Predicate::Not(inner) = &**inner => {
+                self.holds_somewhere(inner, words, zone)
+            }
+            Predicate::Or(parts) => {
+                for part in parts {
+                    if self.holds_somewhere(part, words, zone)? {
+                        return Ok(true);
+                    }
+                }
+                Ok(false)
+            }
+            Predicate::And(parts) => {
+                // Locations come before deadlocks. Code that may fail is run in its place.
+                let said = parts.iter().map_while(|part| match part {
+                    Predicate::Deadlock => Some(true),
+                    _ => decided_by_locations(part, words),
+                });
+                if said.into_iter().any(|holds| !holds) {
+                    return Ok(false);
+                }
+                if parts.iter().filter(|part| !part.is_of_words()).count() > 1 {
+                    return Ok(self.conjunction(parts, words, zone)?.is_somewhere());
+                }
+                for part in parts {
+                    if !self.holds_somewhere(part, words, zone)? {
+                        return Ok(false);
+                    }
+                }
+                Ok(true)
+            }
+            _ => Ok(self.extent(predicate, words, zone)?.is_somewhere()),
         }
     }
 
@@ -181,58 +223,17 @@ impl Symbolic<'_> {
             )),
         }
     }
+}
 
-    /// The valuations from which no move is possible, now or after any delay.
-    fn deadlock_extent(&mut self, words: &mut [i32], own: &[Bound]) -> Result<Extent, Failure> {
-        let may_delay = self.may_delay(words)?;
-        let stopped = self.stopped(words)?;
-        // Beside barriers the zone may be one of several pieces of what time reaches.
-        let future = self.future_beside_barriers(may_delay, words, own)?;
-        let zone = future.as_ref().map_or(own, Zone::bounds);
-        let barriers = if may_delay {
-            self.barriers(words, zone)?
-        } else {
-            Barriers::none(self.dimension())
-        };
-        let mut moves = Moves::default();
-        self.moves_within(words, zone, &mut moves)?;
-        let mut alive = Federation::empty(self.dimension());
-        let mut target = words.to_vec();
-        for one in moves.iter() {
-            if !self.is_enabled(one, zone)? {
-                continue;
-            }
-            target.copy_from_slice(words);
-            if let Some(effect) = self.fire(one, &mut target)? {
-                let mut before = effect.enabled_part(zone, self.dimension());
-                if !barriers.is_empty() {
-                    before = future::predecessors_within(&before, &barriers);
-                } else if may_delay {
-                    before.down(&stopped);
-                }
-                alive.unite(&before);
-            }
+/// What a predicate comes to that asks for locations only.
+fn decided_by_locations(predicate: &Predicate, words: &[i32]) -> Option<bool> {
+    match predicate {
+        Predicate::Constant(value) => Some(*value),
+        Predicate::Location(process, location) => {
+            Some(words[process.0 as usize] == location.0 as i32)
         }
-        let whole = self.whole(own);
-        Ok(Extent::of(difference(&whole, &alive), &whole))
-    }
-
-    /// All that time reaches from the zone within the invariants if barriers may have cut it; `None` if the zone is that.
-    fn future_beside_barriers(
-        &mut self,
-        may_delay: bool,
-        words: &mut [i32],
-        zone: &[Bound],
-    ) -> Result<Option<Zone>, Failure> {
-        if !may_delay || !self.has_barriers() {
-            return Ok(None);
-        }
-        let Some(invariant) = self.invariant(words)? else {
-            return Ok(None);
-        };
-        let mut future = Zone::from_bounds(self.dimension(), zone);
-        self.delay(words, may_delay, &invariant, future.bounds_mut())?;
-        Ok(Some(future))
+        Predicate::Not(inner) => decided_by_locations(inner, words).map(|holds| !holds),
+        _ => None,
     }
 }
 

@@ -20,6 +20,7 @@ use crate::zones::federation::block_bytes;
 use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
 
 use super::bounds::ClockBounds;
+use super::deadlocks::Lookout;
 use super::scope::Scope;
 use super::zone_memo::ZoneMemo;
 use super::{
@@ -48,6 +49,7 @@ pub struct Symbolic<'a> {
     pub(super) ceilings: Ceilings,
     pub(super) memo: ZoneMemo,
     pub(super) inner_moves: Moves,
+    pub(super) lookout: Lookout,
     /// The invariants of the state that [`Symbolic::take`] entered last.
     pub(super) invariant: Vec<Constraint>,
 }
@@ -89,6 +91,7 @@ impl<'a> Symbolic<'a> {
             memo: ZoneMemo::new(network),
             bounds,
             inner_moves: Moves::default(),
+            lookout: Lookout::default(),
             invariant: Vec::new(),
             stepper,
         }
