@@ -12,6 +12,9 @@ Conventions (paper, section 2 and appendix; the code of the appendix wins over i
   (`TIP_Y`).
 * `Scene.axis` is the direction in which insertion makes progress: the heading written in the file.
   It stays the same when the tip's pose is measured anew. The model calls this direction -y.
+
+Each value obeys the rules of `ntagen.rules` from the moment it is made: one that does not raises
+`InputError`.
 """
 
 from __future__ import annotations
@@ -20,12 +23,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from ntagen import rules
+from ntagen.errors import InputError
+
 Vector = tuple[float, float, float]
 """Three numbers along the axes x, y, z."""
 
 DEFAULT_LENGTH_MM = 200.0
 """The length of a needle that does not say otherwise: that of long biopsy needles. The longest path
 of the paper's instance takes 190 mm, so that its model is that of the paper."""
+
+_KINDS = ("target", "critical", "detection")
 
 RegionKind = Literal["target", "critical", "detection"]
 
@@ -49,10 +57,24 @@ class Region:
     radius_mm: float
     around: str | None = None
 
+    def __post_init__(self) -> None:
+        what = f"the radius of `{self.name}`"
+        if self.kind not in _KINDS:
+            raise InputError(f"`{self.name}` is a {self.kind} region\nhint: one of {_KINDS}")
+        _require(
+            rules.finite(self.center_mm, f"the centre of `{self.name}`"),
+            rules.finite([self.radius_mm], what) or rules.positive(self.radius_mm, what),
+        )
+        if self.around is not None and self.kind != "detection":
+            raise InputError(f"`{self.name}` is a {self.kind} region, and lies around nothing")
+
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where the tip is and how it lies; see the module's conventions."""
+    """Where the tip is and how it lies; see the module's conventions.
+
+    Paths make thousands of poses: the rules are looked at where one becomes that of a needle.
+    """
 
     position_mm: Vector
     heading: Vector
@@ -76,6 +98,24 @@ class Needle:
     speed_mm_per_s: float
     length_mm: float = DEFAULT_LENGTH_MM
 
+    def __post_init__(self) -> None:
+        radius, speed = "the radius of the motion circle", "the insertion speed"
+        length = "the needle's length"
+        tip = self.tip
+        _require(
+            rules.finite(tip.position_mm, "the tip's position"),
+            rules.finite(tip.heading, "the heading")
+            or rules.unit_vector(tip.heading, "the heading"),
+            rules.finite(tip.bevel, "the bevel") or rules.unit_vector(tip.bevel, "the bevel"),
+            rules.finite([self.radius_mm], radius) or rules.positive(self.radius_mm, radius),
+            rules.finite([self.speed_mm_per_s], speed)
+            or rules.positive(self.speed_mm_per_s, speed, "speed-not-positive"),
+            # All of a needle may have been inserted.
+            rules.finite([self.length_mm], length)
+            or rules.not_negative(self.length_mm, length, "length-not-positive"),
+        )
+        _require(rules.right_angle(tip.heading, tip.bevel))
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -92,6 +132,17 @@ class Limits:
     roll_angles_rad: tuple[float, ...]
     max_rolls: int
     min_roll_distance_mm: float
+
+    def __post_init__(self) -> None:
+        step, distance = "the step", "the distance between rolls"
+        _require(
+            rules.finite([self.step_s], step)
+            or rules.positive(self.step_s, step, "step-not-positive"),
+            *(rules.finite([a], "a roll") or rules.roll(a) for a in self.roll_angles_rad),
+            rules.roll_count(self.max_rolls),
+            rules.finite([self.min_roll_distance_mm], distance)
+            or rules.not_negative(self.min_roll_distance_mm, distance),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +191,23 @@ class Scene:
     safety: Literal["sampled", "swept"] = "sampled"
     queries: tuple[NamedQuery, ...] = ()
 
+    def __post_init__(self) -> None:
+        _require(
+            rules.finite(self.axis, "the axis") or rules.unit_vector(self.axis, "the axis"),
+            rules.finite([self.resolution_per_mm], "the resolution")
+            or rules.resolution(self.resolution_per_mm),
+        )
+        if self.safety not in ("sampled", "swept"):
+            raise InputError(f"there is no safety `{self.safety}`\nhint: sampled or swept")
+        for kind, regions in zip(
+            _KINDS, (self.targets, self.criticals, self.detections), strict=True
+        ):
+            for region in regions:
+                if region.kind != kind:
+                    raise InputError(
+                        f"`{region.name}` is a {region.kind} region among the {kind} regions"
+                    )
+
     @property
     def regions(self) -> tuple[Region, ...]:
         """Targets, critical and detection regions, in this order."""
@@ -167,4 +235,17 @@ class Scene:
             self,
             criticals=self.criticals + tuple(r for r in regions if r.kind == "critical"),
             detections=self.detections + tuple(r for r in regions if r.kind == "detection"),
+        )
+
+
+def _require(*breaches: rules.Breach | None) -> None:
+    """Refuses a value that breaks a rule.
+
+    Raises:
+        InputError: It breaks one; the message names all of them.
+    """
+    found = [breach for breach in breaches if breach is not None]
+    if found:
+        raise InputError(
+            "\n".join(f"{b.message}\nhint: {b.hint}" if b.hint else b.message for b in found)
         )

@@ -15,12 +15,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "ntagen"
 
-BASE = {"errors", "scene", "units"}
+BASE = {"errors", "rules", "scene", "units"}
 MAY_IMPORT: dict[str, set[str]] = {
     "cache": set(),
     "errors": set(),
     "units": set(),
-    "scene": set(),
+    "rules": {"units"},
+    "scene": {"errors", "rules"},
     "nsl": BASE | {"cache", "files"},
     "render": BASE | {"cache"},
     "model": set(),

@@ -7,7 +7,7 @@ returns is the exit code (nothing means 0); what it raises is turned into one me
 Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied (`verify`: the
 evidence does not hold), 2 the input or the
 command line is wrong, 3 stopped by a limit, 4 run-time error in the model, 5 device fault,
-70 internal error, 130 interrupted.
+70 internal error, 130 interrupted, 143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from typing import Final
 
 import click
 
+from ntagen.cli.signals import TERMINATED, Terminated, termination
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError, NtagenError
 
@@ -116,14 +117,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    try:
-        code = _run(list(sys.argv[1:] if arguments is None else arguments))
-        sys.stdout.flush()
-    except SystemExit:
-        raise
-    except BaseException as error:  # also KeyboardInterrupt and panics of the engine
-        code = _report(error)
-    return code
+    with termination() as signalled:
+        try:
+            code = _run(list(sys.argv[1:] if arguments is None else arguments))
+            sys.stdout.flush()
+        except SystemExit:
+            raise
+        except BaseException as error:  # also KeyboardInterrupt and panics of the engine
+            code = _report(error)
+    return TERMINATED if signalled.came and code == INTERRUPTED else code
 
 
 def _run(arguments: list[str]) -> int:
@@ -155,6 +157,9 @@ def _report(error: BaseException) -> int:
         case NtagenError():
             _say(_with_severity(str(error)))
             return error.exit_code
+        case Terminated():
+            _say("terminated")
+            return INTERRUPTED
         case KeyboardInterrupt() | EOFError() | click.Abort():
             _say("interrupted")
             return INTERRUPTED

@@ -6,16 +6,22 @@ import contextlib
 import json
 import math
 import re
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.signals import TERMINATED, handled
 from ntagen.cli.terminal import echo
+from ntagen.drive.operator import Operator
+from ntagen.drive.states import State
+from ntagen.files import read_file, require_apart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from types import FrameType
 
     from ntagen.drive.records import Journal, Record
     from ntagen.drive.settings import Settings
@@ -26,7 +32,7 @@ if TYPE_CHECKING:
 
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
-5 device fault, 70 internal error, 130 interrupted."""
+5 device fault, 70 internal error, 130 interrupted, 143 ended by SIGTERM."""
 
 
 def _seconds(_ctx: click.Context, _option: click.Parameter, text: str) -> float:
@@ -124,7 +130,8 @@ def command(
 
     Pushes a little, estimates where the needle is and how it bends, finds a safe strategy, and
     drives its best plan while measuring. If the needle deviates or the force rises, it stops,
-    pulls back, and looks for a new strategy with what it has learned.
+    pulls back, and looks for a new strategy with what it has learned. Ctrl-C and SIGTERM stop the
+    needle and complete the log; Ctrl-C a second time ends at once. Only one run writes a log.
 
     \b
     Examples:
@@ -149,13 +156,45 @@ def command(
     errors = Errors(noise_mm=noise_mm, roll_rad=rad_from_deg(roll_error_deg))
     settings = settings_for(Settings(timeout_s=timeout_s, ranking=parse_ranking(ranking)), errors)
     speaks = not (as_json or quiet)
-    with _log(log_path, environment, scene, settings, errors, seed, known) as log:
-        result = _drive(scene, settings, errors, seed, known, log, speaks)
+    with (
+        _operator() as operator,
+        _log(log_path, environment, scene, settings, errors, seed, known) as log,
+    ):
+        result = _drive(scene, settings, errors, seed, known, log, speaks, operator)
     if as_json:
         echo(json.dumps(_summary(result, seed, noise_mm, roll_error_deg, known, log_path)))
     else:
         _report(result, scene, log_path, short=quiet)
+    if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
+        return TERMINATED
     return _exit_code(result.ended.outcome)
+
+
+class _Signalled(Operator):
+    """An operator who speaks by signals."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.was_terminated = False
+
+    def interrupt(self, _number: int, _frame: FrameType | None) -> None:
+        """Ctrl-C: the first time the run ends in order, the second time at once."""
+        if self.wants_end:
+            raise KeyboardInterrupt
+        self.end("interrupted by the operator")
+
+    def terminate(self, _number: int, _frame: FrameType | None) -> None:
+        """SIGTERM: the run ends in order."""
+        self.was_terminated = True
+        self.end("ended by the system (SIGTERM)")
+
+
+@contextlib.contextmanager
+def _operator() -> Iterator[_Signalled]:
+    """The operator, while signals are his."""
+    operator = _Signalled()
+    with handled({signal.SIGINT: operator.interrupt, signal.SIGTERM: operator.terminate}):
+        yield operator
 
 
 def _require_virtual(needle: str) -> None:
@@ -173,12 +212,15 @@ def _drive(
     known: str,
     log: list[Journal],
     speaks: bool,
+    operator: Operator,
 ) -> Result:
     from ntagen.drive.records import Journals
     from ntagen.drive.simulate import simulate
     from ntagen.plan.synthesise import EngineSynthesiser
 
-    synthesise = EngineSynthesiser(margins=settings.margins, ranking=settings.ranking)
+    synthesise = EngineSynthesiser(
+        margins=settings.margins, ranking=settings.ranking, listen=operator.listen
+    )
     with contextlib.ExitStack() as stack:
         terminal = stack.enter_context(_terminal()) if speaks else []
         return simulate(
@@ -189,6 +231,7 @@ def _drive(
             known=known,
             errors=errors,
             seed=seed,
+            listen=operator.listen,
         )
 
 
@@ -209,25 +252,24 @@ def _log(
     from ntagen.drive.knowledge import told
     from ntagen.drive.log import ACTUAL, SOURCE, Log, metadata_of
     from ntagen.drive.scene_json import scene_to_json
-    from ntagen.errors import InputError
+    from ntagen.nsl.source import MAX_SOURCE_BYTES
 
     # What is wrong with the command line must be found before an earlier log is replaced.
     told(scene, known)
-    if path.exists() and path.samefile(environment):
-        raise InputError(f"the log would replace {environment}\nhint: choose another --log")
+    require_apart({"--log": path}, {"environment": environment})
     metadata = {
         "program": f"ntagen {_version()}",
-        "environment": environment.name,
+        "environment": environment.name.encode(errors="replace").decode(),
         "seed": seed,
         "known": known,
         "noise_mm": errors.noise_mm,
         "roll_error_rad": errors.roll_rad,
         "settings": settings.to_json(),
     }
-    attachments = {
-        ACTUAL: scene_to_json(scene).encode(),
-        SOURCE: environment.read_bytes(),
-    }
+    attachments = {ACTUAL: scene_to_json(scene).encode()}
+    # A pipe can be read once only.
+    if environment.is_file():
+        attachments[SOURCE] = read_file(environment, MAX_SOURCE_BYTES)
     with Log(path, metadata_of(metadata), attachments) as log:
         yield [log]
 
@@ -336,8 +378,6 @@ def _report(result: Result, scene: Scene, log_path: Path | None, *, short: bool)
 
 
 def _exit_code(outcome: str) -> int:
-    from ntagen.drive.states import State
-
     return {
         State.TARGET_REACHED: 0,
         State.NO_STRATEGY: 1,

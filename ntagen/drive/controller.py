@@ -15,6 +15,11 @@ Safety rules, in one place:
 Where no plan is left the needle is not pulled back in the hope of one: the driver first asks from
 which place behind the tip, on the channel that it knows, there would be a strategy. If there is
 none back to the entry, the run ends where it is.
+
+Who wants the run to end is listened to at known points: before each motion and each synthesis.
+Between two such points something is always recorded, so that a replay knows at which of them the
+run ended. A motion counts as made when it is commanded: how far the needle got when a motion failed
+is not known.
 """
 
 from __future__ import annotations
@@ -67,6 +72,7 @@ class Controller:
         synthesise: Where plans come from.
         settings: How to drive.
         journal: Who is told what happens.
+        listen: Raises `KeyboardInterrupt`, with the reason, if somebody wants the run to end.
     """
 
     def __init__(
@@ -76,11 +82,13 @@ class Controller:
         synthesise: Synthesiser,
         settings: Settings,
         journal: Journal,
+        listen: Callable[[], None] = lambda: None,
     ) -> None:
         self._device = device
         self._synthesise = synthesise
         self._settings = settings
         self._journal = journal
+        self._listen = listen
         self._knowledge = Knowledge(scene)
         self._estimator = Estimator(scene.needle.tip, scene.needle.radius_mm, settings.priors)
         self._path = Path(scene.needle.tip)
@@ -143,8 +151,8 @@ class Controller:
         except LimitError as error:
             self._reason = str(error)
             return Event.TIMED_OUT
-        except KeyboardInterrupt:
-            self._reason = "interrupted by the operator"
+        except KeyboardInterrupt as error:
+            self._reason = str(error) or "interrupted by the operator"
             return Event.INTERRUPT
 
     # The tasks, in the order of the workflow.
@@ -291,9 +299,9 @@ class Controller:
     def _ask(self, tip: Pose, depth_mm: float) -> Synthesis:
         """The synthesis from a pose with all that is known now."""
         scene = self._knowledge.scene(tip, self._known_estimate().radius_mm, depth_mm)
+        self._listen()
         synthesis = self._in_time(self._synthesise(scene))
-        self._syntheses += 1
-        number, best = self._syntheses, synthesis.best
+        number, best = self._syntheses + 1, synthesis.best
         self._journal.synthesised(number, synthesis)
         clearance_mm = best.certificate.critical_clearance_mm if best else -1.0
         self._note(
@@ -308,6 +316,8 @@ class Controller:
                 model_sha256=hashlib.sha256(synthesis.model_xml.encode()).hexdigest(),
             )
         )
+        # A run that ended in a synthesis has not made it.
+        self._syntheses = number
         self._note(Timed(self._now_s(), number, synthesis.seconds))
         return synthesis
 
@@ -343,22 +353,27 @@ class Controller:
         return Event.PUSHED
 
     def _push(self, length_mm: float) -> None:
-        self._note(Command(self._now_s(), "push", length_mm))
-        self._device.push(length_mm)
+        self._command("push", length_mm)
         self._estimator.push(length_mm)
         self._path = self._path.push(self._radius_mm(), length_mm)
+        self._device.push(length_mm)
 
     def _roll(self, angle_rad: float) -> None:
-        self._note(Command(self._now_s(), "roll", angle_rad))
-        self._device.roll(angle_rad)
+        self._command("roll", angle_rad)
         self._estimator.roll(angle_rad)
         self._path = self._path.roll(angle_rad)
+        self._device.roll(angle_rad)
 
     def _pull(self, length_mm: float) -> None:
-        self._note(Command(self._now_s(), "pull", length_mm))
-        self._device.pull(length_mm)
+        self._command("pull", length_mm)
         self._estimator.pull(length_mm)
         self._path = self._path.pull(length_mm)
+        self._device.pull(length_mm)
+
+    def _command(self, kind: str, value: float) -> None:
+        """Records a motion that begins now, unless the run is to end."""
+        self._listen()
+        self._note(Command(self._now_s(), kind, value))
 
     def _undo_roll(self) -> None:
         """Rolls back what was rolled at or beyond this place: the tip fits its channel again."""

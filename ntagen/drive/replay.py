@@ -78,7 +78,7 @@ def replay(log: RunLog, synthesise: Synthesiser) -> Comparison:
         LimitError: The engine reached a limit that it did not reach then.
     """
     stage = _Stage(record for record in log.records if not isinstance(record, Truth))
-    controller = Controller(log.scene, stage, synthesise, log.settings, stage)
+    controller = Controller(log.scene, stage, synthesise, log.settings, stage, stage.listen)
     try:
         controller.run()
     except _LogOver:
@@ -138,6 +138,12 @@ class _Stage:
             bevel=_vector_or_none(logged.bevel),
         )
 
+    # Whoever ended the run.
+
+    def listen(self) -> None:
+        """Ends the run if it ended here."""
+        self._repeat_failure()
+
     # The journal.
 
     def record(self, record: Record) -> None:
@@ -171,10 +177,10 @@ class _Stage:
         """What came from outside then comes from outside now: a fault or the operator."""
         if not isinstance(logged, Transition):
             return
-        if logged.event == Event.INTERRUPT.value:
-            raise KeyboardInterrupt
         ended = self._records[-1]
         reason = ended.reason if isinstance(ended, Ended) else ""
+        if logged.event == Event.INTERRUPT.value:
+            raise KeyboardInterrupt(reason)
         if logged.event == Event.TIMED_OUT.value:
             raise LimitError(reason)
         if logged.event == Event.FAULT.value:

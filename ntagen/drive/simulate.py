@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -47,6 +48,7 @@ def simulate(
     known: str = "all",
     errors: Errors | None = None,
     seed: int = 0,
+    listen: Callable[[], None] = lambda: None,
 ) -> Result:
     """Drives the virtual needle through the scene.
 
@@ -58,6 +60,7 @@ def simulate(
         known: Which critical regions the driver is told about (`ntagen.drive.knowledge.told`).
         errors: The needle's errors; none by default.
         seed: What they are drawn from.
+        listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
     """
     obstacles = tuple(
         Obstacle(
@@ -69,7 +72,7 @@ def simulate(
     needle = VirtualNeedle(scene.needle, obstacles, errors or Errors(), seed, SimulatedClock())
     witness = _Witness(needle, journal)
     controller = Controller(
-        told(scene, known), needle, synthesise, settings, Journals(journal, witness)
+        told(scene, known), needle, synthesise, settings, Journals(journal, witness), listen
     )
     ended = controller.run()
     last = scene.targets[-1]

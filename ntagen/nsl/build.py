@@ -1,4 +1,4 @@
-"""The draft to a scene, with every rule that the values must obey.
+"""The draft to a scene, with every rule that the values must obey (`ntagen.rules`), and its places.
 
 Each rule reports and goes on; the scene is made if none of them found an error.
 
@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal, cast
 
+from ntagen import rules
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.resolve import Draft, DraftRegion, Placed
 from ntagen.nsl.source import Span
@@ -39,11 +40,8 @@ DEFAULT_ROLL_DISTANCE_MM: Final = 2.0
 DEFAULT_RESOLUTION_PER_MM: Final = 1000
 """What holds where the file says nothing: the values of the paper's declaration."""
 
-INT32_MAX: Final = 2**31 - 1
-MAX_ROLLS: Final = 100
-_RIGHT_ANGLE_TOLERANCE: Final = 1e-6
-"""Cosine between heading and bevel that still counts as a right angle: rounding of written decimals
-is larger only when it should be corrected."""
+
+_ABSURD_MM: Final = 1e100
 
 
 def build(draft: Draft, reporter: Reporter) -> Scene | None:
@@ -76,12 +74,12 @@ class _Builder:
         limits = self._limits()
         resolution = self._resolution()
         spheres = self._spheres()
-        if tip is not None:
-            self._check_regions(tip, spheres)
-        if resolution is not None:
-            self._check_range(resolution, tip, needle, limits, spheres)
-        if needle is not None and limits is not None and resolution is not None:
-            self._check_step(needle, limits, resolution, spheres)
+        # What follows computes with squares, which are no numbers if values are absurd.
+        if self._check_range(resolution or 1, tip, needle, limits, spheres):
+            if tip is not None:
+                self._check_regions(tip, spheres)
+            if needle is not None and limits is not None and resolution is not None:
+                self._check_step(needle, limits, resolution, spheres)
         if self._reporter.has_errors or needle is None or limits is None or resolution is None:
             return None
         safety = cast('Literal["sampled", "swept"]', draft.choices.get("safety", "sampled"))
@@ -142,8 +140,9 @@ class _Builder:
         if position is None or heading is None or bevel is None:
             return None
         cosine = _dot(heading, bevel)
-        if abs(cosine) > _RIGHT_ANGLE_TOLERANCE:
-            self._report_skew(heading, bevel, cosine)
+        breach = rules.right_angle(heading, bevel)
+        if breach is not None:
+            self._report_skew(heading, bevel, breach)
             return None
         # The rest of the skew, below the tolerance, goes into the bevel.
         bevel = _unit(_minus(bevel, _times(cosine, heading)))
@@ -166,33 +165,34 @@ class _Builder:
             return None
         return _unit(placed.value)
 
-    def _report_skew(self, heading: Vector, bevel: Vector, cosine: float) -> None:
+    def _obeys(self, breach: rules.Breach | None, span: Span) -> bool:
+        """Whether a value obeys a rule; reports it if not."""
+        if breach is not None:
+            self._report(breach.rule, span, breach.message, hint=breach.hint)
+        return breach is None
+
+    def _report_skew(self, heading: Vector, bevel: Vector, breach: rules.Breach) -> None:
         """Reports a bevel that is not at right angles to the heading, with the nearest that is."""
         placed = self._draft.vectors.get("bevel") or self._draft.vectors["heading"]
-        angle = deg_from_rad(math.acos(max(-1.0, min(1.0, cosine))))
-        rest = _minus(bevel, _times(cosine, heading))
+        rest = _minus(bevel, _times(_dot(heading, bevel), heading))
         if math.hypot(*rest) < 1e-3:
             axes = ("x", "y", "z")
             smallest = min(range(3), key=lambda axis: abs(heading[axis]))
             hint = f"write for example `bevel +{axes[smallest]}`" if 0.0 in heading else None
         else:
             hint = f"write `bevel ({', '.join(f'{_rounded(c):g}' for c in _unit(rest))})`"
-        self._report(
-            "bevel-not-perpendicular",
-            placed.span,
-            f"heading and bevel must be at right angles, but the angle is {angle:.4g} deg",
-            hint=hint,
-        )
+        self._obeys(replace(breach, hint=hint), placed.span)
 
     def _positive(self, keyword: str, kind: str, role: str) -> float | None:
         """A property of the needle or its motion that is greater than 0."""
         placed = self._draft.numbers.get(keyword)
         if placed is None or placed.value is None:
             return None
-        if placed.value <= 0.0:
-            self._report(kind, placed.span, f"{role} must be greater than 0")
-            return None
-        return placed.value
+        return (
+            placed.value
+            if self._obeys(rules.positive(placed.value, role, kind), placed.span)
+            else None
+        )
 
     def _needle(self, tip: Pose | None) -> Needle | None:
         """The needle, if all of it is right."""
@@ -220,18 +220,20 @@ class _Builder:
         distance = (
             DEFAULT_ROLL_DISTANCE_MM if draft.roll_distance is None else draft.roll_distance.value
         )
-        if draft.max_rolls is not None and count is not None and not 0 <= count <= MAX_ROLLS:
-            self._report(
-                "roll-count-out-of-range",
-                draft.max_rolls.span,
-                f"the number of rolls must be from 0 to {MAX_ROLLS}, but this is {count}",
+        if (
+            draft.max_rolls is not None
+            and count is not None
+            and not self._obeys(rules.roll_count(count), draft.max_rolls.span)
+        ):
+            count = None
+        if (
+            draft.roll_distance is not None
+            and distance is not None
+            and not self._obeys(
+                rules.not_negative(distance, "the distance between rolls"), draft.roll_distance.span
             )
-        if draft.roll_distance is not None and distance is not None and distance < 0.0:
-            self._report(
-                "distance-negative",
-                draft.roll_distance.span,
-                "the distance between rolls cannot be negative",
-            )
+        ):
+            distance = None
         if step is None or angles is None or count is None or distance is None:
             return None
         return Limits(step, angles, count, distance)
@@ -256,25 +258,9 @@ class _Builder:
         """A roll in degrees."""
         if placed.value is None:
             return None
-        degrees = deg_from_rad(placed.value)
-        if not 0.0 < degrees < 360.0:
-            wrapped = degrees % 360.0
-            self._report(
-                "roll-out-of-range",
-                placed.span,
-                f"a roll must be more than 0 and less than 360 deg, but this is {degrees:g} deg",
-                hint=f"write {wrapped:g} deg" if 0.0 < wrapped < 360.0 else "remove it",
-            )
+        if not self._obeys(rules.roll(placed.value), placed.span):
             return None
-        if abs(degrees - round(degrees)) > 1e-9:
-            self._report(
-                "roll-not-whole-degrees",
-                placed.span,
-                f"a roll must be a whole number of degrees, but this is {degrees:.6g} deg",
-                hint=f"write {max(1, min(359, round(degrees)))} deg",
-            )
-            return None
-        return round(degrees)
+        return round(deg_from_rad(placed.value))
 
     def _resolution(self) -> int | None:
         """Fixed-point units in a mm."""
@@ -283,17 +269,9 @@ class _Builder:
             return None if "resolution" in self._draft.seen else DEFAULT_RESOLUTION_PER_MM
         if placed.value is None:
             return None
-        rounded = round(placed.value)
-        if rounded < 1 or abs(placed.value - rounded) > 1e-9 * rounded:
-            self._report(
-                "resolution-not-whole",
-                placed.span,
-                f"the resolution must be a whole number per mm, at least 1,"
-                f" but this is {placed.value:g} per mm",
-                hint=f"write `{max(1, rounded)} per mm`",
-            )
+        if not self._obeys(rules.resolution(placed.value), placed.span):
             return None
-        return rounded
+        return round(placed.value)
 
     # ------------------------------------------------------------------------------------ regions
 
@@ -309,12 +287,9 @@ class _Builder:
     def _sphere(self, draft: DraftRegion) -> Region | None:
         """A region with its own geometry."""
         radius = draft.radius.value
-        if radius is not None and radius <= 0.0:
-            self._report(
-                "radius-not-positive",
-                draft.radius.span,
-                f"the radius of `{draft.name}` must be greater than 0",
-            )
+        if radius is not None and not self._obeys(
+            rules.positive(radius, f"the radius of `{draft.name}`"), draft.radius.span
+        ):
             return None
         if radius is None or draft.center is None or draft.center.value is None:
             return None
@@ -323,12 +298,10 @@ class _Builder:
     def _around(self, draft: DraftRegion) -> Region | None:
         """A detection region around a critical one."""
         margin = draft.margin.value
-        if margin is not None and margin < 0.0:
-            self._report(
-                "margin-negative",
-                draft.margin.span,
-                f"the margin of `{draft.name}` cannot be negative",
-            )
+        if margin is not None and not self._obeys(
+            rules.not_negative(margin, f"the margin of `{draft.name}`", "margin-negative"),
+            draft.margin.span,
+        ):
             margin = None
         elif margin == 0.0:
             self._report(
@@ -343,7 +316,12 @@ class _Builder:
         radius = inner.radius.value
         if radius is None or radius <= 0.0:
             return None
-        return Region(draft.name, draft.kind, inner.center.value, radius + margin, inner.name)
+        radius += margin
+        if not self._obeys(
+            rules.finite([radius], f"the radius of `{draft.name}`"), draft.margin.span
+        ):
+            return None
+        return Region(draft.name, draft.kind, inner.center.value, radius, inner.name)
 
     def _critical_inside(self, draft: DraftRegion) -> DraftRegion | None:
         """The critical region that a detection region is written around."""
@@ -447,18 +425,17 @@ class _Builder:
     def _check_step(
         self, needle: Needle, limits: Limits, resolution: int, spheres: list[_Sphere]
     ) -> None:
-        """One push must bend the needle, and should not jump over a region."""
+        """The model must see all, and one push bend the needle and not jump over a region."""
         placed = self._draft.numbers.get("step")
         span = self._draft.span if placed is None else placed.span
         advance = needle.speed_mm_per_s * limits.step_s
-        if int(advance * resolution) == 0 or int(advance / needle.radius_mm * resolution) == 0:
-            self._report(
-                "step-too-short",
-                span,
-                f"a push of {advance:g} mm vanishes at a resolution of {resolution} per mm",
-                hint="make the step longer or the resolution finer",
-            )
-        smallest = min(spheres, key=lambda s: s.region.radius_mm, default=None)
+        circle = rules.visible(needle.radius_mm, resolution, "the radius of the motion circle")
+        if self._obeys(circle, self._draft.numbers["radius"].span):
+            swept = self._draft.choices.get("safety") == "swept"
+            speed, radius = needle.speed_mm_per_s, needle.radius_mm
+            self._obeys(rules.motion(limits.step_s, speed, radius, resolution, swept=swept), span)
+        seen = [sphere for sphere in spheres if self._is_visible(sphere, resolution)]
+        smallest = min(seen, key=lambda s: s.region.radius_mm, default=None)
         if smallest is not None and advance > 2.0 * smallest.region.radius_mm:
             self._report(
                 "step-too-long",
@@ -469,6 +446,16 @@ class _Builder:
                 notes=("regions are checked at the ends of pushes only",),
             )
 
+    def _is_visible(self, sphere: _Sphere, resolution: int) -> bool:
+        """Whether the model sees a region; reports it if not."""
+        breach = rules.visible(
+            sphere.region.radius_mm, resolution, f"the radius of `{sphere.region.name}`"
+        )
+        # The critical region that it lies around is even smaller.
+        if sphere.draft.around is not None:
+            return breach is None
+        return self._obeys(breach, sphere.draft.radius.span)
+
     def _check_range(
         self,
         resolution: int,
@@ -476,18 +463,17 @@ class _Builder:
         needle: Needle | None,
         limits: Limits | None,
         spheres: list[_Sphere],
-    ) -> None:
-        """Every length of the model must fit into 32 bits at its resolution."""
-        largest_mm = INT32_MAX / resolution
+    ) -> bool:
+        """Reports every length that does not fit into the model's numbers.
+
+        Returns:
+            Whether the square of each is a number.
+        """
+        largest_mm = 0.0
         for what, length_mm, span in self._lengths(tip, needle, limits, spheres):
-            if length_mm > largest_mm:
-                self._report(
-                    "value-out-of-range",
-                    span,
-                    f"{what} does not fit: at {resolution} per mm the model reaches"
-                    f" {largest_mm:.6g} mm",
-                    hint="make it smaller, or the resolution coarser",
-                )
+            self._obeys(rules.fits(length_mm, resolution, what), span)
+            largest_mm = max(largest_mm, length_mm)
+        return largest_mm < _ABSURD_MM
 
     def _lengths(
         self,
@@ -499,13 +485,17 @@ class _Builder:
         """The lengths that the model holds, with what they are and where they come from."""
         draft = self._draft
         if tip is not None and "tip" in draft.vectors:
-            yield "the tip's position", max(map(abs, tip.position_mm)), draft.vectors["tip"].span
+            yield "the tip's position", math.hypot(*tip.position_mm), draft.vectors["tip"].span
         if needle is not None:
             # The centre of the motion circle lies one radius away from the tip.
-            reach = needle.radius_mm + max(map(abs, needle.tip.position_mm))
+            reach = needle.radius_mm + math.hypot(*needle.tip.position_mm)
             yield "the motion circle", reach, draft.numbers["radius"].span
-            if "length" in draft.numbers:
-                yield "the needle's length", needle.length_mm, draft.numbers["length"].span
+            placed = draft.numbers.get("length", draft.resolution)
+            yield (
+                "the needle's length",
+                needle.length_mm,
+                draft.span if placed is None else placed.span,
+            )
         if needle is not None and limits is not None:
             span = draft.numbers["step" if "step" in draft.numbers else "speed"].span
             yield "a push", needle.speed_mm_per_s * limits.step_s, span
@@ -519,7 +509,7 @@ class _Builder:
         for sphere in spheres:
             region = sphere.region
             # The model also holds the distance from the tip to the centre.
-            reach = max(math.dist(start, region.center_mm), *map(abs, region.center_mm))
+            reach = max(math.dist(start, region.center_mm), math.hypot(*region.center_mm))
             yield f"`{region.name}`", reach + region.radius_mm, _place_of(sphere)
 
 

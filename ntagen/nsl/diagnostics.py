@@ -115,7 +115,12 @@ KINDS: Final = _kinds(
         "error",
         "The model counts in whole parts of a mm, 1 or more.",
     ),
-    ("N073", "value-out-of-range", "error", "The model computes with 32-bit integers."),
+    (
+        "N073",
+        "value-out-of-range",
+        "error",
+        "The model computes with 32-bit integers, of which a scene may use 28.",
+    ),
     ("N074", "step-too-short", "error", "At this resolution a step would not bend the needle."),
     ("N075", "step-too-long", "warning", "Regions are checked at the ends of steps only."),
     ("N076", "target-in-critical", "error", "No point of the target may be reached."),
@@ -125,6 +130,8 @@ KINDS: Final = _kinds(
     ("N080", "tip-in-detection", "warning", "Detection counts as critical: there is no plan."),
     ("N081", "tip-in-target", "warning", "The target is reached before the first move."),
     ("N082", "length-not-positive", "error", "The needle's length is greater than 0."),
+    ("N083", "value-too-small", "error", "At this resolution nothing would be left of the value."),
+    ("N084", "step-around-circle", "error", "Swept, a step goes less than half round the circle."),
 )
 """All kinds of defects by name, in the order of their codes."""
 

@@ -194,6 +194,9 @@ class Evaluator:
         """The value of an expression, finite or not."""
         match expression:
             case tree.Number(value=number):
+                digits = expression.span.text.lower().partition("e")[0]
+                if number == 0.0 and digits.strip("0."):
+                    return self._vanished(expression.span)
                 return scalar(number)
             case tree.Name():
                 return self._name(expression, scope)
@@ -248,7 +251,13 @@ class Evaluator:
             )
             return None
         factor, dimension = unit
-        return value.map(lambda n: n * factor, dimension)
+        result = value.map(lambda n: n * factor, dimension)
+        return self._vanished(expression.span) if _vanishes(value, result) else result
+
+    def _vanished(self, span: Span) -> Quantity | None:
+        """Reports a result that is not 0, but nearer to it than any number."""
+        self._report("not-a-number", span, "the result is too small for a number")
+        return None
 
     def unit(self, unit: tree.Identifier) -> tuple[float, Dimension] | None:
         """How many mm, rad or s a unit is, and its dimension; None after a mistake."""
@@ -313,7 +322,7 @@ class Evaluator:
             if operator in "+-":
                 result = self._add(result, right, 1.0 if operator == "+" else -1.0, span)
             else:
-                result = self._scale(result, right, operator, operand.span)
+                result = self._scale(result, right, operator, operand.span, span)
         return result
 
     def _add(self, left: Quantity, right: Quantity, sign: float, span: Span) -> Quantity | None:
@@ -334,7 +343,7 @@ class Evaluator:
         return Quantity(tuple(a + sign * b for a, b in numbers), left.dimension)
 
     def _scale(
-        self, left: Quantity, right: Quantity, operator: str, right_span: Span
+        self, left: Quantity, right: Quantity, operator: str, right_span: Span, span: Span
     ) -> Quantity | None:
         """A product or a quotient; one side of a product may be a vector, and a dividend."""
         if right.is_vector and (operator == "/" or left.is_vector):
@@ -343,12 +352,15 @@ class Evaluator:
             return None
         if operator == "*":
             vector, factor = (right, left.number) if right.is_vector else (left, right.number)
-            return vector.map(lambda n: n * factor, left.dimension * right.dimension)
+            product = vector.map(lambda n: n * factor, left.dimension * right.dimension)
+            vanishes = factor != 0.0 and _vanishes(vector, product)
+            return self._vanished(span) if vanishes else product
         divisor = right.number
         if divisor == 0.0:
             self._report("division-by-zero", right_span, "division by zero")
             return None
-        return left.map(lambda n: n / divisor, left.dimension / right.dimension)
+        quotient = left.map(lambda n: n / divisor, left.dimension / right.dimension)
+        return self._vanished(span) if _vanishes(left, quotient) else quotient
 
     # ---------------------------------------------------------------------------------- functions
 
@@ -426,6 +438,12 @@ class Evaluator:
                 )
                 return None
         return scalar(choose(value.number for value in values), dimension)
+
+
+def _vanishes(before: Quantity, after: Quantity) -> bool:
+    """Whether something that was not 0 has become 0 by a factor that is not 0."""
+    pairs = zip(before.numbers, after.numbers, strict=True)
+    return any(old != 0.0 and new == 0.0 for old, new in pairs)
 
 
 def _example(dimension: Dimension) -> str:

@@ -9,6 +9,7 @@ Cost: one step for each statement and each round of a loop; rounds are limited b
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -542,4 +543,9 @@ class _Resolver:
             )
         elif unit is not None and count is not None:
             value = count / unit[0]
+            if not math.isfinite(value):
+                self._reporter.report(
+                    "not-a-number", statement.count.span, "the result is too large for a number"
+                )
+                value = None
         draft.resolution = Placed(value, statement.count.span.to(statement.unit.span))

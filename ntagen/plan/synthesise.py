@@ -7,7 +7,7 @@ of its steps and with integers: such a plan is refused, and if none is left ther
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -90,6 +90,7 @@ class EngineSynthesiser:
         max_plans: At most this many plans are listed.
         timeout_s: The engine stops after this time.
         memory_bytes: The engine stops when its states take this much.
+        listen: Is called now and then, and raises `KeyboardInterrupt` to end a synthesis.
     """
 
     margins: Margins = Margins()
@@ -97,6 +98,7 @@ class EngineSynthesiser:
     max_plans: int = 100_000
     timeout_s: float | None = 60.0
     memory_bytes: int | None = 2 << 30
+    listen: Callable[[], None] = lambda: None
 
     def __call__(self, scene: Scene) -> Synthesis:
         """The plans of a scene.
@@ -105,6 +107,7 @@ class EngineSynthesiser:
             InputError: The scene does not fit the model's numbers.
             LimitError: The engine stopped at a limit before it had an answer.
             ModelError: The model ran into a run-time error.
+            KeyboardInterrupt: `listen` raised it, or the user interrupted.
         """
         from ntagen import checker
         from ntagen.render import render
@@ -116,6 +119,7 @@ class EngineSynthesiser:
             max_plans=self.max_plans,
             timeout_s=self.timeout_s,
             memory_bytes=self.memory_bytes,
+            progress=lambda *_: self.listen(),
         )
         if answer.verdict == "error":
             raise ModelError(f"the model of the scene fails: {answer.message}")
@@ -126,6 +130,12 @@ class EngineSynthesiser:
             scene=scene,
             model_xml=model_xml,
             found=len(plans),
-            candidates=select(plans, scene, self.margins, self.ranking),
+            candidates=select(self._heard(plans), scene, self.margins, self.ranking),
             seconds=answer.seconds,
         )
+
+    def _heard(self, plans: Iterable[Plan]) -> Iterator[Plan]:
+        """The plans, listening before each."""
+        for plan in plans:
+            self.listen()
+            yield plan

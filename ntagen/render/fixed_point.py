@@ -4,21 +4,15 @@ A value ``v`` becomes the integer nearest to ``v * resolution`` (ties to the eve
 exactly: the difference ``v - units / resolution`` is at most ``0.5 / resolution`` in magnitude,
 whatever ``v``.
 
-The model adds and subtracts such numbers (a centre is a tip minus a radius, a distance is a
-difference) in 32 bits. `LARGEST_UNITS` leaves three bits of head room for that, so that only values
-of absurd size are refused.
+Only values of absurd size are refused (`ntagen.rules.LARGEST_UNITS`).
 """
 
 from __future__ import annotations
 
 import math
-from fractions import Fraction
-from typing import Final
 
 from ntagen.errors import InputError
-
-LARGEST_UNITS: Final = 2**28
-"""The largest magnitude of a number that the scene may put into the model, in units."""
+from ntagen.rules import LARGEST_UNITS, units_of
 
 
 def fixed_point(value: float, resolution: int, what: str) -> int:
@@ -37,7 +31,7 @@ def fixed_point(value: float, resolution: int, what: str) -> int:
     """
     if not math.isfinite(value):
         raise InputError(f"{what} is {value}, which is not a number")
-    units = round(Fraction(value) * resolution)
+    units = units_of(value, resolution)
     if abs(units) > LARGEST_UNITS:
         largest = LARGEST_UNITS / resolution
         raise InputError(

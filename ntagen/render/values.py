@@ -12,12 +12,12 @@ The templates hold the language and the arithmetic, this module every decision a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ntagen import rules
 from ntagen.errors import InputError
-from ntagen.render.fixed_point import LARGEST_UNITS, c_literal, fixed_point
+from ntagen.render.fixed_point import c_literal, fixed_point
 from ntagen.render.frame import Matrix, cross, model_frame, turned
 from ntagen.scene import Region, Scene, Vector
 from ntagen.units import deg_from_rad
@@ -25,10 +25,6 @@ from ntagen.units import deg_from_rad
 MIN_ACTIONS = 10
 """Entries of the log in the paper (`MAX_ACT_COUNT`); more are made only if more rolls are
 allowed."""
-
-WHOLE_TOLERANCE = 1e-9
-"""How far a number that went through floating point may lie from the whole number that was
-meant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,13 +120,12 @@ def model_values(scene: Scene) -> ModelValues:
     writer = _Writer(scale, frame)
     needle, limits = scene.needle, scene.limits
     tip = needle.tip
-    dt, velocity_mm, time_unit = _time(limits.step_s, needle.speed_mm_per_s)
-    swept = scene.safety == "swept"
-    _check_motion(scale, dt, velocity_mm, needle.radius_mm, swept)
+    _check_motion(scene)
+    dt, velocity_mm, unit_s = rules.time_units(limits.step_s, needle.speed_mm_per_s)
     return ModelValues(
         name=_one_line(scene.name),
         frame_note="" if _is_identity(frame) else "The scene was turned so that this is so.",
-        time_unit=time_unit,
+        time_unit="1 s" if unit_s == 1.0 else f"one push: {unit_s:g} s",
         scale=scale,
         dt=dt,
         velocity=writer.number(velocity_mm, "the insertion per unit of time"),
@@ -147,44 +142,34 @@ def model_values(scene: Scene) -> ModelValues:
         targets=writer.spheres(scene.targets),
         criticals=writer.spheres(scene.criticals),
         detections=writer.spheres(scene.detections),
-        swept=swept,
+        swept=scene.safety == "swept",
         sweep_margin=_sweep_margin(scale, needle.radius_mm),
     )
 
 
-def _time(step_s: float, speed_mm_per_s: float) -> tuple[int, float, str]:
-    """The step in units of time, the insertion in mm per unit of time, and the unit in words."""
-    whole = round(step_s)
-    if whole >= 1 and abs(step_s - whole) <= WHOLE_TOLERANCE * whole:
-        return whole, speed_mm_per_s, "1 s"
-    return 1, speed_mm_per_s * step_s, f"one push: {step_s:g} s"
-
-
-def _check_motion(scale: int, dt: int, velocity_mm: float, radius_mm: float, swept: bool) -> None:
+def _check_motion(scene: Scene) -> None:
     """Refuses a step that the model's numbers cannot hold.
-
-    A push turns the tip by ``insertion / radius``, cut to units. If that leaves nothing, the tip
-    would stand still while the needle is inserted for ever.
 
     Raises:
         InputError: The radius or the angle of one step is less than one unit, or a step is too
         long.
     """
-    radius = fixed_point(radius_mm, scale, "the radius of the motion circle")
-    insertion = dt * fixed_point(velocity_mm, scale, "the insertion per unit of time")
-    if insertion > LARGEST_UNITS:
-        raise InputError("one step is too long for the model\nhint: make `step` shorter")
-    if radius < 1 or insertion * scale < radius:
-        raise InputError(
-            f"a step of {insertion / scale:g} mm on a circle of radius {radius_mm:g} mm turns the "
-            f"tip by less than one unit of the model (1/{scale} rad)\n"
-            "hint: make `step` longer or `resolution` finer"
+    needle, limits, per_mm = scene.needle, scene.limits, scene.resolution_per_mm
+    push_mm = needle.speed_mm_per_s * limits.step_s
+    breach = (
+        rules.fits(needle.radius_mm, per_mm, "the radius of the motion circle")
+        or rules.visible(needle.radius_mm, per_mm, "the radius of the motion circle")
+        or rules.fits(push_mm, per_mm, "a push")
+        or rules.motion(
+            limits.step_s,
+            needle.speed_mm_per_s,
+            needle.radius_mm,
+            per_mm,
+            swept=scene.safety == "swept",
         )
-    if swept and insertion >= math.pi * radius:
-        raise InputError(
-            "one step goes half around the motion circle, too far for `safety swept`\n"
-            "hint: make `step` shorter"
-        )
+    )
+    if breach is not None:
+        raise InputError(f"{breach.message}\nhint: {breach.hint}")
 
 
 def _sweep_margin(scale: int, radius_mm: float) -> int:
@@ -205,7 +190,7 @@ def _whole_degrees(angle_rad: float) -> int:
     """
     angle_deg = deg_from_rad(angle_rad)
     whole = round(angle_deg)
-    if abs(angle_deg - whole) > WHOLE_TOLERANCE * 360.0:
+    if abs(angle_deg - whole) > rules.WHOLE_TOLERANCE * 360.0:
         raise InputError(
             f"a roll of {angle_deg:g} deg is not a whole number of degrees\n"
             "hint: the model chooses among whole degrees"

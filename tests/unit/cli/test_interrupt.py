@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -37,3 +40,22 @@ def test_interrupt_ends_with_the_counters_so_far(
         r"A\[\] a \+ b < 60000\n  [\d,]+ states explored \([\d,]+/s\), [\d,]+ stored", said
     )
     assert said.endswith("interrupted\n")
+
+
+def test_sigterm_ends_in_order(tmp_path: Path) -> None:
+    path = tmp_path / "endless.xta"
+    path.write_text(ENDLESS)
+    command = [sys.executable, "-m", "ntagen", "check", str(path), "--memory", "4GiB"]
+    command += ["--query", "A[] a + b < 60000", "--trace", str(tmp_path / "trace")]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert b"loaded in" in process.stdout.readline()
+        process.send_signal(signal.SIGTERM)
+        said = process.stderr.read()
+    assert process.returncode == 143
+    assert said.endswith((b"terminated\n", b"interrupted\n"))
+    assert list(tmp_path.iterdir()) == [path]

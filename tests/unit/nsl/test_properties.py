@@ -118,7 +118,7 @@ def test_changed_files_are_answered(data: st.DataObject) -> None:
 
 
 COORDINATES = st.floats(-900.0, 900.0).map(lambda value: round(value, 6) + 0.0)
-LENGTHS = st.floats(0.001, 100.0).map(lambda value: round(value, 6))
+LENGTHS = st.floats(0.01, 100.0).map(lambda value: round(value, 6))
 
 
 @given(

@@ -1,0 +1,202 @@
+"""The rules that the values of a scene obey, wherever the scene comes from.
+
+A scene made in Python obeys them when it is made (`ntagen.scene`); one that is written in a file is
+told all that is wrong with it, with the places (`ntagen.nsl.build`). Each rule is a function that
+gives what is wrong, or None. What concerns the places of regions to each other is not here: a
+driver that learns may well find itself in a critical region.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+from ntagen.units import deg_from_rad
+
+LARGEST_UNITS: Final = 2**28
+"""The largest magnitude of a number that a scene may put into the model, in units. The model adds
+and subtracts such numbers in 32 bits (a centre is a tip minus a radius, a distance is a
+difference); this leaves three bits of head room."""
+
+MAX_ROLLS: Final = 100
+"""Rolls that a plan may hold at most."""
+
+UNIT_TOLERANCE: Final = 1e-6
+"""How far the length of a direction may be from 1, and the cosine of a right angle from 0: what
+rounding of written decimals makes."""
+
+WHOLE_TOLERANCE: Final = 1e-9
+"""How far a number that went through floating point may lie from the whole one that was meant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Breach:
+    """What is wrong with a value.
+
+    Attributes:
+        rule: The rule by its name, which is that of a diagnostic.
+        message: What is wrong: one line, lower case, no full stop.
+        hint: What to do about it.
+    """
+
+    rule: str
+    message: str
+    hint: str | None = None
+
+
+def finite(values: Iterable[float], what: str) -> Breach | None:
+    """All are numbers, and neither infinite nor nan."""
+    for value in values:
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            return Breach("not-a-number", f"{what} is {value}, which is no finite number")
+    return None
+
+
+def positive(value: float, what: str, rule: str = "radius-not-positive") -> Breach | None:
+    """A value is greater than 0."""
+    return None if value > 0.0 else Breach(rule, f"{what} must be greater than 0")
+
+
+def not_negative(value: float, what: str, rule: str = "distance-negative") -> Breach | None:
+    """A value is at least 0."""
+    return None if value >= 0.0 else Breach(rule, f"{what} cannot be negative")
+
+
+def unit_vector(vector: Sequence[float], what: str) -> Breach | None:
+    """A direction has the length 1."""
+    length = math.hypot(*vector)
+    if abs(length - 1.0) <= UNIT_TOLERANCE:
+        return None
+    return Breach(
+        "direction-not-unit",
+        f"{what} must be a vector of length 1, but its length is {length:.6g}",
+        "divide it by its length" if length > 0.0 else "give it a direction",
+    )
+
+
+def right_angle(heading: Sequence[float], bevel: Sequence[float]) -> Breach | None:
+    """Two directions of length 1 are at right angles."""
+    cosine = math.fsum(a * b for a, b in zip(heading, bevel, strict=True))
+    if abs(cosine) <= UNIT_TOLERANCE:
+        return None
+    angle_deg = deg_from_rad(math.acos(max(-1.0, min(1.0, cosine))))
+    return Breach(
+        "bevel-not-perpendicular",
+        f"heading and bevel must be at right angles, but the angle is {angle_deg:.4g} deg",
+    )
+
+
+def roll(angle_rad: float) -> Breach | None:
+    """A roll is by whole degrees, more than 0 and less than 360."""
+    degrees = deg_from_rad(angle_rad)
+    if not WHOLE_TOLERANCE < degrees < 360.0 - WHOLE_TOLERANCE:
+        wrapped = degrees % 360.0
+        return Breach(
+            "roll-out-of-range",
+            f"a roll must be more than 0 and less than 360 deg, but this is {degrees:g} deg",
+            f"write {wrapped:g} deg" if 0.0 < wrapped < 360.0 else "remove it",
+        )
+    if abs(degrees - round(degrees)) > WHOLE_TOLERANCE:
+        return Breach(
+            "roll-not-whole-degrees",
+            f"a roll must be a whole number of degrees, but this is {degrees:.6g} deg",
+            f"write {max(1, min(359, round(degrees)))} deg",
+        )
+    return None
+
+
+def roll_count(count: int) -> Breach | None:
+    """A plan holds from 0 to 100 rolls."""
+    if isinstance(count, int) and 0 <= count <= MAX_ROLLS:
+        return None
+    return Breach(
+        "roll-count-out-of-range",
+        f"the number of rolls must be from 0 to {MAX_ROLLS}, but this is {count:g}",
+    )
+
+
+def resolution(per_mm: float) -> Breach | None:
+    """The fixed-point scale is a whole number that the model can hold."""
+    whole = max(1, round(per_mm))
+    if per_mm < 1.0 - WHOLE_TOLERANCE or abs(per_mm - whole) > WHOLE_TOLERANCE * whole:
+        return Breach(
+            "resolution-not-whole",
+            f"the resolution must be a whole number per mm, at least 1,"
+            f" but this is {per_mm:g} per mm",
+            f"write `{whole} per mm`",
+        )
+    if whole > LARGEST_UNITS:
+        return Breach(
+            "value-out-of-range",
+            f"the resolution does not fit: it is at most {LARGEST_UNITS} per mm",
+            "write for example `1000 per mm`",
+        )
+    return None
+
+
+def fits(length_mm: float, per_mm: int, what: str) -> Breach | None:
+    """A length fits into the model's numbers."""
+    largest_mm = LARGEST_UNITS / per_mm
+    if abs(length_mm) <= largest_mm:
+        return None
+    return Breach(
+        "value-out-of-range",
+        f"{what} does not fit: at {per_mm} per mm the model reaches {largest_mm:.6g} mm",
+        "make it smaller, or the resolution coarser",
+    )
+
+
+def visible(length_mm: float, per_mm: int, what: str) -> Breach | None:
+    """A length that fits is at least one unit of the model."""
+    if units_of(length_mm, per_mm) >= 1:
+        return None
+    return Breach(
+        "value-too-small",
+        f"{what} is {length_mm:g} mm, which is nothing at a resolution of {per_mm} per mm",
+        "make it larger, or the resolution finer",
+    )
+
+
+def motion(
+    step_s: float, speed_mm_per_s: float, radius_mm: float, per_mm: int, *, swept: bool
+) -> Breach | None:
+    """One push turns the tip, by at least one unit of the model; swept, by less than half a turn.
+
+    If nothing were left of the turn, the tip would stand still while the needle is inserted for
+    ever. The radius is visible, and a push fits.
+    """
+    dt, velocity_mm, _ = time_units(step_s, speed_mm_per_s)
+    insertion = dt * units_of(velocity_mm, per_mm)
+    circle = units_of(radius_mm, per_mm)
+    if insertion * per_mm < circle:
+        return Breach(
+            "step-too-short",
+            f"a push of {speed_mm_per_s * step_s:g} mm vanishes at a resolution of {per_mm} per mm",
+            "make the step longer or the resolution finer",
+        )
+    if swept and insertion >= math.pi * circle:
+        return Breach(
+            "step-around-circle",
+            "a push goes half around the motion circle or farther, which `safety swept` cannot see",
+            "make the step shorter",
+        )
+    return None
+
+
+def time_units(step_s: float, speed_mm_per_s: float) -> tuple[int, float, float]:
+    """The step in the model's units of time, the insertion in one of them in mm, and the unit in s.
+
+    The unit is 1 s if the step is a whole number of seconds, otherwise the step itself.
+    """
+    whole = round(step_s)
+    if whole >= 1 and abs(step_s - whole) <= WHOLE_TOLERANCE * whole:
+        return whole, speed_mm_per_s, 1.0
+    return 1, speed_mm_per_s * step_s, step_s
+
+
+def units_of(value: float, per_mm: int) -> int:
+    """The number of units of the model that is nearest to a finite value (ties to the even one)."""
+    return round(Fraction(value) * per_mm)
