@@ -5,6 +5,7 @@ Environments (``.nsl``) become models on the way; UPPAAL's XML and XTA go to the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,12 +31,13 @@ class Loaded:
     warnings: tuple[str, ...] = ()
 
 
-def load(source: str | Path) -> Model:
+def load(source: str | Path, *, include: Sequence[str | Path] = ()) -> Model:
     """Loads a model.
 
     Args:
         source: A path to a file (UPPAAL XML or XTA, or an environment ``.nsl``), or the text of a
             UPPAAL model. A string is a text if it holds a line break, a ``;`` or a ``<``.
+        include: Folders below which the files may lie that an environment includes, beside its own.
 
     Returns:
         The model: `Model.check` answers queries, its attributes say what is in it.
@@ -47,7 +49,7 @@ def load(source: str | Path) -> Model:
     """
     if isinstance(source, str) and any(sign in source for sign in "\n;<"):
         return checker.load(source)
-    return load_file(Path(source)).model
+    return load_file(Path(source), include=include).model
 
 
 def load_strategy(path: str | Path, model: Model) -> Strategy:
@@ -60,8 +62,8 @@ def load_strategy(path: str | Path, model: Model) -> Strategy:
     return model.load_strategy(path)
 
 
-def load_file(path: Path) -> Loaded:
-    """Loads the model of a file, and the scene if it is an environment.
+def load_file(path: Path, *, include: Sequence[str | Path] = ()) -> Loaded:
+    """Loads the model of a file, and the scene if it is an environment; `include` as of `load`.
 
     Raises:
         InputError: The file is wrong.
@@ -72,7 +74,7 @@ def load_file(path: Path) -> Loaded:
     from ntagen.nsl import load_with_warnings
     from ntagen.render import render
 
-    scene, warnings = load_with_warnings(path)
+    scene, warnings = load_with_warnings(path, include=include)
     text = render(scene, source=path.name)
     model = checker.load(text, path=str(path.with_suffix(".xml")))
     return Loaded(model, scene, tuple(warning.render() for warning in warnings))

@@ -15,6 +15,7 @@ from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import (
+    include_option,
     load_model,
     pointing_to_explanations,
     show_warnings,
@@ -240,6 +241,7 @@ class _Outputs:
 )
 @click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
 @limit_options()
+@include_option()
 def command(
     model_path: Path,
     second_path: Path | None,
@@ -267,6 +269,7 @@ def command(
     states: int | None,
     memory: float | None,
     timeout: float | None,
+    include: tuple[Path, ...],
 ) -> int:
     """Answer the queries of a model or an environment.
 
@@ -306,7 +309,7 @@ def command(
     require_apart(outputs.wanted(), inputs)
     worst = 0
     with pointing_to_explanations(not as_json):
-        loaded = load_model(model_path)
+        loaded = load_model(model_path, include)
         shown_already = len(loaded.model.warnings)
         todo = _queries(loaded.model, asked, query_path)
         show_warnings(loaded.model.warnings[shown_already:])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ntagen.cli.models import include_option
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
 
@@ -24,7 +25,8 @@ from ntagen.files import write_files
     type=click.Path(path_type=Path),
     help="Where to write; made if it is not there.  [default: the current folder]",
 )
-def command(environment: Path, folder: Path) -> None:
+@include_option()
+def command(environment: Path, folder: Path, include: tuple[Path, ...]) -> None:
     """Turn an environment into a UPPAAL model and its queries.
 
     Writes DIR/ENV.xml, which UPPAAL 4.1 and 5 open, and DIR/ENV.q with the same queries. Both are
@@ -37,7 +39,7 @@ def command(environment: Path, folder: Path) -> None:
     from ntagen.nsl import load_with_warnings
     from ntagen.render import render, render_queries
 
-    scene, warnings = load_with_warnings(environment)
+    scene, warnings = load_with_warnings(environment, include=include)
     for warning in warnings:
         echo(warning.render(), err=True)
     name = environment.stem or environment.name

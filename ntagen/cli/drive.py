@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.models import include_option
 from ntagen.cli.signals import TERMINATED, handled
 from ntagen.cli.terminal import echo
 from ntagen.drive.operator import Operator
@@ -113,6 +114,7 @@ def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 @click.option("--quiet", is_flag=True, help="Print only how it ended.")
+@include_option()
 def command(
     environment: Path,
     needle: str,
@@ -125,6 +127,7 @@ def command(
     log_path: Path | None,
     as_json: bool,
     quiet: bool,
+    include: tuple[Path, ...],
 ) -> int:
     """Steer a needle to the target and log the run.
 
@@ -150,7 +153,7 @@ def command(
         say_idle({"seed": "--seed"}, "without --noise or --roll-error: it is that of the errors")
     if as_json:
         say_idle({"quiet": "--quiet"}, "with --json")
-    scene, warnings = load_with_warnings(environment)
+    scene, warnings = load_with_warnings(environment, include=include)
     for warning in warnings:
         echo(warning.render(), err=True)
     errors = Errors(noise_mm=noise_mm, roll_rad=rad_from_deg(roll_error_deg))

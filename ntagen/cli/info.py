@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.cli.models import include_option, load_model, pointing_to_explanations
 from ntagen.cli.terminal import echo, safe
 from ntagen.files import write_files
 
@@ -37,7 +37,8 @@ _UNBOUNDED_WIDTH: Final = 10_000
     type=click.Path(path_type=Path),
     help="Write a picture of each template; DIR is made if it is not there.",
 )
-def command(path: Path, as_json: bool, folder: Path | None) -> None:
+@include_option()
+def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path, ...]) -> None:
     """Show what is in a model: templates, processes, variables, clocks, channels, features.
 
     MODEL is an environment (.nsl) or a UPPAAL model (.xml, .xta).
@@ -65,7 +66,7 @@ def command(path: Path, as_json: bool, folder: Path | None) -> None:
       warnings, load_seconds
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(not as_json):
-        model = load_model(path).model
+        model = load_model(path, include).model
     if folder is not None:
         write_files(_pictures(model.templates, folder))
     if as_json:

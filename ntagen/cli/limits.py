@@ -34,7 +34,7 @@ def limit_options(of: str = "") -> Decorator:
         click.option("--timeout", metavar="TIME", type=TIME, help=about["--timeout"]),
     )
 
-    def decorate(command: Callable[..., int]) -> Callable[..., int]:
+    def decorate(command: Callable[..., int | None]) -> Callable[..., int | None]:
         for option in reversed(options):
             command = option(command)
         return command

@@ -8,6 +8,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import click
+
+from ntagen.cli.effects import say_idle
+from ntagen.cli.rules import Decorator
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 
@@ -18,8 +22,24 @@ WARNINGS_SHOWN: Final = 10
 """Warnings that are printed at most; a model of many templates may have the same in each."""
 
 
-def load_model(path: Path) -> Loaded:
+def include_option() -> Decorator:
+    """The option ``--include``."""
+    return click.option(
+        "--include",
+        metavar="DIR",
+        multiple=True,
+        type=click.Path(path_type=Path),
+        help="Let an environment include files below this folder too, not only below its own; may "
+        "be given again.",
+    )
+
+
+def load_model(path: Path, include: Sequence[Path]) -> Loaded:
     """The model of a file; warnings go to standard error.
+
+    Args:
+        path: The file.
+        include: Below which folders an environment may include files.
 
     Raises:
         InputError: The file is wrong.
@@ -27,7 +47,9 @@ def load_model(path: Path) -> Loaded:
     """
     from ntagen.loading import load_file
 
-    loaded = load_file(path)
+    loaded = load_file(path, include=include)
+    if loaded.scene is None:
+        say_idle({"include": "--include"}, "here: only environments (.nsl) include files")
     show_warnings((*loaded.warnings, *loaded.model.warnings))
     return loaded
 

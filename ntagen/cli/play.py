@@ -15,7 +15,7 @@ import click
 
 from ntagen.cli.effects import say_idle
 from ntagen.cli.limits import limit_options, limits
-from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.cli.models import include_option, load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.cli.terminal import Styled, echo
@@ -86,6 +86,7 @@ HELP: Final = """\
 @forced_rule()
 @priority_rule("Whether priorities of channels and processes count.")
 @limit_options("--query")
+@include_option()
 def command(
     model_path: Path,
     strategy_path: Path | None,
@@ -98,6 +99,7 @@ def command(
     states: int | None,
     memory: float | None,
     timeout: float | None,
+    include: tuple[Path, ...],
 ) -> int:
     """Play a timed game against a strategy.
 
@@ -135,7 +137,7 @@ def command(
     inputs = {"model": model_path} | ({"strategy": strategy_path} if strategy_path else {})
     require_apart({"--log": log}, inputs)
     with pointing_to_explanations(True):
-        model = load_model(model_path).model
+        model = load_model(model_path, include).model
         if strategy_path:
             strategy = model.load_strategy(strategy_path, forced, priorities)
         else:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.models import include_option
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
@@ -48,7 +49,10 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     show_default=True,
     help="What the best plan is: clearance, rolls, length, target.",
 )
-def command(source: Path, output: Path | None, shown: int, ranking: str) -> None:
+@include_option()
+def command(
+    source: Path, output: Path | None, shown: int, ranking: str, include: tuple[Path, ...]
+) -> None:
     """Draw a scene with its plans, or a run from its log.
 
     Two projections and a view in space: target green, critical regions red, detection regions
@@ -66,12 +70,15 @@ def command(source: Path, output: Path | None, shown: int, ranking: str) -> None
     criteria = parse_ranking(ranking)
     if _is_log(source):
         say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked when it was driven")
+        say_idle({"include": "--include"}, "here: a run has its scene in its log")
     elif shown == 0:
         say_idle({"ranking": "--rank"}, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
     format_of(path)
     require_apart({"-o": path}, {"source": source})
-    picture = _of_run(source, shown) if _is_log(source) else _of_scene(source, shown, criteria)
+    picture = (
+        _of_run(source, shown) if _is_log(source) else _of_scene(source, shown, criteria, include)
+    )
     # Matplotlib takes half a second: it is asked for when everything else is right.
     from ntagen.plot.picture import draw
 
@@ -97,12 +104,14 @@ def _of_run(source: Path, shown: int) -> Picture:
     return picture_of_run(read_log(source), shown)
 
 
-def _of_scene(source: Path, shown: int, ranking: tuple[str, ...]) -> Picture:
+def _of_scene(
+    source: Path, shown: int, ranking: tuple[str, ...], include: tuple[Path, ...]
+) -> Picture:
     from ntagen.nsl import load_with_warnings
     from ntagen.plan.synthesise import EngineSynthesiser
     from ntagen.plot.run import picture_of_plans
 
-    scene, warnings = load_with_warnings(source)
+    scene, warnings = load_with_warnings(source, include=include)
     for warning in warnings:
         echo(warning.render(), err=True)
     candidates = EngineSynthesiser(ranking=ranking)(scene).candidates if shown > 0 else ()

@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import click
 
-Decorator: TypeAlias = Callable[[Callable[..., int]], Callable[..., int]]
+Decorator: TypeAlias = Callable[[Callable[..., int | None]], Callable[..., int | None]]
 
 
 def forced_rule(

@@ -9,7 +9,7 @@ from typing import Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
-from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.cli.models import include_option, load_model, pointing_to_explanations
 from ntagen.cli.rules import forced_rule, priority_rule
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
@@ -34,11 +34,13 @@ _WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certi
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
 @forced_rule("For strategies: when the environment must move because time cannot pass.")
 @priority_rule("For strategies: whether priorities of channels and processes count.")
+@include_option()
 def command(
     model_path: Path,
     file: Path,
     forced: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     priorities: Any,  # noqa: ANN401
+    include: tuple[Path, ...],
 ) -> int:
     """Check a trace, certificate or strategy, independently of the search that found it.
 
@@ -59,7 +61,7 @@ def command(
       ntagen verify game.xml win.json
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(True):
-        loaded = load_model(model_path)
+        loaded = load_model(model_path, include)
         text = _read(file)
         checked = loaded.model.verify(text, str(file), forced=forced, priorities=priorities)
     kind = _WITHOUT_RULES.match(text)

@@ -16,6 +16,7 @@ scene or a `SourceError`, nothing else.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ntagen.nsl.diagnostics import Diagnostic, Reporter, SourceError
@@ -33,38 +34,46 @@ __all__ = [
 ]
 
 
-def load(path: str | Path) -> Scene:
+def load(path: str | Path, *, include: Sequence[str | Path] = ()) -> Scene:
     """The scene that a file describes.
+
+    Args:
+        path: The file.
+        include: Folders below which included files may lie, beside that of the file.
 
     Raises:
         SourceError: The file cannot be read or has mistakes; all of them are in it.
     """
-    return load_with_warnings(path)[0]
+    return load_with_warnings(path, include=include)[0]
 
 
-def load_with_warnings(path: str | Path) -> tuple[Scene, tuple[Diagnostic, ...]]:
-    """The scene that a file describes, and what is doubtful in it; errors as of `load`."""
+def load_with_warnings(
+    path: str | Path, *, include: Sequence[str | Path] = ()
+) -> tuple[Scene, tuple[Diagnostic, ...]]:
+    """The scene that a file describes, and what is doubtful in it; all else as of `load`."""
     from ntagen.nsl.reading import read_source
 
     reporter = Reporter()
     source = read_source(str(path), reporter)
     if source is None:
         raise SourceError(reporter.diagnostics)
-    return _scene(source, reporter)
+    return _scene(source, reporter, include)
 
 
-def loads(text: str, path: str = "<text>") -> Scene:
+def loads(text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()) -> Scene:
     """The scene that a text describes; `path` is its name and where its includes are looked for.
 
     Raises:
         SourceError: The text has mistakes; all of them are in it.
     """
-    return loads_with_warnings(text, path)[0]
+    return loads_with_warnings(text, path, include=include)[0]
 
 
-def loads_with_warnings(text: str, path: str = "<text>") -> tuple[Scene, tuple[Diagnostic, ...]]:
+def loads_with_warnings(
+    text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()
+) -> tuple[Scene, tuple[Diagnostic, ...]]:
     """The scene that a text describes, and what is doubtful in it; as `loads`."""
-    return _scene(Source(path, text), Reporter())
+    return _scene(Source(path, text), Reporter(), include)
 
 
 def format_text(text: str, path: str = "<text>") -> str:
@@ -78,13 +87,15 @@ def format_text(text: str, path: str = "<text>") -> str:
     return format_source(Source(path, text))
 
 
-def _scene(source: Source, reporter: Reporter) -> tuple[Scene, tuple[Diagnostic, ...]]:
+def _scene(
+    source: Source, reporter: Reporter, include: Sequence[str | Path]
+) -> tuple[Scene, tuple[Diagnostic, ...]]:
     """The phases, one after the other."""
     from ntagen.nsl.build import build
     from ntagen.nsl.resolve import resolve
 
     reporter.enter(source.path)
-    draft = resolve(source, reporter)
+    draft = resolve(source, reporter, include)
     scene = None if draft is None else build(draft, reporter)
     if scene is None or reporter.has_errors:
         raise SourceError(reporter.diagnostics)

@@ -88,6 +88,7 @@ KINDS: Final = _kinds(
     ("N041", "loop-empty", "warning", "The loop makes no round: it counts upwards only."),
     ("N042", "include-cycle", "error", "A file includes itself, perhaps by way of others."),
     ("N043", "query-malformed", "error", "A query has a name, an equals sign and a text."),
+    ("N044", "include-outside", "error", "Files below the folder of the first may be included."),
     # What must be there, and how often.
     ("N050", "environment-missing", "error", "A file describes one environment."),
     ("N051", "environment-repeated", "error", "A file describes one environment."),

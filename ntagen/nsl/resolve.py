@@ -13,6 +13,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final, Generic, TypeVar
 
 from ntagen.nsl import tree
@@ -112,16 +113,23 @@ CHOICES: Final = {"tissue": ("static",), "safety": ("sampled", "swept")}
 _ONCE: Final = frozenset({"needle", "motion", "roll", "resolution", *_NUMBERS, *_VECTORS, *CHOICES})
 
 
-def resolve(source: Source, reporter: Reporter) -> Draft | None:
-    """What the file says; None if it has no environment. Mistakes go to the reporter."""
-    return _Resolver(reporter).file(source)
+def resolve(source: Source, reporter: Reporter, folders: Sequence[str | Path] = ()) -> Draft | None:
+    """What the file says; None if it has no environment. Mistakes go to the reporter.
+
+    Args:
+        source: The file.
+        reporter: Where mistakes go.
+        folders: Below which includes may lie, beside the folder of the file.
+    """
+    return _Resolver(reporter, folders).file(source)
 
 
 class _Resolver:
     """Walks through the statements of a file and those it includes."""
 
-    def __init__(self, reporter: Reporter) -> None:
+    def __init__(self, reporter: Reporter, folders: Sequence[str | Path]) -> None:
         self._reporter = reporter
+        self._folders = [os.path.realpath(folder) for folder in folders]
         self._evaluator = Evaluator(reporter)
         self._draft: Draft | None = None
         self._open_files: list[str] = []
@@ -133,6 +141,7 @@ class _Resolver:
     def file(self, source: Source) -> Draft | None:
         """The draft of the whole file."""
         file = parse(source, self._reporter)
+        self._folders.append(os.path.realpath(os.path.dirname(source.path)))
         self._open_files.append(os.path.realpath(source.path))
         if not file.statements and not self._reporter.has_errors:
             self._reporter.report_file(
@@ -279,6 +288,14 @@ class _Resolver:
         if len(self._open_files) > MAX_DEPTH:
             self._reporter.report(
                 "nesting-too-deep", span, f"includes are nested deeper than {MAX_DEPTH}"
+            )
+            return
+        if not any(_is_below(key, folder) for folder in self._folders):
+            self._reporter.report(
+                "include-outside",
+                span,
+                f"`{path}` is not below the folder of the first file",
+                hint=f"allow it with `--include {os.path.dirname(key)}`",
             )
             return
         self._included.add(key)
@@ -549,3 +566,8 @@ class _Resolver:
                 )
                 value = None
         draft.resolution = Placed(value, statement.count.span.to(statement.unit.span))
+
+
+def _is_below(path: str, folder: str) -> bool:
+    """Whether a file lies in a folder or in one in it; links have been followed in both."""
+    return path.startswith(folder if folder.endswith(os.sep) else folder + os.sep)

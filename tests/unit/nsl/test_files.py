@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+import ntagen
 from ntagen import nsl
+from ntagen.cli import main
 from ntagen.nsl.source import MAX_SOURCE_BYTES
 
 SMALLEST = """environment e {
@@ -138,3 +140,35 @@ def test_countless_mistakes_are_cut_short() -> None:
     codes = [diagnostic.code for diagnostic in caught.value.diagnostics]
     assert len(codes) == 1001
     assert codes[0] == "N007"
+
+
+def test_includes_lie_below_the_first_file_or_where_it_is_allowed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "shared").mkdir()
+    (tmp_path / "task").mkdir()
+    (tmp_path / "shared" / "lets.nsl").write_text("let depth = 50 mm\n")
+    (tmp_path / "task" / "link.nsl").symlink_to(tmp_path / "shared" / "lets.nsl")
+    text = SMALLEST.replace("(0, -50, 0) mm", "-depth * y")
+    for path in ("../shared/lets.nsl", "link.nsl", str(tmp_path / "shared" / "lets.nsl")):
+        env = tmp_path / "task" / "env.nsl"
+        env.write_text(f'include "{path}"\n{text}\n')
+        with pytest.raises(nsl.SourceError) as caught:
+            nsl.load(env)
+        assert [d.code for d in caught.value.diagnostics] == ["N044", "N020"]
+        assert f"--include {tmp_path / 'shared'}" in str(caught.value)
+        scene = nsl.load(env, include=[tmp_path / "shared"])
+        assert scene == nsl.loads(env.read_text(), str(env), include=[str(tmp_path)])
+    monkeypatch.chdir(tmp_path)
+    allowed = ["--include", "other", "--include", "shared"]
+    for command in (
+        ["check"],
+        ["compile", "-o", "."],
+        ["info"],
+        ["plot", "--plans", "0", "-o", "a.png"],
+        ["drive", "--quiet"],
+    ):
+        assert main([*command, "task/env.nsl"]) == 2
+        assert "N044" in capsys.readouterr().err
+        assert main([*command, "task/env.nsl", *allowed]) == 0
+    assert ntagen.load("task/env.nsl", include=["shared"]).processes
