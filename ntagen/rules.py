@@ -24,6 +24,13 @@ difference); this leaves three bits of head room."""
 MAX_ROLLS: Final = 100
 """Rolls that a plan may hold at most."""
 
+PAPER_QUERIES: Final = {
+    "PathExists": "E<> Checker.Final_TR_Reached",
+    "ReachFinalTR": "control: A<> Checker.Final_TR_Reached",
+}
+"""The queries of section 2 of the paper, which every model has; the second one carries its name,
+the first one got one here."""
+
 UNIT_TOLERANCE: Final = 1e-6
 """How far the length of a direction may be from 1, and the cosine of a right angle from 0: what
 rounding of written decimals makes."""
@@ -184,6 +191,18 @@ def motion(
             "make the step shorter",
         )
     return None
+
+
+def query(name: str, text: str) -> Breach | None:
+    """A query does not take the name of one of the paper's, unless it is that one."""
+    text = " ".join(text.split())
+    if PAPER_QUERIES.get(name, text) == text:
+        return None
+    return Breach(
+        "duplicate-name",
+        f"there is a query `{name}` in every model: {PAPER_QUERIES[name]}",
+        f"rename the one that says `{text}`",
+    )
 
 
 def time_units(step_s: float, speed_mm_per_s: float) -> tuple[int, float, float]:

@@ -72,6 +72,8 @@ class _Builder:
         tip = self._pose()
         needle = self._needle(tip)
         limits = self._limits()
+        for name, query in draft.queries.items():
+            self._obeys(rules.query(name, query.value or ""), query.span)
         resolution = self._resolution()
         spheres = self._spheres()
         # What follows computes with squares, which are no numbers if values are absurd.

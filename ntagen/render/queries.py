@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from ntagen import rules
 from ntagen.errors import InputError
 from ntagen.scene import Scene
 
@@ -27,17 +28,16 @@ class Query:
 PAPER_QUERIES: Final = (
     Query(
         "PathExists",
-        "E<> Checker.Final_TR_Reached",
+        rules.PAPER_QUERIES["PathExists"],
         "PathExists\nIs there any path to the final target?",
     ),
     Query(
         "ReachFinalTR",
-        "strategy ReachFinalTR = control: A<> Checker.Final_TR_Reached",
+        f"strategy ReachFinalTR = {rules.PAPER_QUERIES['ReachFinalTR']}",
         "ReachFinalTR\nIs there a strategy that reaches it, whatever the tissue does?",
     ),
 )
-"""The queries of section 2 of the paper; its second one carries its name, the first one got one
-here."""
+"""The queries of section 2 of the paper."""
 
 
 def model_queries(scene: Scene) -> tuple[Query, ...]:
@@ -47,16 +47,19 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
     scene that repeats one of the paper's is left out.
 
     Raises:
-        InputError: Two different queries have the same name.
+        InputError: A query of the scene has the name of another one.
     """
     queries = {query.name: query for query in PAPER_QUERIES}
     for named in scene.queries:
+        breach = rules.query(named.name, named.text)
+        if breach is not None:
+            raise InputError(f"{breach.message}\nhint: {breach.hint}")
         text = " ".join(named.text.split())
         formula = f"strategy {named.name} = {text}" if text.startswith("control") else text
         query = queries.setdefault(named.name, Query(named.name, formula, named.name))
         if query.formula != formula:
             raise InputError(
-                f"there are two different queries with the name {named.name}\n"
+                f"there are two queries with the name {named.name}\n"
                 f"hint: rename the one that says `{text}`"
             )
     return tuple(queries.values())

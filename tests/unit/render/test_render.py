@@ -198,5 +198,5 @@ def test_the_queries_of_the_paper_come_first() -> None:
 
 def test_two_different_queries_of_one_name_are_refused() -> None:
     scene = paper(queries=(NamedQuery("ReachFinalTR", "E<> User.End"),))
-    with pytest.raises(InputError, match="two different queries"):
+    with pytest.raises(InputError, match="in every model"):
         render(scene)
