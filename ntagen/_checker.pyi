@@ -1,6 +1,6 @@
 """Stub of the Rust engine's Python module; see ``checker/src/python.rs``."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal, final
 
 __all__ = [
@@ -75,6 +75,7 @@ class Model:
         partial_order: bool,
         live_variables: bool,
         folder: str | None,
+        allow_write: Sequence[str],
         progress: Callable[[int, int, int, int], object] | None,
     ) -> Answer: ...
 

@@ -306,7 +306,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, partial_order, live_variables, folder, progress))]
+    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, partial_order, live_variables, folder, allow_write, progress))]
     #[expect(
         clippy::too_many_arguments,
         clippy::fn_params_excessive_bools,
@@ -334,6 +334,7 @@ impl Model {
         partial_order: bool,
         live_variables: bool,
         folder: Option<PathBuf>,
+        allow_write: Vec<PathBuf>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Answer> {
         let timeout = time_limit(timeout_s)?;
@@ -374,6 +375,7 @@ impl Model {
             partial_order,
             live_variables,
             folder,
+            allow_write,
         };
         let model = slf.get();
         let answer = slf.py().detach(|| {

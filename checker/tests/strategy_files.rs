@@ -234,6 +234,7 @@ fn strategies_are_saved_and_loaded_beside_the_model() {
     let options = Options {
         code: CodeEngine::Interpreter,
         folder: Some(folder.clone()),
+        allow_write: vec![folder.clone()],
         ..Options::default()
     };
     let mut ask = |query: &str| {

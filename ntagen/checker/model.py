@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -186,6 +186,7 @@ class Model:
         partial_order: bool = True,
         live_variables: bool = True,
         folder: Path | None = None,
+        allow_write: Sequence[str | Path] = (),
         progress: Progress | None = None,
     ) -> Answer:
         """Answers a query.
@@ -236,6 +237,8 @@ class Model:
                 verdicts, values and traces do not depend on it, counts do.
             folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
                 folder of the model.
+            allow_write: Folders below which ``saveStrategy`` may write, beside the current one. An
+                existing file that is no strategy is never replaced.
             progress: Is called some twenty times a second with the numbers of explored,
                 stored and waiting states and of bytes.
 
@@ -275,6 +278,7 @@ class Model:
                 partial_order=partial_order,
                 live_variables=live_variables,
                 folder=None if folder is None else str(folder),
+                allow_write=[os.fspath(one) for one in allow_write],
                 progress=progress,
             )
         return Answer(raw, query, self._edge_table(), (forced, priorities))

@@ -241,6 +241,14 @@ class _Outputs:
 )
 @click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
 @limit_options()
+@click.option(
+    "--allow-write",
+    metavar="DIR",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="Let saveStrategy in queries write below this folder too, not only below the current one; "
+    "may be given again. Other files than strategies are never replaced.",
+)
 @include_option()
 def command(
     model_path: Path,
@@ -269,6 +277,7 @@ def command(
     states: int | None,
     memory: float | None,
     timeout: float | None,
+    allow_write: tuple[Path, ...],
     include: tuple[Path, ...],
 ) -> int:
     """Answer the queries of a model or an environment.
@@ -340,6 +349,7 @@ def command(
                         partial_order=partial_order == "on",
                         live_variables=live_variables == "on",
                         folder=query.folder,
+                        allow_write=allow_write,
                         progress=report,
                     )
             except InputError as error:

@@ -74,6 +74,8 @@ def idle_options(
         )
     if "seed" in given and values["search"] != "random":
         notes.append("--seed has no effect without --search random")
+    if "allow_write" in given and not any("saveStrategy" in query for query in queries):
+        notes.append("--allow-write has no effect here: no query saves a strategy")
     if "max_plans" in given and not values["plans"]:
         notes.append("--max-plans has no effect without --plans")
     if "ranking" in given and not values["plans"]:

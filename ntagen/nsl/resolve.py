@@ -272,7 +272,13 @@ class _Resolver:
         span = statement.path.span
         source_path = span.source.path
         path = os.path.join(os.path.dirname(source_path), statement.path.text)
-        key = os.path.realpath(path)
+        try:
+            key = os.path.realpath(path)
+        except ValueError as error:
+            # No file has such a name; a text that comes from no file may hold anything.
+            reason = str(error)
+            self._reporter.report("file-unreadable", span, f"cannot include `{path}`: {reason}")
+            return
         if key in self._open_files:
             chain = [os.path.basename(p) for p in self._open_files[self._open_files.index(key) :]]
             self._reporter.report(

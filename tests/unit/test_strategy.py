@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import ntagen
+from ntagen.cli import main
 from ntagen.runs import Choice, Run, State
 
 FEEDER = """
@@ -446,7 +447,7 @@ def test_strategies_within_strategies_are_loaded_in_queries(tmp_path: Path) -> N
         ('saveStrategy("more.json", More)', "satisfied"),
         ("A<> P.Off && level == 1 under More", "satisfied"),
     ]:
-        assert model.check(query, verify=True).verdict == verdict, query
+        assert model.check(query, verify=True, allow_write=[tmp_path]).verdict == verdict, query
     more = ntagen.load_strategy(tmp_path / "more.json", model)
     assert more.under is not None
     assert more.under.under is not None
@@ -483,3 +484,92 @@ def test_a_named_strategy_is_made_when_it_is_first_used(tmp_path: Path) -> None:
     assert with_strategy.strategy is not None
     assert with_strategy.explored > 20 * answer.explored
     assert model.check("E<> level == 50 under Low").verdict == "satisfied"
+
+
+OLD = '{"format":"ntagen-strategy","version":1}'
+LEARNED = '{"version": 1.0, "type": "state->regressor", "representation": "map", "actions": {}}'
+
+
+def saves(model: Path, *options: str, path: str) -> int:
+    """The exit code of a check whose queries save a strategy there."""
+    queries = model.with_suffix(".q")
+    queries.write_text(f'strategy S = control: A[] not P.Over\nsaveStrategy("{path}", S)\n')
+    return main(["check", str(model), str(queries), *options])
+
+
+@pytest.fixture
+def tank(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A model in a folder of its own; the current folder is the one that this lies in."""
+    (tmp_path / "here" / "models").mkdir(parents=True)
+    model = tmp_path / "here" / "models" / "tank.xta"
+    model.write_text(TANK)
+    monkeypatch.chdir(tmp_path / "here")
+    return model
+
+
+@pytest.mark.parametrize("path", ["s.json", "../s.json", "{}/here/new.json"])
+def test_queries_save_below_the_current_folder(tank: Path, path: str, tmp_path: Path) -> None:
+    path = path.format(tmp_path)
+    assert saves(tank, path=path) == 0
+    assert json.loads((tank.parent / path).read_text())["format"] == "ntagen-strategy"
+
+
+@pytest.mark.parametrize(
+    "path", ["../../s.json", "{}/s.json", "link/s.json", "../out.json", "dangling.json"]
+)
+def test_queries_do_not_save_elsewhere_unless_it_is_allowed(
+    tank: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], path: str
+) -> None:
+    path = path.format(tmp_path)
+    (tank.parent / "link").symlink_to(tmp_path)
+    (tank.parents[1] / "out.json").symlink_to(tmp_path / "out.json")
+    (tmp_path / "out.json").write_text(OLD)
+    (tank.parent / "dangling.json").symlink_to(tmp_path / "made.json")
+    before = {one.name: one.read_text() for one in tmp_path.iterdir() if one.is_file()}
+    assert saves(tank, path=path) == 2
+    said = capsys.readouterr().err
+    assert "E0805" in said
+    assert {one.name: one.read_text() for one in tmp_path.iterdir() if one.is_file()} == before
+    if path != "dangling.json":
+        assert f"allow it with --allow-write {tmp_path}" in said
+        assert (
+            saves(tank, "--allow-write", "models", "--allow-write", str(tmp_path), path=path) == 0
+        )
+        assert json.loads((tank.parent / path).read_text())["format"] == "ntagen-strategy"
+
+
+@pytest.mark.parametrize(
+    "old", ["alias ls='ls -l'\n", "{}", '{"version": 1, "type": "module"}', "\x7fELF", "\n"]
+)
+def test_queries_replace_nothing_but_strategies(
+    tank: Path, capsys: pytest.CaptureFixture[str], old: str
+) -> None:
+    bashrc = tank.parent / ".bashrc"
+    bashrc.write_text(old)
+    assert saves(tank, path=".bashrc") == 2
+    assert "it exists, and is no strategy" in capsys.readouterr().err
+    assert bashrc.read_text() == old
+
+
+@pytest.mark.parametrize("old", ["", OLD, LEARNED, "Initial state:\n\nState: ( P.A )\n"])
+def test_queries_replace_strategies_and_keep_their_mode(tank: Path, old: str) -> None:
+    path = tank.parent / "s.json"
+    path.write_text(old)
+    path.chmod(0o600)
+    (tank.parent / "link.json").symlink_to("s.json")
+    assert saves(tank, path="link.json") == 0
+    assert json.loads(path.read_text())["format"] == "ntagen-strategy"
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert (tank.parent / "link.json").is_symlink()
+    assert not list(tank.parent.glob(".ntagen*"))
+
+
+@pytest.mark.parametrize("path", ["/dev/zero", "/dev/null", "pipe", "."])
+def test_queries_load_and_save_plain_files_only(
+    tank: Path, capsys: pytest.CaptureFixture[str], path: str
+) -> None:
+    os.mkfifo(tank.parent / "pipe")
+    assert saves(tank, "--allow-write", "/", path=path) == 2
+    assert "cannot be written" in capsys.readouterr().err
+    assert main(["check", str(tank), "--query", f'strategy S = loadStrategy("{path}")']) == 2
+    assert "it is no plain file" in capsys.readouterr().err

@@ -28,6 +28,7 @@ mod reachable;
 pub mod simulation;
 pub mod strategies;
 pub mod strategy_file;
+mod strategy_place;
 pub mod strategy_text;
 pub mod timing;
 mod values;
@@ -142,6 +143,8 @@ pub struct Options {
     pub runs: bool,
     /// Where the files of `saveStrategy` and `loadStrategy` lie; `None` is the folder of the model.
     pub folder: Option<PathBuf>,
+    /// Below which folders `saveStrategy` may write, beside the current one.
+    pub allow_write: Vec<PathBuf>,
     /// Which trace to a state is wanted.
     pub trace: TraceWanted,
     /// Whether a certificate is wanted for the verdict that no reachable state is such.
@@ -180,6 +183,7 @@ impl Default for Options {
             verify: false,
             runs: false,
             folder: None,
+            allow_write: Vec::new(),
             trace: TraceWanted::default(),
             certificate: false,
             symmetry: true,

@@ -3,10 +3,8 @@
 //! A name stays for all later queries of the same loaded model. Its strategy is missing if the query that defines it did not come
 //! out satisfied; to be asked under such a name is an error. Who wins is often known long before the whole strategy is, so unless it is
 //! wanted with the answer, it is made when it is first used. Files lie relative to the folder that [`super::Options`] names, else
-//! to the folder of the model.
+//! to the folder of the model; `strategy_place` says which of them may be written.
 
-use std::fs::File;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,7 +14,8 @@ use crate::ir::Query;
 
 use super::answer::{Answer, Evidence, Verdict, new_answer};
 use super::certificate::stop_text;
-use super::{LoadedModel, Options, Rejection, codes, strategy_file};
+use super::strategy_place::Refusal;
+use super::{LoadedModel, Options, Rejection, codes, strategy_file, strategy_place};
 
 /// A strategy with the query that it answers.
 #[derive(Clone, Debug)]
@@ -60,22 +59,6 @@ pub fn unnamed(query: &str) -> &str {
         .filter(|rest| rest.starts_with(char::is_whitespace));
     let parts = named.and_then(|rest| rest.split_once('='));
     parts.map_or(query, |parts| parts.1.trim())
-}
-
-/// Writes a file completely or not at all: beside its place under another name, which it then loses.
-fn write_whole(path: &Path, text: &str) -> std::io::Result<()> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let part = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
-    let written = File::create(&part).and_then(|mut file| {
-        file.write_all(text.as_bytes())?;
-        file.sync_all()
-    });
-    let moved = written.and_then(|()| std::fs::rename(&part, path));
-    if moved.is_err() {
-        // What is left of it is of no use; that it cannot be removed says nothing new.
-        let _ = std::fs::remove_file(&part);
-    }
-    moved
 }
 
 impl LoadedModel {
@@ -157,9 +140,9 @@ impl LoadedModel {
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let text = strategy_file::text(self.network(), &strategy, query);
         let path = self.strategy_path(file, options);
-        write_whole(&path, &(text + "\n")).map_err(|error| {
-            let message = format!("{} cannot be written: {error}", path.display());
-            self.refused(codes::STRATEGY_FILE, span, message, None)
+        strategy_place::save(&path, &(text + "\n"), &options.allow_write).map_err(|refusal| {
+            let Refusal { message, help } = refusal;
+            self.refused(codes::STRATEGY_FILE, span, message, Some(&help))
         })?;
         let mut answer = new_answer(
             Verdict::Satisfied,
@@ -178,10 +161,9 @@ impl LoadedModel {
         options: &Options,
     ) -> Result<Answer, Rejection> {
         let path = self.strategy_path(file, options);
-        let bytes = std::fs::read(&path).map_err(|error| {
-            let message = format!("{} cannot be read: {error}", path.display());
-            let help = "relative paths start at the folder of the file that the query is in";
-            self.refused(codes::STRATEGY_FILE, span, message, Some(help))
+        let bytes = strategy_place::load(&path).map_err(|refusal| {
+            let Refusal { message, help } = refusal;
+            self.refused(codes::STRATEGY_FILE, span, message, Some(&help))
         })?;
         let (query, strategy) = self.read_strategy(&path.display().to_string(), &bytes, span)?;
         let strategy = Arc::new(strategy);

@@ -142,6 +142,13 @@ def test_countless_mistakes_are_cut_short() -> None:
     assert codes[0] == "N007"
 
 
+@pytest.mark.parametrize("name", ["a\0b", "\ud800"])
+def test_a_name_that_no_file_has_is_reported(name: str) -> None:
+    with pytest.raises(nsl.SourceError) as caught:
+        nsl.loads(f'include "{name}"\n{SMALLEST}')
+    assert caught.value.diagnostics[0].code in ("N001", "N002")
+
+
 def test_includes_lie_below_the_first_file_or_where_it_is_allowed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
