@@ -10,6 +10,9 @@ PYTHON ?= $(firstword $(foreach name,python3 python3.14 python3.13 python3.12 py
 BIN := .venv/bin
 # What the shell must know to find cargo: nothing, or where the fetched tool chain lies.
 RUST := .venv/rust.sh
+# Which packages development needs, with versions and hashes; users may have any that pyproject.toml allows.
+LOCK := requirements-dev.lock
+PACKAGES := .venv/packages
 INSTALLED := .venv/installed
 # What the installed engine is built from. Python files and templates are used in place.
 ENGINE := pyproject.toml checker/Cargo.toml checker/Cargo.lock $(shell find checker/src checker/pages -name '*.rs' -o -name '*.md')
@@ -61,6 +64,12 @@ format: $(INSTALLED) ## Format all sources and repair what the linter can
 	$(BIN)/ruff format .
 	source $(RUST) && cd checker && cargo fmt
 
+.PHONY: lock
+lock: | .venv ## Write requirements-dev.lock anew: the newest versions that pyproject.toml allows
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --upgrade --extra dev --generate-hashes \
+	  --no-annotate --no-emit-index-url --custom-compile-command 'make lock' --output-file $(LOCK) pyproject.toml
+
 .PHONY: picture
 picture: $(INSTALLED) ## Draw examples/scene.png, the picture of the README
 	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10
@@ -85,14 +94,19 @@ clean: ## Remove all that was built, also .venv
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find ntagen tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-$(INSTALLED): $(RUST) $(ENGINE)
-	source $(RUST) && $(BIN)/python -m pip install --quiet --editable '.[dev]'
+# The build takes maturin from .venv, and not the newest there is.
+$(INSTALLED): $(RUST) $(ENGINE) | $(PACKAGES)
+	source $(RUST) && PATH="$(CURDIR)/$(BIN):$$PATH" \
+	  $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
-$(RUST): | .venv
+$(PACKAGES): $(LOCK) | .venv
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement $(LOCK)
+	@touch $@
+
+$(RUST): | $(PACKAGES)
 	@if ! command -v cargo >/dev/null; then \
 	  echo 'There is no cargo on the PATH: fetching a Rust tool chain into the cache.'; \
-	  $(BIN)/python -m pip install --quiet puccinialin; \
 	  $(BIN)/python -m puccinialin --program ntagen --info-json .venv/rust.json >/dev/null; \
 	  $(BIN)/python -c 'import json, shlex; \
 	    [print(f"export {k}={shlex.quote(v)}") for k, v in json.load(open(".venv/rust.json"))["env"].items()]' > $@.part; \

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
 
 import pytest
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
 TEMPLATES = ROOT / "templates"
@@ -34,6 +37,21 @@ def test_the_package_holds_the_templates() -> None:
     assert package.is_dir(), "ntagen/templates is no folder: was the link lost?"
     assert digests(package) == digests(TEMPLATES)
     assert "model.xml.jinja" in digests(package)
+
+
+def test_the_lock_file_pins_all_that_is_asked_for() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    lock = (ROOT / "requirements-dev.lock").read_text()
+    pins = re.findall(r"^([\w.-]+)==([\w.]+)(.*) \\$", lock, re.MULTILINE)
+    for text in [*project["dependencies"], *project["optional-dependencies"]["dev"]]:
+        requirement = Requirement(text)
+        found = [version for name, version, _ in pins if name == requirement.name]
+        assert found, text
+        assert all(requirement.specifier.contains(version) for version in found), text
+    # Each line that is no pin is a hash or a comment: no address is in it.
+    others = [line for line in lock.splitlines() if not re.match(r"[\w.-]+==\S+( ; .*)? \\$", line)]
+    assert all(re.match(r"#|    --hash=sha256:[0-9a-f]{64}( \\)?$", line) for line in others)
+    assert len(pins) == len(re.findall(r"^[\w.-]+==", lock, re.MULTILINE))
 
 
 @pytest.mark.slow
