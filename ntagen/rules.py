@@ -9,6 +9,7 @@ driver that learns may well find itself in a critical region.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -194,7 +195,9 @@ def motion(
 
 
 def query(name: str, text: str) -> Breach | None:
-    """A query does not take the name of one of the paper's, unless it is that one."""
+    """A query is a text, and has not the name of one of the paper's, unless it is that one."""
+    if re.search(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
+        return Breach("query-malformed", f"`{name}` holds a character that no model can hold")
     text = " ".join(text.split())
     if PAPER_QUERIES.get(name, text) == text:
         return None

@@ -121,7 +121,8 @@ class _Outputs:
     epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected "
     "(of several queries those that are not are answered), "
     "3 stopped by a limit or maybe, 4 run-time error in the model, 70 internal error "
-    "(a strategy or trace that fails its check is one), 130 interrupted, with the counters so far.",
+    "(a strategy or trace that fails its check is one), 130 interrupted, with the counters so far, "
+    "143 ended by SIGTERM.",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("second_path", metavar="[FILE.q]", required=False, type=click.Path(path_type=Path))

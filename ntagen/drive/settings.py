@@ -6,12 +6,13 @@ Where a source gives no figure the default is ours, and said to be.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from ntagen.errors import InputError
 from ntagen.needle.estimate import Priors
-from ntagen.plan.rank import DEFAULT_RANKING
+from ntagen.plan.rank import DEFAULT_RANKING, parse_ranking
 from ntagen.plan.synthesise import Margins
 
 
@@ -56,6 +57,22 @@ class Settings:
     ranking: tuple[str, ...] = DEFAULT_RANKING
     priors: Priors = field(default_factory=Priors)
 
+    def __post_init__(self) -> None:
+        """Refuses what no drive can be made with.
+
+        Raises:
+            InputError: A value is no number, or of a size that makes no sense.
+        """
+        for name, value in _numbers(self):
+            least = _LEAST.get(name, 0.0)
+            if not isinstance(value, int | float) or not least <= value <= _LARGEST:
+                raise InputError(
+                    f"the setting {name} is {value!r}\nhint: it is from {least:g} to {_LARGEST:g}"
+                )
+        if self.pull_mm - self.push_mm < _LEAST["spacing_mm"]:
+            raise InputError("pull_mm must be greater than push_mm: nothing would be pulled back")
+        parse_ranking(",".join(self.ranking))
+
     def to_json(self) -> dict[str, Any]:
         """The settings as JSON."""
         return dataclasses.asdict(self)
@@ -75,3 +92,23 @@ class Settings:
             return Settings(**known)
         except (KeyError, TypeError) as error:
             raise InputError(f"the settings of the run cannot be read: {error}") from error
+
+
+_LARGEST: Final = 1e6
+"""The largest setting, in whatever unit."""
+
+_LEAST: Final = {
+    "spacing_mm": 0.01,
+    "learned_radius_mm": 0.01,
+    "deviation_count": 1.0,
+    **dict.fromkeys((field.name for field in dataclasses.fields(Priors)), 1e-12),
+}
+"""The least value of those settings that cannot be 0."""
+
+
+def _numbers(settings: Settings) -> Iterator[tuple[str, object]]:
+    """All numbers by name, those of its parts too."""
+    for part in (settings, settings.margins, settings.priors):
+        for one in dataclasses.fields(part):
+            if one.name not in ("margins", "priors", "ranking"):
+                yield one.name, getattr(part, one.name)

@@ -9,6 +9,7 @@ from typing import Final
 from ntagen.drive.reading import RunLog
 from ntagen.drive.records import Ended, Measured, Synthesised, Truth
 from ntagen.drive.scene_json import scene_from_json
+from ntagen.errors import InputError
 from ntagen.needle.path import sample_poses
 from ntagen.plan.actions import Plan
 from ntagen.plan.document import plan_from_json
@@ -89,10 +90,12 @@ def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
     for number in reversed(numbers):
         folder = f"rebuild-{number:04d}"
         if f"{folder}/plans.json" in log.attachments:
-            document = json.loads(log.attachments[f"{folder}/plans.json"])
-            scene = scene_from_json(log.attachments[f"{folder}/scene.json"])
-            items = document["plans"][:shown]
-            return [plan_from_json(item["actions"]) for item in items], scene.needle
+            scene = scene_from_json(log.attachments.get(f"{folder}/scene.json", b""))
+            try:
+                items = json.loads(log.attachments[f"{folder}/plans.json"])["plans"][:shown]
+                return [plan_from_json(item["actions"]) for item in items], scene.needle
+            except (KeyError, TypeError, ValueError) as error:
+                raise InputError(f"the plans of the run cannot be read: {error!r}") from error
     return [], log.scene.needle
 
 

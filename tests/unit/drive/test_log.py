@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
+import re
 import resource
 import subprocess
 import sys
@@ -195,6 +197,7 @@ def bomb(path: Path, compression: str) -> Path:
     return path
 
 
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="measured as Linux does it")
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 def test_a_log_that_unpacks_to_gigabytes_is_refused_in_little_memory(
     tmp_path: Path, compression: str
@@ -209,10 +212,11 @@ def test_a_log_that_unpacks_to_gigabytes_is_refused_in_little_memory(
 
 
 MEASURED = """
-import resource, sys
+import pathlib, re, sys
 from ntagen.cli import main
 code = main(["replay", sys.argv[1]])
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+# The usage of resources would hold the size of the process that started this one.
+print(re.search(r"VmHWM:\\s+(\\d+) kB", pathlib.Path("/proc/self/status").read_text())[1])
 sys.exit(code)
 """
 """Replays a log; prints the largest size of the process in KiB."""
@@ -282,3 +286,22 @@ def test_a_full_disk_ends_the_log_with_a_whole_record(tmp_path: Path) -> None:
     assert written_s
     assert [record.time_s for record in read.records[len(MANY) + 1 :]] == written_s
     assert read.torn_at_byte == path.stat().st_size
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("timeout_s", "nan"),
+        ("timeout_s", "null"),
+        ("spacing_mm", "0"),
+        ("deviation_mm", '"far"'),
+        ("force_n", "-1"),
+        ("pull_mm", "2.0"),
+        ("noise_mm", "0"),
+        ("depth_mm", "[]"),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(name: str, value: str) -> None:
+    text = re.sub(rf'("{name}": )[^,}}]+', rf"\g<1>{value}", json.dumps(Settings().to_json()))
+    with pytest.raises(InputError):
+        Settings.from_json(json.loads(text.replace("nan", "NaN")))
