@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ntagen import checker
-from ntagen.checker import Model
+from ntagen.checker import Model, OverflowRule
 from ntagen.scene import Scene
 from ntagen.strategy import Strategy
 
@@ -31,13 +31,20 @@ class Loaded:
     warnings: tuple[str, ...] = ()
 
 
-def load(source: str | Path, *, include: Sequence[str | Path] = ()) -> Model:
+def load(
+    source: str | Path,
+    *,
+    include: Sequence[str | Path] = (),
+    overflow: OverflowRule = "wrap",
+) -> Model:
     """Loads a model.
 
     Args:
         source: A path to a file (UPPAAL XML or XTA, or an environment ``.nsl``), or the text of a
             UPPAAL model. A string is a text if it holds a line break, a ``;`` or a ``<``.
         include: Folders below which the files may lie that an environment includes, beside its own.
+        overflow: What happens where the result of integer arithmetic does not fit into 32 bits:
+            `Model.overflow`.
 
     Returns:
         The model: `Model.check` answers queries, its attributes say what is in it.
@@ -48,8 +55,11 @@ def load(source: str | Path, *, include: Sequence[str | Path] = ()) -> Model:
         OSError: The file cannot be read.
     """
     if isinstance(source, str) and any(sign in source for sign in "\n;<"):
-        return checker.load(source)
-    return load_file(Path(source), include=include).model
+        model = checker.load(source)
+    else:
+        model = load_file(Path(source), include=include).model
+    model.overflow = overflow
+    return model
 
 
 def load_strategy(path: str | Path, model: Model) -> Strategy:

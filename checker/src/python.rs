@@ -24,6 +24,7 @@ use crate::engine::{
     machine_file, strategy_file, strategy_text,
 };
 use crate::game::{Forced, Nodes, Priorities};
+use crate::ir::Overflow;
 use crate::search::limits::StopReason;
 use crate::search::plain::Met;
 use crate::search::reach::Order;
@@ -91,6 +92,14 @@ fn forced_rule(name: &str) -> PyResult<Forced> {
         "product" => Ok(Forced::Product),
         "neutral" => Ok(Forced::Neutral),
         other => Err(unknown("rule for forced moves", other)),
+    }
+}
+
+fn overflow_rule(name: &str) -> PyResult<Overflow> {
+    match name {
+        "wrap" => Ok(Overflow::Wrap),
+        "error" => Ok(Overflow::Error),
+        other => Err(unknown("rule for overflows", other)),
     }
 }
 
@@ -184,6 +193,21 @@ impl Model {
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.with(|model| model.warnings.clone())
+    }
+
+    /// What happens where results of integer arithmetic do not fit: "wrap" or "error".
+    #[getter]
+    fn overflow(&self) -> &'static str {
+        self.with(|model| match model.network().overflow {
+            Overflow::Wrap => "wrap",
+            Overflow::Error => "error",
+        })
+    }
+
+    fn set_overflow(&self, rule: &str) -> PyResult<()> {
+        let overflow = overflow_rule(rule)?;
+        self.with(|model| model.set_overflow(overflow));
+        Ok(())
     }
 
     /// The seconds that loading took.
@@ -376,12 +400,20 @@ impl Model {
             live_variables,
             folder,
             allow_write,
+            overflow: Overflow::default(),
         };
         let model = slf.get();
         let answer = slf.py().detach(|| {
             model.with(|model| {
                 let text = model.add_query(query);
-                model.check(&text, &options)
+                let overflow = model.network().overflow;
+                model.check(
+                    &text,
+                    &Options {
+                        overflow,
+                        ..options
+                    },
+                )
             })
         });
         let answer = answer.map_err(rejected)?;
@@ -471,6 +503,15 @@ impl Answer {
     #[getter]
     fn stored(&self) -> u64 {
         self.inner.counters.stored
+    }
+
+    /// The first place where a result wrapped round, and the expression.
+    #[getter]
+    fn wrapped(&self) -> Option<(String, String)> {
+        let site = self.inner.wrapped?;
+        let place =
+            |model: &mut LoadedModel| model.place(model.network().sites[site.0 as usize].span);
+        Some(self.model.get().with(place))
     }
 
     #[getter]

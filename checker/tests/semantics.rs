@@ -4,7 +4,9 @@
 //! * `// expect: E0201 at 3:5 "part of the message"`: a diagnostic; a file gives exactly those that it expects. With
 //!   `at next:5` or `at this:5` the line is that after, or of, the directive.
 //! * `// run: condition`: the condition holds in the initial state.
-//! * `// fails: condition with DivisionByZero at 1 / n`: evaluating it there ends in that error, in that expression.
+//! * `// fails: condition with DivisionByZero at 1 / n`: evaluating it there ends in that error, in that expression; results that do not
+//!   fit are errors.
+//! * `// wraps: condition at n * n`: the condition holds there, and that result does not fit and wraps round.
 //! * `// accept: query`, `// refuse: query with E0271 "part of the message"`: whether a query can be asked.
 //! * `// warn: query with W0204`: the query can be asked, and gives this warning. There is a strategy with the name `known`.
 //!
@@ -16,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 use checker::diagnostics::{Diagnostic, SourceMap};
 use checker::exec::{Context, Executor, Interpreter, RunTimeError};
-use checker::ir::{self, Predicate, QueryKind};
+use checker::ir::{self, Network, Overflow, Predicate, QueryKind, SiteId};
 use checker::semantics::{self, Model};
 use checker::syntax;
 
@@ -69,12 +71,15 @@ fn rendered(diagnostics: &[Diagnostic], sources: &SourceMap) -> String {
 }
 
 /// Evaluates a predicate on the words of the initial state.
-fn evaluate(model: &Model, predicate: &Predicate) -> Result<bool, RunTimeError> {
-    let network = &model.network;
+fn evaluate(
+    network: &Network,
+    interpreter: &Interpreter,
+    predicate: &Predicate,
+) -> Result<bool, RunTimeError> {
+    let evaluate = |part: &Predicate| evaluate(network, interpreter, part);
     Ok(match predicate {
         Predicate::Constant(value) => *value,
         Predicate::Data(function) => {
-            let interpreter = Interpreter::new(&network.functions, &network.constants);
             let mut context = Context {
                 state: &mut network.initial.clone(),
                 constraints: &mut Vec::new(),
@@ -85,24 +90,39 @@ fn evaluate(model: &Model, predicate: &Predicate) -> Result<bool, RunTimeError> 
         Predicate::Location(process, location) => {
             network.initial[process.0 as usize] == location.0 as i32
         }
-        Predicate::Not(inner) => !evaluate(model, inner)?,
+        Predicate::Not(inner) => !evaluate(inner)?,
         Predicate::And(parts) => parts
             .iter()
-            .try_fold(true, |all, part| Ok(all && evaluate(model, part)?))?,
+            .try_fold(true, |all, part| Ok(all && evaluate(part)?))?,
         Predicate::Or(parts) => parts
             .iter()
-            .try_fold(false, |any, part| Ok(any || evaluate(model, part)?))?,
+            .try_fold(false, |any, part| Ok(any || evaluate(part)?))?,
         other => panic!("conditions on clocks have no value here: {other:?}"),
     })
 }
 
-fn run(loaded: &mut Loaded, condition: &str) -> Result<Result<bool, RunTimeError>, String> {
+/// The value of a condition, and the first place where a result wrapped round.
+type Ran = (Result<bool, RunTimeError>, Option<SiteId>);
+
+fn run(loaded: &mut Loaded, condition: &str, overflow: Overflow) -> Result<Ran, String> {
     let query = compile(loaded, &format!("E<> {condition}"))?;
     let QueryKind::Reachable(predicate) = &query.kind else {
         return Err(String::from("it is no condition"));
     };
     let model = loaded.model.as_ref().expect("the query was compiled");
-    Ok(evaluate(model, predicate))
+    let network = &model.network;
+    let interpreter =
+        Interpreter::new(&network.functions, &network.constants).with_overflow(overflow);
+    let result = evaluate(network, &interpreter, predicate);
+    Ok((result, interpreter.wraps().first()))
+}
+
+/// The text of a site.
+fn text_of(loaded: &Loaded, site: SiteId) -> &str {
+    let model = loaded.model.as_ref().expect("the query was compiled");
+    loaded
+        .sources
+        .text(model.network.sites[site.0 as usize].span)
 }
 
 /// What a directive finds wrong; empty if nothing.
@@ -122,22 +142,32 @@ fn check_directive(
             );
             None
         }
-        "run" => match run(loaded, value) {
-            Ok(Ok(true)) => None,
-            Ok(Ok(false)) => Some(format!("is false: {value}")),
-            Ok(Err(error)) => Some(format!("ends in {:?}: {value}", error.kind)),
+        "run" => match run(loaded, value, Overflow::Wrap) {
+            Ok((Ok(true), None)) => None,
+            Ok((Ok(true), Some(_))) => Some(format!("wraps round: {value}")),
+            Ok((Ok(false), _)) => Some(format!("is false: {value}")),
+            Ok((Err(error), _)) => Some(format!("ends in {:?}: {value}", error.kind)),
             Err(message) => Some(format!("cannot be compiled: {value}\n{message}")),
         },
         "fails" => {
             let (condition, wanted) = value.split_once(" with ").expect("fails: … with …");
-            match run(loaded, condition) {
-                Ok(Err(error)) => {
-                    let model = loaded.model.as_ref().expect("the query was compiled");
-                    let span = model.network.sites[error.site.0 as usize].span;
-                    let found = format!("{:?} at {}", error.kind, loaded.sources.text(span));
+            match run(loaded, condition, Overflow::Error) {
+                Ok((Err(error), _)) => {
+                    let found = format!("{:?} at {}", error.kind, text_of(loaded, error.site));
                     (found != wanted).then(|| format!("fails with {found}: {condition}"))
                 }
-                Ok(Ok(value)) => Some(format!("is {value} and does not fail: {condition}")),
+                Ok((Ok(value), _)) => Some(format!("is {value} and does not fail: {condition}")),
+                Err(message) => Some(format!("cannot be compiled: {condition}\n{message}")),
+            }
+        }
+        "wraps" => {
+            let (condition, wanted) = value.split_once(" at ").expect("wraps: … at …");
+            match run(loaded, condition, Overflow::Wrap) {
+                Ok((Ok(true), Some(site))) => {
+                    let found = text_of(loaded, site);
+                    (found != wanted).then(|| format!("wraps round at {found}: {condition}"))
+                }
+                Ok(other) => Some(format!("gives {other:?}: {condition}")),
                 Err(message) => Some(format!("cannot be compiled: {condition}\n{message}")),
             }
         }

@@ -3,13 +3,14 @@
 The engine is the Rust crate in ``checker/``; this package only gives its answers Python types.
 """
 
-from ntagen.checker.answer import Answer, Extreme, Value, Verdict
+from ntagen.checker.answer import Answer, Extreme, Place, Value, Verdict
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
 from ntagen.checker.model import (
     MAX_PLANS,
     CodeEngine,
     Model,
+    OverflowRule,
     PlansWanted,
     Progress,
     SearchOrder,
@@ -29,6 +30,8 @@ __all__ = [
     "EngineStep",
     "Extreme",
     "Model",
+    "OverflowRule",
+    "Place",
     "PlansWanted",
     "Progress",
     "RejectedError",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Literal
 
 from ntagen import _checker
@@ -23,6 +24,22 @@ Value = Extreme | list[Extreme] | list[list[Extreme] | None]
 and the greatest; of several items a list of these."""
 
 
+@dataclass(frozen=True)
+class Place:
+    """An expression of a model.
+
+    Attributes:
+        place: ``file:line:column``, from 1; of an XML file also which text of it the line is in.
+        text: The expression.
+    """
+
+    place: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.text}"
+
+
 class Answer:
     """The answer to a query.
 
@@ -34,6 +51,8 @@ class Answer:
         value: What a query with ``sup``, ``inf`` or ``bounds`` found; ``None`` for other queries,
             and if no state counts. Whether a clock reaches the value is in `message`.
         message: A remark for the user, or what went wrong in the model.
+        wrapped: The first place, in the order of the model, where a result of integer arithmetic
+            did not fit into 32 bits and wrapped round: `Model.overflow` makes it an error.
         warnings: What the user should know about the query, one text a warning.
         stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
         explored: States whose successors were computed.
@@ -64,6 +83,7 @@ class Answer:
         value = raw.value_json()
         self.value: Value = None if value is None else json.loads(value)
         self.message = raw.message
+        self.wrapped = None if raw.wrapped is None else Place(*raw.wrapped)
         self.warnings = tuple(raw.warnings)
         self.stop = raw.stop
         self.explored = raw.explored

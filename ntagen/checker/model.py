@@ -34,6 +34,7 @@ from ntagen.strategy import ForcedRule, PriorityRule, Strategy, Verification
 SearchOrder = Literal["bfs", "dfs", "random"]
 CodeEngine = Literal["jit", "interpreter"]
 PlansWanted = Literal["none", "first", "all"]
+OverflowRule = Literal["wrap", "error"]
 TraceWanted = Literal["any", "shortest", "fastest"]
 
 Progress = Callable[[int, int, int, int], object]
@@ -61,6 +62,19 @@ class Model:
         self._raw = raw
         self._edges: list[list[EdgeEntry]] | None = None
         self._facts: Facts | None = None
+
+    @property
+    def overflow(self) -> OverflowRule:
+        """What happens where the result of integer arithmetic does not fit into 32 bits.
+
+        It can be set. ``wrap``: it wraps round, as UPPAAL's does, and `Answer.wrapped` says where
+        it did; ``error``: it is a run-time error.
+        """
+        return self._raw.overflow
+
+    @overflow.setter
+    def overflow(self, rule: OverflowRule) -> None:
+        self._raw.set_overflow(rule)
 
     def __repr__(self) -> str:
         names = ", ".join(process.name for process in self.processes[:_PROCESSES_SHOWN])

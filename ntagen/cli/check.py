@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,7 +22,7 @@ from ntagen.cli.models import (
     with_pointer,
 )
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.rules import forced_rule, priority_rule
+from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart, write_files
@@ -240,6 +240,7 @@ class _Outputs:
     "Whether priorities of channels and processes count in games and under strategies. TIGA "
     "ignores them; in all other queries they count."
 )
+@overflow_rule()
 @click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
 @limit_options()
 @click.option(
@@ -275,6 +276,7 @@ def command(
     forced: Any,  # noqa: ANN401
     priorities: Any,  # noqa: ANN401
     engine: Any,  # noqa: ANN401
+    overflow: Any,  # noqa: ANN401
     states: int | None,
     memory: float | None,
     timeout: float | None,
@@ -319,7 +321,7 @@ def command(
     require_apart(outputs.wanted(), inputs)
     worst = 0
     with pointing_to_explanations(not as_json):
-        loaded = load_model(model_path, include)
+        loaded = load_model(model_path, include, overflow)
         shown_already = len(loaded.model.warnings)
         todo = _queries(loaded.model, asked, query_path)
         show_warnings(loaded.model.warnings[shown_already:])
@@ -451,6 +453,7 @@ def _record(answer: Answer, query: _Asked) -> dict[str, object]:
         "verdict": answer.verdict,
         "value": answer.value,
         "message": answer.message,
+        "wrapped": None if answer.wrapped is None else asdict(answer.wrapped),
         "stop": answer.stop,
         "explored": answer.explored,
         "stored": answer.stored,
@@ -478,12 +481,17 @@ def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_writte
     facts.append(f"{answer.peak_bytes / 2**20:.1f} MiB")
     if answer.stop:
         facts.insert(0, f"stopped by the limit of {answer.stop}")
+    wrapped = []
+    if answer.wrapped is not None and answer.verdict != "error":
+        where = f"first at {answer.wrapped}"
+        wrapped = [f"a result does not fit into 32 bits and wraps round, {where}"]
     way = [] if trace_is_written else _way_to_failure(answer)
     shown = [f"value: {json.dumps(answer.value)}"] if answer.value is not None else []
     for line in [
         *shown,
         ", ".join(facts),
         *([answer.message] if answer.message else []),
+        *wrapped,
         *way,
         *notes,
     ]:

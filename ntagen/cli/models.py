@@ -16,6 +16,7 @@ from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
+    from ntagen.checker.model import OverflowRule
     from ntagen.loading import Loaded
 
 WARNINGS_SHOWN: Final = 10
@@ -34,12 +35,13 @@ def include_option() -> Decorator:
     )
 
 
-def load_model(path: Path, include: Sequence[Path]) -> Loaded:
+def load_model(path: Path, include: Sequence[Path], overflow: OverflowRule = "wrap") -> Loaded:
     """The model of a file; warnings go to standard error.
 
     Args:
         path: The file.
         include: Below which folders an environment may include files.
+        overflow: What happens where results of integer arithmetic do not fit.
 
     Raises:
         InputError: The file is wrong.
@@ -50,6 +52,7 @@ def load_model(path: Path, include: Sequence[Path]) -> Loaded:
     loaded = load_file(path, include=include)
     if loaded.scene is None:
         say_idle({"include": "--include"}, "here: only environments (.nsl) include files")
+    loaded.model.overflow = overflow
     show_warnings((*loaded.warnings, *loaded.model.warnings))
     return loaded
 

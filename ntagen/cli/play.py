@@ -17,7 +17,7 @@ from ntagen.cli.effects import say_idle
 from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import include_option, load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.rules import forced_rule, priority_rule
+from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError, NtagenError
 from ntagen.files import require_apart, write_files
@@ -85,6 +85,7 @@ HELP: Final = """\
 )
 @forced_rule()
 @priority_rule("Whether priorities of channels and processes count.")
+@overflow_rule()
 @limit_options("--query")
 @include_option()
 def command(
@@ -96,6 +97,7 @@ def command(
     log: Path | None,
     forced: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     priorities: Any,  # noqa: ANN401
+    overflow: Any,  # noqa: ANN401
     states: int | None,
     memory: float | None,
     timeout: float | None,
@@ -137,7 +139,7 @@ def command(
     inputs = {"model": model_path} | ({"strategy": strategy_path} if strategy_path else {})
     require_apart({"--log": log}, inputs)
     with pointing_to_explanations(True):
-        model = load_model(model_path, include).model
+        model = load_model(model_path, include, overflow).model
         if strategy_path:
             strategy = model.load_strategy(strategy_path, forced, priorities)
         else:

@@ -16,6 +16,17 @@ def forced_rule(
     return click.option("--forced", type=rules, default="tiga", help=about)
 
 
+def overflow_rule() -> Decorator:
+    """The option ``--overflow``."""
+    return click.option(
+        "--overflow",
+        type=click.Choice(["wrap", "error"]),
+        default="wrap",
+        help="Where the result of integer arithmetic does not fit into 32 bits: it wraps round, as "
+        "UPPAAL's does, or it is a run-time error.",
+    )
+
+
 def priority_rule(about: str) -> Decorator:
     """The option ``--priorities``; ``about`` is its line in ``--help``."""
     rules = click.Choice(["ignore", "keep"])

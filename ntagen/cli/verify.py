@@ -10,7 +10,7 @@ import click
 
 from ntagen.cli.effects import say_idle
 from ntagen.cli.models import include_option, load_model, pointing_to_explanations
-from ntagen.cli.rules import forced_rule, priority_rule
+from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import EVIDENCE_BYTES, read_file
@@ -35,12 +35,14 @@ _WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certi
 @forced_rule("For strategies: when the environment must move because time cannot pass.")
 @priority_rule("For strategies: whether priorities of channels and processes count.")
 @include_option()
+@overflow_rule()
 def command(
     model_path: Path,
     file: Path,
     forced: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     priorities: Any,  # noqa: ANN401
     include: tuple[Path, ...],
+    overflow: Any,  # noqa: ANN401
 ) -> int:
     """Check a trace, certificate or strategy, independently of the search that found it.
 
@@ -61,7 +63,7 @@ def command(
       ntagen verify game.xml win.json
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(True):
-        loaded = load_model(model_path, include)
+        loaded = load_model(model_path, include, overflow)
         text = _read(file)
         checked = loaded.model.verify(text, str(file), forced=forced, priorities=priorities)
     kind = _WITHOUT_RULES.match(text)

@@ -10,7 +10,7 @@ use crate::game::closed_loop::ClosedLoop;
 use crate::game::observed::Machine;
 use crate::game::plans::Plan;
 use crate::game::strategy::{Strategy, Under};
-use crate::ir::{ClockAtom, FunctionId, Network, Predicate, Query, QueryKind};
+use crate::ir::{ClockAtom, FunctionId, Network, Predicate, Query, QueryKind, SiteId};
 use crate::network::bounds::is_difference;
 use crate::network::{
     Abstraction, ClockBounds, Failure, LiveVariables, Restriction, Stepper, Symbolic, Symmetry,
@@ -134,6 +134,8 @@ pub struct Answer {
     pub seconds: f64,
     /// Seconds of loading the model and compiling its code.
     pub load_seconds: f64,
+    /// The first place, in the order of the model, where the result of integer arithmetic did not fit and wrapped round.
+    pub wrapped: Option<SiteId>,
 }
 
 /// What a query is about.
@@ -309,7 +311,14 @@ pub(super) fn new_answer(verdict: Verdict, evidence: Evidence, counters: Counter
         peak_bytes: 0,
         seconds: 0.0,
         load_seconds: 0.0,
+        wrapped: None,
     }
+}
+
+/// The answer to a query on a model that has no meaning.
+pub(super) fn failed(failure: Failure) -> Answer {
+    let verdict = Verdict::Error(failure);
+    new_answer(verdict, Evidence::default(), Counters::default())
 }
 
 pub(super) fn negation(predicate: &Predicate) -> Predicate {

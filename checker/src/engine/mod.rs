@@ -39,11 +39,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
-use crate::exec::Executor;
-use crate::exec::Interpreter;
 #[cfg(feature = "jit")]
 use crate::exec::Jit;
-use crate::ir::{Network, QueryKind};
+use crate::exec::{Executor, Interpreter, RunTimeError};
+use crate::ir::{Network, Overflow, QueryKind, RunTimeErrorKind, SiteId};
+use crate::network::Failure;
 use crate::semantics::{self, Model};
 use crate::syntax::{
     self,
@@ -149,6 +149,8 @@ pub struct Options {
     pub trace: TraceWanted,
     /// Whether a certificate is wanted for the verdict that no reachable state is such.
     pub certificate: bool,
+    /// What happens where results of integer arithmetic do not fit into 32 bits.
+    pub overflow: Overflow,
     /// Whether a search may take states that differ only in which member of a scalar set is which for the same.
     pub symmetry: bool,
     /// Whether a search for a state need not take independent moves in every order where time stands still.
@@ -186,6 +188,7 @@ impl Default for Options {
             allow_write: Vec::new(),
             trace: TraceWanted::default(),
             certificate: false,
+            overflow: Overflow::default(),
             symmetry: true,
             partial_order: true,
             live_variables: true,
@@ -230,7 +233,7 @@ pub struct LoadedModel {
     pub warnings: Vec<String>,
     /// Seconds that loading took, compilation of code included once a query was checked.
     pub load_seconds: f64,
-    code: Option<(CodeEngine, PreparedCode)>,
+    code: Option<(CodeEngine, Overflow, PreparedCode)>,
 }
 
 /// The code of the model, ready to run.
@@ -327,6 +330,13 @@ impl LoadedModel {
 
     /// Answers a query.
     pub fn check(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
+        let before = std::mem::replace(&mut self.model.network.overflow, options.overflow);
+        let answer = self.check_it(text, options);
+        self.model.network.overflow = before;
+        answer
+    }
+
+    fn check_it(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
         let start = Instant::now();
         let (query, warnings) = self.compile(text.span)?;
         self.load_seconds += start.elapsed().as_secs_f64();
@@ -337,17 +347,20 @@ impl LoadedModel {
         let start = Instant::now();
         self.refuse_unsupported(&query, options.priorities)?;
         self.prepare_code(options.code, query.span)?;
+        self.executor().wraps().clear();
         self.load_seconds += start.elapsed().as_secs_f64();
-        let mut answer = match &query.kind {
-            QueryKind::SaveStrategy { file, strategy } => {
+        let mut answer = match (&query.kind, self.constant_failure()) {
+            (_, Some(failure)) => answer::failed(failure),
+            (QueryKind::SaveStrategy { file, strategy }, None) => {
                 self.save_strategy((file, strategy), query.span, options)?
             }
-            QueryKind::LoadStrategy { file } => {
+            (QueryKind::LoadStrategy { file }, None) => {
                 let name = query.strategy.as_deref().unwrap_or_default();
                 self.load_strategy((file, name), query.span, options)?
             }
             _ => self.answer(&query, options)?,
         };
+        answer.wrapped = self.first_wrap();
         self.complete_failure(&query, options, &mut answer);
         answer.warnings = warnings;
         answer.load_seconds = self.load_seconds;
@@ -419,7 +432,7 @@ impl LoadedModel {
     ///
     /// If no query was checked and no simulation prepared before.
     fn executor(&self) -> &dyn Executor {
-        let (_, code) = self
+        let (_, _, code) = self
             .code
             .as_ref()
             .expect("code is prepared before it is run");
@@ -456,33 +469,56 @@ impl LoadedModel {
         Err(Rejection::new(diagnostics, &self.sources))
     }
 
+    /// Says what happens where results of integer arithmetic do not fit into 32 bits; a query has an option of its own.
+    pub fn set_overflow(&mut self, overflow: Overflow) {
+        self.model.network.overflow = overflow;
+    }
+
+    /// Why the model has no meaning if what does not fit is an error: a constant wrapped round.
+    fn constant_failure(&self) -> Option<Failure> {
+        let network = self.network();
+        let site = network.wrapped_constant?;
+        let kind = RunTimeErrorKind::Overflow;
+        let is_error = network.overflow == Overflow::Error;
+        is_error.then_some(Failure::RunTime(RunTimeError { kind, site }))
+    }
+
+    /// Where the answer to a query first wrapped round, in the order of the model, or a constant did.
+    fn first_wrap(&self) -> Option<SiteId> {
+        let in_constants = self.network().wrapped_constant;
+        let noted = self.executor().wraps().first();
+        noted.into_iter().chain(in_constants).min()
+    }
+
     /// Makes the code of the model, or adds what queries brought since.
     pub(super) fn prepare_code(&mut self, wanted: CodeEngine, span: Span) -> Result<(), Rejection> {
         let network = &self.model.network;
+        let overflow = network.overflow;
+        self.code.take_if(|code| code.1 != overflow);
         let result = match (&mut self.code, wanted) {
-            (
-                Some((CodeEngine::Interpreter, PreparedCode::Interpreter(interpreter))),
-                CodeEngine::Interpreter,
-            ) => {
+            (Some((_, _, PreparedCode::Interpreter(interpreter))), CodeEngine::Interpreter) => {
                 interpreter.extend(&network.functions, &network.constants);
                 Ok(())
             }
             #[cfg(feature = "jit")]
-            (Some((CodeEngine::Jit, PreparedCode::Jit(jit))), CodeEngine::Jit) => jit
+            (Some((_, _, PreparedCode::Jit(jit))), CodeEngine::Jit) => jit
                 .extend(&network.functions, &network.constants)
                 .map_err(|error| error.to_string()),
             (code, CodeEngine::Interpreter) => {
-                let interpreter = Interpreter::new(&network.functions, &network.constants);
-                *code = Some((wanted, PreparedCode::Interpreter(interpreter)));
+                let interpreter = Interpreter::new(&network.functions, &network.constants)
+                    .with_overflow(overflow);
+                *code = Some((wanted, overflow, PreparedCode::Interpreter(interpreter)));
                 Ok(())
             }
             #[cfg(feature = "jit")]
-            (code, CodeEngine::Jit) => Jit::new(&network.functions, &network.constants)
-                .map(|jit| {
-                    jit.prepare(network.functions_of_edges());
-                    *code = Some((wanted, PreparedCode::Jit(Box::new(jit))));
-                })
-                .map_err(|error| error.to_string()),
+            (code, CodeEngine::Jit) => {
+                Jit::with_overflow(&network.functions, &network.constants, overflow)
+                    .map(|jit| {
+                        jit.prepare(network.functions_of_edges());
+                        *code = Some((wanted, overflow, PreparedCode::Jit(Box::new(jit))));
+                    })
+                    .map_err(|error| error.to_string())
+            }
             #[cfg(not(feature = "jit"))]
             (_, CodeEngine::Jit) => Err("this build of the engine has no compiler".to_owned()),
         };

@@ -89,8 +89,11 @@ impl LoadedModel {
         let due = self.strategy(name).and_then(|one| one.due.clone());
         let remark = match due {
             Some(due) => {
+                self.model.network.overflow = due.options.overflow;
                 self.prepare_code(due.options.code, span)?;
-                self.make_strategy(name, *due, options)
+                let remark = self.make_strategy(name, *due, options);
+                self.model.network.overflow = options.overflow;
+                remark
             }
             None => None,
         };

@@ -1,41 +1,57 @@
 //! What the operators mean, on plain values: the one definition that interpretation, constant folding and the tests of
 //! compiled code go back to.
 //!
-//! Invariant: nothing here panics or wraps silently; whatever has no result is a [`RunTimeErrorKind`].
+//! Invariant: nothing here panics or wraps silently: whether a result wrapped round is said with it, and whatever has no result is
+//! a [`RunTimeErrorKind`].
 
 use crate::ir::{DoubleOperator, IntegerOperator, Relation, RunTimeErrorKind};
+
+/// The result of integer arithmetic, and whether it wrapped round: the true result is another one modulo 2^32.
+pub(crate) type Wrapping = (i32, bool);
 
 /// `left operator right`, or why there is no such integer.
 pub(crate) fn integer(
     operator: IntegerOperator,
     left: i32,
     right: i32,
-) -> Result<i32, RunTimeErrorKind> {
-    let overflow = RunTimeErrorKind::Overflow;
-    match operator {
-        IntegerOperator::Add => left.checked_add(right).ok_or(overflow),
-        IntegerOperator::Subtract => left.checked_sub(right).ok_or(overflow),
-        IntegerOperator::Multiply => left.checked_mul(right).ok_or(overflow),
+) -> Result<Wrapping, RunTimeErrorKind> {
+    Ok(match operator {
+        IntegerOperator::Add => left.overflowing_add(right),
+        IntegerOperator::Subtract => left.overflowing_sub(right),
+        IntegerOperator::Multiply => left.overflowing_mul(right),
         IntegerOperator::Divide | IntegerOperator::Remainder if right == 0 => {
-            Err(RunTimeErrorKind::DivisionByZero)
+            return Err(RunTimeErrorKind::DivisionByZero);
         }
-        IntegerOperator::Divide => left.checked_div(right).ok_or(overflow),
-        IntegerOperator::Remainder => Ok(left.wrapping_rem(right)),
-        IntegerOperator::Power => power(left, right),
-        IntegerOperator::ShiftLeft => Ok(left << shift_distance(right)?),
-        IntegerOperator::ShiftRight => Ok(left >> shift_distance(right)?),
-        IntegerOperator::And => Ok(left & right),
-        IntegerOperator::Or => Ok(left | right),
-        IntegerOperator::Xor => Ok(left ^ right),
-        IntegerOperator::Minimum => Ok(left.min(right)),
-        IntegerOperator::Maximum => Ok(left.max(right)),
+        IntegerOperator::Divide => left.overflowing_div(right),
+        IntegerOperator::Remainder => (left.wrapping_rem(right), false),
+        IntegerOperator::Power => power(left, right)?,
+        IntegerOperator::ShiftLeft => (left << shift_distance(right)?, false),
+        IntegerOperator::ShiftRight => (left >> shift_distance(right)?, false),
+        IntegerOperator::And => (left & right, false),
+        IntegerOperator::Or => (left | right, false),
+        IntegerOperator::Xor => (left ^ right, false),
+        IntegerOperator::Minimum => (left.min(right), false),
+        IntegerOperator::Maximum => (left.max(right), false),
+    })
+}
+
+/// `left operator right` if there is such an integer and it did not wrap round: what may be computed beforehand.
+pub(crate) fn fitting(operator: IntegerOperator, left: i32, right: i32) -> Option<i32> {
+    match integer(operator, left, right) {
+        Ok((value, false)) => Some(value),
+        Ok((_, true)) | Err(_) => None,
     }
 }
 
 /// `base ** exponent`; `0 ** 0` is 1.
-pub(crate) fn power(base: i32, exponent: i32) -> Result<i32, RunTimeErrorKind> {
+pub(crate) fn power(base: i32, exponent: i32) -> Result<Wrapping, RunTimeErrorKind> {
     let exponent = u32::try_from(exponent).map_err(|_| RunTimeErrorKind::NegativeExponent)?;
-    base.checked_pow(exponent).ok_or(RunTimeErrorKind::Overflow)
+    Ok(base.overflowing_pow(exponent))
+}
+
+/// The absolute value; that of -2^31 wraps round to itself.
+pub(crate) fn absolute(value: i32) -> Wrapping {
+    value.overflowing_abs()
 }
 
 fn shift_distance(bits: i32) -> Result<u32, RunTimeErrorKind> {

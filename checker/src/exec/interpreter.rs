@@ -8,18 +8,20 @@
 //! Cost: some nanoseconds an instruction.
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use crate::cancellation;
 use crate::ir::{
     Address, Base, Block, CLOCK_LIMIT, ClockId, ClockOperand, Function, FunctionId, Instruction,
-    MathFunction, Register, RegisterType, RunTimeErrorKind, Terminator,
+    MathFunction, Overflow, Register, RegisterType, RunTimeErrorKind, SiteId, Terminator,
 };
 
+use super::arithmetic::Wrapping;
 use super::math::{self, MathCode};
 use super::rounds::{ROUND_LIMIT, count_rounds};
 use super::{
     Context, EmittedAssignment, EmittedConstraint, Executor, ROUNDS_BETWEEN_LOOKS, RunTimeError,
-    arithmetic,
+    Wraps, arithmetic,
 };
 
 /// Runs functions by walking over their instructions.
@@ -27,6 +29,8 @@ use super::{
 pub struct Interpreter {
     functions: Vec<Function>,
     constants: Vec<i32>,
+    overflow: Overflow,
+    wraps: Arc<Wraps>,
 }
 
 impl Interpreter {
@@ -35,6 +39,13 @@ impl Interpreter {
         let mut interpreter = Interpreter::default();
         interpreter.extend(functions, constants);
         interpreter
+    }
+
+    /// The same, with what happens where results of integer arithmetic do not fit.
+    #[must_use]
+    pub fn with_overflow(mut self, overflow: Overflow) -> Interpreter {
+        self.overflow = overflow;
+        self
     }
 
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
@@ -89,6 +100,10 @@ impl Executor for Interpreter {
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
         self.measure(ROUND_LIMIT, function, arguments, context).0
+    }
+
+    fn wraps(&self) -> &Wraps {
+        &self.wraps
     }
 }
 
@@ -411,10 +426,11 @@ impl<'run> Run<'run, '_> {
                 target,
                 left,
                 right,
-                ..
+                site,
             } => {
                 let (left, right) = (self.integer(active, *left), self.integer(active, *right));
-                let value = arithmetic::integer(*operator, left, right)?;
+                let result = arithmetic::integer(*operator, left, right)?;
+                let value = self.wrapped(result, *site)?;
                 self.set_integer(active, *target, value);
             }
             Instruction::DoubleToInteger { target, source, .. } => {
@@ -425,8 +441,8 @@ impl<'run> Run<'run, '_> {
                 function,
                 target,
                 arguments,
-                ..
-            } => self.apply(active, *function, *target, arguments)?,
+                site,
+            } => self.apply(active, *function, *target, arguments, *site)?,
             &Instruction::CheckRange {
                 value, low, high, ..
             } => {
@@ -468,6 +484,21 @@ impl<'run> Run<'run, '_> {
         Ok(())
     }
 
+    /// The result of integer arithmetic at a site.
+    fn wrapped(
+        &self,
+        (value, has_wrapped): Wrapping,
+        site: SiteId,
+    ) -> Result<i32, RunTimeErrorKind> {
+        if has_wrapped {
+            match self.program.overflow {
+                Overflow::Error => return Err(RunTimeErrorKind::Overflow),
+                Overflow::Wrap => self.program.wraps.note(site),
+            }
+        }
+        Ok(value)
+    }
+
     /// A function of the mathematical library.
     fn apply(
         &mut self,
@@ -475,11 +506,15 @@ impl<'run> Run<'run, '_> {
         function: MathFunction,
         target: Register,
         arguments: &[Register],
+        site: SiteId,
     ) -> Result<(), RunTimeErrorKind> {
         let double = |index: usize| self.double(active, arguments[index]);
         let integer = |index: usize| self.integer(active, arguments[index]);
         let value = match math::code_of(function) {
-            MathCode::Abs => Value::Integer(math::abs(integer(0))?),
+            MathCode::Abs => {
+                let result = arithmetic::absolute(integer(0));
+                Value::Integer(self.wrapped(result, site)?)
+            }
             MathCode::Ilogb => Value::Integer(math::ilogb(double(0))?),
             MathCode::Classify(code) => Value::Integer(code(double(0))),
             MathCode::Unary(code) => Value::Double(code(double(0))),

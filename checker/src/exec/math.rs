@@ -48,11 +48,6 @@ pub(crate) fn code_of(function: MathFunction) -> MathCode {
     }
 }
 
-/// The absolute value, if it fits.
-pub(crate) fn abs(value: i32) -> Result<i32, RunTimeErrorKind> {
-    value.checked_abs().ok_or(RunTimeErrorKind::Overflow)
-}
-
 /// The binary exponent of a number other than 0.
 pub(crate) fn ilogb(value: f64) -> Result<i32, RunTimeErrorKind> {
     if value == 0.0 || !value.is_finite() {

@@ -7,6 +7,7 @@ pub(crate) mod arithmetic;
 pub(crate) mod math;
 
 mod rounds;
+mod wraps;
 
 mod interpreter;
 mod optimise;
@@ -23,6 +24,7 @@ pub use optimise::optimise;
 pub(crate) use optimise::target;
 pub use rounds::ROUND_LIMIT;
 pub use validate::{Flaw, validate};
+pub use wraps::Wraps;
 
 use crate::ir::{ClockId, FixedConstraint, FunctionId, RunTimeErrorKind, SiteId};
 
@@ -90,6 +92,9 @@ pub trait Executor: Send + Sync {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError>;
+
+    /// Where results wrapped round since this was cleared.
+    fn wraps(&self) -> &Wraps;
 }
 
 /// Rounds of loops between two looks whether to end ([`crate::cancellation::is_due`]); a call that is ended so fails with

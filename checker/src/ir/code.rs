@@ -2,9 +2,10 @@
 //!
 //! Invariants:
 //! * Registers are typed and may be written more than once; every register is written before it is read.
-//! * Arithmetic on integers is 32-bit and *checked*: an overflow, a division by zero, a negative or too large shift, an index
-//!   or a value out of range ends the call with a [`RunTimeErrorKind`] at the instruction's [`SiteId`], and the state's words
-//!   are then of no further use.
+//! * Arithmetic on integers is 32-bit: where a result does not fit, [`Overflow`] says whether it wraps round, and is noted with the
+//!   instruction's [`SiteId`], or is an error.
+//! * An error (a division by zero, a negative or too large shift, an index or a value out of range) ends the call with a
+//!   [`RunTimeErrorKind`] at the instruction's [`SiteId`], and the state's words are then of no further use.
 //! * Floating-point arithmetic is IEEE double precision in the order written; mathematical functions are those of the
 //!   platform's C library, in the interpreter and in compiled code alike, so that the two agree bit for bit.
 //! * Functions never call themselves, directly or indirectly.
@@ -28,6 +29,16 @@ pub struct BlockId(pub u32);
 /// Index of a site in [`super::Network::sites`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SiteId(pub u32);
+
+/// What happens where the result of integer arithmetic does not fit into 32 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Overflow {
+    /// It wraps round, as in two's complement, which is noted: what UPPAAL does.
+    #[default]
+    Wrap,
+    /// It is a [`RunTimeErrorKind::Overflow`].
+    Error,
+}
 
 /// The type of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -122,7 +133,7 @@ pub enum Instruction {
     Double { target: Register, value: f64 },
     /// A copy between registers of one type.
     Copy { target: Register, source: Register },
-    /// Checked integer arithmetic.
+    /// Integer arithmetic.
     Arithmetic {
         operator: IntegerOperator,
         target: Register,
@@ -256,19 +267,19 @@ pub enum Instruction {
 /// Integer operators.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum IntegerOperator {
-    /// Sum; overflow is an error.
+    /// Sum; may wrap round.
     Add,
-    /// Difference; overflow is an error.
+    /// Difference; may wrap round.
     Subtract,
-    /// Product; overflow is an error.
+    /// Product; may wrap round.
     Multiply,
-    /// Quotient, truncated towards zero; division by zero and `-2^31 / -1` are errors.
+    /// Quotient, truncated towards zero; division by zero is an error, and `-2^31 / -1` wraps round to `-2^31`.
     Divide,
     /// Remainder with the dividend's sign; division by zero is an error, `-2^31 % -1` is 0.
     Remainder,
-    /// Power; a negative exponent and overflow are errors; `0 ** 0` is 1.
+    /// Power; may wrap round; a negative exponent is an error; `0 ** 0` is 1.
     Power,
-    /// Shift left by 0 to 31 bits; bits are lost without an error, as in C; other distances are errors.
+    /// Shift left by 0 to 31 bits; bits are lost without a word, as in C; other distances, of which C says nothing, are errors.
     ShiftLeft,
     /// Arithmetic shift right by 0 to 31 bits; other distances are errors.
     ShiftRight,
@@ -314,7 +325,7 @@ pub enum Relation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "the names are those of the language")]
 pub enum MathFunction {
-    /// int → int: an error for `-2^31`.
+    /// int → int; `-2^31` wraps round to itself.
     Abs,
     Fabs,
     Exp,
@@ -412,7 +423,7 @@ impl MathFunction {
 /// What can go wrong while a model runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum RunTimeErrorKind {
-    /// The result of integer arithmetic does not fit into 32 bits.
+    /// The result of integer arithmetic does not fit into 32 bits ([`Overflow::Error`]).
     Overflow,
     /// A division by zero.
     DivisionByZero,

@@ -59,6 +59,10 @@ pub struct Network {
     pub sites: Vec<Site>,
     /// The constant memory.
     pub constants: Vec<i32>,
+    /// What happens where results of integer arithmetic do not fit.
+    pub overflow: Overflow,
+    /// The first place, in the order of sites, where the value of a constant wrapped round.
+    pub wrapped_constant: Option<SiteId>,
     /// The words of the initial state.
     pub initial: Vec<i32>,
     /// The initial values of the clocks, by clock index.

@@ -207,7 +207,7 @@ impl<'a> Possibility<'a> {
                 left,
                 right,
                 ..
-            } => arithmetic::integer(operator, value(left)?, value(right)?).ok(),
+            } => arithmetic::fitting(operator, value(left)?, value(right)?),
             Instruction::CompareIntegers {
                 relation,
                 left,

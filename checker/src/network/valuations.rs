@@ -399,9 +399,9 @@ impl<'a> Analysis<'a> {
             return false;
         }
         let network = self.network;
-        let interpreter = self
-            .interpreter
-            .get_or_insert_with(|| Interpreter::new(&network.functions, &network.constants));
+        let interpreter = self.interpreter.get_or_insert_with(|| {
+            Interpreter::new(&network.functions, &network.constants).with_overflow(network.overflow)
+        });
         let (mut constraints, mut assignments) = (Vec::new(), Vec::new());
         for combination in combinations(&all) {
             let (arguments, words) = combination.split_at(edge.select.len());

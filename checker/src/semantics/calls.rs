@@ -257,7 +257,7 @@ pub(super) fn folded_math(function: MathFunction, arguments: Vec<Expr>, span: Sp
 fn absolute(arguments: Vec<Expr>, span: Span) -> Expr {
     let (low, high) = arguments[0].interval;
     if let Some(value) = arguments[0].constant()
-        && let Ok(value) = math::abs(value)
+        && let (value, false) = arithmetic::absolute(value)
     {
         return Expr::int(value, Type::ANY_INT, span);
     }
@@ -267,6 +267,8 @@ fn absolute(arguments: Vec<Expr>, span: Span) -> Expr {
         low.saturating_abs().min(high.saturating_abs())
     };
     let most = low.saturating_abs().max(high.saturating_abs());
+    // The least integer wraps round to itself.
+    let least = if low == i32::MIN { low } else { least };
     let kind = Kind::Math(MathFunction::Abs, arguments);
     Expr::new(kind, Type::ANY_INT, span).within((least, most))
 }

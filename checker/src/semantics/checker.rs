@@ -10,10 +10,10 @@ use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Local, LocalId, Place, Root};
 use super::types::{Size, Type};
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
-use crate::exec::{Context, EmittedAssignment, Interpreter, RunTimeError};
+use crate::exec::{Context, EmittedAssignment, Executor, Interpreter, RunTimeError};
 use crate::ir::{
     Channel, Clock, Coordinate, Function, FunctionId, Instruction, Network, ProcessId,
-    RunTimeErrorKind, Variable,
+    RunTimeErrorKind, SiteId, Variable,
 };
 
 /// The place of the system section's scope: behind the prelude's and the global one.
@@ -330,6 +330,21 @@ impl<'a> Checker<'a> {
         result.map_err(|error| error.kind)
     }
 
+    /// Warns that what is computed while the model is loaded wrapped round.
+    fn constant_wraps(&mut self, site: SiteId) {
+        let first = &mut self.world.network.wrapped_constant;
+        *first = Some(first.map_or(site, |first| first.min(site)));
+        let span = self.world.network.sites[site.0 as usize].span;
+        self.report(
+            Diagnostic::new(
+                codes::CONSTANT_WRAPS,
+                span,
+                "this does not fit into 32 bits, and wraps round",
+            )
+            .help("use smaller numbers; --overflow error lets no query go on from here"),
+        );
+    }
+
     /// Runs a function on the words of a state, and gives them back; what it assigns to clocks is appended.
     pub(super) fn run_on(
         &mut self,
@@ -348,6 +363,9 @@ impl<'a> Checker<'a> {
         let left = CONSTANT_ROUND_LIMIT.saturating_sub(self.world.constant_rounds);
         let (result, rounds) = interpreter.call_within(left, FunctionId(0), &[], &mut context);
         self.world.constant_rounds += rounds;
+        if let Some(site) = interpreter.wraps().first() {
+            self.constant_wraps(site);
+        }
         result.map(|_| state)
     }
 }

@@ -171,6 +171,8 @@ codes! {
     HYBRID_CLOCK_IGNORED = "W0206" "hybrid-clock-ignored";
     /// An array without parts.
     ARRAY_EMPTY = "W0207" "array-empty";
+    /// Arithmetic of constants beyond 32 bits.
+    CONSTANT_WRAPS = "W0212" "constant-wraps";
     /// A function that UPPAAL calls after all that a query sees.
     HOOK_WITHOUT_EFFECT = "W0211" "hook-without-effect";
 }

@@ -9,7 +9,7 @@ use super::typed::{Expr, Kind, Root};
 use super::types::Type;
 use crate::diagnostics::Span;
 use crate::exec::arithmetic;
-use crate::ir::{IntegerOperator, RunTimeErrorKind};
+use crate::ir::RunTimeErrorKind;
 
 impl Checker<'_> {
     /// Whether the value of an expression is known without a state.
@@ -153,7 +153,7 @@ impl Checker<'_> {
 /// What goes wrong, for a sentence.
 pub(super) fn reason(kind: RunTimeErrorKind) -> &'static str {
     match kind {
-        RunTimeErrorKind::Overflow => "an overflow of 32 bits",
+        RunTimeErrorKind::Overflow => "a result that does not fit into 32 bits",
         RunTimeErrorKind::DivisionByZero => "a division by zero",
         RunTimeErrorKind::ShiftDistance => {
             "a shift by a negative number of bits or by more than 31"
@@ -199,12 +199,8 @@ fn wrapping_value(expr: &Expr) -> Option<i32> {
         Kind::Int(value) => Some(*value),
         Kind::Integer(operator, left, right) => {
             let (left, right) = (wrapping_value(left)?, wrapping_value(right)?);
-            match operator {
-                IntegerOperator::Add => Some(left.wrapping_add(right)),
-                IntegerOperator::Subtract => Some(left.wrapping_sub(right)),
-                IntegerOperator::Multiply => Some(left.wrapping_mul(right)),
-                _ => arithmetic::integer(*operator, left, right).ok(),
-            }
+            let result = arithmetic::integer(*operator, left, right).ok();
+            result.map(|(value, _)| value)
         }
         _ => None,
     }

@@ -258,7 +258,7 @@ pub(super) fn integer_operation(
     span: Span,
 ) -> Expr {
     if let (Some(a), Some(b)) = (left.constant(), right.constant())
-        && let Ok(value) = arithmetic::integer(operator, a, b)
+        && let Some(value) = arithmetic::fitting(operator, a, b)
     {
         return Expr::int(value, Type::ANY_INT, span);
     }
@@ -316,7 +316,8 @@ fn compare_doubles(relation: Relation, left: Expr, right: Expr, span: Span) -> E
     Expr::new(kind, Type::Bool, span)
 }
 
-/// The values of an operation whose operands have values in these intervals, where it has one.
+/// The values of an operation whose operands have values in these intervals, where it has one. Results that may not fit into 32 bits may
+/// wrap round to any value.
 pub(super) fn integer_interval(
     operator: IntegerOperator,
     (a, b): (i32, i32),
@@ -325,10 +326,14 @@ pub(super) fn integer_interval(
     let (wide_a, wide_b) = (i64::from(a), i64::from(b));
     let (wide_c, wide_d) = (i64::from(c), i64::from(d));
     let clamp = |value: i64| value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+    let fitting = |low: i64, high: i64| match (i32::try_from(low), i32::try_from(high)) {
+        (Ok(low), Ok(high)) => (low, high),
+        _ => (i32::MIN, i32::MAX),
+    };
     let hull = |values: [i64; 4]| {
         let low = values.into_iter().fold(i64::MAX, i64::min);
         let high = values.into_iter().fold(i64::MIN, i64::max);
-        (clamp(low), clamp(high))
+        fitting(low, high)
     };
     let products = [
         wide_a * wide_c,
@@ -338,8 +343,8 @@ pub(super) fn integer_interval(
     ];
     let magnitude = clamp(wide_a.abs().max(wide_b.abs()));
     match operator {
-        IntegerOperator::Add => (clamp(wide_a + wide_c), clamp(wide_b + wide_d)),
-        IntegerOperator::Subtract => (clamp(wide_a - wide_d), clamp(wide_b - wide_c)),
+        IntegerOperator::Add => fitting(wide_a + wide_c, wide_b + wide_d),
+        IntegerOperator::Subtract => fitting(wide_a - wide_d, wide_b - wide_c),
         IntegerOperator::Multiply => hull(products),
         IntegerOperator::Divide => divided((a, b), (c, d), magnitude),
         IntegerOperator::Remainder => {
@@ -368,6 +373,9 @@ fn divided((a, b): (i32, i32), (c, d): (i32, i32), magnitude: i32) -> (i32, i32)
     }
     if a >= 0 && c >= 0 {
         return (0, b);
+    }
+    if a == i32::MIN && c <= -1 && -1 <= d {
+        return (i32::MIN, i32::MAX);
     }
     (magnitude.saturating_neg(), magnitude)
 }

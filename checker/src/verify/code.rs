@@ -74,7 +74,8 @@ impl<'a> Code<'a> {
     pub(super) fn new(network: &'a Network) -> Code<'a> {
         Code {
             network,
-            interpreter: Interpreter::new(&network.functions, &network.constants),
+            interpreter: Interpreter::new(&network.functions, &network.constants)
+                .with_overflow(network.overflow),
             emitted: RefCell::default(),
         }
     }

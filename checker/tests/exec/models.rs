@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use checker::engine::LoadedModel;
 use checker::engine::simulation::{Point, successors, symbolic};
 use checker::exec::Executor;
-use checker::ir::Network;
+use checker::ir::{Network, Overflow};
 use checker::network::Symbolic;
 use checker::zones::Bound;
 
@@ -155,7 +155,7 @@ fn engines_agree_on_walks_through_every_model() {
         if network.clocks.len() > MOST_CLOCKS || network.processes.len() > MOST_PROCESSES {
             continue;
         }
-        let executors = engines(&network.functions, &network.constants);
+        let executors = engines(&network.functions, &network.constants, Overflow::default());
         walked += 1;
         let mut random = Random(7);
         for _ in 0..WALKS {

@@ -3,11 +3,11 @@
 
 use checker::exec::RunTimeError;
 use checker::ir::{
-    ClockId, ClockOperand, DoubleOperator, FunctionId, Instruction, IntegerOperator, MathFunction,
-    Register, RegisterType, Relation, RunTimeErrorKind, SiteId,
+    ClockId, ClockOperand, DoubleOperator, Function, FunctionId, Instruction, IntegerOperator,
+    MathFunction, Overflow, Register, RegisterType, Relation, RunTimeErrorKind, SiteId,
 };
 
-use crate::support::{Outcome, engines, run, state_word, straight_line};
+use crate::support::{OVERFLOWS, Outcome, engines, run, state_word, straight_line};
 
 use RegisterType::{Double, Integer};
 use RunTimeErrorKind as Kind;
@@ -25,14 +25,72 @@ fn check(
     expected: &Result<(i32, Vec<i32>), Kind>,
 ) {
     let code = straight_line(arguments.len() as u32, registers, instructions, result);
-    let functions = [code];
-    for (name, engine) in engines(&functions, &[]) {
-        let Outcome { result, state, .. } = run(&*engine, FunctionId(0), arguments, &[0; 4]);
+    for overflow in OVERFLOWS {
+        let expected = (expected, None);
+        check_on(overflow, std::slice::from_ref(&code), arguments, expected);
+    }
+}
+
+/// What a call returns, with the state, or how it ends; and the first place where a result wrapped round.
+type Expected<'e> = (&'e Result<(i32, Vec<i32>), Kind>, Option<SiteId>);
+
+fn check_on(overflow: Overflow, functions: &[Function], arguments: &[i32], expected: Expected<'_>) {
+    for (name, engine) in engines(functions, &[], overflow) {
+        let outcome = run(&*engine, FunctionId(0), arguments, &[0; 4]);
+        let Outcome { result, state, .. } = outcome;
         let actual = result.map(|value| (value, state)).map_err(|error| {
             assert_eq!(error.site, SITE, "{name}: {}", functions[0]);
             error.kind
         });
-        assert_eq!(&actual, expected, "{name} {arguments:?}: {}", functions[0]);
+        assert_eq!(
+            (&actual, outcome.wrapped),
+            expected,
+            "{name} {arguments:?}: {}",
+            functions[0]
+        );
+    }
+}
+
+/// Checks what computing this comes to where its result does not fit: the wrapped result with a note, or an error.
+fn check_wrapping(
+    registers: &[RegisterType],
+    arguments: &[i32],
+    instructions: &[Instruction],
+    result: u32,
+    wrapped: i32,
+) {
+    let code = straight_line(
+        arguments.len() as u32,
+        registers,
+        instructions.to_vec(),
+        Some(result),
+    );
+    let functions = [code];
+    let value = Ok((wrapped, vec![0; 4]));
+    check_on(Overflow::Wrap, &functions, arguments, (&value, Some(SITE)));
+    let error = Err(Kind::Overflow);
+    check_on(Overflow::Error, &functions, arguments, (&error, None));
+}
+
+/// Operands whose results do not fit, with what is left of them modulo 2^32.
+fn check_wrapping_integer(operator: IntegerOperator, cases: &[(i32, i32, i32)]) {
+    for &(left, right, wrapped) in cases {
+        let instruction = Instruction::Arithmetic {
+            operator,
+            target: Register(2),
+            left: Register(0),
+            right: Register(1),
+            site: SITE,
+        };
+        let values = [(0, left), (1, right)].map(|(target, value)| Instruction::Integer {
+            target: Register(target),
+            value,
+        });
+        // No operand is known beforehand, or the second one, or both.
+        for known in [&values[..0], &values[1..], &values[..]] {
+            let instructions = [known, std::slice::from_ref(&instruction)].concat();
+            check_wrapping(&[Integer; 3], &[left, right], &instructions, 2, wrapped);
+        }
     }
 }
 
@@ -132,42 +190,55 @@ fn check_classification(function: MathFunction, operand: f64, expected: Result<i
 }
 
 #[test]
-fn sums_and_differences_overflow_at_32_bits() {
+fn sums_and_differences_reach_the_limits_of_32_bits() {
     use IntegerOperator::{Add, Subtract};
+    check_integer(Add, &[(2, 3, Ok(5)), (MAX, 0, Ok(MAX)), (MIN, MAX, Ok(-1))]);
+    check_integer(Subtract, &[(2, 3, Ok(-1)), (-1, MIN, Ok(MAX))]);
+}
+
+#[test]
+fn products_reach_the_limits_of_32_bits() {
     check_integer(
-        Add,
+        IntegerOperator::Multiply,
         &[
-            (2, 3, Ok(5)),
-            (MAX, 0, Ok(MAX)),
-            (MAX, 1, Err(Kind::Overflow)),
-            (MIN, -1, Err(Kind::Overflow)),
-            (MIN, MAX, Ok(-1)),
-        ],
-    );
-    check_integer(
-        Subtract,
-        &[
-            (2, 3, Ok(-1)),
-            (0, MIN, Err(Kind::Overflow)),
-            (-1, MIN, Ok(MAX)),
-            (MIN, 1, Err(Kind::Overflow)),
-            (MAX, -1, Err(Kind::Overflow)),
+            (6, -7, Ok(-42)),
+            (46340, 46340, Ok(2_147_395_600)),
+            (65536, -32768, Ok(MIN)),
+            (MIN, 1, Ok(MIN)),
+            (MIN, 0, Ok(0)),
         ],
     );
 }
 
 #[test]
-fn products_overflow_at_32_bits() {
-    check_integer(
-        IntegerOperator::Multiply,
+fn results_that_do_not_fit_wrap_round() {
+    use IntegerOperator::{Add, Divide, Multiply, Power, Subtract};
+    check_wrapping_integer(
+        Add,
+        &[(MAX, 1, MIN), (MIN, -1, MAX), (MAX, MAX, -2), (MIN, MIN, 0)],
+    );
+    check_wrapping_integer(
+        Subtract,
+        &[(0, MIN, MIN), (MIN, 1, MAX), (MAX, -1, MIN), (MAX, MIN, -1)],
+    );
+    check_wrapping_integer(
+        Multiply,
         &[
-            (6, -7, Ok(-42)),
-            (46341, 46341, Err(Kind::Overflow)),
-            (46340, 46340, Ok(2_147_395_600)),
-            (65536, -32768, Ok(MIN)),
-            (MIN, -1, Err(Kind::Overflow)),
-            (MIN, 1, Ok(MIN)),
-            (MIN, 0, Ok(0)),
+            (46341, 46341, -2_147_479_015),
+            (MIN, -1, MIN),
+            (MAX, MAX, 1),
+            (65536, 65536, 0),
+        ],
+    );
+    check_wrapping_integer(Divide, &[(MIN, -1, MIN)]);
+    check_wrapping_integer(
+        Power,
+        &[
+            (2, 31, MIN),
+            (2, 32, 0),
+            (MIN, 2, 0),
+            (-2, 33, 0),
+            (3, 21, 1_870_418_611),
         ],
     );
 }
@@ -183,7 +254,6 @@ fn division_truncates_and_the_remainder_has_the_dividends_sign() {
             (7, -2, Ok(-3)),
             (1, 0, Err(Kind::DivisionByZero)),
             (MIN, 0, Err(Kind::DivisionByZero)),
-            (MIN, -1, Err(Kind::Overflow)),
             (MIN, 1, Ok(MIN)),
             (MAX, -1, Ok(-MAX)),
         ],
@@ -202,7 +272,7 @@ fn division_truncates_and_the_remainder_has_the_dividends_sign() {
 }
 
 #[test]
-fn powers_reject_negative_exponents_and_overflow() {
+fn powers_reject_negative_exponents() {
     check_integer(
         IntegerOperator::Power,
         &[
@@ -212,10 +282,7 @@ fn powers_reject_negative_exponents_and_overflow() {
             (-1, MAX, Ok(-1)),
             (-1, MAX - 1, Ok(1)),
             (-2, 31, Ok(MIN)),
-            (2, 31, Err(Kind::Overflow)),
             (MIN, 1, Ok(MIN)),
-            (MIN, 2, Err(Kind::Overflow)),
-            (3, MAX, Err(Kind::Overflow)),
             (2, -1, Err(Kind::NegativeExponent)),
             (1, MIN, Err(Kind::NegativeExponent)),
         ],
@@ -517,14 +584,22 @@ fn classification_of_doubles() {
 }
 
 #[test]
-fn the_absolute_value_of_the_least_integer_overflows() {
-    for (value, expected) in [(-5, Ok(5)), (MAX, Ok(MAX)), (MIN, Err(Kind::Overflow))] {
-        let instruction = Instruction::Math {
-            function: MathFunction::Abs,
-            target: Register(1),
-            arguments: vec![Register(0)],
-            site: SITE,
-        };
+fn the_absolute_value_of_the_least_integer_wraps_round() {
+    let instruction = Instruction::Math {
+        function: MathFunction::Abs,
+        target: Register(1),
+        arguments: vec![Register(0)],
+        site: SITE,
+    };
+    check_wrapping(
+        &[Integer; 2],
+        &[MIN],
+        std::slice::from_ref(&instruction),
+        1,
+        MIN,
+    );
+    for (value, expected) in [(-5, Ok(5)), (MAX, Ok(MAX)), (MIN + 1, Ok(MAX))] {
+        let instruction = instruction.clone();
         check(
             &[Integer; 2],
             &[value],
@@ -663,7 +738,7 @@ fn an_endless_loop_ends_at_the_limit_of_rounds() {
             terminator: Terminator::Jump(BlockId(0)),
         }],
     }];
-    for (name, engine) in engines(&functions, &[]) {
+    for (name, engine) in engines(&functions, &[], Overflow::default()) {
         let outcome = run(&*engine, FunctionId(0), &[], &[]);
         let expected = Err(RunTimeError {
             kind: Kind::StepLimit,
@@ -696,7 +771,7 @@ fn a_look_ends_a_call_that_runs_long() {
             site: SiteId(0),
         })
     };
-    for (name, engine) in engines(&functions, &[]) {
+    for (name, engine) in engines(&functions, &[], Overflow::default()) {
         let looks = Arc::new(AtomicU32::new(0));
         let seen = Arc::clone(&looks);
         let look: Look = Arc::new(move |_| seen.fetch_add(1, Ordering::Relaxed) == 2);

@@ -3,10 +3,11 @@
 //! A program is a few functions, of which each calls only earlier ones and the last is called from outside. Functions work
 //! on small pools of registers that are written over and over, on 64 words each of state, constants and frame, cut into
 //! blocks of four, and through addresses of blocks. Loops have few rounds. Numbers are mostly small, so that many programs
-//! run to their end, and sometimes extreme, so that every error comes up.
+//! run to their end, and sometimes extreme, so that results wrap round and every error comes up.
 
 use std::fmt::Write;
 
+use checker::exec::Interpreter;
 use checker::ir::{
     Address, Base, Block, BlockId, ClockId, ClockOperand, DoubleOperator, Function, FunctionId,
     Instruction, IntegerOperator, MathFunction, Register, RegisterType, Relation, RunTimeErrorKind,
@@ -14,7 +15,7 @@ use checker::ir::{
 };
 use proptest::prelude::*;
 
-use crate::support::{engines, run};
+use crate::support::{OVERFLOWS, engines, run};
 
 const INTEGERS: u32 = 5;
 const DOUBLES: u32 = 4;
@@ -49,9 +50,22 @@ fn integers() -> impl Strategy<Value = i32> {
         8 => -4..10,
         2 => -40_000..40_000,
         1 => any::<i32>(),
-        1 => prop::sample::select(vec![i32::MIN, i32::MIN + 1, -1, 31, 32, i32::MAX - 1, i32::MAX]),
+        2 => prop::sample::select(LIMITS.to_vec()),
+        1 => prop::sample::select(vec![-1, 31, 32]),
     ]
 }
+
+/// Numbers that arithmetic soon takes beyond 32 bits.
+const LIMITS: [i32; 8] = [
+    i32::MIN,
+    i32::MIN + 1,
+    i32::MIN / 2,
+    -65536,
+    46341,
+    i32::MAX / 2,
+    i32::MAX - 1,
+    i32::MAX,
+];
 
 fn doubles() -> impl Strategy<Value = f64> {
     prop_oneof![
@@ -318,6 +332,15 @@ impl<'a> Lowering<'a> {
             4 => self.copy(a, b, c),
             5..10 => {
                 let (target, left, right) = (self.integer(b), self.integer(c), self.integer(d));
+                if e % 2 == 0 {
+                    // Near the limits results wrap round, which registers seldom come to.
+                    let target = if f % 2 == 0 { left } else { right };
+                    let value = match e % 4 {
+                        0 => pick_from(&LIMITS, f / 2),
+                        _ => value,
+                    };
+                    self.push(Instruction::Integer { target, value });
+                }
                 self.push(Instruction::Arithmetic {
                     operator: pick_from(&INTEGER_OPERATORS, a),
                     target,
@@ -801,9 +824,12 @@ fn check_agreement(program: &[Body], seeds: &[i32]) -> Result<(), TestCaseError>
     let functions = lower(program);
     let constants: Vec<i32> = (0..WORDS as i32).map(|word| word * 7 % 11 - 3).collect();
     let last = FunctionId(functions.len() as u32 - 1);
-    let engines = engines(&functions, &constants);
-    let (_, reference) = &engines[0];
-    for &seed in seeds {
+    let all = OVERFLOWS.map(|overflow| engines(&functions, &constants, overflow));
+    for (engines, &seed) in all
+        .iter()
+        .flat_map(|one| seeds.iter().map(move |seed| (one, seed)))
+    {
+        let (_, reference) = &engines[0];
         let arguments = vec![seed; functions[last.0 as usize].parameters as usize];
         let state: Vec<i32> = (0..WORDS as i32)
             .map(|word| seed.wrapping_mul(word) % 5)
@@ -867,6 +893,7 @@ fn random_programs_end_in_every_way() {
     use proptest::test_runner::TestRunner;
     let mut runner = TestRunner::deterministic();
     let mut ends = std::collections::BTreeMap::new();
+    let mut wrapped = 0;
     for seed in 0..3000 {
         let program = programs()
             .new_tree(&mut runner)
@@ -875,16 +902,23 @@ fn random_programs_end_in_every_way() {
         let functions = lower(&program);
         let last = FunctionId(functions.len() as u32 - 1);
         let arguments = vec![seed % 7; functions[last.0 as usize].parameters as usize];
-        let interpreter = checker::exec::Interpreter::new(&functions, &[1; WORDS]);
-        let outcome = run(&interpreter, last, &arguments, &[2; WORDS]);
-        let end = match outcome.result {
-            Ok(_) => "end".to_owned(),
-            Err(error) => format!("{:?}", error.kind),
-        };
-        *ends.entry(end).or_insert(0) += 1;
+        for overflow in OVERFLOWS {
+            let interpreter = Interpreter::new(&functions, &[1; WORDS]).with_overflow(overflow);
+            let outcome = run(&interpreter, last, &arguments, &[2; WORDS]);
+            let end = match outcome.result {
+                Ok(_) => "end".to_owned(),
+                Err(error) => format!("{:?}", error.kind),
+            };
+            *ends.entry(end).or_insert(0) += 1;
+            wrapped += i32::from(outcome.wrapped.is_some());
+        }
     }
     assert!(
-        ends["end"] > 1000,
+        wrapped > 150,
+        "results wrap round in {wrapped} programs only"
+    );
+    assert!(
+        ends["end"] > 2000,
         "too few programs run to their end: {ends:?}"
     );
     assert_eq!(ends.len(), 10, "not all errors come up: {ends:?}");

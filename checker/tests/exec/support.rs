@@ -4,7 +4,8 @@ use checker::exec::{
     Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError, optimise,
 };
 use checker::ir::{
-    Address, Base, Block, Function, FunctionId, Instruction, Register, RegisterType, Terminator,
+    Address, Base, Block, Function, FunctionId, Instruction, Overflow, Register, RegisterType,
+    SiteId, Terminator,
 };
 
 /// Everything that a call leaves behind.
@@ -18,26 +19,39 @@ pub(crate) struct Outcome {
     pub constraints: Vec<EmittedConstraint>,
     /// The emitted assignments; empty after an error.
     pub assignments: Vec<EmittedAssignment>,
+    /// The first place where a result wrapped round.
+    pub wrapped: Option<SiteId>,
 }
+
+/// Both ways to take results that do not fit.
+pub(crate) const OVERFLOWS: [Overflow; 2] = [Overflow::Wrap, Overflow::Error];
 
 /// All engines on the same code, the reference first.
 pub(crate) fn engines(
     functions: &[Function],
     constants: &[i32],
+    overflow: Overflow,
 ) -> Vec<(&'static str, Box<dyn Executor>)> {
-    let interpreter = Interpreter::new(functions, constants);
-    let optimised = Interpreter::new(&optimise(functions, constants), constants);
+    let interpreter =
+        |functions: &[Function]| Interpreter::new(functions, constants).with_overflow(overflow);
+    let (optimised, interpreter) = (
+        interpreter(&optimise(functions, constants)),
+        interpreter(functions),
+    );
     vec![
         ("interpreter", Box::new(interpreter)),
         ("optimised code", Box::new(optimised)),
         #[cfg(feature = "jit")]
-        ("compiled code", Box::new(compiled(functions, constants))),
+        (
+            "compiled code",
+            Box::new(compiled(functions, constants, overflow)),
+        ),
     ]
 }
 
 #[cfg(feature = "jit")]
-fn compiled(functions: &[Function], constants: &[i32]) -> checker::exec::Jit {
-    checker::exec::Jit::compile(functions, constants).expect("the host is supported")
+fn compiled(functions: &[Function], constants: &[i32], overflow: Overflow) -> checker::exec::Jit {
+    checker::exec::Jit::compile(functions, constants, overflow).expect("the host is supported")
 }
 
 /// Calls a function on one engine.
@@ -52,7 +66,9 @@ pub(crate) fn run(
         state: state.to_vec(),
         constraints: Vec::new(),
         assignments: Vec::new(),
+        wrapped: None,
     };
+    engine.wraps().clear();
     outcome.result = engine.call(
         function,
         arguments,
@@ -62,6 +78,7 @@ pub(crate) fn run(
             assignments: &mut outcome.assignments,
         },
     );
+    outcome.wrapped = engine.wraps().first();
     if outcome.result.is_err() {
         outcome.state.clear();
         outcome.constraints.clear();

@@ -32,6 +32,7 @@ RECORD = {
     "verdict",
     "value",
     "message",
+    "wrapped",
     "stop",
     "explored",
     "stored",
@@ -398,6 +399,72 @@ def failing(tmp_path: Path) -> Path:
     path = tmp_path / "failing.xta"
     path.write_text(FAILING)
     return path
+
+
+WRAPPING = """\
+int32_t used = -1;
+bool fits() { return 5 <= INT32_MAX - used; }
+process P() {
+    state A, B, C;
+    init A;
+    trans A -> B { guard fits(); }, A -> C { guard !fits(); };
+}
+system P;
+"""
+
+
+@pytest.mark.parametrize("engine", ["jit", "interpreter"])
+def test_arithmetic_wraps_round_and_the_answer_says_where(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, engine: str
+) -> None:
+    path = tmp_path / "wrapping.xta"
+    path.write_text(WRAPPING)
+    place = {"place": f"{path}:2:27", "text": "INT32_MAX - used"}
+    for query, code in [("E<> P.B", 1), ("E<> P.C", 0), ("control: A<> P.C", 0)]:
+        common = (path, "--query", query, "--engine", engine)
+        out, _ = check_run(capsys, code, *common, "--json")
+        assert json.loads(out)["wrapped"] == place
+        out, _ = check_run(capsys, code, *common)
+        assert f"wraps round, first at {path}:2:27: INT32_MAX - used" in out
+        out, _ = check_run(capsys, 4, *common, "--overflow", "error")
+        assert f"does not fit into 32 bits, at {path}:2:27: INT32_MAX - used" in out
+        assert "wraps round" not in out
+    path.write_text(WRAPPING.replace("used = -1", "used = 0"))
+    out, _ = check_run(capsys, 0, path, "--query", "E<> P.B", "--engine", engine, "--json")
+    assert json.loads(out)["wrapped"] is None
+
+
+def test_a_constant_that_wraps_round_is_an_error_for_every_query_if_overflow_is_one(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "constant.xta"
+    path.write_text("const int c = INT32_MAX + 1;\nprocess P() { state A; init A; }\nsystem P;\n")
+    query = f"E<> c == {-(2**31)}"
+    out, err = check_run(capsys, 0, path, "--query", query)
+    assert "W0212" in err
+    assert f"wraps round, first at {path}:1:15: INT32_MAX + 1" in out
+    out, _ = check_run(capsys, 4, path, "--query", query, "--overflow", "error")
+    assert f"does not fit into 32 bits, at {path}:1:15: INT32_MAX + 1" in out
+
+
+def test_what_happens_at_overflows_holds_for_all_that_a_model_is_asked(tmp_path: Path) -> None:
+    path = tmp_path / "wrapping.xta"
+    path.write_text(WRAPPING)
+    model = ntagen.load(path, overflow="error")
+    assert model.overflow == "error"
+    assert model.check("E<> P.C").verdict == "error"
+    with pytest.raises(ntagen.ModelError, match="does not fit into 32 bits"):
+        model.simulate(steps=1)
+    model.overflow = "wrap"
+    answer = model.check("E<> P.C")
+    assert (answer.verdict, str(answer.wrapped)) == (
+        "satisfied",
+        f"{path}:2:27: INT32_MAX - used",
+    )
+    assert model.simulate(steps=1).states[-1].locations == {"P": "C"}
+    model.overflow = "error"
+    with pytest.raises(ntagen.ModelError, match="does not fit into 32 bits"):
+        list(model.states(limit=10))
 
 
 @pytest.mark.parametrize("query", [*SYMBOLIC, *GAMES])

@@ -15,7 +15,7 @@ use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Module, default_libcall_names};
 
 use crate::exec::optimise::Optimiser;
-use crate::ir::{Function, FunctionId, RegisterType};
+use crate::ir::{Function, FunctionId, Overflow, RegisterType};
 
 use super::JitError;
 use super::needs::{AllNeeds, callees};
@@ -35,6 +35,7 @@ pub(super) struct Compiler {
     /// Taken out only to free its memory.
     module: ManuallyDrop<JITModule>,
     convention: CallConv,
+    overflow: Overflow,
     context: Context,
     builder_context: FunctionBuilderContext,
     optimiser: Optimiser,
@@ -49,7 +50,7 @@ pub(super) struct Compiler {
 }
 
 impl Compiler {
-    pub(super) fn new() -> Result<Compiler, JitError> {
+    pub(super) fn new(overflow: Overflow) -> Result<Compiler, JitError> {
         if cfg!(target_endian = "big") {
             // Doubles lie in memory with the low word first.
             return Err(JitError("the processor stores the high word first".into()));
@@ -79,6 +80,7 @@ impl Compiler {
             context: module.make_context(),
             module: ManuallyDrop::new(module),
             convention,
+            overflow,
             builder_context: FunctionBuilderContext::new(),
             optimiser: Optimiser::default(),
             needs: AllNeeds::default(),
@@ -187,7 +189,7 @@ impl Compiler {
             });
             import_far(&mut self.module, callee, native)
         };
-        translate(builder, function, &mut import, config);
+        translate(builder, function, &mut import, config, self.overflow);
         if let Some(error) = failure {
             return Err(error);
         }

@@ -22,9 +22,9 @@ use std::ptr;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
-use crate::ir::{Function, FunctionId};
+use crate::ir::{Function, FunctionId, Overflow};
 
-use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, validate};
+use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, validate};
 
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};
@@ -78,20 +78,33 @@ struct Entry {
 impl Jit {
     /// An engine that compiles a function once it has run for a while.
     pub fn new(functions: &[Function], constants: &[i32]) -> Result<Jit, JitError> {
+        Jit::with_overflow(functions, constants, Overflow::default())
+    }
+
+    /// The same, with what happens where results of integer arithmetic do not fit.
+    pub fn with_overflow(
+        functions: &[Function],
+        constants: &[i32],
+        overflow: Overflow,
+    ) -> Result<Jit, JitError> {
         let mut jit = Jit {
-            interpreter: Interpreter::default(),
+            interpreter: Interpreter::default().with_overflow(overflow),
             entries: Vec::new(),
             constants: Vec::new(),
             state_words: 0,
-            compiler: Mutex::new(Compiler::new()?),
+            compiler: Mutex::new(Compiler::new(overflow)?),
         };
         jit.extend(functions, constants)?;
         Ok(jit)
     }
 
     /// An engine that has compiled everything that can be called from outside.
-    pub fn compile(functions: &[Function], constants: &[i32]) -> Result<Jit, JitError> {
-        let jit = Jit::new(functions, constants)?;
+    pub fn compile(
+        functions: &[Function],
+        constants: &[i32],
+        overflow: Overflow,
+    ) -> Result<Jit, JitError> {
+        let jit = Jit::with_overflow(functions, constants, overflow)?;
         for index in 0..functions.len() as u32 {
             jit.compile_function(FunctionId(index))?;
         }
@@ -217,6 +230,10 @@ impl Executor for Jit {
             self.call_native(code, frames.as_mut_ptr(), arguments, context)
         })
     }
+
+    fn wraps(&self) -> &Wraps {
+        self.interpreter.wraps()
+    }
 }
 
 thread_local! {
@@ -239,7 +256,7 @@ impl Jit {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
-        let (mut native, state) = NativeContext::new(&self.constants, context);
+        let (mut native, state) = NativeContext::new(&self.constants, self.wraps(), context);
         let state = state.as_mut_ptr();
         // SAFETY: `code` was made by the compiler of the engine that is borrowed for this call, for a function with as many
         // parameters as there are arguments (a precondition of `Executor::call`), with the signature of an entry if there are

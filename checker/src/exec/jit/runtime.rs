@@ -7,7 +7,7 @@
 use crate::cancellation;
 use crate::exec::{
     Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, ROUNDS_BETWEEN_LOOKS, RunTimeError,
-    arithmetic, math,
+    Wraps, arithmetic, math,
 };
 use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
 
@@ -21,6 +21,7 @@ pub(super) struct NativeContext<'call> {
     pub(super) constants: *const i32,
     /// How many rounds it may take beyond these.
     rounds_beyond: u64,
+    wraps: &'call Wraps,
     constraints: &'call mut Vec<EmittedConstraint>,
     assignments: &'call mut Vec<EmittedAssignment>,
 }
@@ -30,11 +31,13 @@ impl<'call> NativeContext<'call> {
     #[inline]
     pub(super) fn new(
         constants: &[i32],
+        wraps: &'call Wraps,
         context: &'call mut Context<'_>,
     ) -> (NativeContext<'call>, &'call mut [i32]) {
         let native = NativeContext {
             rounds_left: ROUNDS_BETWEEN_LOOKS,
             rounds_beyond: ROUND_LIMIT - ROUNDS_BETWEEN_LOOKS,
+            wraps,
             constants: constants.as_ptr(),
             constraints: context.constraints,
             assignments: context.assignments,
@@ -88,12 +91,22 @@ pub(super) extern "C" fn more_rounds(context: &mut NativeContext<'_>, site: u32)
     0
 }
 
+/// Notes that a result wrapped round.
+pub(super) extern "C" fn note_wrap(context: &NativeContext<'_>, site: u32) {
+    context.wraps.note(SiteId(site));
+}
+
 /// What a called-back function gives where there is no result.
 const NO_RESULT: i64 = -1;
 
-/// `base ** exponent` as an unsigned word; negative if there is none.
+/// The bit of [`power`] that says that the result wrapped round.
+pub(super) const HAS_WRAPPED: i64 = 1 << 32;
+
+/// `base ** exponent` as an unsigned word, with [`HAS_WRAPPED`] if it wrapped round; the exponent is not negative.
 pub(super) extern "C" fn power(base: i32, exponent: i32) -> i64 {
-    arithmetic::power(base, exponent).map_or(NO_RESULT, |power| i64::from(power as u32))
+    arithmetic::power(base, exponent).map_or(NO_RESULT, |(power, has_wrapped)| {
+        i64::from(power as u32) | if has_wrapped { HAS_WRAPPED } else { 0 }
+    })
 }
 
 /// The binary exponent as an unsigned word; negative if there is none.

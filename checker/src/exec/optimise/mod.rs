@@ -1,7 +1,7 @@
 //! From code to faster code that does the same: for compiled code, and testable with the interpreter.
 //!
-//! Invariant: results, states, emitted constraints and assignments, and the kind and site of a run-time error stay what they
-//! were. Only rounds of loops that are written out are no longer counted.
+//! Invariant: results, states, emitted constraints and assignments, the sites where results wrap round, and the kind and site of a
+//! run-time error stay what they were. Only rounds of loops that are written out are no longer counted.
 //!
 //! A function is optimised after the functions that it calls: their code is taken in where they are small, or made to
 //! measure where they are called with constants ([`Optimiser::specialise`]); then values are numbered and loops of few

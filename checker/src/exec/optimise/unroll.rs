@@ -193,7 +193,7 @@ fn evaluate(instruction: &Instruction, integers: &mut Integers) {
             ..
         } => known(left)
             .zip(known(right))
-            .and_then(|(left, right)| arithmetic::integer(*operator, left, right).ok()),
+            .and_then(|(left, right)| arithmetic::fitting(*operator, left, right)),
         Instruction::AddIndices { left, right, .. } => known(left)
             .zip(known(right))
             .map(|(left, right)| left.wrapping_add(right)),

@@ -2,7 +2,7 @@
 
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::types::{F64, I32, I64};
-use cranelift_codegen::ir::{InstBuilder, Value};
+use cranelift_codegen::ir::{InstBuilder, InstructionData, Opcode, Value};
 
 use crate::exec::jit::runtime;
 use crate::exec::math::{self, MathCode};
@@ -157,20 +157,23 @@ impl Translator<'_> {
         match operator {
             IntegerOperator::Add => {
                 let (sum, overflow) = ins.sadd_overflow(left, right);
-                self.without_overflow(sum, overflow, site)
+                self.overflow_if(overflow, site);
+                sum
             }
             IntegerOperator::Subtract => {
                 let (difference, overflow) = ins.ssub_overflow(left, right);
-                self.without_overflow(difference, overflow, site)
+                self.overflow_if(overflow, site);
+                difference
             }
             IntegerOperator::Multiply => {
                 let (product, overflow) = ins.smul_overflow(left, right);
-                self.without_overflow(product, overflow, site)
+                self.overflow_if(overflow, site);
+                product
             }
             IntegerOperator::Divide => {
                 self.check_divisor(right, site);
-                self.check_quotient(left, right, site);
-                self.builder.ins().sdiv(left, right)
+                let divisor = self.divisor_that_fits(left, right, site);
+                self.builder.ins().sdiv(left, divisor)
             }
             IntegerOperator::Remainder => {
                 self.check_divisor(right, site);
@@ -193,28 +196,46 @@ impl Translator<'_> {
         }
     }
 
-    fn without_overflow(&mut self, value: Value, overflow: Value, site: SiteId) -> Value {
-        self.fail_if(overflow, RunTimeErrorKind::Overflow, site);
-        value
+    /// The integer that a value always is, if it is a constant.
+    fn constant(&self, value: Value) -> Option<i32> {
+        let graph = &self.builder.func.dfg;
+        match graph.insts[graph.value_def(value).inst()?] {
+            InstructionData::UnaryImm {
+                opcode: Opcode::Iconst,
+                imm,
+            } => Some(imm.bits() as i32),
+            _ => None,
+        }
     }
 
     fn check_divisor(&mut self, divisor: Value, site: SiteId) {
+        if self.constant(divisor).is_some_and(|divisor| divisor != 0) {
+            return;
+        }
         let is_zero = self.builder.ins().icmp_imm_s(IntCC::Equal, divisor, 0);
         self.fail_if(is_zero, RunTimeErrorKind::DivisionByZero, site);
     }
 
-    /// Fails for `-2^31 / -1`.
-    fn check_quotient(&mut self, dividend: Value, divisor: Value, site: SiteId) {
+    /// The divisor, but 1 for `-2^31 / -1`, which wraps round to the dividend.
+    fn divisor_that_fits(&mut self, dividend: Value, divisor: Value, site: SiteId) -> Value {
+        if self.constant(divisor).is_some_and(|divisor| divisor != -1) {
+            return divisor;
+        }
         let is_least = self
             .builder
             .ins()
             .icmp_imm_s(IntCC::Equal, dividend, i64::from(i32::MIN));
         let is_minus_one = self.builder.ins().icmp_imm_s(IntCC::Equal, divisor, -1);
         let both = self.builder.ins().band(is_least, is_minus_one);
-        self.fail_if(both, RunTimeErrorKind::Overflow, site);
+        self.overflow_if(both, site);
+        let one = self.integer(1);
+        self.builder.ins().select(both, one, divisor)
     }
 
     fn check_distance(&mut self, distance: Value, site: SiteId) {
+        if (self.constant(distance)).is_some_and(|distance| (0..32).contains(&distance)) {
+            return;
+        }
         let outside = self
             .builder
             .ins()
@@ -230,7 +251,13 @@ impl Translator<'_> {
         self.fail_if(negative, RunTimeErrorKind::NegativeExponent, site);
         let code = runtime::power as *const () as usize;
         let power = self.call_back(code, Some(I64), &[base, exponent]);
-        self.word_of(power, RunTimeErrorKind::Overflow, site)
+        let has_wrapped = self.builder.ins().icmp_imm_s(
+            IntCC::SignedGreaterThanOrEqual,
+            power,
+            runtime::HAS_WRAPPED,
+        );
+        self.overflow_if(has_wrapped, site);
+        self.builder.ins().ireduce(I32, power)
     }
 
     /// The integer that a called-back function gave; fails if it gave none.
@@ -270,7 +297,7 @@ impl Translator<'_> {
             MathCode::Abs => {
                 let least = i64::from(i32::MIN);
                 let is_least = ins.icmp_imm_s(IntCC::Equal, arguments[0], least);
-                self.fail_if(is_least, RunTimeErrorKind::Overflow, site);
+                self.overflow_if(is_least, site);
                 return self.builder.ins().iabs(arguments[0]);
             }
             MathCode::Ilogb => {

@@ -7,7 +7,7 @@ use cranelift_codegen::ir::types::I64;
 use cranelift_codegen::ir::{Block as NativeBlock, InstBuilder, MemFlagsData, Value};
 
 use crate::exec::jit::runtime::{self, NativeContext, failure_status};
-use crate::ir::{Instruction, Register, RunTimeErrorKind, SiteId};
+use crate::ir::{Instruction, Overflow, Register, RunTimeErrorKind, SiteId};
 
 use super::Translator;
 
@@ -112,6 +112,13 @@ impl Translator<'_> {
     }
 
     pub(super) fn write_failures(&mut self) {
+        for (SiteId(site), block, next) in std::mem::take(&mut self.wraps) {
+            self.builder.switch_to_block(block);
+            let site = self.integer(site as i32);
+            let code = runtime::note_wrap as *const () as usize;
+            self.call_back(code, None, &[self.context, site]);
+            self.builder.ins().jump(next, &[]);
+        }
         for (status, block) in std::mem::take(&mut self.failures) {
             self.builder.switch_to_block(block);
             let status = self.builder.ins().iconst(I64, status);
@@ -140,6 +147,19 @@ impl Translator<'_> {
         self.builder.set_cold_block(block);
         self.failures.push((status, block));
         block
+    }
+
+    /// Does what is to be done where a result of integer arithmetic does not fit: notes it and goes on, or fails.
+    pub(super) fn overflow_if(&mut self, condition: Value, site: SiteId) {
+        if self.overflow == Overflow::Error {
+            self.fail_if(condition, RunTimeErrorKind::Overflow, site);
+            return;
+        }
+        let (cold, next) = (self.builder.create_block(), self.builder.create_block());
+        self.builder.set_cold_block(cold);
+        self.wraps.push((site, cold, next));
+        self.builder.ins().brif(condition, cold, &[], next, &[]);
+        self.builder.switch_to_block(next);
     }
 
     pub(super) fn fail_if(&mut self, condition: Value, kind: RunTimeErrorKind, site: SiteId) {

@@ -22,8 +22,8 @@ use cranelift_codegen::isa::{CallConv, TargetFrontendConfig};
 use cranelift_frontend::{FunctionBuilder, Variable};
 
 use crate::ir::{
-    CLOCK_LIMIT, ClockOperand, Function, FunctionId, Instruction, Register, RegisterType,
-    RunTimeErrorKind, Terminator,
+    CLOCK_LIMIT, ClockOperand, Function, FunctionId, Instruction, Overflow, Register, RegisterType,
+    RunTimeErrorKind, SiteId, Terminator,
 };
 
 use super::runtime;
@@ -98,6 +98,7 @@ pub(super) fn translate(
     function: &Function,
     import: &mut dyn FnMut(FunctionId, &mut cranelift_codegen::ir::Function) -> FuncRef,
     config: TargetFrontendConfig,
+    overflow: Overflow,
 ) {
     let variables = function
         .registers
@@ -116,6 +117,7 @@ pub(super) fn translate(
     let mut translator = Translator {
         builder,
         function,
+        overflow,
         import,
         variables,
         blocks,
@@ -123,6 +125,7 @@ pub(super) fn translate(
         state: parameters[1],
         frame: parameters[2],
         failures: Vec::new(),
+        wraps: Vec::new(),
         failed_call: None,
         signatures: Vec::new(),
     };
@@ -144,6 +147,7 @@ pub(super) fn translate(
 struct Translator<'a> {
     builder: FunctionBuilder<'a>,
     function: &'a Function,
+    overflow: Overflow,
     import: &'a mut dyn FnMut(FunctionId, &mut cranelift_codegen::ir::Function) -> FuncRef,
     variables: Vec<Variable>,
     blocks: Vec<NativeBlock>,
@@ -152,6 +156,8 @@ struct Translator<'a> {
     frame: Value,
     /// The cold blocks that return an error, by status.
     failures: Vec<(i64, NativeBlock)>,
+    /// The cold blocks that note that a result wrapped round: the site, the block, and where it goes on.
+    wraps: Vec<(SiteId, NativeBlock, NativeBlock)>,
     /// The cold block that hands on the error of a callee.
     failed_call: Option<NativeBlock>,
     /// The signatures of called-back functions, by types.

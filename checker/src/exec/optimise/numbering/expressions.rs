@@ -1,7 +1,7 @@
 //! What an instruction computes, in a form in which equal computations are equal.
 
 use crate::ir::{
-    Address, DoubleOperator, Instruction, IntegerOperator, MathFunction, Register, Relation,
+    Address, DoubleOperator, Instruction, IntegerOperator, MathFunction, Register, Relation, SiteId,
 };
 
 /// A constant.
@@ -17,14 +17,15 @@ pub(super) enum Expression {
     Integer(i32),
     /// The bits of a double.
     Double(u64),
-    Arithmetic(IntegerOperator, Register, Register),
+    /// With its site where the result may wrap round, so that every place where one does is noted.
+    Arithmetic(IntegerOperator, Register, Register, Option<SiteId>),
     CompareIntegers(Relation, Register, Register),
     CompareDoubles(Relation, Register, Register),
     Not(Register),
     DoubleArithmetic(DoubleOperator, Register, Register),
     ToDouble(Register),
     ToInteger(Register),
-    Math(MathFunction, Vec<Register>),
+    Math(MathFunction, Vec<Register>, Option<SiteId>),
     Address(Address),
     Scale(Register, i32, u32, u32),
     AddIndices(Register, Register),
@@ -39,14 +40,18 @@ pub(super) fn expression_of(instruction: &Instruction) -> Option<Expression> {
             operator,
             left,
             right,
+            site,
             ..
         } => {
-            use IntegerOperator::{Add, And, Maximum, Minimum, Multiply, Or, Xor};
+            use IntegerOperator::{
+                Add, And, Divide, Maximum, Minimum, Multiply, Or, Power, Subtract, Xor,
+            };
             let (left, right) = match operator {
                 Add | Multiply | And | Or | Xor | Minimum | Maximum => sorted(left, right),
                 _ => (left, right),
             };
-            Expression::Arithmetic(operator, left, right)
+            let may_wrap = matches!(operator, Add | Subtract | Multiply | Divide | Power);
+            Expression::Arithmetic(operator, left, right, may_wrap.then_some(site))
         }
         &Instruction::CompareIntegers {
             relation,
@@ -78,8 +83,12 @@ pub(super) fn expression_of(instruction: &Instruction) -> Option<Expression> {
         Instruction::Math {
             function,
             arguments,
+            site,
             ..
-        } => Expression::Math(*function, arguments.clone()),
+        } => {
+            let may_wrap = *function == MathFunction::Abs;
+            Expression::Math(*function, arguments.clone(), may_wrap.then_some(*site))
+        }
         &Instruction::AddressOf { address, .. } => Expression::Address(address),
         &Instruction::ScaleIndex {
             index,

@@ -8,7 +8,8 @@
 //!   all values are immutable, and what is known of them holds wherever their definition dominates.
 //! * What is known of memory is forgotten in blocks with several predecessors, at calls, and at writes that may concern it.
 //! * No instruction moves in front of another one, and an instruction that can fail goes only if it cannot: the first error
-//!   of a run stays the first. Checking the same values again cannot fail, for the call has ended if it did.
+//!   of a run stays the first. Checking the same values again cannot fail, for the call has ended if it did. What may wrap round is
+//!   computed at every place where it stands, since it is noted there.
 //!
 //! Method: dominator-based value numbering after Briggs, Cooper and Simpson, "Value Numbering" (1997). Cost: linear in the
 //! code but for copying what is known at branches, which is given up in very large functions.

@@ -115,7 +115,10 @@ impl Numbering<'_> {
                 arguments,
                 ..
             } => match math::code_of(*function) {
-                MathCode::Abs => Literal::Integer(math::abs(integer(&arguments[0])?).ok()?),
+                MathCode::Abs => match arithmetic::absolute(integer(&arguments[0])?) {
+                    (value, false) => Literal::Integer(value),
+                    (_, true) => return None,
+                },
                 MathCode::Ilogb => Literal::Integer(math::ilogb(double(&arguments[0])?).ok()?),
                 MathCode::Classify(code) => Literal::Integer(code(double(&arguments[0])?)),
                 MathCode::Unary(code) => Literal::Double(code(double(&arguments[0])?)),
@@ -148,9 +151,9 @@ impl Numbering<'_> {
             return Simplified::Instruction(instruction);
         };
         match (operator, self.integer(left), self.integer(right)) {
-            (_, Some(left), Some(right)) => match arithmetic::integer(operator, left, right) {
-                Ok(value) => Simplified::Literal(Literal::Integer(value)),
-                Err(_) => Simplified::Instruction(instruction),
+            (_, Some(left), Some(right)) => match arithmetic::fitting(operator, left, right) {
+                Some(value) => Simplified::Literal(Literal::Integer(value)),
+                None => Simplified::Instruction(instruction),
             },
             (Add | Subtract, _, Some(0)) | (Multiply | Divide, _, Some(1)) => {
                 Simplified::Value(left)
