@@ -48,12 +48,14 @@ def command(
 
     FILE is what `ntagen check` wrote for MODEL with --certificate FILE, --trace FILE.json or
     --strategy FILE.json, or `ntagen play` with --log FILE. A trace is replayed with its exact
-    times, and must show what its query asks about; a play must end as it says. A certificate is a
+    times, and must show what its query asks about; the states, edges and zones that it shows must
+    be those of the run. A play must end as it says. A certificate is a
     set of states for E<> (not satisfied) or A[] (satisfied): it must contain the initial state, no
     move and no delay may lead out of it, and it must not meet what is to be avoided; states that
     differ in meta variables alone count as different, so that it holds whichever of them are kept.
     A strategy is played against every move of its opponent, at every moment, and its owner must
-    win.
+    win. What is not checked of a file is said; names that the format or the model does not have
+    are refused.
 
     \b
     Examples:

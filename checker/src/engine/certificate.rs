@@ -24,6 +24,7 @@ use crate::verify::{self, Effort, Part};
 use super::describe;
 use super::evidence::{Missing, Proof};
 use super::limits::cut_as_interrupted;
+use super::shown::{self, Difference};
 use super::verification::{Asked, Played, Verification};
 use super::{LoadedModel, Rejection, json, machine_file, observed, strategy_file, verification};
 
@@ -168,6 +169,15 @@ impl Checked {
             lines: verification::describe(network, result),
         }
     }
+
+    /// The same; where the file holds, with a line that says what of it was not checked.
+    #[must_use]
+    pub(super) fn without(mut self, unchecked: &str) -> Checked {
+        if self.holds == Some(true) {
+            self.lines.push(format!("  not checked: {unchecked}"));
+        }
+        self
+    }
 }
 
 /// Why a file is not read.
@@ -244,7 +254,7 @@ fn check_strategy(
     let played = Played::new(strategy, &decisions);
     let effort = &mut Effort::up_to(verification::MOST_REGIONS);
     let result = verification::verify(network, asked, played, rules, effort);
-    Ok(Checked::of_strategy(network, &result))
+    Ok(Checked::of_strategy(network, &result).without("states that play by it does not come to"))
 }
 
 /// Checks a certificate as read from its file.
@@ -265,10 +275,21 @@ fn check_certificate(
     {
         return Err("it belongs to a model with other processes, variables or clocks".to_owned());
     }
+    let known = [
+        "format",
+        "version",
+        "query",
+        "processes",
+        "variables",
+        "clocks",
+        "states",
+    ];
+    shown::only(header, &known, "line 1")?;
     let mut states = Vec::new();
     for (index, line) in text.lines().enumerate().skip(1) {
         let at_line = |why: &str| format!("line {}: {why}", index + 1);
         let line: Json = serde_json::from_str(line).map_err(|error| at_line(&error.to_string()))?;
+        shown::only(&line, &["words", "zones"], &format!("line {}", index + 1))?;
         states.push(state_of(&line).ok_or_else(|| at_line("this is no state"))?);
     }
     if header["states"] != json!(states.len()) {
@@ -331,7 +352,11 @@ fn state_of(line: &Json) -> Option<States> {
                 left: usize::try_from(integer(left)?).ok()?,
                 right: usize::try_from(integer(right)?).ok()?,
                 bound: integer(bound)?,
-                strict: strict == 1,
+                strict: match strict.as_u64()? {
+                    0 => false,
+                    1 => true,
+                    _ => return None,
+                },
             })
         });
         constraints.collect::<Option<Vec<_>>>()
@@ -352,15 +377,37 @@ fn check_traces(
     query: &QueryKind,
     header: &Json,
 ) -> Result<Checked, Unreadable> {
-    let traces = match header["traces"].as_array() {
-        Some(traces) => traces.iter().collect(),
-        None => vec![header],
+    const HEADER: [&str; 3] = ["format", "version", "query"];
+    const TRACE: [&str; 11] = [
+        "title",
+        "kind",
+        "value",
+        "states",
+        "transitions",
+        "failing",
+        "ending",
+        "run",
+        "winner",
+        "priorities",
+        "time_limit",
+    ];
+    let traces = if let Some(traces) = header["traces"].as_array() {
+        shown::only(header, &[&HEADER[..], &["traces"]].concat(), "the file")?;
+        traces.iter().collect()
+    } else {
+        vec![header]
     };
     let mut checked = Checked {
         holds: Some(true),
         lines: Vec::new(),
     };
     for trace in traces {
+        shown::only(trace, &[&HEADER[..], &TRACE[..]].concat(), "a trace")?;
+        shown::only(
+            &trace["value"],
+            &["item", "value", "greatest", "reached"],
+            "value",
+        )?;
         if trace["run"].is_null() {
             checked.holds = checked.holds.filter(|holds| !holds);
             checked
@@ -370,9 +417,9 @@ fn check_traces(
         }
         let run = run_of(network, &trace["run"])
             .ok_or("the run in it does not fit the model".to_owned())?;
-        let proof = replay_of(network, query, trace, run)?;
+        let (proof, difference) = replay_of(network, query, trace, run)?;
         let holds = match &proof {
-            Proof::Replayed(..) => Some(true),
+            Proof::Replayed(..) => Some(difference.is_ok()),
             Proof::Violated(..) | Proof::Impossible => Some(false),
             Proof::Missing(_) => None,
         };
@@ -382,17 +429,28 @@ fn check_traces(
             _ => None,
         };
         checked.lines.extend(describe::proof_lines(&proof));
+        match difference {
+            Ok(unchecked) if !unchecked.is_empty() => {
+                let unchecked = unchecked.join("; ");
+                checked.lines.push(format!("  not checked: {unchecked}"));
+            }
+            Ok(_) => {}
+            Err(text) => checked.lines.push(format!("trace violated: {text}")),
+        }
     }
     Ok(checked)
 }
 
-/// Replays a run that is to show what its file says of the query.
+/// What of a trace is not checked, or what it shows that is not so.
+type Agreement = Result<Vec<&'static str>, String>;
+
+/// Replays a run that is to show what its file says of the query, and compares it with all that is shown beside it.
 fn replay_of(
     network: &Network,
     query: &QueryKind,
     trace: &Json,
     run: Run,
-) -> Result<Proof, Unreadable> {
+) -> Result<(Proof, Agreement), Unreadable> {
     let always = Predicate::Constant(true);
     let (first, second, game);
     let mut network = network;
@@ -434,7 +492,7 @@ fn replay_of(
             if trace["priorities"] == "ignore" && network.features.priorities =>
         {
             let what = verify::Error::Unsupported("plays that ignore the priorities of the model");
-            return Ok(Proof::Missing(Missing::NotCovered(what)));
+            return Ok((Proof::Missing(Missing::NotCovered(what)), Ok(Vec::new())));
         }
         QueryKind::Control { .. } if trace["kind"] == "play" => {
             let limit = trace["time_limit"].as_i64();
@@ -465,11 +523,22 @@ fn replay_of(
         }
         _ => return Err("a control query has no trace but that of a play".to_owned()),
     };
-    Ok(match replay::replay(network, &run, &claim) {
+    let proof = match replay::replay(network, &run, &claim) {
         Ok(replay::Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),
         Ok(replay::Outcome::Violated(violation)) => Proof::Violated(run, violation),
         Err(error) => Proof::Missing(Missing::NotCovered(error)),
-    })
+    };
+    let agreement = match &proof {
+        Proof::Replayed(run, states, _) => {
+            match shown::compare_trace(network, trace, run, states) {
+                Ok(unchecked) => Ok(unchecked),
+                Err(Difference::False(text)) => Err(text),
+                Err(Difference::Unknown(text)) => return Err(text),
+            }
+        }
+        _ => Ok(Vec::new()),
+    };
+    Ok((proof, agreement))
 }
 
 /// A run as it stands in a file; `None` if it is none of this network.
@@ -502,7 +571,7 @@ fn run_of(network: &Network, run: &Json) -> Option<Run> {
     })
 }
 
-pub(super) fn part_of(network: &Network, part: &Json) -> Option<Part> {
+fn part_of(network: &Network, part: &Json) -> Option<Part> {
     let name = part["process"].as_str()?;
     let process = network.processes.iter().position(|one| one.name == name)?;
     let number = |key: &str| u32::try_from(part[key].as_u64()?).ok();

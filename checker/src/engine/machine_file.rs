@@ -2,7 +2,7 @@
 //!
 //! The format is described in `docs/observations.md`. In short: an object with `format` "ntagen-machine", `version` 1, the `query`, the
 //! `observations`, and `states`, the initial one first, each with what is seen in it, the action that is proposed, the next state for
-//! each next observation, and what the controller knows on entry. What is known is for people: reading passes over it.
+//! each next observation, and what the controller knows on entry. What is known, and what is seen in a state itself, is for people: reading passes over it.
 
 use std::fmt::Write as _;
 
@@ -14,6 +14,7 @@ use crate::network::Part;
 use crate::verify::observed as check;
 use crate::zones::{Federation, Zone};
 
+use super::shown::{self, Difference};
 use super::strategy_file::{self, At, Mismatch, Reader};
 use super::{describe, json};
 
@@ -117,16 +118,25 @@ pub fn read(
     seen: usize,
 ) -> Result<Vec<check::MachineState>, Mismatch> {
     let whole = At::whole(file);
+    whole.only(&["format", "version", "query", "observations", "states"])?;
     let names = whole.list("observations")?.len();
     if names != seen {
         let message = format!("there are {names} observations, and the query has {seen}");
         return Err(whole.field("observations")?.wrong(message, OTHER_MODEL));
     }
+    let right = observations(&whole.text("query")?);
+    if let Err(Difference::False(text) | Difference::Unknown(text)) =
+        shown::compare(&file["observations"], &json!(right), "observations")
+    {
+        return Err(whole.field("observations")?.wrong(text, OTHER_MODEL));
+    }
     let states = whole.list("states")?;
     let count = states.len();
     let states = states.iter().map(|state| {
+        state.only(&["observation", "action", "next", "knowledge"])?;
         let mut next = Vec::new();
         for one in state.list("next")? {
+            one.only(&["observation", "state"])?;
             let observation = one.list("observation")?;
             let values = observation.iter().map(|value| {
                 let truth = value.0.as_bool();
@@ -156,6 +166,7 @@ fn read_action(network: &Network, at: &At<'_>) -> Result<check::Action, Mismatch
     if at.0.is_null() {
         return Ok(check::Action::Wait);
     }
+    at.only(&["channel", "edge"])?;
     if at.0.get("channel").is_some() {
         let name = at.text("channel")?;
         let mut channels = network.channels.iter();

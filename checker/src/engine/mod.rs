@@ -25,6 +25,7 @@ pub mod machine_file;
 pub mod observed;
 pub mod play;
 mod reachable;
+mod shown;
 pub mod simulation;
 pub mod strategies;
 pub mod strategy_file;

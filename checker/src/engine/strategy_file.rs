@@ -204,6 +204,17 @@ fn read_whole(network: &Network, whole: &At<'_>) -> Result<(String, Strategy), M
         let message = format!("this is no strategy of ntagen: its \"format\" is not \"{FORMAT}\"");
         return Err(whole.wrong(message, SEE_FORMAT));
     }
+    whole.only(&[
+        "format",
+        "version",
+        "query",
+        "owner",
+        "selection",
+        "states",
+        "time_limit",
+        "under",
+        "start",
+    ])?;
     let version = whole.field("version")?;
     if version.0.as_u64() != Some(VERSION) {
         let message = format!("version {} of the format is not known", version.0);
@@ -271,6 +282,7 @@ fn start(network: &Network, file: &Json) -> Result<Start, Mismatch> {
         None | Some(Json::Null) => return Ok(Start::Initial),
         Some(start) => At(start, "start".to_owned()),
     };
+    at.only(&["kind", "ticks_per_unit", "steps", "wait"])?;
     match at.text("kind")?.as_str() {
         "anywhere" => return Ok(Start::Anywhere),
         "after" => {}
@@ -289,12 +301,9 @@ fn start(network: &Network, file: &Json) -> Result<Start, Mismatch> {
     };
     let mut moves = Vec::new();
     for step in at.list("steps")? {
+        step.only(&["wait", "edges"])?;
         let edges = step.list("edges")?;
-        let parts = edges.iter().map(|edge| {
-            let part = super::certificate::part_of(network, edge.0);
-            part.map(Part::from)
-                .ok_or_else(|| edge.wrong("the model has no such edge", OTHER_MODEL))
-        });
+        let parts = edges.iter().map(|edge| Reader::new(network).part(edge));
         moves.push((
             ticks(&step, "wait")?,
             parts.collect::<Result<Vec<Part>, _>>()?,
@@ -361,6 +370,14 @@ impl<'j> At<'j> {
         }
     }
 
+    /// Refuses fields that are none of these.
+    pub(super) fn only(&self, known: &[&str]) -> Result<(), Mismatch> {
+        match super::shown::only(self.0, known, "the format") {
+            Ok(()) => Ok(()),
+            Err(message) => Err(self.wrong(message, SEE_FORMAT)),
+        }
+    }
+
     fn typed<T>(
         &self,
         name: &str,
@@ -418,6 +435,7 @@ impl<'n> Reader<'n> {
 
 impl Reader<'_> {
     fn state(&self, state: &At<'_>) -> Result<StrategyState, Mismatch> {
+        state.only(&["locations", "variables", "goal", "decisions", "legs"])?;
         let mut words = self.network.initial.clone();
         self.locations(state, &mut words)?;
         self.variables(state, &mut words)?;
@@ -513,6 +531,7 @@ impl Reader<'_> {
         words: &[i32],
         owner: Player,
     ) -> Result<Decision, Mismatch> {
+        decision.only(&["zones", "action", "rank"])?;
         let dimension = self.network.clocks.len().max(1);
         let mut zones = Federation::empty(dimension);
         for zone in decision.list("zones")? {
@@ -556,7 +575,11 @@ impl Reader<'_> {
     }
 
     /// Adds the constraints that a text such as `x-y <= 3` stands for.
-    fn constraint(&self, at: &At<'_>, into: &mut Vec<Constraint>) -> Result<(), Mismatch> {
+    pub(super) fn constraint(
+        &self,
+        at: &At<'_>,
+        into: &mut Vec<Constraint>,
+    ) -> Result<(), Mismatch> {
         let text = at.0.as_str().unwrap_or_default();
         let relations = ["<=", ">=", "==", "<", ">"];
         let parts = relations.iter().find_map(|relation| {
@@ -626,6 +649,18 @@ impl Reader<'_> {
 
     /// An edge with its branch and the values of its `select`.
     pub(super) fn part(&self, at: &At<'_>) -> Result<Part, Mismatch> {
+        at.only(&[
+            "process",
+            "edge",
+            "source",
+            "target",
+            "branch",
+            "select",
+            "guard",
+            "sync",
+            "update",
+            "controllable",
+        ])?;
         let name = at.text("process")?;
         let mut processes = self.network.processes.iter().enumerate();
         let Some((index, process)) = processes.find(|(_, one)| one.name == name) else {
@@ -642,6 +677,18 @@ impl Reader<'_> {
             let message = format!("edge {edge_index} of process {name} does not leave {source}");
             return Err(at.wrong(message, OTHER_MODEL));
         };
+        let labels = [
+            ("guard", json!(edge.labels.guard)),
+            ("sync", json!(edge.labels.sync)),
+            ("update", json!(edge.labels.update)),
+            ("controllable", json!(edge.controllable)),
+        ];
+        for (field, right) in labels {
+            if at.0.get(field).is_some_and(|shown| *shown != right) {
+                let message = format!("in the model this is {right}");
+                return Err(at.field(field)?.wrong(message, OTHER_MODEL));
+            }
+        }
         let branch = at.index("branch")?;
         let target_of = edge.branches.get(branch as usize);
         if target_of.is_none_or(|branch| location(branch.target.0) != target) {

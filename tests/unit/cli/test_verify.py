@@ -64,6 +64,65 @@ def test_trace_holds_until_a_wait_is_changed(
     assert "the move is not possible here" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (("states", 1, "locations", "Lamp"), "On", "states[1].locations.Lamp"),
+        (("states", 1, "zone"), ["x <= 3"], "does not hold in its run"),
+        (("run", "states", 1, "locations", "Lamp"), "Off", "run.states[1].locations.Lamp"),
+        (("run", "states", 1, "clocks", "x"), 9, "run.states[1].clocks.x"),
+        (("transitions", 0, 0, "guard"), "x > 9", "transitions[0][0].guard"),
+    ],
+)
+def test_trace_that_shows_what_is_not_so_is_violated(
+    place: tuple[str | int, ...],
+    value: object,
+    said: str,
+    lamp: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    trace = tmp_path / "trace.json"
+    check_exit(0, "check", lamp, "--query", "E<> Lamp.Dim", "--trace", trace)
+    check_exit(0, "verify", lamp, trace)
+    assert "not checked: that zones hold nothing else" in capsys.readouterr().out
+    file = json.loads(trace.read_text())
+    part = file
+    for key in place[:-1]:
+        part = part[key]
+    part[place[-1]] = value
+    trace.write_text(json.dumps(file))
+    check_exit(1, "verify", lamp, trace)
+    assert said in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        (),
+        ("run",),
+        ("states", 0),
+        ("states", 0, "locations"),
+        ("states", 0, "variables"),
+        ("run", "states", 0, "clocks"),
+        ("run", "steps", 0, "edges", 0),
+    ],
+)
+def test_names_that_nothing_knows_are_refused(
+    place: tuple[str | int, ...], lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = tmp_path / "trace.json"
+    check_exit(0, "check", lamp, "--query", "E<> Lamp.Dim", "--trace", trace)
+    file = json.loads(trace.read_text())
+    part = file
+    for key in place:
+        part = part[key]
+    part["surprise"] = 1
+    trace.write_text(json.dumps(file))
+    check_exit(2, "verify", lamp, trace)
+    assert "surprise" in capsys.readouterr().err
+
+
 def test_shortest_and_fastest_traces_differ(lamp: Path, tmp_path: Path) -> None:
     def found(option: str) -> tuple[int, float]:
         trace = tmp_path / "trace.json"

@@ -1,0 +1,146 @@
+//! What files of traces show: all that the corpus gives holds, and nothing that is changed in one passes.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use checker::engine::{LoadedModel, Options, json};
+use checker::game::{Forced, Priorities};
+use serde_json::Value as Json;
+
+const RULES: (Forced, Priorities) = (Forced::Tiga, Priorities::Ignored);
+
+/// Leaves of a trace that are changed, at most.
+const MOST_CHANGES: usize = 24;
+
+fn queries(text: &str) -> Vec<String> {
+    let lines = text.lines().filter_map(|line| line.strip_prefix("// "));
+    let queries = lines.filter_map(|line| line.strip_prefix("query: "));
+    queries.map(str::to_owned).collect()
+}
+
+fn load(path: &Path) -> LoadedModel {
+    let bytes = fs::read(path).expect("the corpus can be read");
+    LoadedModel::load(&path.display().to_string(), &bytes)
+        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
+}
+
+/// The file of the traces of an answer, if it has one with exact times.
+fn trace(path: &Path, query: &str) -> Option<Json> {
+    let mut model = load(path);
+    let text = model.add_query(query);
+    let options = Options {
+        runs: true,
+        ..Options::default()
+    };
+    let answer = model.check(&text, &options).ok()?;
+    let witnesses = &answer.evidence.witnesses;
+    let is_exact = witnesses.iter().all(|one| one.run.is_some());
+    (!witnesses.is_empty() && is_exact).then(|| json::witnesses(model.network(), witnesses, query))
+}
+
+/// The pointers to all leaves that say something which is checked.
+fn leaves(value: &Json, pointer: &str, into: &mut Vec<String>) {
+    // Other values than those shown may be right too: another wait, another moment from which something stays, another state that a loop leads back
+    // to, a value that is nearly reached.
+    let free = [
+        "/format",
+        "/version",
+        "/query",
+        "/title",
+        "/from",
+        "/end",
+        "/ending/loop",
+        "/value",
+        "/item",
+        "/wait",
+        "/ticks_per_unit",
+        "/kind",
+    ];
+    if free.iter().any(|name| pointer.ends_with(name)) {
+        return;
+    }
+    match value {
+        Json::Object(fields) => {
+            for (name, value) in fields {
+                let name = name.replace('~', "~0").replace('/', "~1");
+                leaves(value, &format!("{pointer}/{name}"), into);
+            }
+        }
+        Json::Array(entries) => {
+            for (index, value) in entries.iter().enumerate() {
+                leaves(value, &format!("{pointer}/{index}"), into);
+            }
+        }
+        Json::Null => {}
+        _ => into.push(pointer.to_owned()),
+    }
+}
+
+fn changed(value: &Json) -> Json {
+    match value {
+        Json::Bool(value) => Json::Bool(!value),
+        Json::Number(number) => match number.as_i64() {
+            Some(number) => Json::from(number + 1),
+            None => Json::from(number.as_f64().unwrap_or_default() + 1.0),
+        },
+        Json::String(text) => Json::from(format!("{text}x")),
+        other => other.clone(),
+    }
+}
+
+fn paths() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/verdicts");
+    let entries = fs::read_dir(folder).expect("the corpus is there");
+    let mut paths: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("the corpus can be listed").path())
+        .collect();
+    paths.sort();
+    paths
+}
+
+#[test]
+fn what_traces_show_is_checked() {
+    let (mut traces, mut changes) = (0, 0);
+    for path in paths() {
+        let text = fs::read_to_string(&path).expect("the corpus can be read");
+        for query in queries(&text) {
+            let Some(file) = trace(&path, &query) else {
+                continue;
+            };
+            let mut model = load(&path);
+            let place = format!("{}: {query}", path.display());
+            let mut holds = |file: &Json| {
+                let checked = model.verify_evidence("file", &file.to_string(), RULES);
+                checked.map(|checked| (checked.holds, checked.lines))
+            };
+            match holds(&file) {
+                Ok((Some(true), _)) => {}
+                Ok((None, _)) => continue,
+                other => panic!("{place}: {other:?}\n{file:#}"),
+            }
+            traces += 1;
+            let mut pointers = Vec::new();
+            leaves(&file, "", &mut pointers);
+            let stride = pointers.len().div_ceil(MOST_CHANGES).max(1);
+            for pointer in pointers.iter().step_by(stride) {
+                let mut other = file.clone();
+                let leaf = other.pointer_mut(pointer).expect("the leaf is there");
+                *leaf = changed(leaf);
+                let result = holds(&other);
+                let passes = matches!(result, Ok((Some(true) | None, _)));
+                assert!(
+                    !passes,
+                    "{place}: {pointer} can be changed: {result:?}\n{other:#}"
+                );
+                changes += 1;
+            }
+            let mut other = file.clone();
+            other["surprise"] = Json::from(1);
+            assert!(holds(&other).is_err(), "{place}: an unknown field passes");
+        }
+    }
+    assert!(
+        traces > 50 && changes > 1000,
+        "{traces} traces, {changes} changes"
+    );
+}
