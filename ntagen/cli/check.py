@@ -225,8 +225,9 @@ class _Outputs:
     "--partial-order",
     type=click.Choice(["on", "off"]),
     default="on",
-    help="Whether independent moves are taken in one order only where urgent or committed "
-    "locations keep time from passing (E<>, A[]).",
+    help="Whether independent moves are taken in one order only where time cannot pass: in urgent "
+    "and committed locations, where bounds of invariants are reached, beside urgent channels "
+    "(E<>, A[]).",
 )
 @click.option(
     "--live-variables",

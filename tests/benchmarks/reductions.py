@@ -3,7 +3,8 @@
     python tests/benchmarks/reductions.py [--limit 120]
 
 Whole state spaces without and with a reduction. Partial orders: sensors that work side by side in
-urgent steps, of which every order is as good as any other. Live variables: controllers that read
+urgent steps, of which every order is as good as any other, and sensors that all begin again at
+one time. Live variables: controllers that read
 inputs one after the other and work out from them what to do next. Then, for both, models in which
 nothing may be left out. Printed are stored states and seconds of processor time without and with
 the reduction, and their ratios; `limit` is in seconds of wall time for each search.
@@ -41,6 +42,7 @@ REDUCTIONS: dict[str, tuple[Ask, dict[str, str]]] = {
     "partial orders": (
         _partial_orders,
         {f"alarms {number}": models.alarms(number) for number in (4, 6, 7)}
+        | {f"roll call {number}": models.roll_call(number) for number in (12, 16)}
         | {"entangled 5": models.entangled(5)}
         | WITHOUT_GAIN,
     ),

@@ -2,7 +2,7 @@
 //!
 //! A *situation* of a process is its location, and whether the edges that may sleep do; situations alone decide.
 
-use crate::ir::{LocationId, Network, Urgency};
+use crate::ir::{LocationId, Network};
 use crate::zones::{Zone, dbm};
 
 use super::footprints::{Footprint, Footprints, Ground, Moment, Sleeper, Still};
@@ -18,7 +18,6 @@ pub(super) struct Interference {
     first: Vec<u32>,
     /// By location: its process.
     owners: Vec<u32>,
-    urgencies: Vec<Urgency>,
     tables: Tables,
 }
 
@@ -63,40 +62,20 @@ impl Table {
 
 impl Interference {
     pub(super) fn new(network: &Network) -> Interference {
-        let (mut first, mut owners, mut urgencies) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut first, mut owners) = (Vec::new(), Vec::new());
         for (index, process) in (0..).zip(&network.processes) {
-            first.push(urgencies.len() as u32);
-            urgencies.extend(process.locations.iter().map(|location| location.urgency));
-            owners.resize(urgencies.len(), index);
+            first.push(owners.len() as u32);
+            owners.resize(owners.len() + process.locations.len(), index);
         }
         Interference {
             footprints: Footprints::default(),
             first,
-            owners,
             tables: Tables {
-                urgent: Table::new(urgencies.len()),
-                committed: Table::new(urgencies.len()),
+                urgent: Table::new(owners.len()),
+                committed: Table::new(owners.len()),
             },
-            urgencies,
+            owners,
         }
-    }
-
-    /// Why time stands still in a state with these words, if a location is the reason.
-    pub(super) fn still(&self, words: &[i32]) -> Option<Still> {
-        let mut still = None;
-        for (&first, &location) in self.first.iter().zip(words) {
-            match self.urgencies[(first + location as u32) as usize] {
-                Urgency::Normal => {}
-                Urgency::Urgent => still = Some(Still::Urgent),
-                Urgency::Committed => return Some(Still::Committed),
-            }
-        }
-        still
-    }
-
-    /// The urgency of the location of a situation.
-    pub(super) fn urgency(&self, situation: Situation) -> Urgency {
-        self.urgencies[situation as usize / 2]
     }
 
     /// By process: the situations of a state with these words and this zone.
@@ -151,7 +130,7 @@ impl Interference {
     ) -> bool {
         self.now(ground, member, still);
         self.future(ground, other, still);
-        let situations = 2 * self.urgencies.len();
+        let situations = 2 * self.owners.len();
         let table = self.tables.of(still);
         let now = &table.now[member as usize];
         let future = &table.future[other as usize];

@@ -17,6 +17,7 @@ mod exposure;
 pub mod failure;
 mod fixed;
 mod footprints;
+mod holders;
 mod instances;
 mod interference;
 mod listening;

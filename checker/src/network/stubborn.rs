@@ -1,9 +1,9 @@
 //! Partial-order reduction: where time stands still, independent processes need not be interleaved in every order.
 //!
-//! In a state in which some location is urgent or committed, a set P of processes is *stubborn* if no process outside, whatever
+//! In a state in which time cannot pass, a set P of processes is *stubborn* if no process outside, whatever
 //! it may do while time stands still, gets in the way of an edge that leaves the current location of a process in P, or takes
-//! part in a move with it ([`super::footprints`]), and if P has a process that stays in an urgent location, or in a committed
-//! one if there are any. As long as no process of P moves, time stands still and the moves of P stay what they are. So of every
+//! part in a move with it ([`super::footprints`]), and if P has a process that keeps time from passing ([`super::holders`]), by staying in
+//! a committed location if there are any. As long as no process of P moves, time stands still and the moves of P stay what they are. So of every
 //! run from the state, the first move of P can be taken first, and if it has none, one of P can be put before it. Moves of P
 //! that cannot make what is looked for false again, or that nothing outside P can make true, are enough then to find it.
 //!
@@ -25,11 +25,13 @@ use crate::ir::{Network, Predicate, Urgency};
 use crate::zones::{Zone, dbm};
 
 use super::footprints::{Ground, Still, greatest_values};
+use super::holders::Holders;
 use super::interference::{Interference, Situation};
 use super::moves::{MoveRef, Moves, Part};
 use super::recurrence::recurrent_edges;
 use super::symbolic::to_constraint;
 use super::watched::Watched;
+use super::{Failure, Symbolic};
 
 /// Networks with more locations are not reduced: what is remembered grows with the square.
 const MOST_LOCATIONS: usize = 2048;
@@ -50,6 +52,7 @@ pub struct PartialOrder {
     greatest: Vec<i32>,
     /// By process and edge: whether it may be taken again and again while time stands still.
     recurrent: Vec<Vec<bool>>,
+    holders: Holders,
 }
 
 impl PartialOrder {
@@ -60,15 +63,14 @@ impl PartialOrder {
             .iter()
             .map(|process| process.locations.len())
             .sum();
-        let has = |urgency| {
-            network.processes.iter().filter(move |process| {
-                let mut locations = process.locations.iter();
-                locations.any(|location| location.urgency == urgency)
-            })
-        };
+        let holders = Holders::new(network);
+        let may_commit = network.processes.iter().filter(|process| {
+            let mut locations = process.locations.iter();
+            locations.any(|location| location.urgency == Urgency::Committed)
+        });
         // In a committed state every move needs a committed process.
-        let may_gain = network.processes.len() > 1
-            && (has(Urgency::Urgent).next().is_some() || has(Urgency::Committed).count() > 1);
+        let may_gain =
+            network.processes.len() > 1 && (holders.are_possible() || may_commit.count() > 1);
         let is_known = !network.features.priorities
             && network.before_update.is_none()
             && network.after_update.is_none()
@@ -82,6 +84,7 @@ impl PartialOrder {
             watched,
             recurrent: recurrent_edges(network, &greatest),
             greatest,
+            holders,
         }))
     }
 }
@@ -136,8 +139,9 @@ impl Agenda {
 pub(crate) struct StubbornSets {
     order: Arc<PartialOrder>,
     interference: Interference,
-    /// By process: its situation in the state at hand.
+    /// By process: its situation in the state at hand, and whether it keeps time from passing.
     situations: Vec<Situation>,
+    holds: Vec<bool>,
     /// The moves that each clock constraint for itself leaves possible.
     possible: Vec<u32>,
     /// By process: whether it is in the set at hand.
@@ -158,6 +162,7 @@ impl StubbornSets {
             order,
             interference: Interference::new(network),
             situations: Vec::new(),
+            holds: Vec::new(),
             possible: Vec::new(),
             is_member: Vec::new(),
             members: Vec::new(),
@@ -171,17 +176,19 @@ impl StubbornSets {
     /// Puts the moves of a stubborn set first, if the state with these words, zone and moves has one with fewer than all.
     pub(crate) fn choose(
         &mut self,
-        network: &Network,
-        (words, zone): (&[i32], &Zone),
+        symbolic: &mut Symbolic<'_>,
+        (words, zone): (&mut [i32], &Zone),
         moves: &Moves,
         agenda: &mut Agenda,
-    ) {
+    ) -> Result<(), Failure> {
         agenda.clear();
         if moves.len() < 2 || self.is_given_up {
-            return;
+            return Ok(());
         }
-        let Some(still) = self.interference.still(words) else {
-            return;
+        let order = Arc::clone(&self.order);
+        let (holders, state) = (&order.holders, (&mut *words, zone));
+        let Some(still) = holders.find(symbolic, state, moves, &mut self.holds)? else {
+            return Ok(());
         };
         self.possible.clear();
         let possible = (0..)
@@ -190,24 +197,23 @@ impl StubbornSets {
         self.possible
             .extend(possible.map(|(index, _): (u32, _)| index));
         if self.possible.len() < 2 {
-            return;
+            return Ok(());
         }
         self.states += 1;
         if self.states == TRIAL {
             self.is_given_up = self.gains < TRIAL / LEAST_SHARE;
             (self.states, self.gains) = (0, 0);
         }
-        let order = Arc::clone(&self.order);
         let ground = Ground {
-            network,
+            network: symbolic.stepper.network(),
             watched: &order.watched,
             greatest: &order.greatest,
         };
         let situations = &mut self.situations;
         self.interference
             .situations(ground, (words, zone), still, situations);
-        if !self.find_best(ground, still, moves) {
-            return;
+        if !self.find_best(ground, still, (moves, zone)) {
+            return Ok(());
         }
         let is_first = |index: u32| self.best[moves.get(index as usize).parts[0].process as usize];
         let indices = 0..moves.len() as u32;
@@ -217,6 +223,7 @@ impl StubbornSets {
         agenda
             .order
             .extend(indices.filter(|&index| !is_first(index)));
+        Ok(())
     }
 
     /// Whether a move cannot be taken again and again while time stands still.
@@ -234,11 +241,12 @@ impl StubbornSets {
 
     /// Looks for the stubborn set with the fewest possible moves, which is left in `best`; returns whether there is one with fewer
     /// than all.
-    fn find_best(&mut self, ground: Ground<'_>, still: Still, moves: &Moves) -> bool {
-        let holds = match still {
-            Still::Urgent => Urgency::Urgent,
-            Still::Committed => Urgency::Committed,
-        };
+    fn find_best(
+        &mut self,
+        ground: Ground<'_>,
+        still: Still,
+        (moves, zone): (&Moves, &Zone),
+    ) -> bool {
         let all = self.possible.len();
         let mut fewest = all;
         let mut tried = 0;
@@ -250,16 +258,13 @@ impl StubbornSets {
             if fewest == 1 || tried == MOST_SETS || last.replace(process) == Some(process) {
                 continue;
             }
-            let stays = |part: &&Part| {
-                let situation = self.situations[part.process as usize];
-                self.interference.urgency(situation) == holds
-            };
-            let Some(holder) = one.parts.iter().find(stays) else {
+            let holds = |part: &&Part| self.holds[part.process as usize];
+            let Some(holder) = one.parts.iter().find(holds) else {
                 continue;
             };
             tried += 1;
             self.close(ground, still, holder.process);
-            if let Some(count) = self.moves_of_set(ground, still, moves)
+            if let Some(count) = self.moves_of_set(ground, still, (moves, zone))
                 && count < fewest
             {
                 fewest = count;
@@ -291,14 +296,19 @@ impl StubbornSets {
     }
 
     /// How many possible moves the set at hand has; `None` if they cannot be enough.
-    fn moves_of_set(&mut self, ground: Ground<'_>, still: Still, moves: &Moves) -> Option<usize> {
+    fn moves_of_set(
+        &mut self,
+        ground: Ground<'_>,
+        still: Still,
+        (moves, zone): (&Moves, &Zone),
+    ) -> Option<usize> {
         let mut count = 0;
         let mut has_sure_one = false;
         for &index in &self.possible {
             let one = moves.get(index as usize);
             if self.is_member[one.parts[0].process as usize] {
                 count += 1;
-                has_sure_one |= one.is_unconditional();
+                has_sure_one |= is_sure(one, zone);
             }
         }
         if !has_sure_one || count == self.possible.len() {
@@ -316,6 +326,14 @@ impl StubbornSets {
             !is_spoilt || !processes().any(|(&situation, &is_in)| !is_in && fulfils(situation));
         is_enough.then_some(count)
     }
+}
+
+/// Whether the guards of a move hold in the whole zone.
+fn is_sure(one: MoveRef<'_>, zone: &Zone) -> bool {
+    one.excluded().next().is_none()
+        && one.constraints.iter().all(|emitted| {
+            to_constraint(emitted).is_ok_and(|one| zone.bound(one.left, one.right) <= one.bound)
+        })
 }
 
 /// Whether each clock constraint of a move, for itself, leaves something of the zone.

@@ -276,7 +276,7 @@ impl Explorer {
         depth: usize,
     ) -> Result<Taken, Failure> {
         let one = source.moves.get(source.agenda.index(source.next));
-        let may_lead_on = source.agenda.is_open(source.next) && one.is_unconditional();
+        let may_lead_on = source.agenda.is_open(source.next);
         source.next += 1;
         self.leads_on = false;
         let symbolic = &mut *scene.symbolic;
@@ -515,8 +515,7 @@ fn open(
     }
     symbolic.moves_within(words, zone.bounds(), moves)?;
     if let Some(stubborn) = stubborn {
-        let network = symbolic.stepper.network();
-        stubborn.choose(network, (words, zone), moves, agenda);
+        stubborn.choose(symbolic, (words, zone), moves, agenda)?;
     }
     Ok(())
 }
