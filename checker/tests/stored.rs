@@ -256,7 +256,7 @@ fn deadlocks_are_looked_for_in_the_zones_of_reachability() {
     assert_eq!(check(&text, query, |_| {}).counters.stored, 2);
     // The trace with the fewest moves is only found in zones that keep deadlocks apart.
     let exact = check(&text, query, |options| {
-        options.trace = TraceWanted::Shortest
+        options.trace = TraceWanted::Shortest;
     });
     assert_eq!(exact.counters.stored, 8);
 }
