@@ -373,16 +373,12 @@ impl View<'_> {
         // Where the environment acts the controller comes too late.
         let is_late = !waits && action.is_some() && self.rules.claim.owner == Owner::Environment;
         if !is_late {
-            match self.rules.others(&here.now, &possible) {
-                Some(others) => {
-                    for (one, _) in others {
-                        add(&mut self.situation.replies, &one.parts, window);
-                    }
-                }
-                None => {
-                    self.situation.next = Next::Fails(Gap::ImpossibleAction);
-                    return Ok(true);
-                }
+            let Some(others) = self.rules.others(&here.now, &possible) else {
+                self.situation.next = Next::Fails(Gap::ImpossibleAction);
+                return Ok(true);
+            };
+            for (one, _) in others {
+                add(&mut self.situation.replies, &one.parts, window);
             }
         }
         Ok(!waits)
