@@ -25,6 +25,7 @@ pub mod store;
 pub mod taking;
 mod times;
 mod tree;
+mod zone_lists;
 
 pub use limits::{Counters, StopReason, Watch};
 pub use store::{DiscreteId, StateStore};

@@ -231,6 +231,48 @@ impl Signature {
         left(0) & left(1) & SIXTEENTH_BITS == SIXTEENTH_BITS
     }
 
+    /// By number, the first lowest: whether it is at least that of the other.
+    #[inline]
+    pub(super) fn reaches(self, other: Signature) -> u8 {
+        const SIXTEENTH_BITS: u64 = 0x8000_8000_8000_8000;
+        // Brings the bits 0, 16, 32 and 48 to 48 to 51.
+        const GATHER: u64 = 1 << 48 | 1 << 33 | 1 << 18 | 1 << 3;
+        let bits = |half: usize| {
+            let left = (self.half(half) | SIXTEENTH_BITS) - other.half(half);
+            ((left & SIXTEENTH_BITS) >> 15).wrapping_mul(GATHER) >> 48 & 15
+        };
+        (bits(0) | bits(1) << 4) as u8
+    }
+
+    /// The numbers in the middle of those of others, rounded up; `None` if these are all the same.
+    pub(super) fn mean(signatures: impl Iterator<Item = Signature> + Clone) -> Option<Signature> {
+        let first = signatures.clone().next()?;
+        if signatures.clone().all(|one| one == first) {
+            return None;
+        }
+        let count = signatures.clone().count() as u64;
+        let sum = |lane| {
+            signatures
+                .clone()
+                .map(|one| u64::from(one.number(lane)))
+                .sum()
+        };
+        let mean = |lane: usize| u64::div_ceil(sum(lane), count) as u32;
+        Some(Signature::of(std::array::from_fn(mean)))
+    }
+
+    /// One with these numbers, which have fifteen bits.
+    pub(super) fn of(numbers: [u32; 8]) -> Signature {
+        Signature(std::array::from_fn(|pair| {
+            numbers[2 * pair] | numbers[2 * pair + 1] << 16
+        }))
+    }
+
+    fn number(self, lane: usize) -> u32 {
+        self.0[lane / 2] >> (16 * (lane % 2)) & 0xffff
+    }
+
+    #[inline]
     fn half(self, half: usize) -> u64 {
         u64::from(self.0[2 * half]) | u64::from(self.0[2 * half + 1]) << 32
     }
@@ -372,9 +414,7 @@ impl PackedZones {
             let above_least = sums[lane] + self.greatest * self.weights[lane];
             ((above_least as u64 * self.scale) >> 32) as u32
         };
-        Signature(std::array::from_fn(|pair| {
-            number(2 * pair) | number(2 * pair + 1) << 16
-        }))
+        Signature::of(std::array::from_fn(number))
     }
 
     fn pack(&mut self, zone: &[Bound]) -> bool {

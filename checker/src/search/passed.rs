@@ -18,6 +18,7 @@ use crate::zones::zone_table::ZoneId;
 
 use super::packed_zones::{Kept, PackedZones, Signature};
 use super::store::{DiscreteId, StateStore};
+use super::zone_lists::{Entry, Lists};
 
 /// A stored state with its number.
 #[derive(Clone, Copy, Debug)]
@@ -26,113 +27,6 @@ pub(super) struct Stored {
     pub(super) node: u32,
     discrete: DiscreteId,
     zone: ZoneId,
-}
-
-/// A zone in the list of a discrete state.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    signature: Signature,
-    zone: ZoneId,
-    node: u32,
-}
-
-/// The zones of a discrete state: so many entries from `first` on. They lie side by side, since long lists are read again and again,
-/// in a place for as many as the next power of two.
-#[derive(Clone, Copy, Debug)]
-struct List {
-    first: u32,
-    len: u32,
-}
-
-/// Lists of entries.
-#[derive(Debug, Default)]
-struct Lists {
-    entries: Vec<Entry>,
-    /// By discrete state: its entries.
-    by_discrete: Vec<List>,
-    /// By exponent of their size: the places that are not in use.
-    free: Vec<Vec<u32>>,
-}
-
-impl Lists {
-    fn bytes(&self) -> usize {
-        let free = self.free.iter().map(|places| size_of_val(&**places));
-        size_of_val(&*self.entries) + size_of_val(&*self.by_discrete) + free.sum::<usize>()
-    }
-
-    fn get(&self, discrete: DiscreteId) -> &[Entry] {
-        let List { first, len } = self.by_discrete[discrete.0 as usize];
-        &self.entries[first as usize..][..len as usize]
-    }
-
-    fn get_mut(&mut self, discrete: DiscreteId) -> &mut [Entry] {
-        let List { first, len } = self.by_discrete[discrete.0 as usize];
-        &mut self.entries[first as usize..][..len as usize]
-    }
-
-    /// Adds a discrete state without entries.
-    fn open(&mut self) {
-        self.by_discrete.push(List { first: 0, len: 0 });
-    }
-
-    fn push(&mut self, discrete: DiscreteId, entry: Entry) {
-        let List { first, len } = self.by_discrete[discrete.0 as usize];
-        let place = if len == 0 {
-            self.place(0, entry)
-        } else if len.is_power_of_two() {
-            let exponent = len.ilog2() as usize;
-            let place = self.place(exponent + 1, entry);
-            let old = first as usize..(first + len) as usize;
-            self.entries.copy_within(old, place as usize);
-            self.release(exponent, first);
-            place
-        } else {
-            first
-        };
-        self.entries[(place + len) as usize] = entry;
-        self.by_discrete[discrete.0 as usize] = List {
-            first: place,
-            len: len + 1,
-        };
-    }
-
-    /// Takes an entry out; the last one takes its place.
-    fn remove(&mut self, discrete: DiscreteId, index: usize) {
-        let List { first, len } = self.by_discrete[discrete.0 as usize];
-        let last = len - 1;
-        self.entries[first as usize + index] = self.entries[(first + last) as usize];
-        let mut place = first;
-        if last == 0 {
-            self.release(0, first);
-        } else if last.is_power_of_two() {
-            let exponent = last.ilog2() as usize;
-            place = self.place(exponent, self.entries[first as usize]);
-            let old = first as usize..(first + last) as usize;
-            self.entries.copy_within(old, place as usize);
-            self.release(exponent + 1, first);
-        }
-        self.by_discrete[discrete.0 as usize] = List {
-            first: place,
-            len: last,
-        };
-    }
-
-    /// A place for 2^exponent entries, which mean nothing if it is new.
-    fn place(&mut self, exponent: usize, filler: Entry) -> u32 {
-        let free = self.free.get_mut(exponent).and_then(Vec::pop);
-        free.unwrap_or_else(|| {
-            let first = self.entries.len();
-            self.entries.resize(first + (1 << exponent), filler);
-            first as u32
-        })
-    }
-
-    fn release(&mut self, exponent: usize, first: u32) {
-        if self.free.len() <= exponent {
-            self.free.resize_with(exponent + 1, Vec::new);
-        }
-        self.free[exponent].push(first);
-    }
 }
 
 /// Stored symbolic states.
@@ -228,7 +122,9 @@ impl PassedList {
         let signature = self.zones.propose(zone);
         if !is_new {
             // None of the stored ones lies within another, so that what one contains contains none of them.
-            if self.is_contained(discrete, signature, zone.limits) {
+            let zones = &mut self.zones;
+            let contains = |other| zones.contains_candidate(other, zone.limits);
+            if self.lists.any_above(discrete, signature, contains) {
                 return None;
             }
             self.forget_within(discrete, signature, zone.limits);
@@ -254,49 +150,32 @@ impl PassedList {
         }
     }
 
-    /// Whether a stored zone of a discrete state contains the proposed one.
-    fn is_contained(
-        &mut self,
-        discrete: DiscreteId,
-        proposed: Signature,
-        limits: &[Bound],
-    ) -> bool {
-        let entries = self.lists.get_mut(discrete);
-        // The last ones come first.
-        let container = entries.iter().rposition(|entry| {
-            proposed.may_be_within(entry.signature)
-                && self.zones.contains_candidate(entry.zone, limits)
-        });
-        // What contains one zone often contains the next one.
-        let last = entries.len().saturating_sub(1);
-        container
-            .inspect(|&place| entries.swap(place, last))
-            .is_some()
-    }
-
     /// Forgets the zones of a discrete state that the proposed one contains.
     fn forget_within(&mut self, discrete: DiscreteId, proposed: Signature, limits: &[Bound]) {
-        // Where one is taken out, one that was looked at takes its place.
-        for index in (0..self.lists.get(discrete).len()).rev() {
-            let Entry {
-                signature,
-                zone,
-                node,
-            } = self.lists.get(discrete)[index];
-            if signature.may_be_within(proposed) && self.zones.is_in_candidate(zone, limits) {
-                self.cover(node);
-                self.zones.release(zone);
-                self.lists.remove(discrete, index);
+        let PassedList {
+            zones,
+            lists,
+            covered,
+            covered_count,
+            ..
+        } = self;
+        lists.remove_below(discrete, proposed, |entry| {
+            let is_within = zones.is_in_candidate(entry.zone, limits);
+            if is_within {
+                cover(covered, entry.node);
+                *covered_count += 1;
+                zones.release(entry.zone);
             }
-        }
+            is_within
+        });
     }
+}
 
-    fn cover(&mut self, node: u32) {
-        let word = node as usize / 64;
-        if self.covered.len() <= word {
-            self.covered.resize(word + 1, 0);
-        }
-        self.covered[word] |= 1 << (node % 64);
-        self.covered_count += 1;
+/// Notes that a node is covered.
+fn cover(covered: &mut Vec<u64>, node: u32) {
+    let word = node as usize / 64;
+    if covered.len() <= word {
+        covered.resize(word + 1, 0);
     }
+    covered[word] |= 1 << (node % 64);
 }
