@@ -44,6 +44,8 @@ pub(super) struct Group {
     before: u64,
     /// How many moves the groups after it stand for.
     after: u64,
+    /// How many ways there are to choose: candidates by the branches of their edges.
+    ways: u64,
 }
 
 /// What a process does in a move that is being put together.
@@ -56,6 +58,38 @@ pub(super) enum Choice {
 }
 
 impl Group {
+    /// The place of its first candidate.
+    pub(super) fn first(&self) -> usize {
+        self.first
+    }
+
+    /// How many choices there are.
+    pub(super) fn picks(&self) -> u64 {
+        (self.end - self.first) as u64
+    }
+
+    /// How many moves its choices stand for.
+    pub(super) fn ways(&self) -> u64 {
+        self.ways
+    }
+
+    /// The same of candidates that begin at another place.
+    pub(super) fn starting_at(&self, first: usize) -> Group {
+        Group {
+            first,
+            last: first + (self.last - self.first),
+            end: first + (self.end - self.first),
+            pick: first,
+            ..*self
+        }
+    }
+
+    /// Puts it before groups that stand for so many moves; returns for how many they stand with it.
+    pub(super) fn put_before(&mut self, after: u64) -> u64 {
+        self.after = after;
+        after.saturating_mul(self.ways)
+    }
+
     fn choice(&self) -> Choice {
         if self.pick < self.last {
             Choice::Takes(self.pick as u32)
@@ -76,6 +110,11 @@ impl Stepper<'_> {
         scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
+        // Whoever records wants to see all that is evaluated.
+        let is_shared = self.record.is_none();
+        if is_shared && self.has_audience(channel) {
+            return self.broadcast_again(sender, needs_committed, words, scope, out);
+        }
         let mut groups = std::mem::take(&mut self.groups);
         groups.clear();
         let mut has_committed = !needs_committed;
@@ -91,6 +130,9 @@ impl Stepper<'_> {
                 groups.push(self.group(first));
             }
         }
+        if is_shared {
+            self.note_audience(sender, channel, &groups);
+        }
         if has_committed {
             self.combine(&mut groups, needs_committed, words, scope, out)?;
         }
@@ -99,12 +141,14 @@ impl Stepper<'_> {
     }
 
     /// The candidates from `first` on, all of one receiving process.
-    fn group(&self, first: usize) -> Group {
+    pub(super) fn group(&self, first: usize) -> Group {
         let last = self.candidates.len();
         // A receiver whose edges all have clock guards may have none that is open: abstaining comes after its candidates.
         let guarded = |candidate: &Candidate| candidate.constraints.0 < candidate.constraints.1;
         let may_abstain = self.candidates[first..last].iter().all(guarded);
+        let ways = (first..last).map(|candidate| self.ways(Choice::Takes(candidate as u32)));
         Group {
+            ways: ways.sum::<u64>() + u64::from(may_abstain),
             first,
             last,
             end: last + usize::from(may_abstain),
@@ -126,34 +170,40 @@ impl Stepper<'_> {
     ) -> Result<(), Failure> {
         let (mut combinations, mut after) = (1_u64, 1_u64);
         for group in groups.iter_mut().rev() {
-            group.after = after;
-            let picks = group.first..group.end;
-            combinations = combinations.saturating_mul(picks.len() as u64);
-            let ways = picks.map(|pick| self.ways(Group { pick, ..*group }.choice()));
-            after = after.saturating_mul(ways.sum());
+            combinations = combinations.saturating_mul(group.picks());
+            after = group.put_before(after);
         }
-        let sender = Choice::Takes(0);
-        let ways = self.ways(sender);
-        let rank_after = self.rank.saturating_add(ways.saturating_mul(after));
-        if rank_after > MOST_RANKS {
-            return Err(Failure::Moves(MOST_RANKS as usize));
-        }
-        let scope = if combinations <= FEW_COMBINATIONS {
-            Scope::Everything
-        } else {
-            scope
-        };
+        let (rank_after, scope) = self.ranks_and_scope(combinations, after, scope)?;
         self.chosen.clear();
         self.sieve.begin(scope);
-        if self.choose(sender, scope)? {
+        if self.choose(Choice::Takes(0), scope)? {
             self.combine_from(groups, needs_committed, words, scope, out)?;
         }
         self.rank = rank_after;
         Ok(())
     }
 
+    /// The rank after all moves of a broadcast whose receivers can be combined in so many ways, which stand for so many moves, and the
+    /// scope in which they are.
+    pub(super) fn ranks_and_scope<'z>(
+        &self,
+        combinations: u64,
+        after: u64,
+        scope: Scope<'z>,
+    ) -> Result<(u64, Scope<'z>), Failure> {
+        let ways = self.ways(Choice::Takes(0));
+        let rank_after = self.rank.saturating_add(ways.saturating_mul(after));
+        if rank_after > MOST_RANKS {
+            return Err(Failure::Moves(MOST_RANKS as usize));
+        }
+        if combinations <= FEW_COMBINATIONS {
+            return Ok((rank_after, Scope::Everything));
+        }
+        Ok((rank_after, scope))
+    }
+
     /// Goes through the choices of the groups, after the sender was chosen.
-    fn combine_from(
+    pub(super) fn combine_from(
         &mut self,
         groups: &mut [Group],
         needs_committed: bool,
@@ -206,7 +256,7 @@ impl Stepper<'_> {
     }
 
     /// Adds a choice to the combination; returns false, with nothing added, if the scope has none with it.
-    fn choose(&mut self, choice: Choice, scope: Scope<'_>) -> Result<bool, Failure> {
+    pub(super) fn choose(&mut self, choice: Choice, scope: Scope<'_>) -> Result<bool, Failure> {
         let (candidates, constraints) = (&self.candidates, &self.constraints);
         let constraints_of = |candidate: &Candidate| {
             let (first, last) = candidate.constraints;

@@ -8,6 +8,7 @@
 //! hold after all updates; a committed location must take part if there is one; a broadcast takes along every process with an
 //! enabled receiving edge.
 
+mod audience;
 pub mod bounds;
 mod combinations;
 mod deadlocks;

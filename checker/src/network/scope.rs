@@ -6,7 +6,7 @@
 //! Invariant: what a scope leaves out is never possible, or not wanted; what it lets pass may still turn out to be impossible.
 
 use crate::exec::EmittedConstraint;
-use crate::zones::dbm::Constraint;
+use crate::zones::dbm::{self, Constraint};
 use crate::zones::{Bound, Federation};
 
 use super::symbolic::add_constraints;
@@ -38,13 +38,21 @@ pub(super) enum Demand<'c> {
 #[derive(Debug)]
 pub(super) struct Sieve {
     dimension: usize,
-    /// After each choice the valuations at which all choices are possible, for [`Scope::Within`].
+    /// After each choice that took something away the valuations at which all choices are possible, for [`Scope::Within`].
     left: Vec<Federation>,
-    /// How many of them count.
-    depth: usize,
+    /// By choice, the first of which is none: the one of them that counts after it.
+    places: Vec<usize>,
     constraints: Vec<Constraint>,
     /// Whether clocks have decided anything since this was false.
     pub(super) has_narrowed: bool,
+}
+
+/// What a demand leaves of valuations.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Leaves {
+    All,
+    Nothing,
+    Some,
 }
 
 impl Sieve {
@@ -52,7 +60,7 @@ impl Sieve {
         Sieve {
             dimension,
             left: Vec::new(),
-            depth: 0,
+            places: Vec::new(),
             constraints: Vec::new(),
             has_narrowed: false,
         }
@@ -60,12 +68,12 @@ impl Sieve {
 
     /// Begins a combination.
     pub(super) fn begin(&mut self, scope: Scope<'_>) {
-        self.depth = 0;
+        self.places.clear();
         if let Scope::Within(zone) = scope {
-            self.grow();
+            self.grow(0);
             self.left[0].clear();
             self.left[0].push(zone);
-            self.depth = 1;
+            self.places.push(0);
         }
     }
 
@@ -75,11 +83,9 @@ impl Sieve {
         scope: Scope<'_>,
         demands: impl IntoIterator<Item = Demand<'c>>,
     ) -> Result<bool, Failure> {
-        if matches!(scope, Scope::Within(_)) {
-            self.grow();
-            let (before, after) = self.left.split_at_mut(self.depth);
-            after[0].clone_from(&before[self.depth - 1]);
-        }
+        // Where nothing is taken away, nothing is copied.
+        let before = self.places.last().copied().unwrap_or_default();
+        let mut place = before;
         for demand in demands {
             let passes = match scope {
                 Scope::Everything => true,
@@ -98,41 +104,83 @@ impl Sieve {
                         parts.iter().all(|wanted| wanted.process != process)
                     }
                 },
-                Scope::Within(_) => self.narrow(demand)?,
+                Scope::Within(_) => match self.leaves(place, demand)? {
+                    Leaves::All => true,
+                    Leaves::Nothing => false,
+                    Leaves::Some => {
+                        if place == before {
+                            place = before + 1;
+                            self.grow(place);
+                            let (before, after) = self.left.split_at_mut(place);
+                            after[0].clone_from(&before[place - 1]);
+                        }
+                        self.narrow(place, demand)
+                    }
+                },
             };
             if !passes {
                 return Ok(false);
             }
         }
         if matches!(scope, Scope::Within(_)) {
-            self.depth += 1;
+            self.places.push(place);
         }
         Ok(true)
     }
 
     /// Takes the last choice back.
     pub(super) fn take_back(&mut self) {
-        self.depth = self.depth.saturating_sub(1);
+        self.places.pop();
     }
 
-    fn narrow(&mut self, demand: Demand<'_>) -> Result<bool, Failure> {
-        let left = &mut self.left[self.depth];
+    /// What a demand leaves of the valuations at hand, as far as that is seen at a glance; reads its constraints.
+    fn leaves(&mut self, place: usize, demand: Demand<'_>) -> Result<Leaves, Failure> {
         let (Demand::Takes(_, emitted) | Demand::Abstains(_, emitted)) = demand;
         self.has_narrowed |= !emitted.is_empty();
         // A conjunction in which a clock is less than itself never holds.
         let may_hold = add_constraints(emitted, &mut self.constraints)?;
-        match demand {
-            Demand::Takes(..) if !may_hold => left.clear(),
-            Demand::Takes(..) => left.constrain_all(&self.constraints),
-            Demand::Abstains(..) if may_hold => left.subtract_conjunction(&self.constraints),
-            Demand::Abstains(..) => {}
-        }
-        Ok(!left.is_empty())
+        let mut zones = self.left[place].zones();
+        let (zone, is_one) = (zones.next(), zones.next().is_none());
+        let holds = match zone {
+            _ if !may_hold => Leaves::Nothing,
+            Some(zone) if is_one => part_within(zone, self.dimension, &self.constraints),
+            _ => Leaves::Some,
+        };
+        Ok(match (demand, holds) {
+            (Demand::Takes(..), holds) => holds,
+            (Demand::Abstains(..), Leaves::All) => Leaves::Nothing,
+            (Demand::Abstains(..), Leaves::Nothing) => Leaves::All,
+            (Demand::Abstains(..), Leaves::Some) => Leaves::Some,
+        })
     }
 
-    fn grow(&mut self) {
-        if self.left.len() <= self.depth {
+    /// Takes away what the demand does not leave, the constraints of which were read; returns whether something is left.
+    fn narrow(&mut self, place: usize, demand: Demand<'_>) -> bool {
+        let left = &mut self.left[place];
+        match demand {
+            Demand::Takes(..) => left.constrain_all(&self.constraints),
+            Demand::Abstains(..) => left.subtract_conjunction(&self.constraints),
+        }
+        !left.is_empty()
+    }
+
+    fn grow(&mut self, place: usize) {
+        if self.left.len() <= place {
             self.left.push(Federation::empty(self.dimension));
         }
     }
+}
+
+/// In how much of a zone some constraints hold, as far as each says for itself.
+fn part_within(zone: &[Bound], dimension: usize, constraints: &[Constraint]) -> Leaves {
+    let mut part = Leaves::All;
+    for one in constraints {
+        if !dbm::satisfies(zone, dimension, one) {
+            return Leaves::Nothing;
+        }
+        if zone[one.left * dimension + one.right] > one.bound {
+            part = Leaves::Some;
+        }
+    }
+    part
 }

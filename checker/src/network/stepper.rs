@@ -9,9 +9,11 @@
 
 use std::ops::Range;
 
+use crate::cancellation;
 use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
 use crate::ir::{ChannelId, Edge, FunctionId, Network, RunTimeErrorKind, Update, Urgency};
 
+use super::audience::Audience;
 use super::combinations::{Choice, Group};
 use super::enumeration::Candidate;
 use super::failure::Failure;
@@ -46,6 +48,9 @@ pub struct Stepper<'a> {
     /// The rank of the next move; see [`super::combinations`].
     pub(super) rank: u64,
     pub(super) sieve: Sieve,
+    /// The receivers of the channel that was sent on last, and the buffer for their constraints.
+    pub(super) audience: Audience,
+    pub(super) heard: Vec<EmittedConstraint>,
     /// The enabled instances of edges that are remembered.
     pub(super) instances: Instances,
     pub(super) partners: Partners,
@@ -99,6 +104,8 @@ impl<'a> Stepper<'a> {
             parts: Vec::new(),
             rank: 0,
             sieve: Sieve::new(network.clocks.len().max(1)),
+            audience: Audience::default(),
+            heard: Vec::new(),
             listening: network
                 .processes
                 .iter()
@@ -267,7 +274,9 @@ impl<'a> Stepper<'a> {
     ) -> Result<Option<OfferId>, Failure> {
         self.sieve.has_narrowed = false;
         self.record = Some(Record::default());
-        let result = self.put_together(words, scope, out);
+        // Where it is cut off, what was recorded so far must not be taken for that of another state.
+        let put_together = || self.put_together(words, scope, out);
+        let result = cancellation::unless_cut(put_together).unwrap_or(Err(Failure::Interrupted));
         let mut record = self.record.take().unwrap_or_default();
         result?;
         if self.sieve.has_narrowed {

@@ -27,8 +27,8 @@ use super::{
     Failure, LiveVariables, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, Symmetry,
 };
 
-/// From this dimension on a move takes long enough to count.
-const MANY_CLOCKS: usize = 16;
+/// What it takes to take a move, beside its zones: see [`cancellation::work`].
+const UNITS_FOR_MOVE: usize = 512;
 
 /// Zones on top of the moves of a network. One per thread.
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
@@ -250,10 +250,8 @@ impl<'a> Symbolic<'a> {
         words: &mut [i32],
         effect: &mut ClockEffect,
     ) -> Result<bool, Failure> {
-        if self.dimension >= MANY_CLOCKS {
-            // The zones that are made of what is said here are to come.
-            cancellation::work(self.dimension * self.dimension);
-        }
+        // The zones that are made of what is said here are to come.
+        cancellation::work(UNITS_FOR_MOVE + self.dimension * self.dimension);
         effect.excluded.clear();
         effect.assignments.clear();
         if !add_constraints(one.constraints, &mut effect.guard)? {
@@ -285,9 +283,20 @@ impl<'a> Symbolic<'a> {
         Ok(())
     }
 
-    /// Whether [`Symbolic::take`] and [`Symbolic::pass_time`] can take the move: the state that it leads to has one zone.
-    pub fn stays_whole(&self, one: MoveRef<'_>) -> bool {
-        one.excluded().next().is_none() && !self.has_barriers() && !self.bounds.splits()
+    /// Whether [`Symbolic::take`] and [`Symbolic::pass_time`] can take the move from this zone: the state that it leads to has one zone,
+    /// since what must not hold is false everywhere.
+    pub fn stays_whole(&self, one: MoveRef<'_>, zone: &[Bound]) -> bool {
+        !self.has_barriers()
+            && !self.bounds.splits()
+            && one.excluded().all(|excluded| self.is_false(excluded, zone))
+    }
+
+    /// Whether some constraint of a conjunction holds nowhere in the zone.
+    fn is_false(&self, conjunction: &[EmittedConstraint], zone: &[Bound]) -> bool {
+        conjunction.iter().any(|one| {
+            let constraint = to_constraint(one);
+            constraint.is_ok_and(|one| !dbm::satisfies(zone, self.dimension, &one))
+        })
     }
 
     /// Takes a move on words and zone at once; returns whether it is possible. If it is not, neither means anything, and no
@@ -576,8 +585,11 @@ impl ClockEffect {
     /// The part of a zone in which the move is possible.
     pub fn enabled_part(&self, zone: &[Bound], dimension: usize) -> Federation {
         let mut enabled = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
-        self.preimage(&mut enabled);
+        enabled.constrain_all(&self.invariant);
+        enabled.preimage(&self.guard, &self.assignments);
         enabled.intersect_zone(zone);
+        // What must not hold is cut out last: outside of the zone it would make zones without number.
+        self.subtract_excluded(&mut enabled);
         enabled
     }
 

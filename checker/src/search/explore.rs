@@ -280,7 +280,7 @@ impl Explorer {
         source.next += 1;
         self.leads_on = false;
         let symbolic = &mut *scene.symbolic;
-        if !may_lead_on && symbolic.stays_whole(one) {
+        if !may_lead_on && symbolic.stays_whole(one, source.zone.bounds()) {
             if !symbolic.may_satisfy(one, source.zone.bounds())? {
                 return Ok(Taken::Nothing);
             }

@@ -229,11 +229,17 @@ impl Federation {
             return;
         }
         let (dimension, size) = (self.dimension, self.size());
+        let meets = |zone: &[Bound]| {
+            let mut constraints = constraints.iter();
+            constraints.all(|one| dbm::satisfies(zone, dimension, one))
+        };
+        if !self.zones().any(meets) {
+            return;
+        }
         let end = self.bounds.len();
         for start in (0..end).step_by(size) {
             let minuend = &self.bounds[start..start + size];
-            let meets = |one: &Constraint| dbm::satisfies(minuend, dimension, one);
-            if !constraints.iter().all(meets) {
+            if !meets(minuend) {
                 make_room(&mut self.bounds, size);
                 self.bounds.extend_from_within(start..start + size);
                 continue;
@@ -541,7 +547,6 @@ struct Subtrahend<'a> {
 impl<'a> Subtrahend<'a> {
     fn new(zone: &'a [Bound], dimension: usize) -> Subtrahend<'a> {
         let mut constraints = Vec::new();
-        cancellation::work(dimension * dimension * dimension / 4);
         minimal::for_each_minimal(zone, dimension, |constraint| constraints.push(constraint));
         Subtrahend {
             zone,

@@ -15,6 +15,8 @@
 //!
 //! Cost: reduction O(n^3), inclusion linear in the number of constraints, unpacking that of closing.
 
+use crate::cancellation;
+
 use super::dbm::{self, Constraint};
 use super::rows::{relax_row, rows, with_row};
 use super::{Bound, ClockSet};
@@ -81,6 +83,7 @@ fn visit_minimal(
             None
         };
         if is_representative {
+            cancellation::work(dimension * dimension / 4);
             find_detours(zone, dimension, &representatives, left, detours);
         }
         for (right, (&bound, &detour)) in row.iter().zip(&*detours).enumerate() {
