@@ -84,6 +84,10 @@ bench: $(INSTALLED) ## Measure the engine: all plans, a thousand syntheses, redu
 	$(BIN)/python tests/benchmarks/race.py --threads 2 "fischer 10" "csmacd 11" peterson
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
+.PHONY: bench-limits
+bench-limits: $(INSTALLED) ## Measure whether the limits of time and memory hold: 20 models with up to 250 clocks
+	$(BIN)/python tests/benchmarks/limits.py
+
 .PHONY: bench-games
 bench-games: $(INSTALLED) ## Measure how far the solver of games gets: seven families, up to 60 s or 4 GiB
 	$(BIN)/python tests/benchmarks/games.py

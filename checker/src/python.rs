@@ -7,14 +7,15 @@ mod play;
 mod walks;
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::cancellation::{self, Cut, Look};
 use crate::diagnostics::Severity;
 use crate::engine::limits::Observer;
 use crate::engine::verification;
@@ -136,6 +137,28 @@ fn observer(progress: Option<Py<PyAny>>) -> Observer {
     })
 }
 
+/// How often signals are looked for.
+const LOOK_FOR_SIGNALS_EVERY: Duration = Duration::from_millis(50);
+
+/// Does work without the interpreter, which a signal (Ctrl-C) ends.
+fn until_signal<T: Send>(py: Python<'_>, run: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let owner = thread::current().id();
+    let looked = Mutex::new(Instant::now());
+    let look: Look = Arc::new(move |_| {
+        if thread::current().id() != owner {
+            return false;
+        }
+        let mut looked = looked.lock().unwrap_or_else(PoisonError::into_inner);
+        if looked.elapsed() < LOOK_FOR_SIGNALS_EVERY {
+            return false;
+        }
+        *looked = Instant::now();
+        Python::attach(|py| py.check_signals().is_err())
+    });
+    let result = py.detach(|| cancellation::within(look, run));
+    result.map_err(|Cut| PyKeyboardInterrupt::new_err(()))
+}
+
 /// A loaded model.
 #[pyclass(frozen, module = "ntagen._checker")]
 struct Model {
@@ -144,12 +167,7 @@ struct Model {
 
 impl Model {
     fn with<T>(&self, action: impl FnOnce(&mut LoadedModel) -> T) -> T {
-        action(
-            &mut self
-                .inner
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner),
-        )
+        action(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
@@ -317,10 +335,8 @@ impl Model {
     ) -> PyResult<(Option<bool>, Vec<String>)> {
         let rules = (forced_rule(forced)?, priority_rule(priorities)?);
         let model = slf.get();
-        let checked = slf
-            .py()
-            .detach(|| model.with(|model| model.verify_evidence(path, text, rules)));
-        let checked = checked.map_err(rejected)?;
+        let verify = || model.with(|model| model.verify_evidence(path, text, rules));
+        let checked = until_signal(slf.py(), verify)?.map_err(rejected)?;
         Ok((checked.holds, checked.lines))
     }
 
@@ -558,53 +574,23 @@ impl Answer {
     }
 
     /// The plans as JSON; `None` without plans.
-    fn plans_json(&self) -> Option<String> {
-        let evidence = &self.inner.evidence;
-        let plans = evidence.plans.as_ref()?;
-        let more = evidence.has_more_plans;
-        Some(
-            self.model
-                .get()
-                .with(|model| json::plans(model.network(), plans, &self.query, more).to_string()),
-        )
+    fn plans_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.plans_json_or_none())
     }
 
     /// The traces in UPPAAL's form, with the runs with exact times; `None` without a trace.
-    fn trace_text(&self) -> Option<String> {
-        let witnesses = &self.inner.evidence.witnesses;
-        if witnesses.is_empty() {
-            return None;
-        }
-        let texts: Vec<String> = self.model.get().with(|model| {
-            let texts = witnesses.iter();
-            texts
-                .map(|one| describe::witness_text(model.network(), one))
-                .collect()
-        });
-        Some(texts.join("\n"))
+    fn trace_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.trace_text_or_none())
     }
 
     /// The traces as JSON; `None` without a trace.
-    fn trace_json(&self) -> Option<String> {
-        let witnesses = &self.inner.evidence.witnesses;
-        if witnesses.is_empty() {
-            return None;
-        }
-        Some(
-            self.model
-                .get()
-                .with(|model| json::witnesses(model.network(), witnesses, &self.query).to_string()),
-        )
+    fn trace_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.trace_json_or_none())
     }
 
     /// The certificate as a file; `None` without one.
-    fn certificate_text(&self) -> Option<String> {
-        let certificate = self.inner.evidence.certificate.as_ref()?;
-        Some(
-            self.model
-                .get()
-                .with(|model| certificate.text(model.network(), &self.query)),
-        )
+    fn certificate_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.certificate_text_or_none())
     }
 
     /// Whether the strategy and the traces passed their checks; `None` if none was made or one came to no end.
@@ -629,7 +615,70 @@ impl Answer {
     }
 
     /// The strategy, or the machine of a game with observations, as JSON; `None` without any.
-    fn strategy_json(&self) -> Option<String> {
+    fn strategy_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.strategy_json_or_none())
+    }
+
+    /// The strategy, or the machine of a game with observations, as a controller in C; `None` without any.
+    fn controller_c(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let text = until_signal(py, || self.controller_c_or_reason())?;
+        text.map_err(|reason| RejectedError::new_err((vec![format!("error: {reason}")],)))
+    }
+
+    /// The strategy as text in TIGA's form, or the machine of a game with observations; `None` without any.
+    fn strategy_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.strategy_text_or_none())
+    }
+}
+
+impl Answer {
+    fn plans_json_or_none(&self) -> Option<String> {
+        let evidence = &self.inner.evidence;
+        let plans = evidence.plans.as_ref()?;
+        let more = evidence.has_more_plans;
+        Some(
+            self.model
+                .get()
+                .with(|model| json::plans(model.network(), plans, &self.query, more).to_string()),
+        )
+    }
+
+    fn trace_text_or_none(&self) -> Option<String> {
+        let witnesses = &self.inner.evidence.witnesses;
+        if witnesses.is_empty() {
+            return None;
+        }
+        let texts: Vec<String> = self.model.get().with(|model| {
+            let texts = witnesses.iter();
+            texts
+                .map(|one| describe::witness_text(model.network(), one))
+                .collect()
+        });
+        Some(texts.join("\n"))
+    }
+
+    fn trace_json_or_none(&self) -> Option<String> {
+        let witnesses = &self.inner.evidence.witnesses;
+        if witnesses.is_empty() {
+            return None;
+        }
+        Some(
+            self.model
+                .get()
+                .with(|model| json::witnesses(model.network(), witnesses, &self.query).to_string()),
+        )
+    }
+
+    fn certificate_text_or_none(&self) -> Option<String> {
+        let certificate = self.inner.evidence.certificate.as_ref()?;
+        Some(
+            self.model
+                .get()
+                .with(|model| certificate.text(model.network(), &self.query)),
+        )
+    }
+
+    fn strategy_json_or_none(&self) -> Option<String> {
         if let Some(machine) = &self.inner.evidence.machine {
             let write = |model: &mut LoadedModel| {
                 machine_file::write(model.network(), machine, &self.query).to_string()
@@ -644,8 +693,18 @@ impl Answer {
         )
     }
 
-    /// The strategy, or the machine of a game with observations, as a controller in C; `None` without any.
-    fn controller_c(&self) -> PyResult<Option<String>> {
+    fn strategy_text_or_none(&self) -> Option<String> {
+        if let Some(machine) = &self.inner.evidence.machine {
+            let write =
+                |model: &mut LoadedModel| machine_file::text(model.network(), machine, &self.query);
+            return Some(self.model.get().with(write));
+        }
+        let strategy = self.inner.evidence.strategy.as_ref()?;
+        let write = |model: &mut LoadedModel| strategy_text::write(model.network(), strategy);
+        Some(self.model.get().with(write))
+    }
+
+    fn controller_c_or_reason(&self) -> Result<Option<String>, controller::NoController> {
         if let Some(machine) = &self.inner.evidence.machine {
             let write = |model: &mut LoadedModel| {
                 machine_controller::write(model.network(), machine, &self.query)
@@ -660,19 +719,6 @@ impl Answer {
             .get()
             .with(|model| controller::write(model.network(), strategy, &self.query));
         text.map(Some)
-            .map_err(|reason| RejectedError::new_err((vec![format!("error: {reason}")],)))
-    }
-
-    /// The strategy as text in TIGA's form, or the machine of a game with observations; `None` without any.
-    fn strategy_text(&self) -> Option<String> {
-        if let Some(machine) = &self.inner.evidence.machine {
-            let write =
-                |model: &mut LoadedModel| machine_file::text(model.network(), machine, &self.query);
-            return Some(self.model.get().with(write));
-        }
-        let strategy = self.inner.evidence.strategy.as_ref()?;
-        let write = |model: &mut LoadedModel| strategy_text::write(model.network(), strategy);
-        Some(self.model.get().with(write))
     }
 }
 
@@ -680,9 +726,7 @@ impl Answer {
 #[pyfunction]
 fn load(py: Python<'_>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Model> {
     let bytes = data.as_bytes();
-    let model = py
-        .detach(|| LoadedModel::load(path, bytes))
-        .map_err(rejected)?;
+    let model = until_signal(py, || LoadedModel::load(path, bytes))?.map_err(rejected)?;
     Ok(Model {
         inner: Mutex::new(model),
     })

@@ -9,6 +9,7 @@
 
 use serde_json::{Value as Json, json};
 
+use crate::cancellation::{self, Cut};
 use crate::game::strategy::Strategy;
 use crate::game::{Forced, Priorities};
 use crate::ir::{Network, Objective, Predicate, QueryKind};
@@ -48,6 +49,9 @@ pub(super) fn stop_text(reason: StopReason) -> &'static str {
     }
 }
 
+/// Bytes of a certificate between two looks at the memory that it takes.
+const BYTES_BETWEEN_LOOKS: usize = 1 << 20;
+
 /// The network with `meta` variables as ordinary ones: whether states that differ in them alone are the same decides which of them
 /// a search meets, but not what it claims of those that it meets.
 pub(super) fn with_all_words(network: &Network) -> Network {
@@ -82,18 +86,24 @@ pub(super) fn reached(
         }
         Err(_) => return Err("the model fails".to_owned()),
     }
+    let mut bytes = 0;
     let states = search.into_reached().into_iter().map(|(words, zones)| {
         let zones = zones.iter();
-        States {
-            words,
-            zones: zones
-                .map(|zone| verification::constraints(zone.bounds(), dimension))
-                .collect(),
+        let zones = zones.map(|zone| verification::constraints(zone.bounds(), dimension));
+        let zones: Vec<_> = zones.collect();
+        // The zones that these are made of count still.
+        let constraints = zones.iter().map(|zone| size_of_val(&**zone));
+        let before = bytes;
+        bytes += size_of::<States>() + size_of_val(&*words) + constraints.sum::<usize>();
+        if bytes / BYTES_BETWEEN_LOOKS > before / BYTES_BETWEEN_LOOKS {
+            cancellation::ask_for(bytes);
         }
+        States { words, zones }
     });
-    Ok(Certificate {
+    let certificate = cancellation::unless_cut(|| Certificate {
         states: states.collect(),
-    })
+    });
+    certificate.map_err(|Cut| "writing it was stopped by a limit".to_owned())
 }
 
 impl Certificate {

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value as Json, json};
 
+use crate::cancellation;
 use crate::game::plans::Plan;
 use crate::ir::Network;
 use crate::network::Part;
@@ -43,8 +44,12 @@ pub fn parts(network: &Network, list: &[Part]) -> Json {
     Json::Array(list.iter().map(|&one| part(network, one)).collect())
 }
 
+/// What it takes to write the location of a process, with its share of the state: see [`cancellation::work`].
+const UNITS_FOR_LOCATION: usize = 256;
+
 /// The location of each process.
 pub fn locations(network: &Network, words: &[i32]) -> Json {
+    cancellation::work(UNITS_FOR_LOCATION * network.processes.len());
     let entries = network.processes.iter().enumerate();
     Json::Object(
         entries

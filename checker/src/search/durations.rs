@@ -12,6 +12,8 @@
 //!
 //! Cost: a step takes rows times columns; numbers that outgrow 128 bits end it.
 
+use crate::cancellation;
+
 /// A number outgrew its bits, or there were too many steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TooHard;
@@ -20,6 +22,12 @@ pub(super) struct TooHard;
 const MOST_PIVOTS: u32 = 20_000;
 /// Rows times columns, at most.
 const MOST_CELLS: usize = 4_000_000;
+
+/// So many are asked for before they are made.
+const MANY_CELLS: usize = 1 << 15;
+
+/// What it takes to add a multiple of a fraction: see [`cancellation::work`].
+const UNITS_FOR_CELL: usize = 16;
 
 /// A fraction in lowest terms, with a positive denominator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -201,10 +209,14 @@ impl Durations {
 
     /// Adds a bound and finds durations that satisfy all; returns false if there are none, and then they mean nothing until it is undone.
     pub(super) fn require(&mut self, bound: &LinearBound) -> Result<bool, TooHard> {
-        let variable = self.add_variable();
-        if self.rows.len().saturating_mul(self.value.len()) > MOST_CELLS {
+        let cells = (self.rows.len() + 1).saturating_mul(self.value.len() + 1);
+        if cells > MOST_CELLS {
             return Err(TooHard);
         }
+        if cells > MANY_CELLS {
+            cancellation::ask_for(cells * size_of::<Fraction>());
+        }
+        let variable = self.add_variable();
         let mut row = vec![Fraction::ZERO; self.value.len()];
         let signed = bound.plus.iter().map(|&wait| (wait, Fraction::ONE));
         let minus = bound
@@ -374,6 +386,7 @@ fn amount((whole, infinitesimals): (i64, i64)) -> Amount {
 }
 
 fn add_multiple(row: &mut [Fraction], other: &[Fraction], factor: Fraction) -> Result<(), TooHard> {
+    cancellation::work(UNITS_FOR_CELL * other.len());
     for (one, other) in row.iter_mut().zip(other) {
         if !other.is_zero() {
             *one = one.plus(other.times(factor)?)?;

@@ -21,7 +21,7 @@ use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::{Bound, Zone, dbm};
 
 use super::goal::{Goal, Target};
-use super::limits::{Counters, StopReason, Watch, states_between_looks};
+use super::limits::{Counters, StopReason, Watch, moves_between_looks, states_between_looks};
 use super::reach::Trace;
 use super::retrace::{self, Step};
 use super::store::{DiscreteId, StateStore};
@@ -157,7 +157,9 @@ impl<'s, 'a> Search<'s, 'a> {
             if is_goal {
                 return Ok(Outcome::Found(self.way(node, cost)));
             }
-            self.explore(node)?;
+            if let Some(reason) = self.explore(node, watch)? {
+                return Ok(Outcome::Stopped(reason));
+            }
             if self.explored >= next_look {
                 next_look = self.explored + look_every;
                 if let Some(reason) = watch.look(&self.counters()) {
@@ -168,7 +170,11 @@ impl<'s, 'a> Search<'s, 'a> {
         Ok(Outcome::Exhausted)
     }
 
-    fn explore(&mut self, node: u32) -> Result<(), Failure> {
+    /// Comes to the successors of a node; a limit may come first.
+    fn explore(&mut self, node: u32, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
+        let dimension = self.symbolic.dimension();
+        let nodes_between = moves_between_looks(LOOK_EVERY, dimension) as usize;
+        let mut nodes_at_look = self.nodes.len() + nodes_between;
         self.explored += 1;
         let network = self.symbolic.stepper.network();
         let mut words = network.initial.clone();
@@ -192,8 +198,15 @@ impl<'s, 'a> Search<'s, 'a> {
             self.symbolic
                 .let_time_pass(&mut target, &effect.invariant, &mut zones)?;
             self.enter(&mut target, &mut zones, node, one.rank)?;
+            if self.nodes.len() >= nodes_at_look {
+                nodes_at_look = self.nodes.len() + nodes_between;
+                let reason = watch.look(&self.counters());
+                if reason.is_some() {
+                    return Ok(reason);
+                }
+            }
         }
-        Ok(())
+        Ok(None)
     }
 
     /// Stores the zones of a state that was come to, unless a stored one contains them, and looks for the goal in them.

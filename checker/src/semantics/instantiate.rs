@@ -6,6 +6,8 @@
 
 use std::collections::HashMap;
 
+use crate::cancellation;
+
 use super::assigned::assigned_names;
 use super::checker::Checker;
 use super::codes;
@@ -304,6 +306,7 @@ impl Checker<'_> {
         (types, values): (&[Type], &[i32]),
         level: u32,
     ) {
+        cancellation::work(UNITS_FOR_PROCESS);
         let mut scope = Scope::default();
         for (formal, (ty, &value)) in formals.iter().zip(types.iter().zip(values)) {
             let value = Expr::int(value, ty.clone(), formal.name.span);
@@ -502,6 +505,9 @@ impl Checker<'_> {
 }
 
 /// A variable of a template without instance: its type is known, its place is not.
+/// What it takes to make a process, beside its functions: see [`cancellation::work`].
+const UNITS_FOR_PROCESS: usize = 1 << 14;
+
 fn unknown_variable(ty: Type) -> Entity {
     let place = Place {
         root: Root::State,

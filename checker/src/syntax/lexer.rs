@@ -7,6 +7,8 @@
 //!
 //! Cost: linear in the text.
 
+use crate::cancellation;
+
 use super::codes;
 use crate::diagnostics::{Diagnostic, SourceId, Span};
 
@@ -101,10 +103,14 @@ struct Lexer<'a> {
     diagnostics: &'a mut Vec<Diagnostic>,
 }
 
+/// What it takes to read a token, and to parse it later: see [`cancellation::work`].
+const UNITS_FOR_TOKEN: usize = 64;
+
 impl Lexer<'_> {
     fn run(&mut self) {
         while let Some(&byte) = self.text.as_bytes().get(self.position) {
             let start = self.position;
+            cancellation::work(UNITS_FOR_TOKEN);
             if self.tokens.len() >= MOST_TOKENS {
                 let span = self.span_from(start);
                 let message = format!("this text has more than {MOST_TOKENS} tokens");

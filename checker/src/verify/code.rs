@@ -13,12 +13,16 @@
 
 use std::cell::RefCell;
 
+use crate::cancellation;
 use crate::exec::{
     Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError,
 };
 use crate::ir::{ClockId, Edge, FixedConstraint, FunctionId, Guard, Network, Update, Urgency};
 
 use super::concrete::{Error, Part};
+
+/// What it takes to look at the edges of a process: see [`cancellation::work`].
+const UNITS_FOR_PROCESS: usize = 1 << 10;
 
 /// Runs the code of a network on the interpreter.
 pub(super) struct Code<'a> {
@@ -162,6 +166,7 @@ impl<'a> Code<'a> {
         words: &[i32],
         accepts: &dyn Fn(&[FixedConstraint]) -> bool,
     ) -> Result<Vec<Candidate>, Error> {
+        cancellation::work(UNITS_FOR_PROCESS);
         let mut found = Vec::new();
         let definition = &self.network.processes[process];
         for &edge in &definition.locations[words[process] as usize].edges {

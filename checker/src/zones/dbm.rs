@@ -26,6 +26,8 @@
 
 use std::cmp::Ordering;
 
+use crate::cancellation;
+
 use super::rows::{for_small_dimension, relax_row, rows, rows_mut, with_row};
 use super::{Bound, ClockSet};
 
@@ -121,9 +123,21 @@ pub fn close_touched(zone: &mut [Bound], dimension: usize, touched: &ClockSet) -
         .all(|via| close_through(zone, dimension, via))
 }
 
+/// From this dimension on, a pass over a matrix takes long enough to be counted.
+const LONG_PASS: usize = 64;
+
+/// Counts the work of one pass over a matrix, a vector of bounds at a time.
+#[inline(always)]
+fn count_if_long(dimension: usize) {
+    if dimension >= LONG_PASS {
+        cancellation::work(dimension * dimension / 4);
+    }
+}
+
 /// One step of Floyd–Warshall: admits paths through the clock `via`.
 #[inline(always)]
 fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
+    count_if_long(dimension);
     let (before, rest) = zone.split_at_mut(via * dimension);
     let (source, after) = rest.split_at_mut(dimension);
     let mut is_consistent = true;
@@ -160,6 +174,7 @@ pub fn constrain(
         set_empty(zone);
         return false;
     }
+    count_if_long(dimension);
     for_small_dimension!(dimension, tighten(zone, left, right, bound));
     true
 }

@@ -18,6 +18,8 @@ pub(super) use clocks::{bound_range, comparisons};
 
 use std::collections::HashMap;
 
+use crate::cancellation;
+
 use super::typed::{Effects, Expr, Local, LocalId, Statement};
 use super::types::{Memory, Type};
 use crate::diagnostics::Span;
@@ -251,6 +253,7 @@ impl<'n> Builder<'n> {
     }
 
     fn finish(self, name: String, result: Option<RegisterType>) -> (FunctionId, Effects) {
+        cancellation::work(UNITS_FOR_FUNCTION);
         let id = FunctionId(self.network.functions.len() as u32);
         self.network.functions.push(Function {
             name,
@@ -345,6 +348,9 @@ impl<'n> Builder<'n> {
 }
 
 /// The registers that hold values of a type.
+/// What it takes to lower a function, as a rule: see [`cancellation::work`].
+const UNITS_FOR_FUNCTION: usize = 1 << 13;
+
 fn register_type(ty: &Type) -> RegisterType {
     if *ty == Type::Double {
         RegisterType::Double
