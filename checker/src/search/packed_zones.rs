@@ -245,7 +245,9 @@ impl Signature {
     }
 
     /// The numbers in the middle of those of others, rounded up; `None` if these are all the same.
-    pub(super) fn mean(signatures: impl Iterator<Item = Signature> + Clone) -> Option<Signature> {
+    pub(super) fn mean(
+        signatures: &(impl Iterator<Item = Signature> + Clone),
+    ) -> Option<Signature> {
         let first = signatures.clone().next()?;
         if signatures.clone().all(|one| one == first) {
             return None;

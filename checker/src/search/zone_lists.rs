@@ -205,7 +205,7 @@ impl Lists {
         let List { first, len } = self.list(at);
         let range = first as usize..(first + len) as usize;
         let signatures = self.entries[range.clone()].iter();
-        let Some(mean) = Signature::mean(signatures.map(|entry| entry.signature)) else {
+        let Some(mean) = Signature::mean(&signatures.map(|entry| entry.signature)) else {
             return false;
         };
         let number = self.splits.len() as u32;
