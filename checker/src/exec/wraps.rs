@@ -7,23 +7,23 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::ir::SiteId;
 
-/// No site.
-const NOWHERE: u32 = u32::MAX;
-
 /// Keeps where results wrapped.
 #[derive(Debug)]
 pub struct Wraps(AtomicU32);
 
 impl Default for Wraps {
     fn default() -> Wraps {
-        Wraps(AtomicU32::new(NOWHERE))
+        Wraps(AtomicU32::new(Wraps::NOWHERE))
     }
 }
 
 impl Wraps {
+    /// The number of no site.
+    pub const NOWHERE: u32 = u32::MAX;
+
     /// Forgets all places.
     pub fn clear(&self) {
-        self.0.store(NOWHERE, Ordering::Relaxed);
+        self.0.store(Wraps::NOWHERE, Ordering::Relaxed);
     }
 
     /// Notes that a result wrapped here.
@@ -37,6 +37,6 @@ impl Wraps {
     /// The first place that was noted.
     pub fn first(&self) -> Option<SiteId> {
         let first = self.0.load(Ordering::Relaxed);
-        (first != NOWHERE).then_some(SiteId(first))
+        (first != Wraps::NOWHERE).then_some(SiteId(first))
     }
 }

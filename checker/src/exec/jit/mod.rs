@@ -22,7 +22,7 @@ use std::ptr;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
-use crate::ir::{Function, FunctionId, Overflow};
+use crate::ir::{Function, FunctionId, Overflow, SiteId};
 
 use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, validate};
 
@@ -256,7 +256,7 @@ impl Jit {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError> {
-        let (mut native, state) = NativeContext::new(&self.constants, self.wraps(), context);
+        let (mut native, state) = NativeContext::new(&self.constants, context);
         let state = state.as_mut_ptr();
         // SAFETY: `code` was made by the compiler of the engine that is borrowed for this call, for a function with as many
         // parameters as there are arguments (a precondition of `Executor::call`), with the signature of an entry if there are
@@ -271,6 +271,9 @@ impl Jit {
                 code(&raw mut native, state, frame, arguments.as_ptr())
             }
         };
+        if native.wrapped != Wraps::NOWHERE {
+            self.wraps().note(SiteId(native.wrapped));
+        }
         result_of_status(status)
     }
 }

@@ -21,7 +21,8 @@ pub(super) struct NativeContext<'call> {
     pub(super) constants: *const i32,
     /// How many rounds it may take beyond these.
     rounds_beyond: u64,
-    wraps: &'call Wraps,
+    /// The first site where a result wrapped round in this call, or [`Wraps::NOWHERE`]. Compiled code writes it.
+    pub(super) wrapped: u32,
     constraints: &'call mut Vec<EmittedConstraint>,
     assignments: &'call mut Vec<EmittedAssignment>,
 }
@@ -31,13 +32,12 @@ impl<'call> NativeContext<'call> {
     #[inline]
     pub(super) fn new(
         constants: &[i32],
-        wraps: &'call Wraps,
         context: &'call mut Context<'_>,
     ) -> (NativeContext<'call>, &'call mut [i32]) {
         let native = NativeContext {
             rounds_left: ROUNDS_BETWEEN_LOOKS,
             rounds_beyond: ROUND_LIMIT - ROUNDS_BETWEEN_LOOKS,
-            wraps,
+            wrapped: Wraps::NOWHERE,
             constants: constants.as_ptr(),
             constraints: context.constraints,
             assignments: context.assignments,
@@ -89,11 +89,6 @@ pub(super) extern "C" fn more_rounds(context: &mut NativeContext<'_>, site: u32)
     context.rounds_left = context.rounds_beyond.min(ROUNDS_BETWEEN_LOOKS);
     context.rounds_beyond -= context.rounds_left;
     0
-}
-
-/// Notes that a result wrapped round.
-pub(super) extern "C" fn note_wrap(context: &NativeContext<'_>, site: u32) {
-    context.wraps.note(SiteId(site));
 }
 
 /// What a called-back function gives where there is no result.

@@ -3,7 +3,7 @@
 use std::mem::offset_of;
 
 use cranelift_codegen::ir::condcodes::IntCC;
-use cranelift_codegen::ir::types::I64;
+use cranelift_codegen::ir::types::{I32, I64};
 use cranelift_codegen::ir::{Block as NativeBlock, InstBuilder, MemFlagsData, Value};
 
 use crate::exec::jit::runtime::{self, NativeContext, failure_status};
@@ -114,9 +114,13 @@ impl Translator<'_> {
     pub(super) fn write_failures(&mut self) {
         for (SiteId(site), block, next) in std::mem::take(&mut self.wraps) {
             self.builder.switch_to_block(block);
+            // Without a call, which would make the hot path save registers.
+            let offset = offset_of!(NativeContext<'static>, wrapped) as i32;
+            let (flags, context) = (MemFlagsData::trusted(), self.context);
+            let first = self.builder.ins().load(I32, flags, context, offset);
             let site = self.integer(site as i32);
-            let code = runtime::note_wrap as *const () as usize;
-            self.call_back(code, None, &[self.context, site]);
+            let first = self.builder.ins().umin(first, site);
+            self.builder.ins().store(flags, first, context, offset);
             self.builder.ins().jump(next, &[]);
         }
         for (status, block) in std::mem::take(&mut self.failures) {
