@@ -28,15 +28,14 @@ impl ClockSet {
     /// Adds a clock.
     pub fn insert(&mut self, clock: usize) {
         let index = clock / 64;
-        let word = match self.words.get_mut(index) {
-            Some(word) => word,
-            None => {
-                let index = index - INLINE_WORDS;
-                if self.more.len() <= index {
-                    self.more.resize(index + 1, 0);
-                }
-                &mut self.more[index]
+        let word = if let Some(word) = self.words.get_mut(index) {
+            word
+        } else {
+            let index = index - INLINE_WORDS;
+            if self.more.len() <= index {
+                self.more.resize(index + 1, 0);
             }
+            &mut self.more[index]
         };
         *word |= 1 << (clock % 64);
     }
