@@ -84,6 +84,7 @@ fn stop_name(reason: StopReason) -> Option<&'static str> {
         StopReason::Memory => Some("memory"),
         StopReason::Time => Some("time"),
         StopReason::Interrupted => None,
+        StopReason::Clocks => Some("clocks"),
     }
 }
 

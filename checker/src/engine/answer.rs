@@ -22,7 +22,7 @@ use crate::search::liveness::Ending;
 use crate::search::reach::Trace;
 use crate::verify::strategy::Outcome as StrategyCheck;
 
-use super::certificate::Certificate;
+use super::certificate::{CLOCKS_GREW, Certificate};
 use super::endless::{always, leads_to};
 use super::evidence::{self, Kind, Missing, Proof, Shows, Takes, Witness};
 use super::fastest::{Race, fastest};
@@ -171,6 +171,11 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
         let counters = answer.counters;
         let verdict = Verdict::Unknown(watch.stop());
         answer = new_answer(verdict, Evidence::default(), counters);
+    }
+    if answer.verdict == Verdict::Error(Failure::ClockRange) {
+        let verdict = Verdict::Unknown(StopReason::Clocks);
+        answer = new_answer(verdict, Evidence::default(), answer.counters);
+        answer.message = Some(CLOCKS_GREW.to_owned());
     }
     if options.plans != PlansWanted::No {
         games::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());

@@ -39,6 +39,10 @@ pub struct Certificate {
     pub states: Vec<States>,
 }
 
+/// What becomes of a search in zones whose bounds are too great.
+pub(super) const CLOCKS_GREW: &str =
+    "differences of clocks grow beyond what zones can hold: no abstraction keeps them small here";
+
 /// Why a search was stopped.
 pub(super) fn stop_text(reason: StopReason) -> &'static str {
     match reason {
@@ -46,6 +50,7 @@ pub(super) fn stop_text(reason: StopReason) -> &'static str {
         StopReason::Memory => "the search for it was stopped by the limit of memory",
         StopReason::Time => "the search for it was stopped by the limit of time",
         StopReason::Interrupted => "the search for it was interrupted",
+        StopReason::Clocks => CLOCKS_GREW,
     }
 }
 

@@ -475,6 +475,7 @@ pub fn failure_text(model: &LoadedModel, failure: Failure) -> String {
             )
         }
         Failure::Interrupted => "interrupted".to_owned(),
+        Failure::ClockRange => super::certificate::CLOCKS_GREW.to_owned(),
         Failure::InitialInvariant => "the initial state breaks an invariant".to_owned(),
     }
 }

@@ -142,7 +142,7 @@ pub(super) fn game(
     let exact = zones(Abstraction::Exact);
     let allowance = Some(WITHOUT_ABSTRACTION);
     let (first, has_given_up) = played(exact, Nodes::Symbolic, allowance, watch);
-    if !has_given_up {
+    if !has_given_up && first.verdict != Verdict::Error(Failure::ClockRange) {
         return first;
     }
     let cut = zones(Abstraction::Differences);

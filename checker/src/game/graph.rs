@@ -587,6 +587,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         (mut length, mut may_delay): (u32, bool),
     ) -> Result<(), Failure> {
         while (length as usize) < self.longest_chain
+            && !self.symbolic.is_almost_out_of_range(zone.bounds())
             && self.only_move(target, &mut zone, may_delay)?
         {
             push_step(&mut self.steps, may_delay, &self.effect);

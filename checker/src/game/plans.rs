@@ -126,9 +126,9 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
     }
 
     /// The zones that an edge reaches from the last node of the path; `None` if a plan does not take it.
-    fn follow(&self, edge: usize) -> Option<Vec<Zone>> {
-        let graph = &self.solver.graph;
-        let edge = &graph.edges[edge];
+    fn follow(&mut self, edge: usize) -> Option<Vec<Zone>> {
+        let graph = &*self.solver.graph;
+        let edge = graph.edges[edge];
         if self.on_path[edge.target as usize]
             || matches!(self.solver.win[edge.target as usize], Win::Nothing)
         {
@@ -146,6 +146,15 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
         let mut zones: Vec<Zone> = images.collect();
         if let Some(urgent) = urgent {
             zones = urgent.later(&zones);
+        }
+        if zones
+            .iter()
+            .any(|zone| graph.symbolic.has_grown(zone.bounds()))
+        {
+            let graph = &mut *self.solver.graph;
+            let mut words = graph.symbolic.stepper.network().initial.clone();
+            graph.load(edge.target, &mut words);
+            graph.symbolic.extrapolate_all(&words, &mut zones);
         }
         (!zones.is_empty()).then_some(zones)
     }

@@ -313,6 +313,7 @@ impl Graph<'_, '_> {
         let may_delay = delay_after(self.symbolic, &mut target, (&steps, self.latest), &mut zone)?;
         let is_end = length as usize == LONGEST_CHAIN
             || (may_delay && !self.chains_delays)
+            || self.symbolic.is_almost_out_of_range(zone.bounds())
             || (trails.is_objective_fixed && !self.is_open(&mut target, &zone)?);
         Ok(trails.add(Trail {
             last,

@@ -53,6 +53,7 @@ pub struct ClockBounds {
     everywhere: Ceilings,
     abstraction: Abstraction,
     differences: Differences,
+    has_differences: bool,
     greatest: i32,
     has_opposed_clocks: bool,
 }
@@ -149,8 +150,14 @@ impl ClockBounds {
             abstraction,
             differences,
             greatest: greatest.max(0),
+            has_differences: network.features.diagonals || atoms.iter().any(is_difference),
             has_opposed_clocks,
         }
+    }
+
+    /// Whether clocks are compared with each other.
+    pub fn has_differences(&self) -> bool {
+        self.has_differences
     }
 
     /// The greatest constant that a clock is compared with; 0 without any.

@@ -10,6 +10,8 @@ pub enum Failure {
     RunTime(RunTimeError),
     /// A clock bound or value is beyond what zones can hold; the number is the value.
     ClockLimit(i32),
+    /// Bounds of clocks grew beyond what zones can hold, where no abstraction keeps them small.
+    ClockRange,
     /// A rate other than 0 and 1 on a clock of the process with this index.
     Rate {
         /// The process.

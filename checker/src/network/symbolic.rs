@@ -21,6 +21,7 @@ use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
 
 use super::bounds::ClockBounds;
 use super::deadlocks::Lookout;
+use super::differences::greatest_reset;
 use super::scope::Scope;
 use super::zone_memo::ZoneMemo;
 use super::{
@@ -38,6 +39,9 @@ pub struct Symbolic<'a> {
     pub(super) dimension: usize,
     pub(super) bounds: ClockBounds,
     has_rates: bool,
+    /// How great bounds may become, if it is to be looked at: where they are not extrapolated, or constants are so large that they get there
+    /// in the few steps between two extrapolations.
+    range: Option<i32>,
     has_urgent_channels: bool,
     pub(super) has_guarded_urgency: bool,
     pub(super) has_priorities: bool,
@@ -67,6 +71,9 @@ pub struct ClockEffect {
     pub invariant: Vec<Constraint>,
 }
 
+/// Constants up to this cannot make bounds too great between two extrapolations, of which there are fewer than a hundred steps.
+const CALM_CONSTANT: i32 = 1 << 20;
+
 impl<'a> Symbolic<'a> {
     /// Zones for the network of `stepper`; `bounds` are the constants that extrapolation must keep apart.
     pub fn new(stepper: Stepper<'a>, bounds: ClockBounds) -> Symbolic<'a> {
@@ -76,9 +83,12 @@ impl<'a> Symbolic<'a> {
             .processes
             .iter()
             .any(|process| process.locations.iter().any(|l| !l.rates.is_empty()));
+        let greatest = bounds.greatest().max(greatest_reset(network));
+        let is_looked_at = !bounds.simulates() || greatest > CALM_CONSTANT;
         Symbolic {
             dimension,
             has_rates,
+            range: is_looked_at.then(|| Bound::most_in_zone(dimension, bounds.has_differences())),
             has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
             has_guarded_urgency: network.features.clock_guarded_urgent,
             has_priorities: network.features.priorities,
@@ -384,6 +394,9 @@ impl<'a> Symbolic<'a> {
     }
 
     /// Lets time pass within the invariant if it may.
+    ///
+    /// # Errors
+    /// Rates that have no meaning, code that fails, and bounds that grow too great.
     pub fn delay(
         &mut self,
         words: &[i32],
@@ -391,9 +404,33 @@ impl<'a> Symbolic<'a> {
         invariant: &[Constraint],
         zone: &mut [Bound],
     ) -> Result<(), Failure> {
-        if !may_delay || self.dimension == 1 {
-            return Ok(());
+        if may_delay && self.dimension > 1 {
+            self.delay_in_range(words, invariant, zone)?;
         }
+        match self.range {
+            Some(most) if !dbm::is_in_range(zone, most) => Err(Failure::ClockRange),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether bounds of a zone have grown so much that it is better extrapolated before more steps. Zones of calm models are not looked at.
+    pub fn is_almost_out_of_range(&self, zone: &[Bound]) -> bool {
+        self.range
+            .is_some_and(|most| !dbm::is_in_range(zone, most / 2))
+    }
+
+    /// Whether bounds of a zone that was never extrapolated on a long way have grown so much that it is to be now.
+    pub fn has_grown(&self, zone: &[Bound]) -> bool {
+        let most = Bound::most_in_zone(self.dimension, self.bounds.has_differences());
+        !dbm::is_in_range(zone, most / 2)
+    }
+
+    fn delay_in_range(
+        &mut self,
+        words: &[i32],
+        invariant: &[Constraint],
+        zone: &mut [Bound],
+    ) -> Result<(), Failure> {
         if self.has_rates {
             let stopped = self.stopped(words)?;
             self.is_approximate |= !stopped.is_empty() && self.dimension - 1 > stopped.len() + 1;

@@ -39,6 +39,8 @@ pub enum StopReason {
     Time,
     /// The user interrupted.
     Interrupted,
+    /// Bounds of clocks that no abstraction keeps small grew beyond what zones can hold.
+    Clocks,
 }
 
 /// Watches a search.

@@ -100,6 +100,10 @@ fn take(
     let mut entries = Vec::new();
     effect.entry_zones(zone.bounds(), symbolic.dimension(), &mut entries);
     symbolic.let_time_pass(&mut words, &effect.invariant, &mut entries)?;
+    // What extrapolation adds is simulated by what was there, so that the same moves are possible.
+    if entries.iter().any(|zone| symbolic.has_grown(zone.bounds())) {
+        symbolic.extrapolate_all(&words, &mut entries);
+    }
     entries.reverse();
     Ok(Some((one.parts.to_vec(), (words, entries))))
 }

@@ -7,9 +7,10 @@
 //! weak only if both are. In the encoding, for a fixed first bound `a`,
 //! `a + b = (a & !1) + (b & (a | !1))`: the rest of a row costs one `and` and one `add` per entry and no branch.
 //!
-//! Range: constants of a model lie within ±[`Bound::MAX_VALUE`]. Inside an operation on a zone sums of a few bounds
-//! occur; an `i32` has room for five bounds of the greatest size, which a path through a zone with one lower and one
-//! upper guard needs. Whoever lets bounds grow without extrapolation asks [`super::dbm::is_in_range`] once per step.
+//! Range: constants of a model lie within ±[`Bound::MAX_VALUE`]. Inside an operation on a zone, bounds along a path are added. Where
+//! single clocks are compared with constants, a path has two of the zone and two new ones at most; where clocks are compared with each
+//! other, it may pass all clocks. An `i32` has room for that as long as no bound of the zone is beyond [`Bound::most_in_zone`]. Extrapolated zones
+//! are within it; whoever lets bounds grow asks [`super::dbm::is_in_range`] once per step, and goes on otherwise or stops.
 
 use std::fmt;
 use std::ops::Add;
@@ -28,6 +29,18 @@ impl Bound {
     pub const LT_ZERO: Bound = Bound(0);
     /// The greatest constant, and the negative of the least one, that a model may write.
     pub const MAX_VALUE: i32 = (1 << 27) - 1;
+
+    /// The greatest constant, and the negative of the least one, that a zone of this dimension may have for no sum to leave the range of the
+    /// encoding. `has_differences` says whether clocks are compared with each other.
+    pub const fn most_in_zone(dimension: usize, has_differences: bool) -> i32 {
+        const MOST: usize = 2 * (Bound::MAX_VALUE as usize + 1);
+        let shared = (1 << 30) / (dimension + 1);
+        if has_differences && shared < MOST {
+            shared as i32
+        } else {
+            MOST as i32
+        }
+    }
 
     /// The bound `< value`; none if the value lies beyond [`Bound::MAX_VALUE`].
     pub const fn strict(value: i32) -> Option<Bound> {

@@ -90,13 +90,13 @@ pub fn is_empty(zone: &[Bound]) -> bool {
     zone[0] < Bound::LE_ZERO
 }
 
-/// Whether every bound is within the range of the constants of a model; see [`super::bound`].
+/// Whether the constant of every bound is at most this great, signs aside; see [`Bound::most_in_zone`].
 ///
-/// Bounds can only leave that range by growing over many steps without extrapolation.
-pub fn is_in_range(zone: &[Bound]) -> bool {
-    const LIMIT: i32 = 2 * Bound::MAX_VALUE + 1;
+/// Bounds can only become greater than the constants of a model by growing over many steps without extrapolation.
+pub fn is_in_range(zone: &[Bound], most: i32) -> bool {
+    let (least, most) = (-2 * most, 2 * most + 1);
     zone.iter()
-        .all(|bound| bound.is_infinite() || (-LIMIT..=LIMIT).contains(&bound.0))
+        .all(|bound| bound.is_infinite() || (least..=most).contains(&bound.0))
 }
 
 /// Closes any matrix with a diagonal of `<= 0` (Floyd–Warshall); returns whether it is consistent, else marks it empty.

@@ -6,6 +6,7 @@ use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict, stra
 use checker::game::strategy::{self, Start};
 use checker::game::{Forced, Nodes, Player, Priorities};
 use checker::search::extremum::Extreme;
+use checker::search::limits::StopReason;
 use proptest::strategy::Strategy;
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
@@ -361,4 +362,75 @@ fn least_times_are_the_bounds_of_ordinary_games() {
         generate::formula(SHAPE),
     );
     compare::run("least times", 100, &strategy, compare_times);
+}
+
+/// A scale for which all constants stay allowed, and differences leave the range of zones in a few rounds of a loop.
+const SCALE: i32 = (checker::zones::Bound::MAX_VALUE / SHAPE.constant) - 1;
+
+/// Who wins does not depend on the unit of time: with all clock values multiplied, the engine must say what brute force says without.
+fn compare_scaled(
+    (network, goal, keep): &(Network, Formula, Formula),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let has_differences = generate::has_differences(goal) || generate::has_differences(keep);
+    let constant = i64::from(SHAPE.constant);
+    let model = compare::load(&network.text());
+    let Ok(Some(graph)) = compare::regions(&model, constant, has_differences, tally) else {
+        return Ok(());
+    };
+    let large = network.scaled(SCALE);
+    let text = large.text();
+    let mut model = compare::load(&text);
+    let (goal_text, keep_text) = (large.formula(goal), large.formula(keep));
+    let reached = labels(network, goal, &graph).contains(&true);
+    let mut queries = vec![(format!("E<> {goal_text}"), reached, Forced::Tiga)];
+    for (query, kind) in [
+        (format!("control: A<> {goal_text}"), Kind::Reach),
+        (format!("control: A[] {keep_text}"), Kind::Safe),
+        (
+            format!("control: A[ {keep_text} W {goal_text} ]"),
+            Kind::WeakUntil,
+        ),
+        (
+            format!("control: A[] ({keep_text} && A<> {goal_text})"),
+            Kind::Recur,
+        ),
+    ] {
+        for (rule, forced) in RULES {
+            let wins = wins(network, (goal, keep), &graph, kind, rule)[0];
+            queries.push((query.clone(), wins, forced));
+        }
+    }
+    for (query, expected, forced) in queries {
+        let query_text = model.add_query(&query);
+        let options = Options {
+            forced,
+            priorities: Priorities::Kept,
+            // The independent replay has no regions for so many values.
+            runs: false,
+            ..compare::options()
+        };
+        let answer = model.check(&query_text, &options);
+        if answer
+            .as_ref()
+            .is_ok_and(|one| one.verdict == Verdict::Unknown(StopReason::Clocks))
+        {
+            tally.count_stopped();
+            continue;
+        }
+        compare::check(&answer, Ok(expected), tally, || {
+            format!("{text}{query}\n{forced:?}")
+        })?;
+    }
+    Ok(())
+}
+
+#[test]
+fn games_with_large_constants_equal_brute_force_with_small_ones() {
+    let strategy = (
+        generate::network(SHAPE),
+        generate::formula(SHAPE),
+        generate::formula(SHAPE),
+    );
+    compare::run("games with large constants", 150, &strategy, compare_scaled);
 }

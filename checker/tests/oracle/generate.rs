@@ -23,6 +23,8 @@ pub(crate) struct Network {
     guards_urgency: bool,
     /// Whether controllable edges have no strict lower bounds, and receivers of a broadcast no clock guards at all.
     is_observable: bool,
+    /// What every clock value is multiplied by in the text. Who wins does not depend on it.
+    scale: i32,
 }
 
 #[derive(Clone, Debug)]
@@ -371,6 +373,7 @@ pub(crate) fn network(shape: Shape) -> impl Strategy<Value = Network> {
         priority,
         guards_urgency,
         is_observable: false,
+        scale: 1,
     };
     (parts, priority, guarded).prop_map(network)
 }
@@ -433,6 +436,23 @@ pub(crate) fn observation(shape: Shape) -> impl Strategy<Value = Formula> {
 }
 
 impl Network {
+    /// The same with all clock values multiplied.
+    pub(crate) fn scaled(&self, scale: i32) -> Network {
+        let mut network = self.clone();
+        network.scale = scale;
+        network
+    }
+
+    /// What a clock is compared with or set to: a constant, and a variable.
+    fn time(&self, variable: Option<usize>, constant: i32) -> String {
+        let constant = constant * self.scale;
+        match (variable.map(|variable| self.variable(variable)), self.scale) {
+            (None, _) => constant.to_string(),
+            (Some(variable), 1) => format!("{variable} + {constant}"),
+            (Some(variable), scale) => format!("{variable} * {scale} + {constant}"),
+        }
+    }
+
     /// The model as XTA.
     pub(crate) fn text(&self) -> String {
         let mut text = String::new();
@@ -596,6 +616,7 @@ impl Network {
                 strict,
             } => {
                 let relation = if strict { "<" } else { "<=" };
+                let bound = self.time(None, bound);
                 format!("{} {relation} {bound}", self.clock(clock))
             }
             Invariant::UpperByVariable {
@@ -603,11 +624,8 @@ impl Network {
                 variable,
                 bound,
             } => {
-                format!(
-                    "{} <= {} + {bound}",
-                    self.clock(clock),
-                    self.variable(variable)
-                )
+                let bound = self.time(Some(variable), bound);
+                format!("{} <= {bound}", self.clock(clock))
             }
             Invariant::Conditional {
                 variable,
@@ -617,7 +635,8 @@ impl Network {
             } => format!(
                 "({} == {value} imply {} <= {bound})",
                 self.variable(variable),
-                self.clock(clock)
+                self.clock(clock),
+                bound = self.time(None, bound)
             ),
             Invariant::Variable { variable, bound } => {
                 format!("{} <= {bound}", self.variable(variable))
@@ -632,6 +651,7 @@ impl Network {
                 relation,
                 bound,
             } => {
+                let bound = self.time(None, bound);
                 format!("{} {} {bound}", self.clock(clock), relation.text())
             }
             Atom::ClockByVariable {
@@ -639,12 +659,10 @@ impl Network {
                 relation,
                 variable,
                 bound,
-            } => format!(
-                "{} {} {} + {bound}",
-                self.clock(clock),
-                relation.text(),
-                self.variable(variable)
-            ),
+            } => {
+                let bound = self.time(Some(variable), bound);
+                format!("{} {} {bound}", self.clock(clock), relation.text())
+            }
             Atom::Difference {
                 left,
                 right,
@@ -654,7 +672,8 @@ impl Network {
                 "{} - {} {} {bound}",
                 self.clock(left),
                 self.clock(right),
-                relation.text()
+                relation.text(),
+                bound = self.time(None, bound)
             ),
             Atom::Variable {
                 variable,
@@ -668,9 +687,12 @@ impl Network {
 
     fn update(&self, update: &Update, has_select: bool) -> String {
         match *update {
-            Update::Reset { clock, value } => format!("{} = {value}", self.clock(clock)),
+            Update::Reset { clock, value } => {
+                format!("{} = {}", self.clock(clock), self.time(None, value))
+            }
             Update::ResetToVariable { clock, variable } => {
-                format!("{} = {}", self.clock(clock), self.variable(variable))
+                let value = self.time(Some(variable), 0);
+                format!("{} = {value}", self.clock(clock))
             }
             Update::Copy { target, source } => {
                 format!("{} = {}", self.clock(target), self.clock(source))
