@@ -167,7 +167,8 @@ def drive(folder: Path, log: Path, seconds: float, number: signal.Signals) -> in
     with subprocess.Popen(
         command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     ) as process:
-        while not log.exists() and process.poll() is None:
+        # A run has begun when the head of its log is written.
+        while not (log.exists() and log.stat().st_size) and process.poll() is None:
             time.sleep(0.001)
         time.sleep(seconds)
         process.send_signal(number)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import signal
@@ -10,7 +11,7 @@ import stat
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -36,15 +37,21 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-@pytest.fixture
-def no_room() -> object:
-    """Files cannot grow beyond 100 bytes, as on a full disk."""
+@contextlib.contextmanager
+def no_room() -> Iterator[None]:
+    """Files cannot grow beyond 100 bytes, as on a full disk.
+
+    That holds for what the test runner prints into a file too, so nothing but what is tested
+    happens in between.
+    """
     old = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, old[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, old)
-    signal.signal(signal.SIGXFSZ, handler)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, old)
+        signal.signal(signal.SIGXFSZ, handler)
 
 
 # ---------------------------------------------------------------------------------- write_files
@@ -144,10 +151,9 @@ def test_a_socket_is_refused_and_stays(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("size", [101, 3_000_000])
-@pytest.mark.usefixtures("no_room")
 def test_a_full_disk_changes_nothing(tmp_path: Path, size: int) -> None:
     (tmp_path / "old").write_text("old")
-    with pytest.raises(InputError, match=r"cannot write .*large: file too large"):
+    with no_room(), pytest.raises(InputError, match=r"cannot write .*large: file too large"):
         write_files({tmp_path / "old": "new", tmp_path / "new" / "deep" / "large": "x" * size})
     assert (tmp_path / "old").read_text() == "old"
     assert names(tmp_path) == ["old"]
@@ -225,14 +231,14 @@ def test_the_lock_ends_with_the_process(tmp_path: Path) -> None:
     GrowingFile(path).close()
 
 
-@pytest.mark.usefixtures("no_room")
 def test_a_growing_file_ends_with_what_was_acknowledged(tmp_path: Path) -> None:
     file = GrowingFile(tmp_path / "log")
-    file.write(b"x" * 60)
-    file.acknowledge(to_disk=False)
-    file.write(b"y" * 60)
-    with pytest.raises(InputError, match="file too large"):
+    with no_room():
+        file.write(b"x" * 60)
         file.acknowledge(to_disk=False)
+        file.write(b"y" * 60)
+        with pytest.raises(InputError, match="file too large"):
+            file.acknowledge(to_disk=False)
     assert file.closed
     assert (tmp_path / "log").read_bytes() == b"x" * 60
 
