@@ -183,7 +183,8 @@ def test_signals_at_random_moments_end_a_run_that_is_decided_again(
     from ntagen.cli import main
 
     chance = random.Random(number)
-    ends = {0: 0, 130: 0, 143: 0}
+    # A signal that comes when the run has ended, and nobody listens any more, ends the process.
+    ends = {0: 0, 130: 0, 143: 0, -number: 0}
     for index in range(TRIES):
         path = tmp_path / f"{index}.mcap"
         code = drive(tmp_path, path, chance.uniform(0.0, 1.2), number)

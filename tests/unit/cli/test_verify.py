@@ -205,7 +205,7 @@ system P;
     ("query", "code", "owner", "changed", "said"),
     [
         ("control: A<> P.G", 0, "controller", ('["P.x < 1"]', '["P.x < 0"]'), "has no decision"),
-        ("control: A[] not P.Bad", 0, "controller", ('["P.x < 1"]', '["P.x <= 2"]'), "not hold"),
+        ("control: A[] not P.Bad", 0, "controller", ('["P.x < 1"]', '["P.x <= 2"]'), "may not"),
         ("control: A<> P.Bad", 1, "environment", ('"goal": false', '"goal": true'), "no decision"),
     ],
 )
