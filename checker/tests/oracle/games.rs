@@ -42,21 +42,9 @@ pub(crate) fn seeded_games() -> impl Strategy<Value = (Network, Formula, Formula
     )
 }
 
-fn compare(
-    (network, goal, keep): &(Network, Formula, Formula),
-    tally: &Tally,
-) -> Result<(), TestCaseError> {
-    let text = network.text();
-    let mut model = compare::load(&text);
-    let has_differences = generate::has_differences(goal) || generate::has_differences(keep);
-    let constant = i64::from(SHAPE.constant);
-    let graph = match compare::regions(&model, constant, has_differences, tally) {
-        Ok(Some(graph)) => Ok(graph),
-        Ok(None) => return Ok(()),
-        Err(error) => Err(error),
-    };
-    let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
-    for (query, kind) in [
+/// A query for each objective that has a goal to reach, or something to keep, or both.
+fn objectives(goal_text: &str, keep_text: &str) -> [(String, Kind); 5] {
+    [
         (format!("control: A<> {goal_text}"), Kind::Reach),
         (
             format!("control: A[ {keep_text} U {goal_text} ]"),
@@ -71,7 +59,24 @@ fn compare(
             format!("control: A[] ({keep_text} && A<> {goal_text})"),
             Kind::Recur,
         ),
-    ] {
+    ]
+}
+
+fn compare(
+    (network, goal, keep): &(Network, Formula, Formula),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let text = network.text();
+    let mut model = compare::load(&text);
+    let has_differences = generate::has_differences(goal) || generate::has_differences(keep);
+    let constant = i64::from(SHAPE.constant);
+    let graph = match compare::regions(&model, constant, has_differences, tally) {
+        Ok(Some(graph)) => Ok(graph),
+        Ok(None) => return Ok(()),
+        Err(error) => Err(error),
+    };
+    let (goal_text, keep_text) = (network.formula(goal), network.formula(keep));
+    for (query, kind) in objectives(&goal_text, &keep_text) {
         for (rule, forced) in RULES {
             let wins = match &graph {
                 Ok(graph) => Ok(wins(network, (goal, keep), graph, kind, rule)),
@@ -384,18 +389,8 @@ fn compare_scaled(
     let (goal_text, keep_text) = (large.formula(goal), large.formula(keep));
     let reached = labels(network, goal, &graph).contains(&true);
     let mut queries = vec![(format!("E<> {goal_text}"), reached, Forced::Tiga)];
-    for (query, kind) in [
-        (format!("control: A<> {goal_text}"), Kind::Reach),
-        (format!("control: A[] {keep_text}"), Kind::Safe),
-        (
-            format!("control: A[ {keep_text} W {goal_text} ]"),
-            Kind::WeakUntil,
-        ),
-        (
-            format!("control: A[] ({keep_text} && A<> {goal_text})"),
-            Kind::Recur,
-        ),
-    ] {
+    let objectives = objectives(&goal_text, &keep_text).into_iter();
+    for (query, kind) in objectives.filter(|(_, kind)| *kind != Kind::Until) {
         for (rule, forced) in RULES {
             let wins = wins(network, (goal, keep), &graph, kind, rule)[0];
             queries.push((query.clone(), wins, forced));
