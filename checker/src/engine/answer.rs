@@ -410,7 +410,8 @@ pub(super) fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Op
     if has_differences(subject.network, &all) {
         return None;
     }
-    Some(symbolic(subject, &[], &atoms, Abstraction::LowerUpper))
+    // What simulates a valuation may have more moves: a deadlock could be left out for a state that has none.
+    Some(symbolic(subject, &[], &atoms, Abstraction::LowerUpper).comparing_as_sets())
 }
 
 /// The verdict on something that was found, in zones that may be too large.

@@ -238,6 +238,11 @@ impl ClockBounds {
         self.simulates() && self.has_opposed_clocks
     }
 
+    /// Compares zones by inclusion from now on, also where simulation would pay.
+    pub(super) fn compare_as_sets(&mut self) {
+        self.has_opposed_clocks = false;
+    }
+
     /// Bounds to start from: those that hold everywhere.
     pub fn everywhere(&self) -> &Ceilings {
         &self.everywhere

@@ -480,6 +480,12 @@ impl<'a> Symbolic<'a> {
         }
     }
 
+    /// The same, but zones are compared by inclusion, also where simulation would pay.
+    pub fn comparing_as_sets(mut self) -> Symbolic<'a> {
+        self.bounds.compare_as_sets();
+        self
+    }
+
     /// Whether [`Symbolic::to_stored`] makes anything else of extrapolated zones.
     pub fn stores_reduced(&self) -> bool {
         self.dimension > 1 && self.bounds.compares_by_simulation()
