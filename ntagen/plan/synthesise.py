@@ -113,7 +113,10 @@ class EngineSynthesiser:
         from ntagen.render import render
 
         model_xml = render(scene)
-        answer = checker.load(model_xml).check(
+        model = checker.load(model_xml)
+        # The model computes distances: one that wrapped round would be a wrong answer in silence.
+        model.overflow = "error"
+        answer = model.check(
             STRATEGY_QUERY,
             plans="all",
             max_plans=self.max_plans,
