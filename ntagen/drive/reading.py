@@ -160,7 +160,8 @@ class _Collected:
 def _read(file: IO[bytes], collected: _Collected, budget: _Budget) -> int | None:
     """Reads what is readable; where it stops being so, or None if the file is whole."""
     good_byte = 0
-    reader = StreamReader(file, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES)
+    whole = cast("io.BytesIO", _Whole(file, budget.file_bytes))
+    reader = StreamReader(whole, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES)
     items: Any = iter(reader.records)
     while True:
         try:
@@ -180,6 +181,20 @@ def _read(file: IO[bytes], collected: _Collected, budget: _Budget) -> int | None
         good_byte = file.tell()
 
 
+class _Whole:
+    """A file that is asked for no more than it has: a wrong length in it would reserve memory."""
+
+    def __init__(self, file: IO[bytes], file_bytes: int) -> None:
+        self._file = file
+        self._left = file_bytes
+
+    def read(self, size: int) -> bytes:
+        """So many bytes; fewer at the end."""
+        piece = self._file.read(min(size, self._left))
+        self._left -= len(piece)
+        return piece
+
+
 class _Budget:
     """How many bytes may still be unpacked and kept.
 
@@ -189,6 +204,7 @@ class _Budget:
 
     def __init__(self, path: Path, file_bytes: int) -> None:
         self._path = path
+        self.file_bytes = file_bytes
         self._all = self._left = _SPARE_BYTES + _LARGEST_RATIO * file_bytes
 
     def take(self, count: int) -> None:

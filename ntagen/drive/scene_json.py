@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from typing import Any, Final
+from typing import Final
 
+from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
-from ntagen.scene import (
-    Limits,
-    NamedQuery,
-    Needle,
-    Pose,
-    Region,
-    Scene,
-    Tissue,
-    Vector,
-)
+from ntagen.scene import Scene
 
 VERSION: Final = 1
 
@@ -30,44 +22,12 @@ def scene_from_json(text: str | bytes) -> Scene:
     """The scene of such a text.
 
     Raises:
-        InputError: The text is no scene.
+        InputError: The text is no scene, or its scene does not obey the rules.
     """
     try:
         document = json.loads(text)
         if document["version"] != VERSION:
-            raise InputError(f"scene of version {document['version']}: only {VERSION} is known")
-        return _scene(document["scene"])
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise InputError(f"scene of version {document['version']!r}: only {VERSION} is known")
+        return value_from_json(document["scene"], Scene)
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"the scene of the run cannot be read: {error!r}") from error
-
-
-def _scene(fields: dict[str, Any]) -> Scene:
-    needle = fields["needle"]
-    limits = fields["limits"] | {"roll_angles_rad": tuple(fields["limits"]["roll_angles_rad"])}
-    return Scene(
-        name=fields["name"],
-        needle=Needle(
-            Pose(**{name: _vector(value) for name, value in needle["tip"].items()}),
-            needle["radius_mm"],
-            needle["speed_mm_per_s"],
-            needle["length_mm"],
-        ),
-        axis=_vector(fields["axis"]),
-        limits=Limits(**limits),
-        targets=_regions(fields["targets"]),
-        criticals=_regions(fields["criticals"]),
-        detections=_regions(fields["detections"]),
-        tissue=Tissue(**fields["tissue"]),
-        resolution_per_mm=fields["resolution_per_mm"],
-        safety=fields["safety"],
-        queries=tuple(NamedQuery(**query) for query in fields["queries"]),
-    )
-
-
-def _regions(items: list[dict[str, Any]]) -> tuple[Region, ...]:
-    return tuple(Region(**(item | {"center_mm": _vector(item["center_mm"])})) for item in items)
-
-
-def _vector(value: list[float]) -> Vector:
-    x, y, z = value
-    return (x, y, z)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
 from ntagen.needle.estimate import Priors
 from ntagen.plan.rank import DEFAULT_RANKING, parse_ranking
@@ -78,19 +79,15 @@ class Settings:
         return dataclasses.asdict(self)
 
     @staticmethod
-    def from_json(document: dict[str, Any]) -> Settings:
+    def from_json(document: object) -> Settings:
         """The settings of such a document.
 
         Raises:
-            InputError: The document has unknown or missing settings.
+            InputError: The document has unknown or missing settings, or values of a wrong kind.
         """
         try:
-            known = dict(document)
-            known["margins"] = Margins(**known["margins"])
-            known["priors"] = Priors(**known["priors"])
-            known["ranking"] = tuple(known["ranking"])
-            return Settings(**known)
-        except (KeyError, TypeError) as error:
+            return value_from_json(document, Settings)
+        except ValueError as error:
             raise InputError(f"the settings of the run cannot be read: {error}") from error
 
 

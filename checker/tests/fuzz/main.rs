@@ -1,7 +1,7 @@
 //! Hostile inputs: whatever is read, loading, asking and checking end in a value or in a diagnostic, and soon.
 //!
 //! Inputs are made from those of the corpus by mutation, one from each number, so that a failure is found again by its
-//! number. A panic, and an input that takes longer than [`SLOW`], fails the test; a stack overflow ends it.
+//! number. A panic, and an input that takes longer than [`SLOW`] or [`SLOW_CHECK`], fails the test; a stack overflow ends it.
 //!
 //! * `FUZZ_CASES`: how many inputs (a few thousand otherwise).
 //! * `FUZZ_FIRST`: the number of the first one.
@@ -23,6 +23,8 @@ use targets::{Kind, Targets};
 
 /// Longer than this, an input counts as one that hangs.
 const SLOW: Duration = Duration::from_secs(1);
+/// The same for evidence, whose check goes through up to two million regions.
+const SLOW_CHECK: Duration = Duration::from_secs(10);
 
 fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).map_or(otherwise, |text| text.parse().expect("a number is wanted"))
@@ -59,7 +61,8 @@ fn hostile_inputs_do_no_harm() {
         let begin = Instant::now();
         show(case);
         let ended = catch_unwind(AssertUnwindSafe(|| targets.run(kind, &input, &seeds)));
-        let is_slow = begin.elapsed() > SLOW && !cfg!(debug_assertions);
+        let longest = if kind == Kind::Evidence { SLOW_CHECK } else { SLOW };
+        let is_slow = begin.elapsed() > longest && !cfg!(debug_assertions);
         if ended.is_err() || is_slow {
             let what = if is_slow { "is slow" } else { "panics" };
             let shown = String::from_utf8_lossy(&input);

@@ -77,6 +77,23 @@ def test_what_is_no_scene_is_refused(text: str) -> None:
         scene_from_json(text)
 
 
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [("name", {}), ("resolution_per_mm", "9"), ("criticals", None), ("axis", [0, 1]), ("more", 1)],
+)
+def test_a_scene_with_a_wrong_entry_is_refused(entry: str, value: object) -> None:
+    document = json.loads(scene_to_json(PAPER))
+    document["scene"][entry] = value
+    with pytest.raises(InputError, match="cannot be read"):
+        scene_from_json(json.dumps(document))
+
+
+@pytest.mark.parametrize("text", ['{"version": 1, "scene": {"name": ', "9" * 5000, "[" * 100_000])
+def test_a_scene_of_broken_json_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        scene_from_json(text)
+
+
 def test_settings_survive_json() -> None:
     settings = Settings(timeout_s=7.0, ranking=("length",))
     assert Settings.from_json(settings.to_json()) == settings
@@ -151,6 +168,21 @@ def test_a_torn_log_gives_all_before_the_tear(tmp_path: Path, share: float) -> N
     assert log.records == (*MANY, ALARM)[: len(log.records)]
     assert log.torn_at_byte is not None
     assert 0 < log.torn_at_byte <= len(data) * share
+
+
+def test_a_wrong_length_in_a_chunk_is_a_tear(tmp_path: Path) -> None:
+    data = bytearray(written(tmp_path / "run.mcap").read_bytes())
+    chunk = RecordBuilder()
+    Chunk("", b"some data", 0, 0, 0, 9).write(chunk)
+    end = data.index(bytes([Opcode.DATA_END]) + (4).to_bytes(8, "little"))
+    wrong = bytearray(chunk.end())
+    # The length of the data is the last but the data.
+    wrong[-17:-9] = (1 << 62).to_bytes(8, "little")
+    path = tmp_path / "wrong.mcap"
+    path.write_bytes(data[:end] + wrong)
+    log = read_log(path)
+    assert log.records == (*MANY, ALARM)
+    assert log.torn_at_byte == end
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00" * 100, b"\x89MCAP0\r\n", b"<nta></nta>"])
