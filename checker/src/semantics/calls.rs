@@ -67,8 +67,8 @@ impl Checker<'_> {
         arguments: &[ast::Expr],
         span: Span,
     ) -> Expr {
-        let arguments = self.check_all(arguments);
         if arguments.len() != signature.parameters.len() {
+            self.check_all(arguments);
             self.wrong_count(
                 &signature.name,
                 signature.parameters.len(),
@@ -78,8 +78,18 @@ impl Checker<'_> {
             return Expr::error(span);
         }
         let mut converted = Vec::with_capacity(arguments.len());
-        for (argument, parameter) in arguments.into_iter().zip(&signature.parameters) {
-            converted.extend(self.argument(argument, parameter));
+        for (argument, parameter) in arguments.iter().zip(&signature.parameters) {
+            let before = self.unknowns.len();
+            let argument = self.expression(argument);
+            let argument = if parameter.reference {
+                self.reference_left_out(argument, parameter)
+            } else {
+                argument
+            };
+            let argument = self.argument(argument, parameter);
+            converted.extend(argument.map(|argument| {
+                self.value_left_out(argument, parameter, signature.may_write(), before)
+            }));
         }
         if converted.len() < signature.parameters.len() || signature.result.is_error() {
             return Expr::error(span);
@@ -102,6 +112,54 @@ impl Checker<'_> {
             format!("'{name}' takes {wanted} arguments, but {given} are given"),
             "give one argument for each parameter",
         );
+    }
+
+    /// An argument by reference. What refers to a variable that is left out must be left out itself, and the other way round.
+    fn reference_left_out(&mut self, argument: Expr, parameter: &Parameter) -> Expr {
+        self.refers_to(&argument);
+        let is_left_out = self.cause_of(parameter.declared).cloned();
+        if self.target_left_out(&argument).is_some() {
+            if is_left_out.is_none()
+                && let Some(cause) = self.unknowns.last().cloned()
+            {
+                // What would be said of the argument stays.
+                self.candidate_at(parameter.declared, &cause);
+                self.unknowns.push(cause);
+            }
+            return self.place_left_out(argument);
+        }
+        if let Some(cause) = is_left_out
+            && !parameter.constant
+        {
+            self.candidate(argument.variable(), &cause);
+            let span = argument.span;
+            self.unknowns.push(Diagnostic { span, ..cause });
+        }
+        argument
+    }
+
+    /// A converted argument by value: where the parameter is left out, it does not matter which.
+    fn value_left_out(
+        &mut self,
+        argument: Expr,
+        parameter: &Parameter,
+        has_effect: bool,
+        before: usize,
+    ) -> Expr {
+        if parameter.reference || !argument.is_unknown() {
+            return argument;
+        }
+        if has_effect {
+            self.takes_unknown(parameter.declared, &argument, before);
+        }
+        if self.cause_of(parameter.declared).is_some()
+            && argument.ty == Type::Double
+            && !argument.has_effect()
+        {
+            self.unknowns.truncate(before);
+            return Expr::new(Kind::Double(0.0), Type::Double, argument.span);
+        }
+        argument
     }
 
     fn argument(&mut self, argument: Expr, parameter: &Parameter) -> Option<Expr> {

@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use rustc_hash::FxHashMap;
 
 use super::codes;
+use super::left_out::{LeftOut, declared_at};
 use super::lower::{Builder, Images};
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Local, LocalId, Place, Root};
@@ -42,6 +43,8 @@ pub(super) struct Checker<'a> {
     pub(super) locals: Vec<Local>,
     /// The values that only statistical queries know, as long as it is open whether anything depends on them: what is to be said if so.
     pub(super) unknowns: Vec<Diagnostic>,
+    /// The variables that are left out because only statistical queries know their values.
+    pub(super) left_out: LeftOut,
     /// The hybrid clocks that were declared; a warning about each if the model is accepted.
     pub(super) hybrid_clocks: Vec<(String, Span)>,
     /// Set when a free parameter is looked up.
@@ -92,6 +95,7 @@ impl<'a> Checker<'a> {
             has_errors: false,
             locals: Vec::new(),
             unknowns: Vec::new(),
+            left_out: LeftOut::default(),
             hybrid_clocks: Vec::new(),
             free_parameter_seen: false,
             is_generic: false,
@@ -115,6 +119,23 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// Begins to hold back what is reported. What the reporting has to go back to is returned.
+    pub(super) fn hold_reports(&mut self) -> (Vec<Diagnostic>, bool) {
+        let diagnostics = std::mem::take(&mut self.diagnostics);
+        (diagnostics, std::mem::take(&mut self.has_errors))
+    }
+
+    /// Ends holding back; what was is returned, and can be reported again.
+    pub(super) fn release_reports(&mut self, held: (Vec<Diagnostic>, bool)) -> Vec<Diagnostic> {
+        let found = std::mem::replace(&mut self.diagnostics, held.0);
+        self.has_errors = held.1;
+        for diagnostic in &found {
+            self.reported
+                .remove(&(diagnostic.code.code, diagnostic.span));
+        }
+        found
+    }
+
     /// Reports a mistake with a way out.
     pub(super) fn error(&mut self, code: Code, span: Span, message: impl Into<String>, help: &str) {
         self.report(Diagnostic::new(code, span, message).help(help));
@@ -125,6 +146,13 @@ impl<'a> Checker<'a> {
         let span = diagnostic.span;
         self.unknowns.push(diagnostic);
         Expr::new(Kind::Unknown(Box::new(from)), ty, span)
+    }
+
+    /// A construct that is not supported, which is reported as a whole.
+    pub(super) fn unsupported(&mut self, span: Span) -> Expr {
+        // In a template that no process uses, it does no harm.
+        self.has_errors |= !self.is_generic;
+        Expr::error(span)
     }
 
     /// An expression that the parser has reported: nothing can be lowered any more.
@@ -232,7 +260,13 @@ impl<'a> Checker<'a> {
     }
 
     /// Room for a variable of the state, with the given initial words and the names of its parts.
-    pub(super) fn allocate(&mut self, name: &str, ty: &Type, meta: bool, words: &[i32]) -> Place {
+    pub(super) fn allocate(
+        &mut self,
+        (name, declared): (&str, Span),
+        ty: &Type,
+        meta: bool,
+        words: &[i32],
+    ) -> Place {
         let full_name = match &self.process {
             Some((_, process)) => format!("{process}.{name}"),
             None => name.to_owned(),
@@ -254,7 +288,8 @@ impl<'a> Checker<'a> {
             channels: self.world.network.channels.len() as u32,
         };
         let owner = self.process.as_ref().map(|(process, _)| *process);
-        if !words.is_empty() {
+        // What is left out has no value that could be shown.
+        if !words.is_empty() && self.cause_of(declared).is_none() {
             self.world.network.layout.variables.push(Variable {
                 name: full_name.clone(),
                 owner,
@@ -268,6 +303,7 @@ impl<'a> Checker<'a> {
             root: Root::State,
             base,
             mutable: true,
+            declared: declared_at(ty, declared),
         }
     }
 

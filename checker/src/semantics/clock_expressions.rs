@@ -104,7 +104,9 @@ impl Checker<'_> {
             if self.is_query || !is_number(&left) || !is_number(&right) {
                 return self.clock_as_number(&left, &right, span);
             }
-            return self.unknown(clock_with_double(span), left, Type::Bool);
+            let kind = Kind::CompareReal(relation, Box::new(left), Box::new(right));
+            let compared = Expr::new(kind, Type::Bool, span);
+            return self.unknown(clock_with_double(span), compared, Type::Bool);
         }
         let (left, right, relation) = match relation {
             Relation::Greater => (right, left, ClockRelation::Less),
@@ -143,7 +145,7 @@ impl Checker<'_> {
             negated: is_negated,
         };
         let compared = Expr::new(kind, Type::Constraint(class), span);
-        match hybrid_comparison(&compared) {
+        match self.hybrid_comparison(&compared) {
             Some(diagnostic) if self.is_query => {
                 self.report(diagnostic);
                 compared
@@ -200,12 +202,14 @@ impl Checker<'_> {
         }
         let outside = rate.interval.1 < 0 || rate.interval.0 > 1;
         if !rate.ty.is_integral() || outside {
-            self.error(
+            let diagnostic = Diagnostic::new(
                 codes::RATE_NOT_ZERO_OR_ONE,
                 rate.span,
-                "only the rates 0 and 1 are supported on ordinary clocks",
-                "declare the clock as a hybrid clock if no condition depends on it",
-            );
+                "only the rates 0 and 1 are supported on clocks that conditions depend on",
+            )
+            .help("keep the clock out of guards, invariants and functions, or let it run at the rates 0 and 1");
+            self.candidate(clock.variable(), &diagnostic);
+            self.report(diagnostic);
             return Expr::error(span);
         }
         let kind = Kind::Rate {
@@ -236,16 +240,36 @@ impl Checker<'_> {
         let sum = if is_clock_term(&value) || value.ty.is_integral() {
             into_sum(value)
         } else {
+            if value.ty == Type::Double {
+                self.candidate(target.variable(), &clock_with_double(span));
+            }
             return self.clock_as_number(&target, &value, span);
         };
         if sum.minus.is_some() {
-            self.error(
+            let diagnostic = Diagnostic::new(
                 codes::CLOCK_SET_TO_DIFFERENCE,
                 span,
                 "a clock cannot be set to a difference of clocks",
-                "set it to an integer, or to a clock plus an integer",
-            );
+            )
+            .help("set it to an integer, or to a clock plus an integer");
+            self.candidate(target.variable(), &diagnostic);
+            self.report(diagnostic);
             return Expr::error(span);
+        }
+        let mut sum = sum;
+        if let Some(source) = sum
+            .plus
+            .take_if(|source| source.ty == (Type::Clock { hybrid: true }))
+        {
+            let diagnostic = Diagnostic::new(
+                codes::HYBRID_CLOCK_COMPARED,
+                span,
+                "the values of hybrid clocks are not known in symbolic and game queries, so no ordinary clock can take one",
+            )
+            .help("use an ordinary clock, or make both hybrid");
+            self.candidate(target.variable(), &diagnostic);
+            let ty = source.ty.clone();
+            sum.plus = Some(Box::new(self.unknown(diagnostic, *source, ty)));
         }
         if let Some(value) = &sum.offset {
             self.check_bound(value);
@@ -256,6 +280,36 @@ impl Checker<'_> {
             value: sum.offset,
         };
         Expr::new(kind, ty, span)
+    }
+
+    /// What is to be said of a comparison that hangs on hybrid clocks, which are abstracted away.
+    fn hybrid_comparison(&self, compared: &Expr) -> Option<Diagnostic> {
+        let Kind::ClockCompare { left, right, .. } = &compared.kind else {
+            return None;
+        };
+        let hybrid = Type::Clock { hybrid: true };
+        let mut clocks = left.iter().chain(right);
+        let clock = clocks.find(|clock| clock.ty == hybrid)?;
+        let cause = clock
+            .variable()
+            .and_then(|place| self.cause_of(place.declared));
+        let Some(cause) = cause else {
+            let message = "hybrid clocks are abstracted away in symbolic and game queries and cannot be compared";
+            return Some(
+                Diagnostic::new(codes::HYBRID_CLOCK_COMPARED, compared.span, message)
+                    .help("use an ordinary clock, or keep the hybrid one out of conditions"),
+            );
+        };
+        let line = self.sources.position(cause.span).line;
+        Some(
+            Diagnostic::new(
+                codes::HYBRID_CLOCK_COMPARED,
+                compared.span,
+                "this clock is abstracted away in symbolic and game queries and cannot be compared",
+            )
+            .note(format!("line {line}: {}", cause.message))
+            .help("mend that, or keep the clock out of conditions"),
+        )
     }
 
     /// Whether the place is one known clock, and which.
@@ -273,23 +327,6 @@ fn clock_with_double(span: Span) -> Diagnostic {
         "a clock meets a double here: clocks have exact, symbolic values",
     )
     .help("use integers for clocks; fint(…) truncates a double")
-}
-
-/// What is to be said of a comparison that hangs on hybrid clocks, which are abstracted away.
-fn hybrid_comparison(compared: &Expr) -> Option<Diagnostic> {
-    let Kind::ClockCompare { left, right, .. } = &compared.kind else {
-        return None;
-    };
-    let hybrid = Type::Clock { hybrid: true };
-    let mut clocks = left.iter().chain(right);
-    clocks.any(|clock| clock.ty == hybrid).then(|| {
-        Diagnostic::new(
-            codes::HYBRID_CLOCK_COMPARED,
-            compared.span,
-            "hybrid clocks are abstracted away in symbolic and game queries and cannot be compared",
-        )
-        .help("use an ordinary clock, or keep the hybrid one out of conditions")
-    })
 }
 
 /// A double constant without fraction as the integer that it is.

@@ -173,6 +173,14 @@ codes! {
     ARRAY_EMPTY = "W0207" "array-empty";
     /// Arithmetic of constants beyond 32 bits.
     CONSTANT_WRAPS = "W0212" "constant-wraps";
+    /// A double that takes values of clocks or random numbers, which symbolic and game queries do not see.
+    DOUBLE_IGNORED = "W0213" "double-ignored";
+    /// A clock with rates or values of its own, which symbolic and game queries do not see.
+    CLOCK_IGNORED = "W0214" "clock-ignored";
+    /// Something unsupported that no process of the system uses.
+    UNSUPPORTED_UNUSED = "W0215" "unsupported-unused";
+    /// A live sequence chart, which does not change the system.
+    CHART_IGNORED = "W0216" "chart-ignored";
     /// A function that UPPAAL calls after all that a query sees.
     HOOK_WITHOUT_EFFECT = "W0211" "hook-without-effect";
 }

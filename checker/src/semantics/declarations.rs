@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::checker::Checker;
 use super::clock_expressions::integral_double;
 use super::codes;
+use super::left_out::declared_at;
 use super::scope::{Carried, Entity};
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{self, DEFAULT_INT, Index, SIZE_LIMIT, Size, StructType, Type};
@@ -509,6 +510,7 @@ impl Checker<'_> {
                 ..Size::default()
             },
             mutable: false,
+            declared: Span::default(),
         };
         Entity::Variable {
             place,
@@ -528,13 +530,24 @@ impl Checker<'_> {
         }
         let parts = parts.unwrap_or_default();
         let words = self.initial_words(&parts, ty);
-        self.warn_of_doubles(variable, ty, meta);
-        if ty.any(&|part| *part == Type::Clock { hybrid: true }) {
+        let declared = declared_at(ty, variable.name.span);
+        let abstracted = ty.with_hybrid_clocks();
+        let (ty, is_left_out) = match self.cause_of(declared) {
+            Some(_) => (&abstracted, true),
+            None => (ty, false),
+        };
+        if is_left_out {
+            self.warn_if_left_out(&variable.name.text, ty, declared);
+        } else {
+            self.warn_of_doubles(variable, ty, meta);
+        }
+        if !is_left_out && ty.any(&|part| *part == Type::Clock { hybrid: true }) {
             let name = variable.name.text.clone();
             self.hybrid_clocks.push((name, variable.name.span));
         }
         let words = words.unwrap_or_else(|| vec![0; ty.size().words as usize]);
-        let place = self.allocate(&variable.name.text, ty, meta, &words);
+        let name = (variable.name.text.as_str(), variable.name.span);
+        let place = self.allocate(name, ty, meta, &words);
         let clock_start = Type::Int {
             low: 0,
             high: CLOCK_LIMIT,

@@ -9,6 +9,7 @@ use super::types::{Class, Index, Memory, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::syntax::ast::{self, BinaryOp, ExprKind, Name, Quantifier, TypeExpr, UnaryOp};
+use std::ops::Range;
 
 /// So many parts of constant arrays are looked at for the interval of their values.
 const MOST_VALUES: usize = 4096;
@@ -39,9 +40,10 @@ impl Checker<'_> {
             ExprKind::Assign(operator, target, value) => {
                 let before = self.unknowns.len();
                 let target = self.expression(target);
+                let behind = self.unknowns.len();
                 let value = self.expression(value);
                 match operator {
-                    None => self.assignment(target, value, before, span),
+                    None => self.assignment(target, value, before..behind, span),
                     Some(operator) => self.compound(*operator, target, value, span),
                 }
             }
@@ -71,6 +73,7 @@ impl Checker<'_> {
             } => self.quantifier(*quantifier, name, ty, body, span),
             ExprKind::Deadlock => self.deadlock(span),
             ExprKind::Error => self.reported_by_parser(span),
+            ExprKind::Unsupported => self.unsupported(span),
         }
     }
 
@@ -115,7 +118,8 @@ impl Checker<'_> {
         if ty.is_error() {
             return Expr::error(span);
         }
-        self.folded(Expr::new(Kind::Variable(place), ty, span))
+        let expr = self.folded(Expr::new(Kind::Variable(place), ty, span));
+        self.unless_left_out(expr)
     }
 
     /// Reports an unknown name, with the nearest known one.
@@ -147,6 +151,7 @@ impl Checker<'_> {
             return member;
         }
         let record = self.expression(record);
+        let record = self.place_left_out(record);
         if record.is_error() {
             return Expr::error(span);
         }
@@ -163,7 +168,9 @@ impl Checker<'_> {
         for (field, ty) in &fields.fields {
             if *field == name.text {
                 let record = Box::new(record);
-                return self.folded(Expr::new(Kind::Field { record, offset }, ty.clone(), span));
+                let kind = Kind::Field { record, offset };
+                let part = self.folded(Expr::new(kind, ty.clone(), span));
+                return self.unless_left_out(part);
             }
             offset = offset.plus(ty.size());
         }
@@ -183,6 +190,7 @@ impl Checker<'_> {
 
     fn index(&mut self, array: &ast::Expr, index: &ast::Expr, span: Span) -> Expr {
         let array = self.expression(array);
+        let array = self.place_left_out(array);
         let index = self.expression(index);
         if array.is_error() || index.is_error() {
             return Expr::error(span);
@@ -204,7 +212,8 @@ impl Checker<'_> {
             length: ty.index.length,
             stride: ty.part.size(),
         };
-        self.folded(Expr::new(kind, ty.part.clone(), span))
+        let part = self.folded(Expr::new(kind, ty.part.clone(), span));
+        self.unless_left_out(part)
     }
 
     /// Checks that an index is an integer or a member of the scalar set.
@@ -366,13 +375,23 @@ impl Checker<'_> {
         true
     }
 
-    /// `target = value`
-    fn assignment(&mut self, target: Expr, value: Expr, before: usize, span: Span) -> Expr {
+    /// `target = value`; `of_target` is where among the unknown values those stand that the target hangs on.
+    fn assignment(
+        &mut self,
+        target: Expr,
+        value: Expr,
+        of_target: Range<usize>,
+        span: Span,
+    ) -> Expr {
+        if let Some(place) = self.target_left_out(&target) {
+            let place = place.clone();
+            return self.assignment_left_out((target, &place), value, of_target, span);
+        }
         if !self.expect_mutable(&target) || value.is_error() {
             return Expr::error(span);
         }
         if target.ty.is_clock() && (target.ty.accepts(&value.ty)) {
-            return self.assign_clock(target, value, before, span);
+            return self.assign_clock(target, value, of_target.start, span);
         }
         let size = target.ty.size();
         if size.clocks + size.channels > 0 {
@@ -387,10 +406,36 @@ impl Checker<'_> {
         let Some(value) = self.converted(value, &target.ty) else {
             return Expr::error(span);
         };
+        if let Some(place) = target.variable() {
+            self.takes_unknown(place.declared, &value, of_target.end);
+        }
         if !matches!(target.kind, Kind::Variable(_)) {
             self.mark_chosen(&target);
         }
         let ty = target.ty.clone();
+        Expr::new(Kind::Assign(Box::new(target), Box::new(value)), ty, span)
+    }
+
+    /// An assignment to a variable that is left out: it remains where its own value is used, which is unknown, and what the
+    /// value does beside it.
+    fn assignment_left_out(
+        &mut self,
+        (target, place): (Expr, &Expr),
+        value: Expr,
+        of_target: Range<usize>,
+        span: Span,
+    ) -> Expr {
+        if !self.expect_mutable(place) || value.is_error() {
+            return Expr::error(span);
+        }
+        let ty = target.ty.clone();
+        let Some(value) = self.converted(value, &ty) else {
+            return Expr::error(span);
+        };
+        if value.has_effect() && !place.has_effect() {
+            self.unknowns.drain(of_target);
+            return value;
+        }
         Expr::new(Kind::Assign(Box::new(target), Box::new(value)), ty, span)
     }
 
@@ -505,6 +550,7 @@ impl Checker<'_> {
             root: Root::Local(local),
             base: Size::default(),
             mutable: false,
+            declared: Span::default(),
         };
         self.scopes.push(super::scope::Scope::default());
         self.declare(
@@ -638,6 +684,7 @@ pub(super) fn entity_kind(entity: &Entity) -> &'static str {
         Entity::Function(..) | Entity::OpenFunction => "a function",
         Entity::Template(_) => "a template",
         Entity::Instantiation(_) => "a process",
+        Entity::Chart => "a live sequence chart",
         Entity::Location(_) => "a location",
         Entity::Constant { .. } => "a constant",
         Entity::Variable { .. } => "a variable",

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::checker::Checker;
 use super::codes;
+use super::left_out::declared_at;
 use super::scalars::is_order_irrelevant;
 use super::scope::{Entity, Scope};
 use super::typed::{
@@ -111,10 +112,12 @@ impl Checker<'_> {
         let local = self.new_local(ty.clone());
         self.locals[local.0 as usize].reference = parameter.reference;
         let constant = self.carried(&parameter.ty).constant;
+        let declared = declared_at(&ty, parameter.name.span);
         let place = Place {
             root: Root::Local(local),
             base: Size::default(),
             mutable: !constant,
+            declared,
         };
         let entity = if ty.is_error() {
             Entity::Broken
@@ -130,6 +133,7 @@ impl Checker<'_> {
             ty,
             reference: parameter.reference,
             constant,
+            declared,
         }
     }
 
@@ -188,7 +192,8 @@ impl Checker<'_> {
 
     fn local_variable(&mut self, variable: &ast::Variable) -> Option<Statement> {
         let ty = self.dimensioned(&variable.ty, &variable.dimensions);
-        let parts = variable
+        let before = self.unknowns.len();
+        let mut parts = variable
             .initialiser
             .as_ref()
             .map(|initialiser| self.initialiser(initialiser, &ty));
@@ -220,8 +225,22 @@ impl Checker<'_> {
                 "write = and a value",
             );
         }
+        let declared = declared_at(&ty, variable.name.span);
+        for part in parts.iter().flatten() {
+            self.takes_unknown(declared, &part.value, before);
+        }
+        if self.cause_of(declared).is_some()
+            && let Some(parts) = &mut parts
+            && !parts.iter().any(|part| part.value.has_effect())
+        {
+            parts.clear();
+            self.unknowns.truncate(before);
+            return Some(self.declare_local(variable, ty, Vec::new()));
+        }
         let parts = parts.unwrap_or_default();
-        let is_known = parts.iter().all(|part| Self::is_computable(&part.value));
+        let is_known = parts
+            .iter()
+            .all(|part| Self::is_computable(&part.value) && !part.value.is_unknown());
         if prefixes.constant && is_known {
             let entity = match self.initial_words(&parts, &ty) {
                 Some(words) => self.constant_entity(&words, &ty, false, variable.name.span),
@@ -256,6 +275,7 @@ impl Checker<'_> {
             root,
             base: Size::default(),
             mutable: !self.carried(&variable.ty).constant,
+            declared: declared_at(&ty, variable.name.span),
         };
         self.declare(&variable.name, Entity::Variable { place, ty });
         Statement::Declare(local, assignments)
@@ -345,6 +365,7 @@ impl Checker<'_> {
                 root: Root::Local(local),
                 base: Size::default(),
                 mutable: false,
+                declared: Span::default(),
             };
             self.declare(name, Entity::Variable { place, ty });
             (range, local)
@@ -378,9 +399,8 @@ impl Checker<'_> {
             return Expr::error(checked.span);
         }
         self.warn_without_effect(&checked);
-        let is_call =
-            matches!(&checked.kind, Kind::Call { signature, .. } if signature.unknown.is_some());
-        if is_call && !checked.has_effect() {
+        let is_work = matches!(checked.kind, Kind::Assign(..) | Kind::Call { .. });
+        if is_work && checked.is_unknown() && !checked.has_effect() {
             // All that it does, it does to what nothing depends on.
             self.unknowns.truncate(before);
             return Expr::new(Kind::Int(0), Type::Void, checked.span);
@@ -392,7 +412,7 @@ impl Checker<'_> {
     fn warn_without_effect(&mut self, expr: &Expr) {
         // A call of a function without effect is common in libraries of models; a dropped comparison is a typing mistake.
         let is_silent = expr.is_error() || expr.ty == Type::Void || expr.has_effect();
-        if !is_silent && !matches!(expr.kind, Kind::Call { .. }) {
+        if !is_silent && !matches!(expr.kind, Kind::Call { .. } | Kind::Assign(..)) {
             self.report(
                 crate::diagnostics::Diagnostic::new(
                     codes::EFFECT_MISSING,
@@ -479,6 +499,7 @@ fn initial_assignment(root: Root, part: super::declarations::InitialPart) -> Exp
         root,
         base: part.offset,
         mutable: true,
+        declared: Span::default(),
     };
     let span = part.value.span;
     let target = Expr::new(Kind::Variable(place), part.ty.clone(), span);

@@ -15,9 +15,10 @@ use super::expressions::known_offset;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{DEFAULT_INT, Memory, Size, Type};
+use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::ir::{Coordinate, ProcessId};
-use crate::syntax::ast::{self, Document, Name, Parameter, SystemItem};
+use crate::syntax::ast::{self, Document, Name, Parameter, SystemItem, UnsupportedPart};
 
 /// The most processes of a network.
 const PROCESS_LIMIT: u64 = 1 << 16;
@@ -74,6 +75,7 @@ impl Checker<'_> {
                     // Without its template it is broken: it must not mean a template that is named like it later on.
                     let entity = match self.check_instantiation(document, i) {
                         Some(_) => Entity::Instantiation(i),
+                        None if self.is_of_chart(document, i) => Entity::Chart,
                         None => Entity::Broken,
                     };
                     self.declare(name, entity);
@@ -86,24 +88,52 @@ impl Checker<'_> {
                 self.system_line_name(document, name, level as u32, &mut used);
             }
         }
-        let mut groups = self.world.processes.groups.values();
-        if self.world.network.processes.is_empty() && groups.any(|group| group.count() == 0) {
-            let mut names = document.system.processes.iter().flatten();
-            let name = names.next().expect("a set of processes has a name");
-            self.error(
-                codes::SYSTEM_EMPTY,
-                name.span,
-                "the system has no process: its sets of processes are empty",
-                "give their parameters at least one value",
-            );
-        }
+        self.expect_processes(document);
         for (template, _) in document
             .templates
             .iter()
-            .zip(used)
-            .filter(|(_, used)| !used)
+            .zip(&used)
+            .filter(|(_, used)| !**used)
         {
-            self.check_unused_template(template);
+            self.unused_template(template);
+        }
+        self.unsupported_parts(document, &used);
+    }
+
+    /// Refuses a system line of empty sets of processes and of charts.
+    fn expect_processes(&mut self, document: &Document) {
+        if !self.world.network.processes.is_empty() {
+            return;
+        }
+        let mut groups = self.world.processes.groups.values();
+        let has_empty_set = groups.any(|group| group.count() == 0);
+        let names = || document.system.processes.iter().flatten();
+        let has_chart = names().any(|name| matches!(self.lookup(&name.text), Some(Entity::Chart)));
+        let (message, help) = if has_empty_set {
+            (
+                "the system has no process: its sets of processes are empty",
+                "give their parameters at least one value",
+            )
+        } else if has_chart {
+            (
+                "the system has no process: live sequence charts are none",
+                "name the processes that the charts observe",
+            )
+        } else {
+            return;
+        };
+        if let Some(name) = names().next() {
+            self.error(codes::SYSTEM_EMPTY, name.span, message, help);
+        }
+    }
+
+    /// Whether it instantiates a live sequence chart.
+    fn is_of_chart(&mut self, document: &Document, item: usize) -> bool {
+        match &document.system.items[item] {
+            SystemItem::Instantiation { template, .. } => {
+                matches!(self.lookup(&template.text), Some(Entity::Chart))
+            }
+            SystemItem::Declaration(_) => false,
         }
     }
 
@@ -131,6 +161,7 @@ impl Checker<'_> {
         }
         for argument in arguments {
             let argument = self.expression(argument);
+            let argument = self.place_left_out(argument);
             self.expect_pure(&argument, "an argument of a template");
         }
         self.scopes.pop();
@@ -156,7 +187,7 @@ impl Checker<'_> {
         match self.lookup(&name.text) {
             Some(Entity::Template(i)) => Some(Target::Template(i)),
             Some(Entity::Instantiation(i)) => Some(Target::Instantiation(i)),
-            Some(Entity::Broken) => None,
+            Some(Entity::Broken | Entity::Chart) => None,
             Some(entity) => {
                 self.error(
                     codes::TEMPLATE_EXPECTED,
@@ -358,7 +389,9 @@ impl Checker<'_> {
                 }
                 _ => continue,
             };
-            let place = self.allocate(&formal.name.text, &ty, false, &words);
+            let name = (formal.name.text.as_str(), formal.name.span);
+            self.warn_if_left_out(name.0, &ty, name.1);
+            let place = self.allocate(name, &ty, false, &words);
             let entity = Entity::Variable { place, ty };
             scope.set(&formal.name.text, entity, formal.name.span);
         }
@@ -395,6 +428,7 @@ impl Checker<'_> {
             self.scopes.push(scope.clone());
             self.free_parameter_seen = false;
             let argument = self.expression(argument);
+            let argument = self.place_left_out(argument);
             let entity = self.bind_argument(formal, &ty, argument);
             self.scopes.pop();
             bound.set(&formal.name.text, entity?, formal.name.span);
@@ -431,7 +465,8 @@ impl Checker<'_> {
         let fits = if constant {
             ty.accepts(&argument.ty) && ty.size() == argument.ty.size()
         } else {
-            ty.is_equivalent(&argument.ty)
+            let argument = argument.ty.with_hybrid_clocks();
+            ty.with_hybrid_clocks().is_equivalent(&argument)
         };
         if !fits || !(constant || ty.accepts_channel(&argument.ty)) {
             self.error(
@@ -447,7 +482,8 @@ impl Checker<'_> {
             );
             return None;
         }
-        let root = argument.variable()?.root;
+        let variable = argument.variable()?;
+        let (root, declared) = (variable.root, variable.declared);
         let base = Size {
             words: known_offset(&argument, Memory::Words)?,
             clocks: known_offset(&argument, Memory::Clocks)?,
@@ -457,12 +493,80 @@ impl Checker<'_> {
             root,
             base,
             mutable: !constant,
+            declared,
         };
         // Ranges are checked against the variable's own type; hybrid clocks stay hybrid.
         Some(Entity::Variable {
             place,
             ty: argument.ty,
         })
+    }
+
+    /// Checks a template that no process uses: what is not supported there does no harm.
+    fn unused_template(&mut self, template: &ast::Template) {
+        let held = self.hold_reports();
+        self.check_unused_template(template);
+        // What is still unknown is said of this template.
+        self.can_lower();
+        let found = self.release_reports(held);
+        let mut unsupported = Vec::new();
+        for diagnostic in found {
+            if is_unsupported(&diagnostic) {
+                unsupported.push(diagnostic);
+            } else {
+                self.report(diagnostic);
+            }
+        }
+        unsupported.sort_by_key(|diagnostic| diagnostic.span);
+        if let Some(first) = unsupported.first() {
+            let line = self.sources.position(first.span).line;
+            let note = format!("line {line}: {}", first.message);
+            self.warn_of_unused(
+                template.name.span,
+                &format!("the template '{}'", template.name.text),
+                note,
+            );
+        }
+    }
+
+    fn warn_of_unused(&mut self, span: Span, what: &str, note: String) {
+        self.report(
+            Diagnostic::new(
+                codes::UNSUPPORTED_UNUSED,
+                span,
+                format!("{what} has parts that are not supported; no process of the system is made of it"),
+            )
+            .note(note)
+            .help("nothing is to be done, unless it is to be used"),
+        );
+    }
+
+    /// Reports unsupported constructs that the processes of the system use, and warns of the others.
+    fn unsupported_parts(&mut self, document: &Document, used: &[bool]) {
+        for construct in &document.unsupported {
+            let name = match &construct.part {
+                UnsupportedPart::DynamicTemplate(name) => Some(name.as_str()),
+                UnsupportedPart::Template(i) => Some(document.templates[*i].name.text.as_str()),
+                UnsupportedPart::Whole => None,
+                UnsupportedPart::Chart(_) => continue,
+            };
+            let mut templates = document.templates.iter().zip(used);
+            let is_used = name.is_none_or(|name| {
+                templates.any(|(template, used)| *used && template.name.text == name)
+            });
+            if is_used {
+                self.error(
+                    codes::CONSTRUCT_UNSUPPORTED,
+                    construct.span,
+                    format!("not supported: {}", construct.text),
+                    "remove them from the model",
+                );
+            } else {
+                let name = name.unwrap_or_default();
+                let note = format!("not supported: {}", construct.text);
+                self.warn_of_unused(construct.span, &format!("the template '{name}'"), note);
+            }
+        }
     }
 
     /// Checks a template that no process uses; nothing of it enters the network.
@@ -504,15 +608,30 @@ impl Checker<'_> {
     }
 }
 
-/// A variable of a template without instance: its type is known, its place is not.
+/// Whether it says that something is not supported, and not that something is wrong.
+fn is_unsupported(diagnostic: &Diagnostic) -> bool {
+    [
+        codes::CONSTRUCT_UNSUPPORTED,
+        codes::RANDOM_UNSUPPORTED,
+        codes::RATE_NOT_ZERO_OR_ONE,
+        codes::CLOCK_AS_NUMBER,
+        codes::CLOCK_WITH_DOUBLE,
+        codes::CLOCK_SET_TO_DIFFERENCE,
+        codes::HYBRID_CLOCK_COMPARED,
+    ]
+    .contains(&diagnostic.code)
+}
+
 /// What it takes to make a process, beside its functions: see [`cancellation::work`].
 const UNITS_FOR_PROCESS: usize = 1 << 14;
 
+/// A variable of a template without instance: its type is known, its place is not.
 fn unknown_variable(ty: Type) -> Entity {
     let place = Place {
         root: Root::State,
         base: Size::default(),
         mutable: true,
+        declared: Span::default(),
     };
     Entity::Variable { place, ty }
 }

@@ -22,9 +22,11 @@ pub(super) struct Select {
 impl Checker<'_> {
     /// Checks and lowers a guard.
     pub(super) fn guard(&mut self, guard: &ast::Expr, locals: &[LocalId], place: &str) -> Guard {
+        let before = self.unknowns.len();
         let guard = self.expression(guard);
         self.expect_pure(&guard, "a guard");
         if !self.expect_condition(&guard) {
+            self.unknowns.truncate(before);
             return Guard::default();
         }
         let sets_rates = guard.any(&|e| matches!(e.kind, Kind::Rate { .. }))
@@ -45,6 +47,9 @@ impl Checker<'_> {
 
     /// Lowers a conjunction of conditions.
     pub(super) fn make_guard(&mut self, parts: &[Expr], locals: &[LocalId], place: &str) -> Guard {
+        for part in parts {
+            self.depends_on_clocks(part);
+        }
         let mut guard = Guard {
             never_holds: parts.iter().any(|part| part.interval == (0, 0)),
             ..Guard::default()

@@ -181,6 +181,7 @@ impl Checker<'_> {
                 match self.member_stride(member, name, &place) {
                     Some(stride) => {
                         let first = Expr::new(Kind::Variable(place), ty, span);
+                        let first = self.unless_left_out(first);
                         chosen_member(first, member, stride, span)
                     }
                     None => self.unroll_members(span),
@@ -235,6 +236,7 @@ impl Checker<'_> {
                 ..Size::default()
             },
             mutable: false,
+            declared: Span::default(),
         };
         let number = Expr::new(Kind::Variable(place), ty, span);
         if process.is_some() {

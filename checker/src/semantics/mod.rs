@@ -13,6 +13,7 @@
 //! * Names that UPPAAL predeclares may be declared again by a model.
 //! * Parameters of templates by value are constants, unless the template assigns to them.
 //! * Mutable doubles are part of the state, with a warning.
+//! * Clocks with rates other than 0 and 1 are left out, with a warning, if no condition depends on them; UPPAAL refuses the queries.
 //!
 //! Cost: linear in the trees, times the number of processes of a template.
 
@@ -31,6 +32,8 @@ mod checker;
 mod operators;
 
 mod clock_expressions;
+
+mod left_out;
 
 mod expressions;
 
@@ -62,6 +65,7 @@ mod members;
 
 mod queries;
 
+use self::left_out::LeftOut;
 use crate::diagnostics::{Diagnostic, SourceMap};
 use crate::ir;
 use crate::syntax::ast;
@@ -73,6 +77,8 @@ pub struct Model {
     pub network: ir::Network,
     world: checker::World,
     relocation: layout::Relocation,
+    /// The variables whose values queries cannot know.
+    left_out: left_out::Causes,
 }
 
 /// Checks and lowers a model; `None` if there are mistakes. The diagnostics are sorted by place.
@@ -81,8 +87,22 @@ pub fn analyse(
     prelude: &[ast::Declaration],
     sources: &SourceMap,
 ) -> (Option<Model>, Vec<Diagnostic>) {
-    let mut checker = checker::Checker::new(sources, checker::World::default());
-    let relocation = checker.document(document, prelude);
+    let mut causes = left_out::Causes::default();
+    let mut rounds = 1;
+    let (checker, relocation) = loop {
+        let world = checker::World::default();
+        let mut checker = checker::Checker::new(sources, world);
+        checker.left_out = LeftOut::of(causes);
+        let relocation = checker.document(document, prelude);
+        if !checker.has_errors() || rounds == left_out::MOST_ROUNDS {
+            break (checker, relocation);
+        }
+        let Some(next) = checker.left_out.next() else {
+            break (checker, relocation);
+        };
+        causes = next;
+        rounds += 1;
+    };
     let has_errors = checker.has_errors();
     let mut world = checker.world;
     let network = std::mem::take(&mut world.network);
@@ -90,6 +110,7 @@ pub fn analyse(
         network,
         world,
         relocation,
+        left_out: checker.left_out.into_fixed(),
     };
     ((!has_errors).then_some(model), sorted(checker.diagnostics))
 }
@@ -109,10 +130,12 @@ impl Model {
         let scopes = std::mem::take(&mut world.query_scopes);
         let mut checker = checker::Checker::new(sources, world);
         checker.scopes = scopes;
+        checker.left_out = LeftOut::of(std::mem::take(&mut self.left_out));
         checker.is_query = true;
         let compiled = checker.query(query, strategies);
         let has_errors = !checker.can_lower();
         let diagnostics = sorted(checker.diagnostics);
+        self.left_out = checker.left_out.into_fixed();
         self.world = checker.world;
         self.world.query_scopes = checker.scopes;
         self.network = std::mem::take(&mut self.world.network);

@@ -322,8 +322,15 @@ impl Checker<'_> {
     }
 
     fn refuse_doubles(&mut self, expr: &Expr) -> bool {
-        let is_refused = expr.any(&|e| e.ty == Type::Double);
+        let hybrid = Type::Clock { hybrid: true };
+        let is_refused = expr.ty == hybrid
+            || expr.any(&|e| match &e.kind {
+                Kind::CompareWords(_, left, _) => left.ty.any(&|part| *part == Type::Double),
+                _ => e.ty == Type::Double,
+            });
         if is_refused {
+            // That says it all.
+            self.unknowns.clear();
             self.error(
                 codes::DOUBLE_IN_QUERY,
                 expr.span,

@@ -30,6 +30,8 @@ pub(super) enum Entity {
     Template(usize),
     /// An instantiation, by its place in the system section.
     Instantiation(usize),
+    /// A live sequence chart, or an instance of one.
+    Chart,
     /// A location of the template.
     Location(u32),
     /// Something about which a mistake was reported, or of which nothing is known.

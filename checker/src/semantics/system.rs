@@ -9,7 +9,7 @@ use super::typed::{Expr, Root};
 use super::types::Memory;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{AssignedValue, Clock, ClockAtom, Features, Location, Network};
-use crate::syntax::ast::{Declaration, Document, SystemItem};
+use crate::syntax::ast::{Declaration, Document, SystemItem, UnsupportedPart};
 
 impl Checker<'_> {
     /// Checks and lowers a model. Returns how its provisional offsets of words are to be read.
@@ -21,20 +21,13 @@ impl Checker<'_> {
             coordinates: Vec::new(),
         });
         self.world.network.initial_clocks.push(0);
-        for construct in &document.unsupported {
-            self.error(
-                codes::CONSTRUCT_UNSUPPORTED,
-                construct.span,
-                format!("not supported: {}", construct.text),
-                "remove them from the model",
-            );
-        }
         self.declarations(prelude);
         self.scopes.push(Scope::default());
         self.declarations(&document.declarations);
         for (i, template) in document.templates.iter().enumerate() {
             self.declare(&template.name, Entity::Template(i));
         }
+        self.charts(document);
         self.scopes.push(Scope::default());
         self.system_is_open = true;
         self.system(document);
@@ -43,6 +36,27 @@ impl Checker<'_> {
         self.hooks();
         self.world.query_scopes = std::mem::take(&mut self.scopes);
         relocation
+    }
+
+    /// Declares the live sequence charts: they observe the system, and are left out.
+    fn charts(&mut self, document: &Document) {
+        for construct in &document.unsupported {
+            let UnsupportedPart::Chart(name) = &construct.part else {
+                continue;
+            };
+            if !name.text.is_empty() {
+                self.declare(name, Entity::Chart);
+            }
+            self.report(
+                Diagnostic::new(
+                    codes::CHART_IGNORED,
+                    construct.span,
+                    format!("the {} is left out", construct.text),
+                )
+                .note("charts observe a system and do not change it; `sat:` queries are not supported")
+                .help("nothing is to be done for other queries"),
+            );
+        }
     }
 
     /// Priorities, hooks and progress measures.
@@ -175,6 +189,7 @@ impl Checker<'_> {
                 .help("use an ordinary clock if it matters"),
             );
         }
+        self.report_left_out();
         let network = &mut self.world.network;
         network.initial = network
             .processes

@@ -186,9 +186,11 @@ impl Checker<'_> {
 
     fn invariant(&mut self, expr: &ast::Expr, place: &str) -> (Guard, Vec<(ClockId, FunctionId)>) {
         self.locals.clear();
+        let before = self.unknowns.len();
         let invariant = self.expression(expr);
         self.expect_pure(&invariant, "an invariant");
         if !self.expect_condition(&invariant) {
+            self.unknowns.truncate(before);
             return (Guard::default(), Vec::new());
         }
         if let Type::Constraint(class) = invariant.ty
@@ -294,6 +296,7 @@ impl Checker<'_> {
                 root: Root::Local(local),
                 base: Size::default(),
                 mutable: false,
+                declared: Span::default(),
             };
             let set = ty.scalar_set();
             self.declare(name, Entity::Variable { place, ty });

@@ -36,6 +36,8 @@ pub(super) struct Place {
     pub(super) base: Size,
     /// Whether it may be assigned.
     pub(super) mutable: bool,
+    /// Where a variable was declared that could be left out (see `left_out`); nowhere for all others.
+    pub(super) declared: Span,
 }
 
 /// Offsets of words below this are variables; from it on, `meta` variables, until the layout is final.
@@ -206,6 +208,8 @@ pub(super) struct Parameter {
     pub(super) reference: bool,
     /// Whether it may not be assigned.
     pub(super) constant: bool,
+    /// Where it was declared, if it could be left out.
+    pub(super) declared: Span,
 }
 
 /// What code reads and writes; conservative.
@@ -466,10 +470,8 @@ impl Expr {
     /// Whether it changes a variable or a clock.
     pub(super) fn has_effect(&self) -> bool {
         self.any(&|e| match &e.kind {
-            Kind::Assign(..)
-            | Kind::Compound(..)
-            | Kind::Step { .. }
-            | Kind::AssignClock { .. } => true,
+            Kind::Assign(target, _) => !target.is_left_out(),
+            Kind::Compound(..) | Kind::Step { .. } | Kind::AssignClock { .. } => true,
             Kind::Call { signature, .. } => signature.may_write(),
             _ => false,
         })
@@ -484,9 +486,15 @@ impl Expr {
         })
     }
 
+    /// Whether it stands for a variable whose values are left out; a place in itself, it is not among [`Expr::is_place`].
+    fn is_left_out(&self) -> bool {
+        matches!(&self.kind, Kind::Unknown(_))
+    }
+
     /// Whether it changes something else than a local, itself and not in an expression below it.
     fn changes_state(&self) -> bool {
         match &self.kind {
+            Kind::Assign(target, _) if target.is_left_out() => false,
             Kind::Assign(target, _) | Kind::Compound(_, target, _) | Kind::Step { target, .. } => {
                 let place = target.variable();
                 !place.is_some_and(|place| matches!(place.root, Root::Local(_)))

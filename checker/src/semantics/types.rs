@@ -354,6 +354,26 @@ impl Type {
         }
     }
 
+    /// The same with hybrid clocks for all clocks.
+    pub(super) fn with_hybrid_clocks(&self) -> Type {
+        match self {
+            Type::Clock { .. } => Type::Clock { hybrid: true },
+            Type::Array(array) if self.size().clocks > 0 => {
+                let part = array.part.with_hybrid_clocks();
+                let index = array.index;
+                Type::Array(Arc::new(ArrayType { part, index }))
+            }
+            Type::Struct(record) if self.size().clocks > 0 => {
+                let fields = record.fields.iter();
+                let fields = fields.map(|(name, ty)| (name.clone(), ty.with_hybrid_clocks()));
+                Type::Struct(Arc::new(StructType {
+                    fields: fields.collect(),
+                }))
+            }
+            _ => self.clone(),
+        }
+    }
+
     /// Whether every value of the other type, read word by word, is one of this type: ranges may be wider here.
     pub(super) fn holds(&self, other: &Type) -> bool {
         match (self, other) {

@@ -27,8 +27,32 @@ pub struct Document {
     pub system: System,
     /// The queries of the file, in order; empty and comment-only formulas are left out.
     pub queries: Vec<QueryText>,
-    /// Constructs that were read and are not supported (LSC templates, dynamic templates, external functions): name and place.
-    pub unsupported: Vec<Name>,
+    /// Constructs that were read and are not supported: LSC templates, dynamic templates, external functions.
+    pub unsupported: Vec<Unsupported>,
+}
+
+/// A construct that was read and is not supported.
+#[derive(Clone, Debug)]
+pub struct Unsupported {
+    /// What it is, as messages call it.
+    pub text: String,
+    /// Where it stands.
+    pub span: Span,
+    /// What it is part of.
+    pub part: UnsupportedPart,
+}
+
+/// What an unsupported construct is part of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum UnsupportedPart {
+    /// The global declarations, the system section, or a query.
+    Whole,
+    /// A template, by its place in [`Document::templates`].
+    Template(usize),
+    /// It declares a dynamic template of this name.
+    DynamicTemplate(String),
+    /// It is a live sequence chart of this name.
+    Chart(Name),
 }
 
 /// The text of a query in a file, before it is parsed.
@@ -329,6 +353,8 @@ pub enum ExprKind {
     Deadlock,
     /// An expression that could not be read; a diagnostic was reported.
     Error,
+    /// A construct that is listed in [`Document::unsupported`].
+    Unsupported,
 }
 
 /// Unary operators.

@@ -1,6 +1,9 @@
 //! Declarations: types, variables, functions, priorities, hooks; what is recognised and not supported is recorded.
 
-use super::ast::{Block, Declaration, Expr, Function, Initialiser, Name, TypeExpr, Variable};
+use super::ast::{
+    Block, Declaration, Expr, Function, Initialiser, TypeExpr, Unsupported, UnsupportedPart,
+    Variable,
+};
 use super::codes;
 use super::lexer::TokenKind;
 use super::parser::{Dialect, Parser};
@@ -156,9 +159,10 @@ impl Parser<'_> {
         self.bump();
         let name = self.name("the name of the template");
         self.parameter_list();
-        self.unsupported.push(Name {
+        self.unsupported.push(Unsupported {
             text: format!("dynamic template `{}`", name.text),
             span: name.span,
+            part: UnsupportedPart::DynamicTemplate(name.text),
         });
         self.end_of_declaration("after the declaration", before);
     }
@@ -175,9 +179,10 @@ impl Parser<'_> {
         } else {
             self.skip_to(&[TokenKind::Semicolon]);
         }
-        self.unsupported.push(Name {
+        self.unsupported.push(Unsupported {
             text: "external functions (`import`)".to_owned(),
             span,
+            part: UnsupportedPart::Whole,
         });
         self.end_of_declaration("after the import", before);
     }

@@ -8,7 +8,9 @@
 //! order of evaluation stays the same. Other trees are refused beyond [`MAX_HEIGHT`] levels, so that every walk over a
 //! tree may recurse.
 
-use super::ast::{BinaryOp, Expr, ExprKind, Name, Quantifier, UnaryOp};
+use super::ast::{
+    BinaryOp, Expr, ExprKind, Name, Quantifier, UnaryOp, Unsupported, UnsupportedPart,
+};
 use super::codes;
 use super::keywords;
 use super::lexer::TokenKind;
@@ -480,13 +482,14 @@ impl Parser<'_> {
         if word != "foreach" && self.at(TokenKind::LeftParenthesis) {
             self.arguments();
         }
-        self.unsupported.push(Name {
+        self.unsupported.push(Unsupported {
             text: format!("dynamic templates (`{word}`)"),
             span,
+            part: UnsupportedPart::Whole,
         });
         self.height = 1;
         Expr {
-            kind: ExprKind::Error,
+            kind: ExprKind::Unsupported,
             span: self.since(span),
         }
     }

@@ -8,7 +8,7 @@
 //! * Every loop consumes a token per turn, and recursion stops at [`MAX_NESTING`] levels, so any text ends in bounded
 //!   time and stack.
 
-use super::ast::{Expr, ExprKind, Name};
+use super::ast::{Expr, ExprKind, Name, Unsupported};
 use super::codes;
 use super::keywords;
 use super::lexer::{Token, TokenKind, lex};
@@ -37,7 +37,7 @@ pub(super) struct Parser<'a> {
     pub(super) dialect: Dialect,
     pub(super) diagnostics: &'a mut Vec<Diagnostic>,
     /// Constructs that were recognised and that nothing behind the parser supports.
-    pub(super) unsupported: Vec<Name>,
+    pub(super) unsupported: Vec<Unsupported>,
     /// The height of the tree of the last expression that was read.
     pub(super) height: u32,
     source: SourceId,

@@ -65,7 +65,7 @@ impl Printer {
             ExprKind::String(text) => self.display(format_args!("\"{text}\"")),
             ExprKind::Name(name) => self.push(name),
             ExprKind::Deadlock => self.push("deadlock"),
-            ExprKind::Error => self.push("<error>"),
+            ExprKind::Error | ExprKind::Unsupported => self.push("<error>"),
             ExprKind::Field(object, name) => {
                 self.expr(object, level::POSTFIX, false);
                 self.push(".");

@@ -2,7 +2,7 @@
 
 use super::ast::{
     BinaryOp, Branchpoint, Declaration, Document, Edge, Expr, ExprKind, Location, Name, QueryText,
-    Sync, System, SystemItem, Template, TypeExpr,
+    Sync, System, SystemItem, Template, TypeExpr, UnsupportedPart,
 };
 use super::codes;
 use super::declarations::Scope;
@@ -244,6 +244,7 @@ impl Parser<'_> {
     /// `process Name(parameters) { … }`
     fn process_definition(&mut self, document: &mut Document) {
         let start = self.here();
+        let unsupported = self.unsupported.len();
         self.bump();
         let name = self.declared_name("the name of the process");
         let parameters = if self.at(TokenKind::LeftParenthesis) || self.dialect == Dialect::New {
@@ -281,6 +282,9 @@ impl Parser<'_> {
                 Diagnostic::new(codes::MISSING_INITIAL_LOCATION, start, message)
                     .help("add `init L;` after the states"),
             );
+        }
+        for construct in &mut self.unsupported[unsupported..] {
+            construct.part = UnsupportedPart::Template(document.templates.len());
         }
         document.templates.push(template);
     }

@@ -14,7 +14,10 @@ pub fn parse_query(span: Span, sources: &SourceMap) -> (Option<Query>, Vec<Diagn
     let mut query = parser.query();
     let unsupported = std::mem::take(&mut parser.unsupported);
     if let Some(first) = unsupported.into_iter().next() {
-        query.kind = QueryKind::Unsupported(first);
+        query.kind = QueryKind::Unsupported(Name {
+            text: first.text,
+            span: first.span,
+        });
     }
     if matches!(query.kind, QueryKind::Unsupported(_)) {
         // Operators of temporal logics that are not read at all are no tokens here.

@@ -5,7 +5,7 @@
 //!
 //! Source: the UPPAAL manual on file formats, and how utap reads what it leaves open.
 
-use super::ast::{Document, Expectation, Name, QueryText};
+use super::ast::{Document, Expectation, Name, QueryText, Unsupported, UnsupportedPart};
 use super::codes;
 use super::keywords::is_reserved;
 use super::lexer::{end_of_word, lex, to_u32};
@@ -243,9 +243,13 @@ impl Reader<'_, '_> {
 
     fn sequence_chart(&mut self, node: Node) {
         let name = child(node, "name").and_then(|name| name.text());
-        let text = format!("live sequence chart `{}`", name.unwrap_or("").trim());
+        let name = name.unwrap_or("").trim().to_owned();
+        let text = format!("live sequence chart `{name}`");
         let span = self.tag(node, &text);
-        self.document.unsupported.push(Name { text, span });
+        let name = Name { text: name, span };
+        let part = UnsupportedPart::Chart(name);
+        let construct = Unsupported { text, span, part };
+        self.document.unsupported.push(construct);
     }
 
     /// The name that stands in an element; `None` if it is blank.

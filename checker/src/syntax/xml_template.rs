@@ -8,7 +8,7 @@
     reason = "the path of a method is not general over the lifetime of the parser"
 )]
 
-use super::ast::{Branchpoint, Edge, LabelKind, Location, Name, Point, Template};
+use super::ast::{Branchpoint, Edge, LabelKind, Location, Name, Point, Template, UnsupportedPart};
 use super::codes;
 use super::keywords::{is_built_in_function, is_reserved};
 use super::lexer::to_u32;
@@ -45,6 +45,7 @@ impl Reader<'_, '_> {
             let message = format!("`{}` is the name of a built-in function", name.text);
             self.error(codes::BUILT_IN_AS_NAME, name.span, message);
         }
+        let unsupported = self.document.unsupported.len();
         let parameters = child(node, "parameter").and_then(|n| {
             self.parse(n, format!("{place}, parameters"), |parser| {
                 parser.parameters()
@@ -72,6 +73,9 @@ impl Reader<'_, '_> {
             }
         }
         template.initial = self.initial(node, &place);
+        for construct in &mut self.document.unsupported[unsupported..] {
+            construct.part = UnsupportedPart::Template(self.document.templates.len());
+        }
         self.document.templates.push(template);
     }
 

@@ -119,7 +119,7 @@ pub(crate) fn shape(expr: &Expr) -> String {
             shape(body)
         ),
         ExprKind::Deadlock => "deadlock".to_owned(),
-        ExprKind::Error => "error".to_owned(),
+        ExprKind::Error | ExprKind::Unsupported => "error".to_owned(),
     }
 }
 
