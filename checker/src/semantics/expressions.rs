@@ -2,7 +2,7 @@
 
 use super::checker::Checker;
 use super::codes;
-use super::operators::{as_truth, integer_operator, to_double, truth_interval};
+use super::operators::{as_truth, integer_operator, is_clock_term, to_double, truth_interval};
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{Class, Index, Memory, Size, Type};
@@ -324,6 +324,13 @@ impl Checker<'_> {
             );
             return Expr::error(span);
         }
+        let is_value = |one: &Expr, other: &Expr| is_clock_term(one) && other.ty.is_number();
+        let is_mixed = is_value(&then, &otherwise) || is_value(&otherwise, &then);
+        let (then, otherwise) = if is_mixed && !self.is_query {
+            (self.clock_value(then), self.clock_value(otherwise))
+        } else {
+            (then, otherwise)
+        };
         let (ty, then, otherwise) = if then.ty == otherwise.ty {
             (then.ty.clone(), then, otherwise)
         } else if then.ty.is_integral() && otherwise.ty.is_integral() {
@@ -561,7 +568,10 @@ impl Checker<'_> {
             },
         );
         let outer = std::mem::take(&mut self.needs_unrolling);
-        let checked = self.expression(body);
+        let mut checked = self.expression(body);
+        if quantifier == Quantifier::Sum && !self.is_query {
+            checked = self.clock_value(checked);
+        }
         let members_differ = std::mem::replace(&mut self.needs_unrolling, outer);
         self.scopes.pop();
         if quantifier == Quantifier::Sum && checked.ty == Type::Double {

@@ -516,6 +516,13 @@ impl Expr {
     }
 }
 
+impl Parameter {
+    /// Whether words behind it may change. What becomes of clocks is known from the body.
+    fn may_be_written(&self) -> bool {
+        self.reference && !self.constant && self.ty.size().words > 0
+    }
+}
+
 impl Signature {
     /// Whether a call may change something outside the function.
     pub(super) fn may_write(&self) -> bool {
@@ -524,10 +531,7 @@ impl Signature {
             .is_some_and(|unknown| unknown.may_write)
             || !self.effects.writes.is_empty()
             || !self.effects.assignments.is_empty()
-            || self
-                .parameters
-                .iter()
-                .any(|parameter| parameter.reference && !parameter.constant)
+            || self.parameters.iter().any(Parameter::may_be_written)
     }
 }
 
