@@ -149,6 +149,33 @@ fn one_enumeration_of_moves_ends() {
     );
 }
 
+/// Processes so many that the moves of all successors of one state take long.
+const MANY: &str = "
+    process P(const int[1,1500] me) { clock x; int[0,3] n; state S, T; init S;
+      trans S -> T { guard x >= me % 7; assign n = me % 4; }, T -> S { guard x <= 90; assign x = 0; }; }
+    system P;";
+
+#[test]
+fn one_state_with_many_moves_ends_before_it_is_explored() {
+    let options = Options {
+        limits: limits_of(StopReason::Time),
+        ..Options::default()
+    };
+    for query in ["A[] not deadlock", "E<> deadlock"] {
+        let answer = check(MANY, query, &options);
+        assert_eq!(
+            answer.verdict,
+            Verdict::Unknown(StopReason::Time),
+            "{query}"
+        );
+        assert!(
+            answer.counters.stored < 1500,
+            "{query}: {:?}",
+            answer.counters
+        );
+    }
+}
+
 #[test]
 fn one_operation_on_zones_ends() {
     let all = [

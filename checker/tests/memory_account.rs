@@ -1,13 +1,14 @@
-//! The bytes that a game says it takes are those that it takes.
+//! The bytes that a game says it takes are those that it takes, and the limit of memory holds where there are many clocks.
 //!
-//! An allocator counts what lives. What it takes is compared with the account of the answer, by which the limit of memory goes.
+//! An allocator counts what lives. What it takes is compared with the account of the answer, by which the limit of memory goes, and with
+//! the limit.
 
 #![expect(unsafe_code, reason = "an allocator is not safe to write")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::game::Nodes;
 use checker::zones::federation::block_bytes;
 
@@ -85,6 +86,12 @@ const LEAST_PERCENT: u64 = 70;
 
 /// One test, since all of them would share the counts.
 #[test]
+fn account_is_what_is_taken() {
+    account_is_what_games_take();
+    limit_holds_where_there_are_many_clocks();
+    bounds_of_clocks_take_no_table_of_all();
+}
+
 fn account_is_what_games_take() {
     let trains = (games::trains(4, "-u->"), games::ONE_ON_THE_BRIDGE);
     let cell = (cell(9, "-u->"), ALL_DONE);
@@ -111,4 +118,67 @@ fn account_is_what_games_take() {
             answer.peak_bytes
         );
     }
+}
+
+/// Jobs with a clock each that pass through committed locations; the environment begins them where `arrow` is `-u->`.
+fn jobs(count: usize, arrow: &str) -> String {
+    format!(
+        "process Job(const int[1,{count}] id) {{
+  clock x;
+  state Idle {{ x <= 9 }}, Begun, Works {{ x <= 5 }};
+  commit Begun;
+  init Idle;
+  trans Idle {arrow} Begun {{ guard x >= id % 5; assign x = 0; }}, Begun {arrow} Works {{ }},
+        Works {arrow} Idle {{ guard x >= 2; assign x = 0; }};
+}}
+system Job;
+"
+    )
+}
+
+/// What is allocated may come to so much of a limit: vectors that grow have room to spare, which takes no memory before it is written to.
+const MOST_PERCENT: u64 = 220;
+
+fn limit_holds_where_there_are_many_clocks() {
+    const LIMIT: u64 = 16 << 20;
+    let cases = [
+        (jobs(200, "->"), "E<> false", false),
+        (jobs(200, "->"), "A[] not deadlock", false),
+        // What is explored for the strategy of the environment counts, too.
+        (jobs(200, "-u->"), "control: A<> false", true),
+    ];
+    for (text, query, strategy) in cases {
+        let options = Options {
+            code: CodeEngine::Interpreter,
+            strategy,
+            limits: Limits {
+                states: Some(1000),
+                memory_bytes: Some(LIMIT),
+                ..Limits::default()
+            },
+            ..Options::default()
+        };
+        let (taken, _) = measured(&text, query, &options);
+        let percent = taken as u64 * 100 / LIMIT;
+        assert!(
+            percent <= MOST_PERCENT,
+            "{query}: {percent} % of the limit are taken"
+        );
+    }
+}
+
+fn bounds_of_clocks_take_no_table_of_all() {
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        limits: Limits {
+            states: Some(1),
+            ..Limits::default()
+        },
+        ..Options::default()
+    };
+    let clocks = 1000;
+    let (taken, _) = measured(&jobs(clocks, "->"), "E<> false", &options);
+    // A table of the bounds of all clocks in all locations of all processes has three times eight bytes for each pair of clocks.
+    let zones = taken / (4 * clocks * clocks);
+    assert!(zones <= 6, "as much as {zones} zones is taken");
 }

@@ -21,6 +21,7 @@ use crate::search::limits::{Counters, StopReason};
 use crate::search::liveness::Ending;
 use crate::search::reach::Trace;
 use crate::verify::strategy::Outcome as StrategyCheck;
+use crate::zones::Bound;
 
 use super::certificate::{CLOCKS_GREW, Certificate};
 use super::endless::{always, leads_to};
@@ -161,8 +162,14 @@ impl<'a> Subject<'a> {
 /// Answers a query that [`super::LoadedModel`] has accepted.
 pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> Answer {
     let start = Instant::now();
-    let mut watch = LimitWatch::new(options.limits.clone());
-    let result = watch.bound(|watch| answer_within(subject, query, options, watch));
+    let zone_bytes = subject.network.clocks.len().pow(2) * size_of::<Bound>();
+    let at_hand_bytes = (zones_at_hand(&query.kind) * zone_bytes) as u64;
+    let mut watch = LimitWatch::with_at_hand(options.limits.clone(), at_hand_bytes);
+    let result = watch.bound(|watch| {
+        // Where there are thousands of clocks this alone may be too much.
+        cancellation::ask_for(zone_bytes);
+        answer_within(subject, query, options, watch)
+    });
     let mut answer = result.unwrap_or_else(|(reason, counters)| {
         new_answer(Verdict::Unknown(reason), Evidence::default(), counters)
     });
@@ -183,6 +190,21 @@ pub(super) fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> 
     answer.seconds = start.elapsed().as_secs_f64();
     answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
     answer
+}
+
+/// So many zones stand side by side in one step of the search, beside those of its account, at most about: where it is a matter of cutting
+/// zones by each other, more.
+fn zones_at_hand(kind: &QueryKind) -> usize {
+    match kind {
+        QueryKind::Reachable(predicate) | QueryKind::Invariantly(predicate)
+            if !predicate::has_deadlock(predicate) =>
+        {
+            1
+        }
+        QueryKind::Extremum { .. } => 1,
+        QueryKind::Control { .. } => 4,
+        _ => 8,
+    }
 }
 
 /// The same, within the limits.

@@ -58,6 +58,8 @@ struct Patience {
     start: Instant,
     timeout: Option<Duration>,
     memory_bytes: Option<u64>,
+    /// What the search takes that no counter tells: the zones that one operation has at hand.
+    at_hand_bytes: u64,
     observer: Option<Observer>,
     /// The thread that asked: the observer is called by it alone.
     owner: ThreadId,
@@ -84,6 +86,7 @@ impl Patience {
     fn look_beside(&self, bytes: u64) -> Option<StopReason> {
         let mut seen = self.seen();
         let memory = seen.counters.bytes.saturating_add(bytes);
+        let memory = memory.saturating_add(self.at_hand_bytes);
         let now = Instant::now();
         if self.timeout.is_some_and(|limit| now - self.start >= limit) {
             seen.stop = Some(StopReason::Time);
@@ -120,6 +123,11 @@ impl std::fmt::Debug for Patience {
 
 impl LimitWatch {
     pub(super) fn new(limits: Limits) -> LimitWatch {
+        LimitWatch::with_at_hand(limits, 0)
+    }
+
+    /// One that counts so many bytes beside those that the search tells.
+    pub(super) fn with_at_hand(limits: Limits, at_hand_bytes: u64) -> LimitWatch {
         let now = Instant::now();
         let seen = Seen {
             counters: Counters::default(),
@@ -131,6 +139,7 @@ impl LimitWatch {
                 start: now,
                 timeout: limits.timeout,
                 memory_bytes: limits.memory_bytes,
+                at_hand_bytes,
                 observer: limits.observer.clone(),
                 owner: thread::current().id(),
                 seen: Mutex::new(seen),
@@ -189,11 +198,9 @@ impl Watch for LimitWatch {
         {
             return Some(StopReason::States);
         }
-        if self
-            .limits
-            .memory_bytes
-            .is_some_and(|limit| counters.bytes >= limit)
-        {
+        if self.limits.memory_bytes.is_some_and(|limit| {
+            counters.bytes.saturating_add(self.patience.at_hand_bytes) >= limit
+        }) {
             return Some(StopReason::Memory);
         }
         self.patience.look(counters)

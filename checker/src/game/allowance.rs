@@ -28,6 +28,7 @@ impl Solver<'_, '_, '_> {
     /// Looks whether to go on, between operations.
     pub(super) fn look(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
         let counters = self.counters();
+        self.graph.counted_zones = self.graph.zones.len();
         let reason = watch.look(&counters);
         if reason.is_some() {
             return reason;

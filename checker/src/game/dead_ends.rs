@@ -7,15 +7,15 @@
 use crate::ir::{LocationId, Network, Process, ProcessId};
 use crate::network::Failure;
 use crate::network::possibility::Possibility;
-use crate::search::limits::{StopReason, Watch};
+use crate::search::limits::{StopReason, Watch, states_between_looks};
 use crate::zones::Zone;
 
 use super::graph::{Edge, Graph, NONE, Objective, Origin, Standing};
 use super::programs::ProgramId;
 use super::reach::Solver;
 
-/// Expanded nodes between two looks at the limits.
-const BETWEEN_LOOKS: usize = 64;
+/// Expanded nodes between two looks at the limits, at most.
+const BETWEEN_LOOKS: u64 = 64;
 
 /// The locations from which nothing sought can come.
 #[derive(Debug, Default)]
@@ -137,6 +137,7 @@ impl Solver<'_, '_, '_> {
         }
         // What follows after a dead end is a dead end, so all of it is made now.
         let mut next = self.graph.nodes.len();
+        let look_every = states_between_looks(BETWEEN_LOOKS, self.graph.dimension()) as usize;
         self.graph.go_on_in_dead_ends()?;
         self.adopt_new_nodes();
         while let Some(node) = self.graph.nodes.get(next) {
@@ -145,7 +146,7 @@ impl Solver<'_, '_, '_> {
                 self.adopt_new_nodes();
             }
             next += 1;
-            if next.is_multiple_of(BETWEEN_LOOKS)
+            if next.is_multiple_of(look_every)
                 && let Some(reason) = self.look(watch)
             {
                 return Ok(Some(reason));

@@ -22,6 +22,7 @@
 //! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly. Where two clocks are compared,
 //! zones are cut along the comparisons, and a move has an edge for each piece; there are no chains then.
 
+use crate::cancellation;
 use crate::ir::Predicate;
 use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
 use crate::search::store::{DiscreteId, StateStore};
@@ -36,6 +37,9 @@ pub use super::deadlines::Deadline;
 use super::programs::{ProgramId, ProgramStep, Programs};
 use super::trails::{Ending, Root, Trails};
 use super::urgency::Urgent;
+
+/// Bytes of zones that the account need not be told of.
+const MOST_UNTOLD_BYTES: usize = 4 << 20;
 
 /// Moves in one chain, at most; longer ones are cut by a node, so that loops end.
 pub(super) const LONGEST_CHAIN: usize = 64;
@@ -148,6 +152,8 @@ pub struct Graph<'s, 'a> {
     pub(super) urgent: rustc_hash::FxHashMap<u32, Urgent>,
     /// The bytes that the zones of `parts` and `urgent` take.
     cut_bytes: usize,
+    /// How many zones there were when the account was told last.
+    pub(super) counted_zones: usize,
     /// How many states were expanded, those inside chains included.
     pub explored: u64,
     words: Vec<i32>,
@@ -246,6 +252,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             spare: network.initial.clone(),
             moves: Moves::default(),
             chain_moves: Moves::default(),
+            counted_zones: 0,
             steps: Vec::new(),
             effect: ClockEffect::default(),
             entries: Vec::new(),
@@ -325,6 +332,8 @@ impl<'s, 'a> Graph<'s, 'a> {
             + self.symbolic.bytes()
             + nodes
             + size_of_val(&*self.edges)
+            + self.moves.heap_bytes()
+            + self.chain_moves.heap_bytes()
             + cut) as u64
     }
 
@@ -484,6 +493,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         let mut moves = std::mem::take(&mut self.moves);
         self.load(node, &mut words);
         let result = self.expand_from(node, &mut words, &mut moves);
+        self.symbolic.stepper.moves_beside = 0;
         self.words = words;
         self.moves = moves;
         result
@@ -497,6 +507,7 @@ impl<'s, 'a> Graph<'s, 'a> {
     ) -> Result<(), Failure> {
         self.explored += 1;
         let root = self.moves_of(node, words, moves)?;
+        self.symbolic.stepper.moves_beside = moves.heap_bytes();
         let delays = self.symbolic.may_delay_with(words, moves)?;
         let first = self.edges.len() as u32;
         for ordinal in 0..moves.len() as u32 {
@@ -684,7 +695,18 @@ impl<'s, 'a> Graph<'s, 'a> {
             program: self.programs.intern(&self.steps),
             totality: None,
         };
+        self.ask_for_zones();
         self.add_edge(target, &mut ending, origin, length)
+    }
+
+    /// Asks whether there may be the zones that the account was not told of yet, if they are many: one node can have thousands of
+    /// successors.
+    fn ask_for_zones(&self) {
+        let count = self.zones.len() - self.counted_zones;
+        let bytes = count * self.dimension().pow(2) * size_of::<Bound>();
+        if bytes > MOST_UNTOLD_BYTES {
+            cancellation::ask_for(bytes);
+        }
     }
 
     /// Adds an edge to the state with these words in which a chain ended.

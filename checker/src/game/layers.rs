@@ -86,6 +86,7 @@ impl Solver<'_, '_, '_> {
                 until_look -= 1;
                 if until_look == 0 {
                     until_look = BETWEEN_LOOKS;
+                    self.graph.counted_zones = self.graph.zones.len();
                     if watch.look(&self.counters()).is_some() {
                         return Ok(false);
                     }

@@ -612,6 +612,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         work: impl FnOnce(&mut Self, &mut Patience<'_>) -> R,
     ) -> (R, Option<StopReason>) {
         let counters = self.counters();
+        self.graph.counted_zones = self.graph.zones.len();
         let zone_bytes = self.zone_bytes();
         let mut reason = None;
         let mut goes_on = |zones: usize| {

@@ -94,6 +94,39 @@ impl Classes {
 /// Lower and upper bounds of all clocks in all nodes of a process.
 type Table = Vec<Vec<(i32, i32)>>;
 
+/// What is asked of all bounds together.
+#[derive(Default)]
+struct Summary {
+    /// The greatest bound; 0 without any.
+    greatest: i32,
+    /// Whether a node of a process has one clock bounded from below and another one from above.
+    has_opposed_clocks: bool,
+}
+
+impl Summary {
+    /// The ceilings of the nodes of a process, which count from now on.
+    fn of(&mut self, table: Table, is_maximum: bool) -> Vec<Vec<Ceiling>> {
+        let nodes = table.into_iter().map(|bounds| {
+            let bounds = self.bounds(bounds, is_maximum);
+            self.has_opposed_clocks = self.has_opposed_clocks || are_opposed(&bounds);
+            to_ceilings(&bounds).each()
+        });
+        nodes.collect()
+    }
+
+    /// The bounds of one node, or of all, as the abstraction needs them.
+    fn bounds(&mut self, mut bounds: Vec<(i32, i32)>, is_maximum: bool) -> Vec<(i32, i32)> {
+        for bound in &mut bounds {
+            let most = bound.0.max(bound.1);
+            if is_maximum {
+                *bound = (most, most);
+            }
+            self.greatest = self.greatest.max(most);
+        }
+        bounds
+    }
+}
+
 impl ClockBounds {
     /// The bounds of a network; `atoms` are comparisons of queries, which matter in every location.
     pub fn new(network: &Network, atoms: &[ClockAtom], abstraction: Abstraction) -> ClockBounds {
@@ -110,11 +143,20 @@ impl ClockBounds {
         let partners = Partners::new(network);
         let mut analysis = Analysis::new(network);
         let (mut tables, mut tracked) = (Vec::new(), Vec::new());
+        let mut summary = Summary::default();
+        let is_maximum = abstraction == Abstraction::Maximum;
+        let mut ceilings = Vec::new();
         for (index, process) in network.processes.iter().enumerate() {
             let valuations = analysis.of(index);
             let partners = partners.as_ref();
-            tables.push(fixpoint(process, &valuations, partners, clock_count, reset));
+            let table = fixpoint(process, &valuations, partners, clock_count, reset);
             tracked.push(valuations.tracked);
+            if network.features.clock_copies {
+                tables.push(table);
+            } else {
+                // One process at a time: tables have a place for every clock, and processes bounds on few.
+                ceilings.push(summary.of(table, is_maximum));
+            }
         }
         let mut everywhere = vec![(NONE, NONE); clock_count.max(1)];
         for atom in atoms {
@@ -122,26 +164,17 @@ impl ClockBounds {
         }
         if network.features.clock_copies {
             spread_over_copies(network, &mut tables, &mut everywhere);
+            ceilings.extend(
+                tables
+                    .into_iter()
+                    .map(|table| summary.of(table, is_maximum)),
+            );
         }
-        if abstraction == Abstraction::Maximum {
-            let all = tables.iter_mut().flatten().flatten();
-            all.chain(&mut everywhere)
-                .for_each(|bound| *bound = (bound.0.max(bound.1), bound.0.max(bound.1)));
-        }
-        let has_opposed_clocks = tables.iter().flatten().any(|bounds| are_opposed(bounds));
-        let ceilings: Vec<Vec<Vec<Ceiling>>> = tables
-            .iter()
-            .map(|table| {
-                let tables = table.iter();
-                tables.map(|bounds| to_ceilings(bounds).each()).collect()
-            })
-            .collect();
+        let opposed = summary.has_opposed_clocks;
+        let everywhere = to_ceilings(&summary.bounds(everywhere, is_maximum));
         let classes = ceilings.iter().zip(&tracked).enumerate();
         let classes =
             classes.filter_map(|(process, (nodes, tracked))| Classes::new(process, nodes, tracked));
-        let all = tables.iter().flatten().flatten().chain(&everywhere);
-        let greatest = all.map(|bound| bound.0.max(bound.1)).max().unwrap_or(0);
-        let everywhere = to_ceilings(&everywhere);
         ClockBounds {
             classes: classes.collect(),
             ceilings,
@@ -149,9 +182,9 @@ impl ClockBounds {
             everywhere,
             abstraction,
             differences,
-            greatest: greatest.max(0),
+            greatest: summary.greatest,
             has_differences: network.features.diagonals || atoms.iter().any(is_difference),
-            has_opposed_clocks,
+            has_opposed_clocks: opposed,
         }
     }
 

@@ -238,8 +238,8 @@ impl Stepper<'_> {
                 check_count(out)?;
                 cancellation::work(UNITS_FOR_MOVE);
                 if out.len().is_multiple_of(MANY_MOVES) {
-                    // The lists are about to grow to more than this, and may double.
-                    cancellation::ask_for(2 * out.heap_bytes());
+                    // The lists are about to grow to more than this, and may double while the old ones are still there.
+                    cancellation::ask_for(3 * out.heap_bytes() + self.moves_beside);
                 }
             } else {
                 self.rank += ways;

@@ -4,6 +4,7 @@
 //! * The order of the moves is that of processes, then edges, select values, partners, branches.
 //! * Where the guard of an edge does not hold, its channel is not looked at: it may have none.
 
+use crate::cancellation;
 use crate::exec::{Context, EmittedConstraint, Executor, RunTimeError};
 use crate::ir::{ChannelId, FunctionId, Guard, RunTimeErrorKind};
 
@@ -17,6 +18,12 @@ use super::tables::EdgeEntry;
 
 /// The number of no channel.
 const NO_CHANNEL: u32 = u32::MAX;
+
+/// What it takes to look at the location of a process, to ask whether one receives, and to put a move together: see
+/// [`cancellation::work`].
+const UNITS_FOR_PROCESS: usize = 8;
+const UNITS_FOR_RECEIVER: usize = 16;
+const UNITS_FOR_MOVE: usize = 256;
 
 /// One enabled edge instance: a process, an edge, its select values and its clock constraints.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +76,7 @@ impl<'a> Stepper<'a> {
             }
             check_count(out)?;
         }
+        cancellation::work(UNITS_FOR_PROCESS * self.tables.len() + UNITS_FOR_MOVE * out.len());
         Ok(())
     }
 
@@ -165,7 +173,9 @@ impl<'a> Stepper<'a> {
         words: &mut [i32],
         out: &mut Moves,
     ) -> Result<(), RunTimeError> {
-        for index in 0..self.receivers[channel as usize].len() {
+        let receivers = self.receivers[channel as usize].len();
+        cancellation::work(UNITS_FOR_RECEIVER * receivers);
+        for index in 0..receivers {
             let receiver = self.receivers[channel as usize][index];
             if receiver == sender
                 || (needs_committed && !self.is_process_committed(receiver, words))

@@ -115,7 +115,7 @@ impl Moves {
     }
 
     /// The bytes that the moves take beside the value itself.
-    pub(super) fn heap_bytes(&self) -> usize {
+    pub(crate) fn heap_bytes(&self) -> usize {
         block_bytes(size_of_val(&*self.headers))
             + block_bytes(size_of_val(&*self.parts))
             + block_bytes(size_of_val(&*self.constraints))

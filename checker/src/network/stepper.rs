@@ -61,6 +61,8 @@ pub struct Stepper<'a> {
     pub(super) round: u64,
     /// The channels of the instances of one edge.
     pub(super) channels: Vec<u32>,
+    /// The bytes of moves that whoever asks for more has at hand.
+    pub(crate) moves_beside: usize,
     /// Moves that were put together before.
     pub(super) offers: Offers,
     /// What is evaluated while moves are put together to be remembered.
@@ -113,6 +115,7 @@ impl<'a> Stepper<'a> {
                 .collect(),
             round: 0,
             channels: Vec::new(),
+            moves_beside: 0,
             offers: Offers::new(network.processes.len()),
             record: None,
         }

@@ -17,6 +17,7 @@
 use hashbrown::HashTable;
 use rustc_hash::FxHashMap;
 
+use crate::cancellation;
 use crate::exec::{EmittedAssignment, EmittedConstraint};
 use crate::ir::{ClockId, Network};
 use crate::zones::clocks;
@@ -48,6 +49,8 @@ impl Default for MemoLimits {
     }
 }
 
+/// Where not as many zones fit nothing is remembered: a state and its successors would not be there together.
+const FEWEST_ZONES: usize = 16;
 /// At most so many states do not ask.
 const LONGEST_PAUSE: u32 = 1 << 22;
 /// After so many pairs what was found and missed before counts half.
@@ -121,11 +124,13 @@ impl ZoneMemo {
         let features = &network.features;
         let dimension = network.clocks.len().max(1);
         let is_possible = dimension > 1 && !features.stopwatches && !features.clock_copies;
+        let limits = MemoLimits::default();
         ZoneMemo {
             dimension,
-            is_possible,
+            is_possible: is_possible
+                && FEWEST_ZONES * dimension * dimension * size_of::<Bound>() <= limits.bytes,
             needs_entered: true,
-            limits: MemoLimits::default(),
+            limits,
             zones: ZoneTable::new(dimension),
             reduced: ZoneTable::of_size(dimension * dimension + dimension),
             effects: Effects::default(),
@@ -286,6 +291,7 @@ impl<'a> Symbolic<'a> {
         (known, source): (KnownZone, &[Bound]),
         zone: &mut [Bound],
     ) -> Result<Option<KeptZone>, Failure> {
+        cancellation::work(words.len() + zone.len());
         if let Some(offered) = one.offered
             && let Some(Some(fixed)) = self.memo.fixed.get(&offered)
             && let Some(outcome) = self.memo.find(known.zone, fixed.effect)
@@ -337,6 +343,10 @@ impl<'a> Symbolic<'a> {
             return Ok(self.memo.result(outcome, zone));
         }
         let (entered, kept) = if self.compute(words, source, may_delay, zone)? {
+            // A single state may have successors without end.
+            if self.memo.used_bytes() > self.memo.limits.bytes {
+                self.memo.forget();
+            }
             self.intern(words, zone)
         } else {
             (NOTHING, NOTHING)
@@ -347,7 +357,9 @@ impl<'a> Symbolic<'a> {
             entered,
             kept,
         };
-        self.memo.insert(outcome);
+        if self.is_known(known) {
+            self.memo.insert(outcome);
+        }
         Ok(self.memo.result(outcome, zone))
     }
 

@@ -4,13 +4,16 @@
 //! durations, with coefficients -1, 0 and 1. Numbers are fractions beside a multiple of an infinitesimal, which makes strict bounds weak
 //! ones; in the end the infinitesimal becomes small enough for all of them.
 //!
-//! Invariant: every row is a basic variable as a sum of multiples of the others, which are not basic and at or above their least
-//! values; `value` satisfies all rows.
+//! Invariants:
+//! * Every row is a basic variable as a sum of multiples of the others, which are not basic and at or above their least values;
+//!   `value` satisfies all rows.
+//! * A row holds the coefficients that are not 0, by ascending variable.
 //!
 //! Source: B. Dutertre, L. de Moura, "A Fast Linear-Arithmetic Solver for DPLL(T)", CAV 2006 (the tableau, bounds that come and
 //! go, and infinitesimals); R. G. Bland, "New finite pivoting rules for the simplex method", 1977 (why it ends).
 //!
-//! Cost: a step takes rows times columns; numbers that outgrow 128 bits end it.
+//! Cost: a step takes at most rows times columns, and hardly more than the coefficients that are not 0, of which rows have few; numbers
+//! that outgrow 128 bits end it.
 
 use crate::cancellation;
 
@@ -20,8 +23,8 @@ pub(super) struct TooHard;
 
 /// Steps of one search for durations, at most.
 const MOST_PIVOTS: u32 = 20_000;
-/// Rows times columns, at most.
-const MOST_CELLS: usize = 4_000_000;
+/// Coefficients of all rows, at most.
+const MOST_CELLS: usize = 1_000_000;
 
 /// So many are asked for before they are made.
 const MANY_CELLS: usize = 1 << 15;
@@ -141,6 +144,9 @@ pub(super) struct LinearBound {
     pub(super) least: (i64, i64),
 }
 
+/// Multiples of variables, by ascending variable; none is 0.
+type Row = Vec<(usize, Fraction)>;
+
 /// Durations under bounds, with a way back.
 #[derive(Debug, Default)]
 pub(super) struct Durations {
@@ -149,8 +155,8 @@ pub(super) struct Durations {
     least: Vec<Option<Amount>>,
     /// The variables of the waits.
     waits: Vec<usize>,
-    /// By row: its basic variable, and by variable its coefficient.
-    rows: Vec<(usize, Vec<Fraction>)>,
+    /// By row: its basic variable, and what that is the sum of.
+    rows: Vec<(usize, Row)>,
     /// By variable: its row, if it is basic.
     row_of: Vec<Option<usize>>,
     /// The variables of bounds in the order in which they were required.
@@ -171,9 +177,6 @@ impl Durations {
         self.value.push(Amount::ZERO);
         self.least.push(None);
         self.row_of.push(None);
-        for (_, row) in &mut self.rows {
-            row.push(Fraction::ZERO);
-        }
         self.value.len() - 1
     }
 
@@ -209,15 +212,15 @@ impl Durations {
 
     /// Adds a bound and finds durations that satisfy all; returns false if there are none, and then they mean nothing until it is undone.
     pub(super) fn require(&mut self, bound: &LinearBound) -> Result<bool, TooHard> {
-        let cells = (self.rows.len() + 1).saturating_mul(self.value.len() + 1);
+        let cells = self.rows.iter().map(|(_, row)| row.len()).sum::<usize>();
         if cells > MOST_CELLS {
             return Err(TooHard);
         }
         if cells > MANY_CELLS {
-            cancellation::ask_for(cells * size_of::<Fraction>());
+            cancellation::ask_for(cells * size_of::<(usize, Fraction)>());
         }
         let variable = self.add_variable();
-        let mut row = vec![Fraction::ZERO; self.value.len()];
+        let (mut row, mut waits) = (Row::new(), Row::new());
         let signed = bound.plus.iter().map(|&wait| (wait, Fraction::ONE));
         let minus = bound
             .minus
@@ -226,10 +229,12 @@ impl Durations {
         for (wait, factor) in signed.chain(minus) {
             let wait = self.waits[wait];
             match self.row_of[wait] {
-                None => row[wait] = row[wait].plus(factor)?,
+                None => waits.push((wait, factor)),
                 Some(other) => add_multiple(&mut row, &self.rows[other].1, factor)?,
             }
         }
+        waits.sort_by_key(|&(wait, _)| wait);
+        add_multiple(&mut row, &waits, Fraction::ONE)?;
         self.value[variable] = self.sum(&row)?;
         self.least[variable] = Some(amount(bound.least));
         self.row_of[variable] = Some(self.rows.len());
@@ -238,12 +243,10 @@ impl Durations {
         self.repair()
     }
 
-    fn sum(&self, row: &[Fraction]) -> Result<Amount, TooHard> {
+    fn sum(&self, row: &Row) -> Result<Amount, TooHard> {
         let mut sum = Amount::ZERO;
-        for (factor, value) in row.iter().zip(&self.value) {
-            if !factor.is_zero() {
-                sum = sum.plus(value.times(*factor)?)?;
-            }
+        for &(variable, factor) in row {
+            sum = sum.plus(self.value[variable].times(factor)?)?;
         }
         Ok(sum)
     }
@@ -281,12 +284,12 @@ impl Durations {
 
     /// The first variable that can change so that the sum of a row grows.
     fn helper(&self, row: usize) -> Result<Option<usize>, TooHard> {
-        for (variable, factor) in self.rows[row].1.iter().enumerate() {
+        for &(variable, factor) in &self.rows[row].1 {
             let can_sink = || match self.least[variable] {
                 None => Ok(true),
                 Some(least) => least.is_less(self.value[variable]),
             };
-            if factor.is_positive() || !factor.is_zero() && can_sink()? {
+            if factor.is_positive() || can_sink()? {
                 return Ok(Some(variable));
             }
         }
@@ -295,31 +298,27 @@ impl Durations {
 
     /// Makes the basic variable of a row its least value, by changing another one, which becomes basic.
     fn pivot(&mut self, row: usize, helper: usize) -> Result<(), TooHard> {
-        let (basic, mut own) = (self.rows[row].0, self.rows[row].1.clone());
-        let Some(least) = self.least[basic] else {
+        let basic = self.rows[row].0;
+        let (Some(least), Some(place)) = (self.least[basic], place_in(&self.rows[row].1, helper))
+        else {
             return Err(TooHard);
         };
-        let factor = own[helper].inverse()?;
+        let mut own = std::mem::take(&mut self.rows[row].1);
+        let factor = own.remove(place).1.inverse()?;
         let change = least.minus(self.value[basic])?.times(factor)?;
         // The row solved for the helper.
-        own[helper] = Fraction::ZERO;
-        for one in &mut own {
-            if !one.is_zero() {
-                *one = one.times(factor.negated())?;
-            }
+        for (_, one) in &mut own {
+            *one = one.times(factor.negated())?;
         }
-        own[basic] = factor;
+        let place_of_basic = own.partition_point(|&(variable, _)| variable < basic);
+        own.insert(place_of_basic, (basic, factor));
         self.value[basic] = least;
         self.value[helper] = self.value[helper].plus(change)?;
-        for index in 0..self.rows.len() {
-            if index == row {
+        for (variable, other) in &mut self.rows {
+            let Some(place) = place_in(other, helper) else {
                 continue;
-            }
-            let (variable, other) = &mut self.rows[index];
-            let share = std::mem::replace(&mut other[helper], Fraction::ZERO);
-            if share.is_zero() {
-                continue;
-            }
+            };
+            let share = other.remove(place).1;
             self.value[*variable] = self.value[*variable].plus(change.times(share)?)?;
             add_multiple(other, &own, share)?;
         }
@@ -385,13 +384,34 @@ fn amount((whole, infinitesimals): (i64, i64)) -> Amount {
     Amount(Fraction::whole(whole), Fraction::whole(infinitesimals))
 }
 
-fn add_multiple(row: &mut [Fraction], other: &[Fraction], factor: Fraction) -> Result<(), TooHard> {
-    cancellation::work(UNITS_FOR_CELL * other.len());
-    for (one, other) in row.iter_mut().zip(other) {
-        if !other.is_zero() {
-            *one = one.plus(other.times(factor)?)?;
+/// Where the multiple of a variable stands.
+fn place_in(row: &Row, variable: usize) -> Option<usize> {
+    row.binary_search_by_key(&variable, |&(one, _)| one).ok()
+}
+
+/// Adds a multiple of a sum, in which variables may come several times, one after the other.
+fn add_multiple(
+    row: &mut Row,
+    other: &[(usize, Fraction)],
+    factor: Fraction,
+) -> Result<(), TooHard> {
+    cancellation::work(UNITS_FOR_CELL * (row.len() + other.len()));
+    let mut sum = Row::with_capacity(row.len() + other.len());
+    let mut own = row.iter().copied().peekable();
+    for &(variable, multiple) in other {
+        while let Some(one) = own.next_if(|&(one, _)| one <= variable) {
+            sum.push(one);
+        }
+        let more = multiple.times(factor)?;
+        match sum.last_mut() {
+            Some((last, multiple)) if *last == variable => *multiple = multiple.plus(more)?,
+            _ => sum.push((variable, more)),
         }
     }
+    sum.extend(own);
+    sum.retain(|(_, multiple)| !multiple.is_zero());
+    sum.shrink_to_fit();
+    *row = sum;
     Ok(())
 }
 
@@ -473,6 +493,22 @@ mod tests {
             found > 50 && none > 50,
             "{found} with durations, {none} without"
         );
+    }
+
+    #[test]
+    fn rows_take_no_more_than_what_bounds_speak_of() {
+        let mut durations = Durations::default();
+        for index in 0..200 {
+            let wait = durations.add_wait();
+            assert_eq!(durations.require(&bound(&[wait], &[], (1, 0))), Ok(true));
+            if index > 0 {
+                let both = bound(&[wait - 1], &[wait], (0, 0));
+                assert_eq!(durations.require(&both), Ok(true));
+            }
+        }
+        let cells: usize = durations.rows.iter().map(|(_, row)| row.len()).sum();
+        let rows = durations.rows.len();
+        assert!(cells <= 4 * rows, "{cells} coefficients in {rows} rows");
     }
 
     #[test]

@@ -158,9 +158,12 @@ impl Explorer {
         self.explored
     }
 
-    /// The bytes that remembered states take.
+    /// The bytes that remembered states and the states at hand take.
     pub(super) fn bytes(&self) -> usize {
-        self.recent.bytes()
+        let frames = self.frames.iter().map(Frame::bytes);
+        let entries = self.entries.iter().map(|zone| size_of_val(zone.bounds()));
+        let stored = size_of_val(&*self.stored);
+        self.recent.bytes() + frames.chain(entries).sum::<usize>() + stored
     }
 
     /// The moves from the stored state to the state at hand.
@@ -521,6 +524,10 @@ fn open(
 }
 
 impl Frame {
+    fn bytes(&self) -> usize {
+        size_of_val(self.zone.bounds()) + size_of_val(&*self.words) + self.moves.heap_bytes()
+    }
+
     /// Whether all moves that are to be taken were.
     fn is_done(&self) -> bool {
         self.next >= self.agenda.end(self.moves.len())

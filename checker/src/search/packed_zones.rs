@@ -9,6 +9,7 @@
 //!
 //! Cost: packing and comparing touch each bound once, a vector of them at a time.
 
+use crate::cancellation;
 use crate::network::KeptZone;
 use crate::zones::simulation::{self, NO_DEMAND};
 use crate::zones::zone_table::ZoneId;
@@ -322,21 +323,91 @@ impl Known {
     }
 }
 
+/// Bytes of matrices in one block, at least; a block holds a power of two of matrices.
+const BLOCK_BYTES: usize = 1 << 16;
+
+/// Packed matrices of one size, by number from 0, in blocks that are never moved.
+#[derive(Debug)]
+struct Matrices {
+    size: usize,
+    /// Matrices in a block, as a power of two.
+    block_bits: u32,
+    blocks: Vec<Vec<u8>>,
+    count: u32,
+}
+
+impl Matrices {
+    fn new(size: usize) -> Matrices {
+        Matrices {
+            size,
+            block_bits: (BLOCK_BYTES / size).max(1).ilog2(),
+            blocks: Vec::new(),
+            count: 0,
+        }
+    }
+
+    #[inline]
+    fn get(&self, id: u32) -> &[u8] {
+        let (block, first) = self.place(id);
+        &self.blocks[block][first..first + self.size]
+    }
+
+    fn get_mut(&mut self, id: u32) -> &mut [u8] {
+        let (block, first) = self.place(id);
+        &mut self.blocks[block][first..first + self.size]
+    }
+
+    /// The block of a matrix, and where it begins there.
+    #[inline]
+    fn place(&self, id: u32) -> (usize, usize) {
+        let within = id as usize & ((1 << self.block_bits) - 1);
+        (id as usize >> self.block_bits, within * self.size)
+    }
+
+    fn push(&mut self, matrix: &[u8]) -> u32 {
+        let id = self.count;
+        self.count += 1;
+        if id as usize >> self.block_bits == self.blocks.len() {
+            self.blocks
+                .push(Vec::with_capacity(self.size << self.block_bits));
+        }
+        let block = self.blocks.last_mut();
+        block
+            .expect("a block was just made if there was none")
+            .extend_from_slice(matrix);
+        id
+    }
+
+    /// Gives entries twice as many bytes, block by block, so that the old and the new ones never stand side by side.
+    fn widen(&mut self, widened: impl Fn(&[u8], &mut Vec<u8>)) {
+        cancellation::ask_for(self.bytes());
+        self.size *= 2;
+        for block in &mut self.blocks {
+            let mut wide = Vec::with_capacity(self.size << self.block_bits);
+            widened(block, &mut wide);
+            *block = wide;
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.blocks.len() * (self.size << self.block_bits)
+    }
+}
+
 /// Stored zones of one dimension.
 #[derive(Debug)]
 pub(super) struct PackedZones {
     dimension: usize,
     width: Width,
-    /// The matrices, one after the other.
-    bytes: Vec<u8>,
+    matrices: Matrices,
     /// The matrix that was proposed last.
     candidate: Vec<u8>,
     known: Known,
-    /// The demands of a zone.
+    /// The demands of a zone; empty until zones have limits.
     demands: Vec<Bound>,
-    /// What [`widen_narrow`] makes of the candidate.
+    /// What [`widen_narrow`] makes of the candidate; empty until it is asked for.
     narrow: Vec<i16>,
-    /// What demands are to be met by.
+    /// What demands are to be met by; empty until zones have limits.
     other: Vec<Bound>,
     /// By zone: how often it is in use.
     uses: Vec<u32>,
@@ -363,12 +434,12 @@ impl PackedZones {
         PackedZones {
             dimension,
             width: Width::One,
-            bytes: Vec::new(),
+            matrices: Matrices::new(dimension * dimension),
             candidate: vec![0; dimension * dimension],
             known: Known::default(),
-            demands: vec![Bound::INFINITY; dimension * dimension],
-            narrow: vec![0; dimension * dimension],
-            other: vec![Bound::INFINITY; dimension * dimension],
+            demands: Vec::new(),
+            narrow: Vec::new(),
+            other: Vec::new(),
             uses: Vec::new(),
             free: Vec::new(),
             table: PiecedTable::new(),
@@ -379,7 +450,7 @@ impl PackedZones {
     }
 
     fn get(&self, id: u32) -> &[u8] {
-        of(&self.bytes, self.candidate.len(), id)
+        self.matrices.get(id)
     }
 
     /// Makes a zone the candidate, which the following questions are about; returns its signature.
@@ -395,12 +466,15 @@ impl PackedZones {
         let (dimension, greatest) = (self.dimension, self.greatest);
         let is_narrow =
             self.width == Width::One && greatest < i8::MAX.into() && self.weights[0] <= NARROW;
+        let size = dimension * dimension;
         let sums = if is_narrow {
+            self.narrow.resize(size, 0);
             widen_narrow(&self.candidate, zone.limits, dimension, &mut self.narrow);
             narrow_sums(&self.narrow, greatest as i16)
         } else if zone.limits.is_empty() {
             sums(zone.matrix, greatest)
         } else {
+            self.demands.resize(size, Bound::INFINITY);
             simulation::demands(zone.matrix, dimension, zone.limits, &mut self.demands);
             sums(&self.demands, greatest)
         };
@@ -464,6 +538,8 @@ impl PackedZones {
         }
         let mut other = std::mem::take(&mut self.other);
         let mut demands = std::mem::take(&mut self.demands);
+        other.resize(self.dimension * self.dimension, Bound::INFINITY);
+        demands.resize(other.len(), Bound::INFINITY);
         let [first, second] = of(self);
         unpack_as(self.width, first, &mut other);
         simulation::demands(&other, self.dimension, limits, &mut demands);
@@ -481,20 +557,17 @@ impl PackedZones {
             self.uses[id as usize] += 1;
             return ZoneId(id);
         }
-        let size = self.candidate.len();
         let id = if let Some(id) = self.free.pop() {
-            let first = id as usize * size;
-            self.bytes[first..first + size].copy_from_slice(&self.candidate);
+            self.matrices.get_mut(id).copy_from_slice(&self.candidate);
             self.uses[id as usize] = 1;
             id
         } else {
-            self.bytes.extend_from_slice(&self.candidate);
             self.uses.push(1);
-            self.uses.len() as u32 - 1
+            self.matrices.push(&self.candidate)
         };
-        let bytes = &self.bytes;
+        let matrices = &self.matrices;
         self.table
-            .insert_unique(new_hash, id, |&id| hash(of(bytes, size, id)));
+            .insert_unique(new_hash, id, |&id| hash(matrices.get(id)));
         ZoneId(id)
     }
 
@@ -519,25 +592,32 @@ impl PackedZones {
     /// The bytes that the zones and their table take.
     pub(super) fn bytes(&self) -> usize {
         let ids = (self.uses.len() + self.free.capacity()) * size_of::<u32>();
-        self.bytes.len() + ids + self.table.bytes() + self.known.bytes()
+        let buffers = self.candidate.len()
+            + size_of_val(&*self.narrow)
+            + size_of_val(&*self.demands)
+            + size_of_val(&*self.other);
+        self.matrices.bytes() + ids + self.table.bytes() + self.known.bytes() + buffers
     }
 
     /// Gives all matrices entries of twice as many bytes.
     fn widen(&mut self) {
-        (self.bytes, self.width) = match self.width {
-            Width::One => (widened::<i8, i16, 1, 2>(&self.bytes), Width::Two),
-            Width::Two => (widened::<i16, i32, 2, 4>(&self.bytes), Width::Four),
+        self.width = match self.width {
+            Width::One => {
+                self.matrices.widen(widened::<i8, i16, 1, 2>);
+                Width::Two
+            }
+            Width::Two => {
+                self.matrices.widen(widened::<i16, i32, 2, 4>);
+                Width::Four
+            }
             Width::Four => unreachable!("every bound fits into four bytes"),
         };
         self.candidate.resize(2 * self.candidate.len(), 0);
         self.known = Known::default();
         let ids: Vec<u32> = self.table.drain().collect();
-        let (bytes, size) = (&self.bytes, self.candidate.len());
+        let hash_of = |&id: &u32| hash(self.matrices.get(id));
         for id in ids {
-            self.table
-                .insert_unique(hash(of(bytes, size, id)), id, |&id| {
-                    hash(of(bytes, size, id))
-                });
+            self.table.insert_unique(hash_of(&id), id, hash_of);
         }
     }
 }
@@ -550,15 +630,14 @@ fn unpack_as(width: Width, bytes: &[u8], zone: &mut [Bound]) {
     }
 }
 
-fn of(bytes: &[u8], size: usize, id: u32) -> &[u8] {
-    &bytes[id as usize * size..][..size]
-}
-
 fn hash(matrix: &[u8]) -> u64 {
     spread(hash_bytes(matrix))
 }
 
-fn widened<T: Entry<N>, W: Entry<M>, const N: usize, const M: usize>(bytes: &[u8]) -> Vec<u8> {
+fn widened<T: Entry<N>, W: Entry<M>, const N: usize, const M: usize>(
+    bytes: &[u8],
+    wide: &mut Vec<u8>,
+) {
     let entries = bytes.as_chunks::<N>().0.iter();
     let widen = |bytes: &[u8; N]| {
         let entry = T::of_bytes(*bytes);
@@ -570,7 +649,7 @@ fn widened<T: Entry<N>, W: Entry<M>, const N: usize, const M: usize>(bytes: &[u8
             W::truncated(entry.raw()).to_bytes()
         }
     };
-    entries.flat_map(widen).collect()
+    entries.for_each(|entry| wide.extend_from_slice(&widen(entry)));
 }
 
 #[cfg(test)]
@@ -697,6 +776,9 @@ mod tests {
             check_zones(&mut packed, &zones(scale), &mut kept);
         }
         assert_eq!(packed.width, Width::Four);
+        // Nothing beyond the account was made room for.
+        let room = packed.matrices.blocks.iter().map(Vec::capacity);
+        assert_eq!(room.sum::<usize>(), packed.matrices.bytes());
     }
 
     #[test]

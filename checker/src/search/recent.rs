@@ -1,7 +1,10 @@
 //! The committed states that were explored last, so that a state to which several ways lead is explored once.
 //!
-//! Committed states are not stored; this is a cache of bounded size. Invariant: what is found in it was entered before,
-//! word by word and bound by bound. What is not found may have been entered before as well.
+//! Committed states are not stored; this is a cache of bounded size.
+//!
+//! Invariants:
+//! * What is found in it was entered before, word by word and bound by bound. What is not found may have been entered before as well.
+//! * It takes at most [`MOST_BYTES`], however large states are: where there are thousands of clocks it has few places, or none.
 //!
 //! Cost: one hash and one comparison for each state.
 
@@ -12,6 +15,9 @@ use super::store::{hash_bytes, spread};
 /// The least and the greatest number of places.
 const FEWEST_PLACES: usize = 1 << 8;
 const MOST_PLACES: usize = 1 << 14;
+
+/// The most bytes of all places.
+const MOST_BYTES: usize = 8 << 20;
 
 /// States that were explored lately.
 #[derive(Debug)]
@@ -41,8 +47,15 @@ impl RecentStates {
     /// Enters a state, packed words and a zone; returns whether it was there already. With the number of stored states the
     /// cache grows, and forgets everything then.
     pub(super) fn enter(&mut self, words: &[u8], zone: &[Bound], stored: usize) -> bool {
-        if self.places < MOST_PLACES && 2 * self.places < stored.max(FEWEST_PLACES) {
-            self.places = (2 * self.places).max(FEWEST_PLACES);
+        let place_bytes = words.len() + size_of_val(zone);
+        let Some(most) = (MOST_BYTES / place_bytes).min(MOST_PLACES).checked_ilog2() else {
+            return false;
+        };
+        let most = 1 << most;
+        if self.places < most && 2 * self.places < stored.max(FEWEST_PLACES) {
+            self.places = (2 * self.places).max(FEWEST_PLACES).min(most);
+            // The old places are given back before there are new ones.
+            (self.words, self.zones) = (Vec::new(), Vec::new());
             self.words = vec![0; self.places * words.len()];
             self.zones = vec![Bound::LT_ZERO; self.places * zone.len()];
         }
@@ -56,5 +69,42 @@ impl RecentStates {
         known_words.copy_from_slice(words);
         known_zone.copy_from_slice(zone);
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::zones::Zone;
+
+    fn enter_twice(dimension: usize, states: u8) -> (RecentStates, usize) {
+        let mut recent = RecentStates::new();
+        let zone = Zone::zero(dimension);
+        let mut known = 0;
+        for round in 0..2 {
+            for state in 0..states {
+                let is_known = recent.enter(&[state, 1], zone.bounds(), 0);
+                assert!(round > 0 || !is_known, "state {state} is new");
+                known += usize::from(is_known);
+                assert!(recent.bytes() <= MOST_BYTES);
+            }
+        }
+        (recent, known)
+    }
+
+    #[test]
+    fn states_with_few_clocks_are_remembered() {
+        let (recent, known) = enter_twice(4, 20);
+        assert_eq!(recent.places, FEWEST_PLACES);
+        assert!(known > 10, "{known} of 20 are found again");
+    }
+
+    #[test]
+    fn states_with_many_clocks_take_bounded_memory() {
+        let (recent, known) = enter_twice(500, 2);
+        assert!(recent.places < FEWEST_PLACES);
+        assert!(known > 0, "{known} of 2 are found again");
+        let (recent, known) = enter_twice(2000, 2);
+        assert_eq!((recent.bytes(), known), (0, 0));
     }
 }
