@@ -117,42 +117,68 @@ fn pack<T: Entry<N>, const N: usize>(zone: &[Bound], target: &mut [u8]) -> bool 
     lost == 0
 }
 
+/// Where zones have fewer clocks than this, with the reference clock, hardly more than one bound counts for each number of a signature,
+/// whichever way they are shared out.
+const FEW_CLOCKS: usize = 6;
+
+/// How many bounds lie side by side before the numbers of a signature begin anew with the first one, and whether bounds have weights.
+///
+/// Where a clock was reset a little later, the bounds of its column are greater and those of its row smaller, or the other way round.
+/// So a number is the sum of columns: those of one clock show it in one direction, all others in the other one. In sums that mix rows and
+/// columns it would cancel out.
+fn period(dimension: usize) -> (usize, bool) {
+    if dimension < FEW_CLOCKS {
+        (dimension * dimension, true)
+    } else {
+        (dimension, false)
+    }
+}
+
 /// The factor of the bounds of a block of eight in the sums of a signature.
 ///
 /// Bounds on a difference and on its negative often lie in the same lane, and would cancel out where a difference is exact.
-fn weight(block: usize) -> i32 {
-    1 + (block & 3) as i32
+fn weight(block: usize, is_weighted: bool) -> i32 {
+    if is_weighted {
+        1 + (block & 3) as i32
+    } else {
+        1
+    }
 }
 
-/// The weighted sums of every eighth bound. A bound counts from the negated greatest one on, and up to one more than that.
-fn sums(matrix: &[Bound], greatest: i32) -> [i32; 8] {
+/// The weighted sums of every eighth bound of a period. A bound counts from the negated greatest one on, and up to one more than that.
+fn sums(matrix: &[Bound], greatest: i32, (period, is_weighted): (usize, bool)) -> [i32; 8] {
     let mut sums = [0; 8];
     let mut add = |bounds: &[Bound], index| {
         for (sum, bound) in sums.iter_mut().zip(bounds) {
-            *sum += weight(index) * bound.raw().clamp(-greatest, greatest + 1);
+            *sum += weight(index, is_weighted) * bound.raw().clamp(-greatest, greatest + 1);
         }
     };
-    let (blocks, rest) = matrix.as_chunks::<8>();
-    for (index, block) in blocks.iter().enumerate() {
-        add(block, index);
+    for row in matrix.chunks_exact(period) {
+        let (blocks, rest) = row.as_chunks::<8>();
+        for (index, block) in blocks.iter().enumerate() {
+            add(block, index);
+        }
+        add(rest, blocks.len());
     }
-    add(rest, blocks.len());
     sums
 }
 
 /// As [`sums`] for entries whose greatest sum is below 2^15, in as narrow lanes.
-fn narrow_sums(matrix: &[i16], greatest: i16) -> [i32; 8] {
+fn narrow_sums(matrix: &[i16], greatest: i16, (period, is_weighted): (usize, bool)) -> [i32; 8] {
     let mut sums = [0_i16; 8];
     let mut add = |entries: &[i16], index| {
+        let weight = weight(index, is_weighted) as i16;
         for (sum, entry) in sums.iter_mut().zip(entries) {
-            *sum += weight(index) as i16 * (*entry).clamp(-greatest, greatest + 1);
+            *sum += weight * (*entry).clamp(-greatest, greatest + 1);
         }
     };
-    let (blocks, rest) = matrix.as_chunks::<8>();
-    for (index, block) in blocks.iter().enumerate() {
-        add(block, index);
+    for row in matrix.chunks_exact(period) {
+        let (blocks, rest) = row.as_chunks::<8>();
+        for (index, block) in blocks.iter().enumerate() {
+            add(block, index);
+        }
+        add(rest, blocks.len());
     }
-    add(rest, blocks.len());
     sums.map(i32::from)
 }
 
@@ -425,8 +451,10 @@ impl PackedZones {
     /// An empty table of zones of this dimension, most of whose constants are at most `greatest`; signatures are best then.
     pub(super) fn new(dimension: usize, greatest: i32) -> PackedZones {
         let mut weights = [0; 8];
+        let (period, is_weighted) = period(dimension);
         for entry in 0..dimension * dimension {
-            weights[entry % 8] += weight(entry / 8);
+            let place = entry % period;
+            weights[place % 8] += weight(place / 8, is_weighted);
         }
         // So that sums of so many bounds fit into a word.
         let greatest = (2 * greatest.clamp(0, Bound::MAX_VALUE) + 1).min((1 << 29) / weights[0]);
@@ -470,13 +498,13 @@ impl PackedZones {
         let sums = if is_narrow {
             self.narrow.resize(size, 0);
             widen_narrow(&self.candidate, zone.limits, dimension, &mut self.narrow);
-            narrow_sums(&self.narrow, greatest as i16)
+            narrow_sums(&self.narrow, greatest as i16, period(dimension))
         } else if zone.limits.is_empty() {
-            sums(zone.matrix, greatest)
+            sums(zone.matrix, greatest, period(dimension))
         } else {
             self.demands.resize(size, Bound::INFINITY);
             simulation::demands(zone.matrix, dimension, zone.limits, &mut self.demands);
-            sums(&self.demands, greatest)
+            sums(&self.demands, greatest, period(dimension))
         };
         let signature = self.signature_of(sums);
         if let Some(known) = zone.known {
@@ -809,6 +837,33 @@ mod tests {
         };
         assert!(signature(3).may_be_within(signature(9)));
         assert!(!signature(9).may_be_within(signature(3)));
+    }
+
+    #[test]
+    fn signatures_tell_apart_what_clock_was_reset_later() {
+        for (dimension, greatest) in [(8, 60), (21, 60), (40, 60), (40, 1000)] {
+            let mut packed = PackedZones::new(dimension, greatest);
+            let mut signature = |later: usize| {
+                let value = |clock: usize| match clock {
+                    0 => 0,
+                    _ => (clock as i32 * 7 % 23) + 9 * i32::from(clock == later),
+                };
+                let bounds = (0..dimension * dimension).map(|entry| {
+                    let difference = value(entry / dimension) - value(entry % dimension);
+                    Bound::weak(difference).expect("a constant within the range")
+                });
+                packed.propose(whole(&bounds.collect::<Vec<_>>()))
+            };
+            let signatures: Vec<_> = (0..dimension).map(&mut signature).collect();
+            for (index, one) in signatures.iter().enumerate() {
+                for other in &signatures[..index] {
+                    // The numbers count clocks modulo eight.
+                    let is_told = !one.may_be_within(*other) && !other.may_be_within(*one);
+                    assert!(is_told || one == other, "{dimension} {greatest} {index}");
+                }
+            }
+            assert!(signatures[1..].iter().all(|one| *one != signatures[0]));
+        }
     }
 
     #[test]
