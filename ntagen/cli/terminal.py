@@ -61,4 +61,5 @@ def echo(*parts: str | Styled, err: bool = False, nl: bool = True) -> None:
 
 def echo_exactly(text: str, *, nl: bool = True) -> None:
     """Prints a document to standard output: exactly, unless that is a terminal."""
-    click.echo(safe(text) if sys.stdout.isatty() else text, nl=nl)
+    # Without a colour, click takes sequences that look like one out of what goes to a file.
+    click.echo(safe(text) if sys.stdout.isatty() else text, nl=nl, color=True)

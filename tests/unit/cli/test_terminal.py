@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
 from ntagen.cli import main
-from ntagen.cli.terminal import Styled, echo, safe
+from ntagen.cli.terminal import Styled, echo, echo_exactly, safe
 
 COMMANDS = "\x1b]0;title\x07\x1b[2J\x9b31m\x7f\x08\u202e\u2066"
 """Control sequences in seven and eight bits, and what turns the direction of writing."""
@@ -51,6 +52,16 @@ def test_safe_text_is_the_same_to_a_reader_of_json() -> None:
 def test_styles_are_ours_only(capsys: pytest.CaptureFixture[str]) -> None:
     echo("a\x1b[1m", Styled("b\x1b[0m", fg="red"), "c", nl=False)
     assert "\x1b[1m" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_documents_are_exact_except_on_a_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, is_terminal: bool
+) -> None:
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: is_terminal)
+    document = f"// {COMMANDS}\n"
+    echo_exactly(document, nl=False)
+    assert capsys.readouterr().out == (safe(document) if is_terminal else document)
 
 
 @pytest.mark.parametrize("extra", [[], ["--json"], ["--trace", "-"]])
