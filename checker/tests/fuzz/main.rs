@@ -61,7 +61,11 @@ fn hostile_inputs_do_no_harm() {
         let begin = Instant::now();
         show(case);
         let ended = catch_unwind(AssertUnwindSafe(|| targets.run(kind, &input, &seeds)));
-        let longest = if kind == Kind::Evidence { SLOW_CHECK } else { SLOW };
+        let longest = if kind == Kind::Evidence {
+            SLOW_CHECK
+        } else {
+            SLOW
+        };
         let is_slow = begin.elapsed() > longest && !cfg!(debug_assertions);
         if ended.is_err() || is_slow {
             let what = if is_slow { "is slow" } else { "panics" };

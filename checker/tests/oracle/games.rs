@@ -348,7 +348,12 @@ pub(crate) fn check_file(
         let is_won = matches!(answer.verdict, Verdict::Satisfied | Verdict::NotSatisfied);
         let message = answer.message.as_deref().unwrap_or_default();
         let is_stopped = message.contains("stopped by the limit of states");
-        prop_assert!(!is_won || is_stopped, "{}\n{:?}", describe(), answer.message);
+        prop_assert!(
+            !is_won || is_stopped,
+            "{}\n{:?}",
+            describe(),
+            answer.message
+        );
         return Ok(());
     };
     let file = strategy_file::write(model.network(), strategy, query);
