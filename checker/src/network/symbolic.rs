@@ -481,6 +481,7 @@ impl<'a> Symbolic<'a> {
     }
 
     /// The same, but zones are compared by inclusion, also where simulation would pay.
+    #[must_use]
     pub fn comparing_as_sets(mut self) -> Symbolic<'a> {
         self.bounds.compare_as_sets();
         self
