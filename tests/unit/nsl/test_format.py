@@ -30,6 +30,7 @@ def check_layout(text: str, expected: str) -> None:
 def test_words_and_clauses_are_spaced() -> None:
     check_layout("let a=-( 1+2 )*- 3 mm/s/min( a,2 )\n", "let a = -(1 + 2) * -3 mm/s / min(a, 2)\n")
     check_layout("let b = ( 0,- 1 , 0 )mm /s", "let b = (0, -1, 0) mm/s\n")
+    check_layout("let b = 1 mm\n/\ns", "let b = 1 mm/s\n")
     check_layout("for i in 0 .. - 1{}", "for i in 0..-1 {\n}\n")
     check_layout("query  A  =A[]  x  ", "query A = A[]  x\n")
 
