@@ -16,7 +16,7 @@ from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
-    from ntagen.checker.model import OverflowRule
+    from ntagen.checker import OverflowRule
     from ntagen.loading import Loaded
 
 WARNINGS_SHOWN: Final = 10
