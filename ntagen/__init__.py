@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, RejectedError
+    from ntagen.checker.strategy import Strategy
     from ntagen.errors import InputError, ModelError, NtagenError, UndecidedError
     from ntagen.loading import load, load_strategy
-    from ntagen.strategy import Strategy
 
 __all__ = [
     "Answer",
@@ -39,7 +39,7 @@ _HOMES = {
     "ModelError": "ntagen.errors",
     "NtagenError": "ntagen.errors",
     "RejectedError": "ntagen.checker",
-    "Strategy": "ntagen.strategy",
+    "Strategy": "ntagen.checker.strategy",
     "UndecidedError": "ntagen.errors",
     "load": "ntagen.loading",
     "load_strategy": "ntagen.loading",

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from ntagen import checker
 from ntagen.checker import Model, OverflowRule
+from ntagen.checker.strategy import Strategy
 from ntagen.scene import Scene
-from ntagen.strategy import Strategy
 
 
 @dataclass(frozen=True, slots=True)

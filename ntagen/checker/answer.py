@@ -10,9 +10,9 @@ from typing import Literal
 from ntagen import _checker
 from ntagen.checker.edges import EdgeEntry, EnginePlan, step_of
 from ntagen.checker.errors import rejecting
+from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy
 from ntagen.machine import Machine
 from ntagen.runs import Run, runs_of
-from ntagen.strategy import ForcedRule, PriorityRule, Strategy
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 

@@ -14,6 +14,7 @@ from ntagen.checker.answer import Answer
 from ntagen.checker.edges import EdgeEntry
 from ntagen.checker.errors import failing, rejecting
 from ntagen.checker.states import Simulation, SymbolicState, symbolic_states
+from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
 from ntagen.errors import InputError, LimitError, ModelError, NtagenError
 from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file
 from ntagen.model.facts import (
@@ -29,7 +30,6 @@ from ntagen.model.facts import (
     queries_from,
 )
 from ntagen.runs import Choose, Run, simulated
-from ntagen.strategy import ForcedRule, PriorityRule, Strategy, Verification
 
 SearchOrder = Literal["bfs", "dfs", "random"]
 CodeEngine = Literal["jit", "interpreter"]

@@ -24,9 +24,9 @@ from ntagen.files import require_apart, write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Model
+    from ntagen.checker.strategy import Strategy
     from ntagen.play import Chance, Play, Reply, Situation
     from ntagen.runs import Edge, State
-    from ntagen.strategy import Strategy
 
 DEFEATED: Final = 1
 """Exit code where the strategy did not keep its promise."""

@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 import ntagen
+from ntagen.checker.strategy import Strategy
 from ntagen.errors import InputError, LimitError
-from ntagen.strategy import Strategy
 
 GAMES = Path(__file__).parents[1] / "corpus" / "games"
 
