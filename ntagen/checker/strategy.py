@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from ntagen import _checker
+from ntagen.checker.play import Play
 from ntagen.errors import InputError, ModelError, UndecidedError
 from ntagen.files import write_files
-from ntagen.play import Play
 from ntagen.runs import Edge, Run, State, edge_of, runs_of
 
 __all__ = ["Advice", "Decision", "Discrete", "Strategy", "StrategyState", "Verification"]

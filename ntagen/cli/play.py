@@ -24,8 +24,8 @@ from ntagen.files import require_apart, write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Model
+    from ntagen.checker.play import Chance, Play, Reply, Situation
     from ntagen.checker.strategy import Strategy
-    from ntagen.play import Chance, Play, Reply, Situation
     from ntagen.runs import Edge, State
 
 DEFEATED: Final = 1
@@ -157,7 +157,7 @@ def command(
         if steps is None:
             session.converse(_reader())
         else:
-            from ntagen.play import Chance
+            from ntagen.checker.play import Chance
 
             session.play_at_random(steps, Chance(seed))
     finally:
