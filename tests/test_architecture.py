@@ -27,14 +27,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     "model": set(),
     "runs": set(),
     "files": {"errors"},
-    "machine": {"errors"},
     "checker.edges": set(),
     "checker.errors": {"errors", "_checker"},
     "checker.states": {"checker.edges", "checker.errors", "_checker"},
+    "checker.machine": {"errors"},
     "checker.play": {"errors", "runs", "_checker"},
     "checker.strategy": {"errors", "files", "runs", "checker.play", "_checker"},
-    "checker.answer": {"machine", "runs", "_checker"}
-    | {"checker.edges", "checker.errors", "checker.strategy"},
+    "checker.answer": {"runs", "_checker"}
+    | {"checker.edges", "checker.errors", "checker.machine", "checker.strategy"},
     "checker.model": {"errors", "files", "model", "runs", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.states", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import ntagen
+from ntagen.checker.machine import Machine
 from ntagen.errors import InputError, UndecidedError
-from ntagen.machine import Machine
 
-BOXES = Path(__file__).parents[1] / "corpus" / "games" / "observed_boxes.xta"
+BOXES = Path(__file__).parents[2] / "corpus" / "games" / "observed_boxes.xta"
 
 QUERY = "{Belt.Tall, Belt.Flat, x >= 4} control: A[] not Belt.Wrong"
 
