@@ -11,8 +11,8 @@ from ntagen import _checker
 from ntagen.checker.edges import EdgeEntry, EnginePlan, step_of
 from ntagen.checker.errors import rejecting
 from ntagen.checker.machine import Machine
+from ntagen.checker.runs import Run, runs_of
 from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy
-from ntagen.runs import Run, runs_of
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 

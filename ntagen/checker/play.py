@@ -18,8 +18,8 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ntagen import _checker
+from ntagen.checker.runs import Edge, State, edge_of, state_of
 from ntagen.errors import InputError, ModelError
-from ntagen.runs import Edge, State, edge_of, state_of
 
 __all__ = ["Chance", "Next", "Play", "Reply", "Situation", "Window"]
 

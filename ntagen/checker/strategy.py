@@ -18,9 +18,9 @@ from typing import Any, Literal, Protocol
 
 from ntagen import _checker
 from ntagen.checker.play import Play
+from ntagen.checker.runs import Edge, Run, State, edge_of, runs_of
 from ntagen.errors import InputError, ModelError, UndecidedError
 from ntagen.files import write_files
-from ntagen.runs import Edge, Run, State, edge_of, runs_of
 
 __all__ = ["Advice", "Decision", "Discrete", "Strategy", "StrategyState", "Verification"]
 

@@ -25,8 +25,8 @@ from ntagen.files import require_apart, write_files
 if TYPE_CHECKING:
     from ntagen.checker import Model
     from ntagen.checker.play import Chance, Play, Reply, Situation
+    from ntagen.checker.runs import Edge, State
     from ntagen.checker.strategy import Strategy
-    from ntagen.runs import Edge, State
 
 DEFEATED: Final = 1
 """Exit code where the strategy did not keep its promise."""

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import ntagen
+from ntagen.checker.runs import Choice, Run, State
 from ntagen.cli import main
-from ntagen.runs import Choice, Run, State
 
 FEEDER = """
 clock x;

@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 
 from ntagen import checker
-from ntagen.runs import Choice, State
+from ntagen.checker.runs import Choice, State
 
 LAMP = """
 clock x, y;
