@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+from ntagen.model.diagram import BranchPoint, Edge, Location
 from ntagen.model.facts import (
-    BranchPoint,
     Channel,
     Clock,
-    Edge,
     Facts,
-    Location,
     Process,
     Query,
     ScalarSet,

@@ -3,117 +3,22 @@
 They are made of the engine's object ``ntagen-model`` (see ``checker/src/engine/facts.rs``, and
 ``ntagen info --json``), one class a kind of part. Templates are as written; processes, variables,
 clocks and channels are those of the network that is left when all templates are instantiated.
-Positions are in the units of UPPAAL's editor, x to the right and y down.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from dataclasses import dataclass
+from typing import Any
 
-Point: TypeAlias = tuple[int, int]
-"""x and y in the units of UPPAAL's editor."""
-
-LocationKind = Literal["normal", "urgent", "committed"]
-
-LabelKind = Literal["name", "invariant", "rate", "select", "guard", "sync", "update", "weight"]
-"""What a label says: its attribute of `Location` or `Edge`."""
+from ntagen.model.diagram import BranchPoint, Diagram, Edge, Location
 
 
 @dataclass(frozen=True, slots=True)
-class Location:
-    """A location of a template.
-
-    Attributes:
-        id: What edges refer to it by; in XTA its name.
-        name: Its name; empty without one.
-        kind: ``normal``, ``urgent`` or ``committed``.
-        initial: Whether processes start here.
-        invariant: As written; empty without one.
-        rate: The exponential rate as written; empty without one.
-        position: Where it is drawn; ``None`` if the file does not say.
-        labels: Where its name, invariant and rate are drawn, as far as the file says so.
-        color: ``#rrggbb``, or ``None`` for the usual colour.
-    """
-
-    id: str
-    name: str = ""
-    kind: LocationKind = "normal"
-    initial: bool = False
-    invariant: str = ""
-    rate: str = ""
-    position: Point | None = None
-    labels: Mapping[LabelKind, Point] = field(default_factory=dict, hash=False)
-    color: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class BranchPoint:
-    """A branch point of a template.
-
-    Attributes:
-        id: What edges refer to it by.
-        position: Where it is drawn; ``None`` if the file does not say.
-    """
-
-    id: str
-    position: Point | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """An edge of a template, the entry of a branch point, or a leg of one.
-
-    Attributes:
-        source: The id of the location or branch point that it leaves.
-        target: The id of the location or branch point that it enters.
-        controllable: Whether the controller owns it, and not the environment.
-        select: The bindings as written; this and the following are empty where there is nothing.
-        guard: As written.
-        sync: The synchronisation, such as ``go[i]!``.
-        update: As written.
-        weight: The weight of a leg as written.
-        nails: The bends of the arrow.
-        labels: Where select, guard, sync, update and weight are drawn, as far as the file says so.
-        color: ``#rrggbb``, or ``None`` for the usual colour.
-    """
-
-    source: str
-    target: str
-    controllable: bool = True
-    select: str = ""
-    guard: str = ""
-    sync: str = ""
-    update: str = ""
-    weight: str = ""
-    nails: tuple[Point, ...] = ()
-    labels: Mapping[LabelKind, Point] = field(default_factory=dict, hash=False)
-    color: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Template:
+class Template(Diagram):
     """A template; a notebook shows it as a picture.
 
-    Attributes:
-        name: Its name.
-        parameters: The parameters as texts, such as ``const id_t id``.
-        locations: In the order of the file.
-        branch_points: In the order of the file.
-        edges: In the order of the file.
+    Its attributes are those of `Diagram`.
     """
-
-    name: str
-    parameters: tuple[str, ...]
-    locations: tuple[Location, ...]
-    branch_points: tuple[BranchPoint, ...]
-    edges: tuple[Edge, ...]
-
-    @property
-    def nodes(self) -> tuple[Location | BranchPoint, ...]:
-        """What edges lead to: the locations, then the branch points."""
-        return (*self.locations, *self.branch_points)
 
     def svg(self) -> str:
         """The template drawn as in UPPAAL's editor.
@@ -123,6 +28,7 @@ class Template:
         Returns:
             An SVG document.
         """
+        # Imported here: few commands draw, and the libraries of XML take time to load.
         from ntagen.model.svg import draw
 
         return draw(self)

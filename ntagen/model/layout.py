@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final, TypeVar
 
-from ntagen.model.facts import Edge, LabelKind, Location, Point, Template
+from ntagen.model.diagram import Diagram, Edge, LabelKind, Location, Point
 
 LOCATION_RADIUS: Final = 11
 BRANCH_POINT_RADIUS: Final = 4
@@ -61,30 +61,30 @@ def labels_of(part: Location | Edge) -> list[tuple[LabelKind, str]]:
     return [(kind, text) for kind, text in texts if text]
 
 
-def placed(template: Template) -> Template:
+def placed(diagram: Diagram) -> Diagram:
     """The template with a place for every location, branch point and label."""
-    if any(node.position is None for node in template.nodes):
-        template = _layered(template)
-    positions = positions_of(template)
+    if any(node.position is None for node in diagram.nodes):
+        diagram = _layered(diagram)
+    positions = positions_of(diagram)
     return replace(
-        template,
-        locations=tuple(_with_labels(one) for one in template.locations),
-        edges=tuple(_with_path(edge, positions) for edge in template.edges),
+        diagram,
+        locations=tuple(_with_labels(one) for one in diagram.locations),
+        edges=tuple(_with_path(edge, positions) for edge in diagram.edges),
     )
 
 
-def drawn_labels(template: Template) -> Iterator[tuple[Point, LabelKind, str]]:
+def drawn_labels(diagram: Diagram) -> Iterator[tuple[Point, LabelKind, str]]:
     """The labels of a placed template: upper left corner, kind and text."""
-    parts: tuple[Location | Edge, ...] = (*template.locations, *template.edges)
+    parts: tuple[Location | Edge, ...] = (*diagram.locations, *diagram.edges)
     for part in parts:
         for kind, text in labels_of(part):
             if kind in part.labels:
                 yield part.labels[kind], kind, text
 
 
-def positions_of(template: Template) -> dict[str, Point]:
+def positions_of(diagram: Diagram) -> dict[str, Point]:
     """Where the locations and branch points of a template are, by id."""
-    return {node.id: node.position for node in template.nodes if node.position is not None}
+    return {node.id: node.position for node in diagram.nodes if node.position is not None}
 
 
 def _with_labels(location: Location) -> Location:
@@ -142,32 +142,32 @@ class _Box:
     below: list[int] = field(default_factory=list)
 
 
-def _layered(template: Template) -> Template:
+def _layered(diagram: Diagram) -> Diagram:
     """The template with places in layers."""
-    ids = [node.id for node in template.nodes]
+    ids = [node.id for node in diagram.nodes]
     index_of = {name: index for index, name in enumerate(ids)}
     ends = [
         (index_of[edge.source], index_of[edge.target])
         if edge.source in index_of and edge.target in index_of
         else None
-        for edge in template.edges
+        for edge in diagram.edges
     ]
-    start = next((i for i, one in enumerate(template.locations) if one.initial), 0)
+    start = next((i for i, one in enumerate(diagram.locations) if one.initial), 0)
     links = [pair for pair in ends if pair is not None and pair[0] != pair[1]]
     ranks = _ranks(len(ids), start, links)
-    boxes = [_location_box(template, index, ends) for index in range(len(ids))]
+    boxes = [_location_box(diagram, index, ends) for index in range(len(ids))]
     layers: dict[int, list[int]] = defaultdict(list)
     for index, rank in enumerate(ranks):
         layers[2 * rank].append(index)
     chains = {
         number: _chain(pair, edge, ranks, boxes, layers)
-        for number, (pair, edge) in enumerate(zip(ends, template.edges, strict=True))
+        for number, (pair, edge) in enumerate(zip(ends, diagram.edges, strict=True))
         if pair is not None and pair[0] != pair[1]
     }
     rows = [layers[number] for number in sorted(layers)]
     _order(rows, boxes)
     _spread(rows, boxes)
-    return _with_places(template, boxes, chains)
+    return _with_places(diagram, boxes, chains)
 
 
 def _ranks(count: int, start: int, links: list[tuple[int, int]]) -> list[int]:
@@ -203,15 +203,15 @@ def _ranks(count: int, start: int, links: list[tuple[int, int]]) -> list[int]:
     return ranks
 
 
-def _location_box(template: Template, index: int, ends: list[tuple[int, int] | None]) -> _Box:
+def _location_box(diagram: Diagram, index: int, ends: list[tuple[int, int] | None]) -> _Box:
     """The room of a location or branch point with its labels and loops."""
-    if index >= len(template.locations):
+    if index >= len(diagram.locations):
         return _Box(BRANCH_POINT_RADIUS, BRANCH_POINT_RADIUS, BRANCH_POINT_RADIUS)
-    texts = [text for _, text in labels_of(template.locations[index])]
+    texts = [text for _, text in labels_of(diagram.locations[index])]
     right = LOCATION_RADIUS + _LABEL_GAP + max((text_width(text) for text in texts), default=0.0)
     half = max(LOCATION_RADIUS, sum(text_height(text) for text in texts) / 2)
     box = _Box(LOCATION_RADIUS, right, half)
-    for pair, edge in zip(ends, template.edges, strict=True):
+    for pair, edge in zip(ends, diagram.edges, strict=True):
         if pair == (index, index):
             loop = [text for _, text in labels_of(edge)]
             width = max((text_width(text) for text in loop), default=0.0)
@@ -324,7 +324,7 @@ def _offsets(members: list[int], boxes: list[_Box]) -> list[float]:
     return offsets
 
 
-def _with_places(template: Template, boxes: list[_Box], chains: dict[int, list[int]]) -> Template:
+def _with_places(diagram: Diagram, boxes: list[_Box], chains: dict[int, list[int]]) -> Diagram:
     """The template with the places that were found."""
 
     def place(box: int) -> Point:
@@ -332,9 +332,9 @@ def _with_places(template: Template, boxes: list[_Box], chains: dict[int, list[i
 
     edges = []
     loops: dict[str, int] = defaultdict(int)
-    index_of = {one.id: index for index, one in enumerate(template.locations)}
-    height_of = {node.id: boxes[index].y for index, node in enumerate(template.nodes)}
-    for number, edge in enumerate(template.edges):
+    index_of = {one.id: index for index, one in enumerate(diagram.locations)}
+    height_of = {node.id: boxes[index].y for index, node in enumerate(diagram.nodes)}
+    for number, edge in enumerate(diagram.edges):
         if number in chains:
             upwards = height_of[edge.source] > height_of[edge.target]
             edges.append(_routed(edge, chains[number], boxes, upwards=upwards))
@@ -345,16 +345,16 @@ def _with_places(template: Template, boxes: list[_Box], chains: dict[int, list[i
             loops[edge.source] += _LOOP_REACH + round(max(widths, default=0.0)) + 8
         else:
             edges.append(edge)
-    count = len(template.locations)
+    count = len(diagram.locations)
     return replace(
-        template,
+        diagram,
         locations=tuple(
             replace(one, position=place(index), labels={})
-            for index, one in enumerate(template.locations)
+            for index, one in enumerate(diagram.locations)
         ),
         branch_points=tuple(
             replace(one, position=place(count + index))
-            for index, one in enumerate(template.branch_points)
+            for index, one in enumerate(diagram.branch_points)
         ),
         edges=tuple(edges),
     )

@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Final
 from xml.sax.saxutils import escape
 
-from ntagen.model.facts import BranchPoint, Edge, LabelKind, Location, Point, Template
+from ntagen.model.diagram import BranchPoint, Diagram, Edge, LabelKind, Location, Point
 from ntagen.model.layout import (
     BRANCH_POINT_RADIUS,
     LINE_HEIGHT,
@@ -50,15 +50,15 @@ _NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010f
 """Characters that no XML document may hold."""
 
 
-def draw(template: Template) -> str:
+def draw(diagram: Diagram) -> str:
     """Draws a template.
 
     Returns:
         An SVG document; lengths are in the units of UPPAAL's editor.
     """
-    drawn = placed(template)
+    drawn = placed(diagram)
     left, top, right, bottom = _bounds(drawn)
-    heading = _heading(template)
+    heading = _heading(diagram)
     width = max(right - left, text_width(heading) * 1.2) + 2 * _MARGIN
     height = bottom - top + 2 * _MARGIN + _HEADING_HEIGHT
     x, y = left - _MARGIN, top - _MARGIN - _HEADING_HEIGHT
@@ -76,28 +76,28 @@ def draw(template: Template) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _heading(template: Template) -> str:
-    if not template.parameters:
-        return template.name
-    return f"{template.name}({', '.join(template.parameters)})"
+def _heading(diagram: Diagram) -> str:
+    if not diagram.parameters:
+        return diagram.name
+    return f"{diagram.name}({', '.join(diagram.parameters)})"
 
 
-def _body(template: Template) -> Iterator[str]:
+def _body(diagram: Diagram) -> Iterator[str]:
     """Edges below, then locations, then labels, each on a light ground so that it can be read."""
-    positions = positions_of(template)
-    radii = {one.id: _radius(one) for one in template.locations}
-    radii |= {one.id: float(BRANCH_POINT_RADIUS) for one in template.branch_points}
-    branch_ids = {one.id for one in template.branch_points}
-    for edge in template.edges:
+    positions = positions_of(diagram)
+    radii = {one.id: _radius(one) for one in diagram.locations}
+    radii |= {one.id: float(BRANCH_POINT_RADIUS) for one in diagram.branch_points}
+    branch_ids = {one.id for one in diagram.branch_points}
+    for edge in diagram.edges:
         if edge.source in positions and edge.target in positions:
             path = [positions[edge.source], *edge.nails, positions[edge.target]]
             dashed = not edge.controllable or edge.source in branch_ids
             yield from _arrow(edge, path, radii[edge.source], radii[edge.target], dashed=dashed)
-    for point in template.branch_points:
+    for point in diagram.branch_points:
         yield from _branch_point(point)
-    for location in template.locations:
+    for location in diagram.locations:
         yield from _circle(location)
-    labels = [(corner, text, _COLORS[kind]) for corner, kind, text in drawn_labels(template)]
+    labels = [(corner, text, _COLORS[kind]) for corner, kind, text in drawn_labels(diagram)]
     yield '<g stroke="#ffffff" stroke-width="3" stroke-linejoin="round">'
     yield from (_text(corner, text, "#ffffff") for corner, text, _ in labels)
     yield "</g>"
@@ -205,15 +205,15 @@ def _safe(text: str) -> str:
     return escape(_NOT_XML.sub("\ufffd", text))
 
 
-def _bounds(template: Template) -> tuple[float, float, float, float]:
+def _bounds(diagram: Diagram) -> tuple[float, float, float, float]:
     """The least rectangle that holds a placed template: left, top, right, bottom."""
     boxes: list[tuple[float, float, float, float]] = []
     reach = LOCATION_RADIUS + _INITIAL_GAP
-    for x, y in positions_of(template).values():
+    for x, y in positions_of(diagram).values():
         boxes.append((x - reach, y - reach, x + reach, y + reach))
-    for edge in template.edges:
+    for edge in diagram.edges:
         boxes += [(x, y, x, y) for x, y in edge.nails]
-    for (x, y), _, text in drawn_labels(template):
+    for (x, y), _, text in drawn_labels(diagram):
         boxes.append((x, y, x + text_width(text), y + text_height(text)))
     if not boxes:
         return 0.0, 0.0, 0.0, 0.0
