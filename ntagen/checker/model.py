@@ -13,12 +13,7 @@ from ntagen import _checker
 from ntagen.checker.answer import Answer
 from ntagen.checker.edges import EdgeEntry
 from ntagen.checker.errors import failing, rejecting
-from ntagen.checker.runs import Choose, Run, simulated
-from ntagen.checker.states import Simulation, SymbolicState, symbolic_states
-from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
-from ntagen.errors import InputError, LimitError, ModelError, NtagenError
-from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file
-from ntagen.model.facts import (
+from ntagen.checker.facts import (
     Channel,
     Clock,
     Facts,
@@ -30,6 +25,11 @@ from ntagen.model.facts import (
     Variable,
     queries_from,
 )
+from ntagen.checker.runs import Choose, Run, simulated
+from ntagen.checker.states import Simulation, SymbolicState, symbolic_states
+from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
+from ntagen.errors import InputError, LimitError, ModelError, NtagenError
+from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file
 
 SearchOrder = Literal["bfs", "dfs", "random"]
 CodeEngine = Literal["jit", "interpreter"]

@@ -29,7 +29,7 @@ from ntagen.files import require_apart, write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
-    from ntagen.model import Query
+    from ntagen.checker.facts import Query
     from ntagen.scene import Scene
 
 STOPPED: Final = 3

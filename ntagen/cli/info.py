@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from ntagen.checker import Model
-    from ntagen.model import Channel, Clock, Process, Template, Variable
+    from ntagen.checker.facts import Channel, Clock, Process, Template, Variable
 
 ROWS_SHOWN: Final = 40
 """Rows of a table at most; the JSON object has all."""

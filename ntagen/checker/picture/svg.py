@@ -13,8 +13,8 @@ from itertools import pairwise
 from typing import Final
 from xml.sax.saxutils import escape
 
-from ntagen.model.diagram import BranchPoint, Diagram, Edge, LabelKind, Location, Point
-from ntagen.model.layout import (
+from ntagen.checker.picture.diagram import BranchPoint, Diagram, Edge, LabelKind, Location, Point
+from ntagen.checker.picture.layout import (
     BRANCH_POINT_RADIUS,
     LINE_HEIGHT,
     LOCATION_RADIUS,

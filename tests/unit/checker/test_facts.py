@@ -10,7 +10,7 @@ import pytest
 
 import ntagen
 from ntagen.checker import load
-from ntagen.model import Channel, Clock, Query, StateSize, Variable
+from ntagen.checker.facts import Channel, Clock, Query, StateSize, Variable
 
 PAPER = Path(__file__).resolve().parents[3] / "examples" / "paper.nsl"
 

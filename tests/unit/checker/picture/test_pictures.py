@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ntagen.checker import load
-from ntagen.model import BranchPoint, Edge, Location, Template
-from ntagen.model.layout import (
+from ntagen.checker.facts import Template
+from ntagen.checker.picture.diagram import BranchPoint, Edge, Location
+from ntagen.checker.picture.layout import (
     LOCATION_RADIUS,
     drawn_labels,
     placed,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ntagen.model.diagram import BranchPoint, Diagram, Edge, Location
+from ntagen.checker.picture.diagram import BranchPoint, Diagram, Edge, Location
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Template(Diagram):
             An SVG document.
         """
         # Imported here: few commands draw, and the libraries of XML take time to load.
-        from ntagen.model.svg import draw
+        from ntagen.checker.picture.svg import draw
 
         return draw(self)
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final, TypeVar
 
-from ntagen.model.diagram import Diagram, Edge, LabelKind, Location, Point
+from ntagen.checker.picture.diagram import Diagram, Edge, LabelKind, Location, Point
 
 LOCATION_RADIUS: Final = 11
 BRANCH_POINT_RADIUS: Final = 4
