@@ -56,8 +56,11 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 """By room: the rooms that it may import. Each may import itself.
 
-The face of the engine is split by module: ``checker`` is what it shows to the other rooms.
+The face of the engine is split by module; ``checker`` alone is what it shows to the other rooms.
 """
+
+NEEDLE = {"rules", "scene", "nsl", "render", "needle", "plan", "drive", "campaign", "plot"}
+"""The rooms that are about needles; the face of the engine serves any model."""
 
 SPLIT = {"checker"}
 """Folders each part of which is a room of its own."""
@@ -169,6 +172,20 @@ def test_the_allowed_arrows_make_no_circle() -> None:
         ready = {room for room, below in MAY_IMPORT.items() if room not in done and below <= done}
         assert ready, f"a circle among {sorted(set(MAY_IMPORT) - done)}"
         done |= ready
+
+
+def rooms_below(room: str) -> set[str]:
+    """All rooms that a room may get to by imports."""
+    below = MAY_IMPORT.get(room, set())
+    return below.union(*map(rooms_below, below))
+
+
+def test_the_face_of_the_engine_knows_nothing_of_the_needle() -> None:
+    face = {room for room in MAY_IMPORT if room.partition(".")[0] == "checker"}
+    assert {f"checker.{name}" for name in ("facts", "play", "strategy")} < face
+    assert {room: wrong for room in sorted(face) if (wrong := rooms_below(room) & NEEDLE)} == {}
+    # The package's own face leads everywhere.
+    assert [one.place for one in imports() if one.room in face and one.module == "ntagen"] == []
 
 
 def test_libraries_stay_in_their_rooms() -> None:
