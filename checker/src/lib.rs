@@ -14,6 +14,8 @@ pub mod semantics;
 
 pub mod zones;
 
+pub mod analysis;
+
 pub mod network;
 
 pub mod search;

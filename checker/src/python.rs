@@ -17,18 +17,22 @@ use pyo3::types::PyBytes;
 
 use crate::cancellation::{self, Cut, Look};
 use crate::diagnostics::Severity;
+use crate::engine;
+use crate::engine::evidence::strategy_check;
+use crate::engine::format::{
+    explain, json, machine_c, machine_json, model_json, strategy_c, strategy_json, strategy_text,
+    text,
+};
 use crate::engine::limits::Observer;
-use crate::engine::verification;
 use crate::engine::{
-    self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
-    TraceWanted, Verdict, controller, describe, explain, facts, json, machine_controller,
-    machine_file, strategy_file, strategy_text,
+    CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection, TraceWanted,
+    Verdict,
 };
 use crate::game::{Forced, Nodes, Priorities};
 use crate::ir::Overflow;
 use crate::search::limits::StopReason;
-use crate::search::plain::Met;
-use crate::search::reach::Order;
+use crate::search::optimum::best_first::Met;
+use crate::search::reachability::search::Order;
 
 use walks::{ExactWalk, Simulation};
 
@@ -199,7 +203,7 @@ fn reached_entry(network: &crate::ir::Network, met: Met) -> ReachedEntry {
     let row = |left: usize| clocks.clone().map(|right| bound(left, right)).collect();
     (
         json::discrete(network, &met.words).to_string(),
-        describe::minimal_constraints(network, &met.zone),
+        text::minimal_constraints(network, &met.zone),
         clocks.clone().map(row).collect(),
         met.from
             .map(|(source, parts)| (source, step_entry(network, &parts))),
@@ -237,12 +241,12 @@ impl Model {
 
     /// What is in the model, as JSON; see `engine::facts`.
     fn facts_json(&self) -> String {
-        self.with(|model| facts::facts(model).to_string())
+        self.with(|model| model_json::facts(model).to_string())
     }
 
     /// The queries of the file, as JSON.
     fn queries_json(&self) -> String {
-        self.with(|model| json_list(facts::queries(&model.queries)))
+        self.with(|model| json_list(model_json::queries(&model.queries)))
     }
 
     /// By process: its edges.
@@ -322,7 +326,7 @@ impl Model {
         let queries = self
             .with(|model| model.read_queries(path, data.as_bytes()))
             .map_err(rejected)?;
-        Ok(json_list(facts::queries(&queries)))
+        Ok(json_list(model_json::queries(&queries)))
     }
 
     /// Checks a file with a certificate, a trace or a strategy: whether it holds (`None` if the check does not cover it), and what was
@@ -447,7 +451,7 @@ impl Model {
 
 fn step_entry(network: &crate::ir::Network, parts: &[crate::network::Part]) -> StepEntry {
     let entry = |part: &crate::network::Part| {
-        let values = describe::selects(network, *part)
+        let values = text::selects(network, *part)
             .into_iter()
             .map(|one| one.1)
             .collect();
@@ -500,7 +504,7 @@ impl Answer {
             Verdict::Error(failure) => Some(
                 self.model
                     .get()
-                    .with(|model| describe::failure_text(model, failure)),
+                    .with(|model| text::failure_text(model, failure)),
             ),
             _ => self.inner.message.clone(),
         }
@@ -604,12 +608,12 @@ impl Answer {
     fn verification(&self) -> Vec<String> {
         let evidence = &self.inner.evidence;
         let runs = evidence.witnesses.iter().filter_map(|one| one.run.as_ref());
-        let mut lines: Vec<String> = runs.flat_map(describe::proof_lines).collect();
+        let mut lines: Vec<String> = runs.flat_map(text::proof_lines).collect();
         if let Some(result) = &evidence.verification {
             lines.extend(
                 self.model
                     .get()
-                    .with(|model| verification::describe(model.network(), result)),
+                    .with(|model| strategy_check::describe(model.network(), result)),
             );
         }
         lines
@@ -652,7 +656,7 @@ impl Answer {
         let texts: Vec<String> = self.model.get().with(|model| {
             let texts = witnesses.iter();
             texts
-                .map(|one| describe::witness_text(model.network(), one))
+                .map(|one| text::witness_text(model.network(), one))
                 .collect()
         });
         Some(texts.join("\n"))
@@ -682,7 +686,7 @@ impl Answer {
     fn strategy_json_or_none(&self) -> Option<String> {
         if let Some(machine) = &self.inner.evidence.machine {
             let write = |model: &mut LoadedModel| {
-                machine_file::write(model.network(), machine, &self.query).to_string()
+                machine_json::write(model.network(), machine, &self.query).to_string()
             };
             return Some(self.model.get().with(write));
         }
@@ -690,14 +694,14 @@ impl Answer {
         Some(
             self.model
                 .get()
-                .with(|model| strategy_file::text(model.network(), strategy, &self.query)),
+                .with(|model| strategy_json::text(model.network(), strategy, &self.query)),
         )
     }
 
     fn strategy_text_or_none(&self) -> Option<String> {
         if let Some(machine) = &self.inner.evidence.machine {
             let write =
-                |model: &mut LoadedModel| machine_file::text(model.network(), machine, &self.query);
+                |model: &mut LoadedModel| machine_json::text(model.network(), machine, &self.query);
             return Some(self.model.get().with(write));
         }
         let strategy = self.inner.evidence.strategy.as_ref()?;
@@ -705,11 +709,10 @@ impl Answer {
         Some(self.model.get().with(write))
     }
 
-    fn controller_c_or_reason(&self) -> Result<Option<String>, controller::NoController> {
+    fn controller_c_or_reason(&self) -> Result<Option<String>, strategy_c::NoController> {
         if let Some(machine) = &self.inner.evidence.machine {
-            let write = |model: &mut LoadedModel| {
-                machine_controller::write(model.network(), machine, &self.query)
-            };
+            let write =
+                |model: &mut LoadedModel| machine_c::write(model.network(), machine, &self.query);
             return Ok(Some(self.model.get().with(write)));
         }
         let Some(strategy) = self.inner.evidence.strategy.as_ref() else {
@@ -718,7 +721,7 @@ impl Answer {
         let text = self
             .model
             .get()
-            .with(|model| controller::write(model.network(), strategy, &self.query));
+            .with(|model| strategy_c::write(model.network(), strategy, &self.query));
         text.map(Some)
     }
 }

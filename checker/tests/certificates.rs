@@ -1,6 +1,6 @@
 //! Certificates: those of the engine pass, and those that were made wrong on purpose are caught.
 
-use checker::engine::certificate::{Certificate, verify};
+use checker::engine::evidence::certificate::{Certificate, verify};
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};
 use checker::verify::certificate::States;

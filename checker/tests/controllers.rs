@@ -14,9 +14,11 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use checker::engine::{controller, describe, timing};
-use checker::game::strategy::{Decision, Selection, Strategy};
-use checker::game::{Player, closed_loop};
+use checker::engine::format::{strategy_c, text};
+use checker::engine::query::time_clock;
+use checker::game::Player;
+use checker::game::strategy::attractor::{Decision, Selection, Strategy};
+use checker::game::strategy::closed_loop;
 use checker::network::{Part, is_same_entry};
 
 use c_programs::{compiled, games, in_folder};
@@ -73,8 +75,8 @@ struct Case {
 fn solve(path: &Path, query: &str) -> Option<Case> {
     let (model, answer) = solved(path, query)?;
     let strategy = answer.evidence.strategy?;
-    let text = controller::write(model.network(), &strategy, query).ok()?;
-    let again = controller::write(model.network(), &strategy, query);
+    let text = strategy_c::write(model.network(), &strategy, query).ok()?;
+    let again = strategy_c::write(model.network(), &strategy, query);
     assert_eq!(again.as_ref(), Ok(&text), "the text is always the same");
     let (_, after) = text.split_once("controller_texts[] = {\n")?;
     let (list, _) = after.split_once("};")?;
@@ -82,7 +84,7 @@ fn solve(path: &Path, query: &str) -> Option<Case> {
         let line = line.trim().strip_prefix('"')?.strip_suffix("\",")?;
         Some(line.replace("\\\"", "\"").replace("\\?", "?"))
     });
-    let network = timing::network_of(model.network(), &strategy).into_owned();
+    let network = time_clock::network_of(model.network(), &strategy).into_owned();
     let words = network.layout.identity_words as usize;
     let decided = closed_loop::joined(&network, &strategy).into_iter();
     let decided = decided.map(|one| {
@@ -156,8 +158,8 @@ impl Case {
 
     fn number(&self, parts: &[Part]) -> i64 {
         let edges = parts.iter().map(|&part| match self.strategy.owner {
-            Player::Controller => describe::entry_text(&self.network, part),
-            Player::Environment => describe::part_text(&self.network, part),
+            Player::Controller => text::entry_text(&self.network, part),
+            Player::Environment => text::part_text(&self.network, part),
         });
         let text = edges.collect::<Vec<_>>().join(" ");
         let number = self.actions.iter().position(|one| *one == text);

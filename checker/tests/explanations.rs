@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use checker::engine::explain::{Example, Role, examples, explanations};
+use checker::engine::format::explain::{Example, Role, examples, explanations};
 use checker::engine::{CodeEngine, LoadedModel, Options, Rejection};
 use checker::syntax::ast::QueryText;
 

@@ -12,8 +12,9 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use checker::engine::{LoadedModel, machine_controller, machine_file};
-use checker::game::observed::Machine;
+use checker::engine::LoadedModel;
+use checker::engine::format::{machine_c, machine_json};
+use checker::game::partial_observation::Machine;
 
 use c_programs::{compiled, games, in_folder};
 use solved::solved;
@@ -50,7 +51,7 @@ struct Case {
 fn solve(path: &Path, query: &str) -> Option<Case> {
     let (model, answer) = solved(path, query)?;
     let machine = answer.evidence.machine?;
-    let text = machine_controller::write(model.network(), &machine, query);
+    let text = machine_c::write(model.network(), &machine, query);
     Some(Case {
         model,
         machine,
@@ -64,7 +65,7 @@ impl Case {
         let mut text = String::new();
         for (number, state) in self.machine.states.iter().enumerate() {
             let own = &state.knowledge.observation;
-            let action = machine_file::action_text(self.model.network(), state.action);
+            let action = machine_json::action_text(self.model.network(), state.action);
             let _ = writeln!(text, "{action}");
             for bits in 0..1_u64 << own.len() {
                 let seen: Vec<bool> = (0..own.len()).map(|index| bits >> index & 1 == 1).collect();

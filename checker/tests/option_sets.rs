@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, TraceWanted, Verdict};
 use checker::game::Nodes;
-use checker::search::reach::Order;
+use checker::search::reachability::search::Order;
 
 use random::{Random, networks};
 

@@ -12,9 +12,9 @@ mod searches;
 
 use std::fmt::Write as _;
 
-use checker::engine::evidence::Proof;
+use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, Options, Verdict};
-use checker::search::reach::Order;
+use checker::search::reachability::search::Order;
 
 use random::{Random, networks};
 

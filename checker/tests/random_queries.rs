@@ -14,9 +14,9 @@ mod random;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use checker::engine::evidence::Proof;
+use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{CodeEngine, Limits, LoadedModel, Options, TraceWanted, Verdict};
-use checker::search::extremum::Extreme;
+use checker::search::optimum::extremum::Extreme;
 use checker::verify::replay::End;
 
 use random::{Random, networks};

@@ -5,8 +5,9 @@
     reason = "UPDATE_EXPECT=1 writes them"
 )]
 
-use checker::engine::evidence::Proof;
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict, describe};
+use checker::engine::evidence::timed_run::Proof;
+use checker::engine::format::text;
+use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};
 use checker::verify::replay::{self, Claim, Coverage, Defect, End, Moment, Outcome, Run};
 use expect_test::{Expect, expect};
@@ -62,9 +63,7 @@ fn check_text(query: &str, expected: &Expect) {
     let texts = answer.evidence.witnesses.iter();
     let text: String = texts
         .map(|witness| match &witness.run {
-            Some(Proof::Replayed(run, states, _)) => {
-                describe::run_text(model.network(), run, states)
-            }
+            Some(Proof::Replayed(run, states, _)) => text::run_text(model.network(), run, states),
             other => panic!("{other:?}"),
         })
         .collect();

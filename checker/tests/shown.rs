@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use checker::engine::{LoadedModel, Options, json};
+use checker::engine::format::json;
+use checker::engine::{LoadedModel, Options};
 use checker::game::{Forced, Priorities};
 use serde_json::Value as Json;
 

@@ -14,11 +14,11 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use checker::engine::certificate::verify;
-use checker::engine::evidence::Proof;
+use checker::engine::evidence::certificate::verify;
+use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};
-use checker::search::extremum::{Extreme, Extremes};
+use checker::search::optimum::extremum::{Extreme, Extremes};
 use checker::verify::certificate::States;
 use checker::verify::{Semantics, State};
 

@@ -6,12 +6,14 @@
 //!
 //! A count that falls is a gain and is written down here; one that rises is a loss that is to be explained.
 
+use checker::analysis::{Abstraction, ClockBounds};
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, TraceWanted};
 use checker::exec::Interpreter;
 use checker::ir::Predicate;
-use checker::network::{Abstraction, ClockBounds, Stepper, Symbolic};
+use checker::network::{Stepper, Symbolic};
 use checker::search::limits::{Counters, StopReason, Watch};
-use checker::search::reach::{self, Order};
+use checker::search::reachability::search;
+use checker::search::reachability::search::Order;
 
 fn load(text: &str) -> LoadedModel {
     LoadedModel::load("model.xta", text.as_bytes())
@@ -57,8 +59,8 @@ fn stored_by(abstraction: Abstraction, text: &str) -> Option<u64> {
     let bounds = ClockBounds::new(network, &[], abstraction);
     let mut symbolic = Symbolic::new(Stepper::new(network, &interpreter), bounds);
     let goal = Predicate::Constant(false);
-    let report = reach::search(&mut symbolic, &mut &goal, Order::BreadthFirst, &mut Few);
-    let is_whole = matches!(report.outcome, Ok(reach::Outcome::Exhausted));
+    let report = search::search(&mut symbolic, &mut &goal, Order::BreadthFirst, &mut Few);
+    let is_whole = matches!(report.outcome, Ok(search::Outcome::Exhausted));
     is_whole.then_some(report.counters.stored)
 }
 

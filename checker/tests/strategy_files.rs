@@ -1,7 +1,8 @@
 //! Strategies read from files: what does not fit the model is refused with its place.
 
 use checker::engine::Verdict;
-use checker::engine::{CodeEngine, LoadedModel, Options, strategy_file};
+use checker::engine::format::strategy_json;
+use checker::engine::{CodeEngine, LoadedModel, Options};
 use serde_json::{Value, json};
 
 const MODEL: &str = "
@@ -55,11 +56,11 @@ fn file() -> Value {
     })
 }
 
-fn read(file: &Value) -> Result<Value, strategy_file::Mismatch> {
+fn read(file: &Value) -> Result<Value, strategy_json::Mismatch> {
     let model = load();
-    let (query, strategy) = strategy_file::read(model.network(), file.to_string().as_bytes())?;
-    let file = strategy_file::write(model.network(), &strategy, &query);
-    let text = strategy_file::text(model.network(), &strategy, &query);
+    let (query, strategy) = strategy_json::read(model.network(), file.to_string().as_bytes())?;
+    let file = strategy_json::write(model.network(), &strategy, &query);
+    let text = strategy_json::text(model.network(), &strategy, &query);
     assert_eq!(text, file.to_string());
     Ok(file)
 }
@@ -276,7 +277,7 @@ fn strategies_within_a_time_are_asked_under() {
         };
         let answer = model.check(&query, &options).expect("the query is right");
         let witnesses = &answer.evidence.witnesses;
-        let trace = checker::engine::json::witnesses(model.network(), witnesses, "");
+        let trace = checker::engine::format::json::witnesses(model.network(), witnesses, "");
         (answer.verdict, answer.evidence.is_verified(), trace)
     };
     assert_eq!(
@@ -306,12 +307,12 @@ fn limit_of_time_is_read_with_care() {
     };
     let answer = model.check(&query, &options).expect("the query is right");
     let strategy = answer.evidence.strategy.expect("the controller wins");
-    let file = strategy_file::write(model.network(), &strategy, "control_t*: A<> P.C");
+    let file = strategy_json::write(model.network(), &strategy, "control_t*: A<> P.C");
     assert_eq!(file["time_limit"], 1);
     let mut other = file.clone();
     other["time_limit"] = "soon".into();
     let read = |file: &serde_json::Value| {
-        strategy_file::read(model.network(), file.to_string().as_bytes())
+        strategy_json::read(model.network(), file.to_string().as_bytes())
             .map_err(|mismatch| (mismatch.place, mismatch.message))
     };
     assert_eq!(

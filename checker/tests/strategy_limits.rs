@@ -1,6 +1,7 @@
 //! Limits that come while a strategy is made: what is known is answered, and why there is no strategy is said.
 
-use checker::engine::verification::{self, Played};
+use checker::engine::evidence::strategy_check;
+use checker::engine::evidence::strategy_check::Played;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::verify::strategy::Outcome;
 use checker::verify::{Effort, GivenUp};
@@ -72,7 +73,7 @@ fn a_check_of_a_strategy_ends_when_it_is_to() {
     };
     let answer = model.check(&query, &options).expect("it is answered");
     let strategy = answer.evidence.strategy.expect("it is wanted");
-    let decisions = verification::decisions(model.network(), &strategy);
+    let decisions = strategy_check::decisions(model.network(), &strategy);
     let played = Played::new(&strategy, &decisions);
     let rules = (options.forced, options.priorities);
     let mut check = |effort: &mut Effort<'_>| {

@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use checker::engine::strategy_text;
+use checker::engine::format::strategy_text;
 
 #[path = "common/solved.rs"]
 mod solved;

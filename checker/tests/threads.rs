@@ -9,13 +9,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::{self, ThreadId};
 use std::time::Duration;
 
+use checker::analysis::{Abstraction, ClockBounds};
 use checker::engine::{Answer, Limits, LoadedModel, Options, Verdict};
 use checker::exec::Interpreter;
-use checker::network::{Abstraction, ClockBounds, Failure, Stepper, Symbolic};
+use checker::network::{Failure, Stepper, Symbolic};
 use checker::search::StopReason;
-use checker::search::goal::{Goal, SharedGoal};
 use checker::search::limits::Unlimited;
-use checker::search::reach::{self, Manner, Order};
+use checker::search::reachability::goal::{Goal, SharedGoal};
+use checker::search::reachability::search;
+use checker::search::reachability::search::{Manner, Order};
 use checker::zones::Zone;
 
 const THREADS: [usize; 4] = [1, 2, 3, 4];
@@ -249,7 +251,7 @@ fn panic_of_a_thread_ends_the_search_with_it() {
         threads: 3,
     };
     let result = panic::catch_unwind(panic::AssertUnwindSafe(|| {
-        reach::search_shared(&mut symbolic, &mut goal, manner, &mut Unlimited)
+        search::search_shared(&mut symbolic, &mut goal, manner, &mut Unlimited)
     }));
     let cause = result.expect_err("the panic comes through");
     let text = cause.downcast_ref::<&str>().copied();

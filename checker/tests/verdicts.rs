@@ -9,11 +9,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use checker::engine::answer::Values;
+use checker::engine::query::answer::Values;
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
 use checker::game::{Forced, Priorities};
-use checker::search::extremum::Extreme;
-use checker::search::reach::Order;
+use checker::search::optimum::extremum::Extreme;
+use checker::search::reachability::search::Order;
 
 type Rules = (Forced, Priorities);
 

@@ -1,11 +1,13 @@
 //! What is remembered of zones changes nothing: searches come to the same end with whatever limits, by the same steps.
 
+use checker::analysis::{Abstraction, ClockBounds};
 use checker::engine::LoadedModel;
 use checker::exec::Interpreter;
-use checker::network::{Abstraction, ClockBounds, Failure, MemoLimits, Stepper, Symbolic};
-use checker::search::goal::{Goal, SharedGoal};
+use checker::network::{Failure, MemoLimits, Stepper, Symbolic};
 use checker::search::limits::Unlimited;
-use checker::search::reach::{self, Manner, Order, Outcome};
+use checker::search::reachability::goal::{Goal, SharedGoal};
+use checker::search::reachability::search;
+use checker::search::reachability::search::{Manner, Order, Outcome};
 use checker::zones::{Bound, Zone};
 
 /// Workers who take turns at a machine, some with flags that updates set and guards ask for.
@@ -90,7 +92,7 @@ fn end(wanted: &Wanted, abstraction: Abstraction, threads: usize, limits: MemoLi
         threads,
     };
     let mut wanted = wanted.clone();
-    let report = reach::search_shared(&mut symbolic, &mut wanted, manner, &mut Unlimited);
+    let report = search::search_shared(&mut symbolic, &mut wanted, manner, &mut Unlimited);
     let (explored, stored) = (report.counters.explored, report.counters.stored);
     match report.outcome.expect("nothing fails") {
         Outcome::Found(trace) => (true, explored, stored, trace.moves.len()),

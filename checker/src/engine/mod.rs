@@ -3,37 +3,12 @@
 //! Everything here is a value: diagnostics, answers, traces, strategies, plans. Nothing prints, and the only clock that is read
 //! is the one for the time limit and the measured seconds.
 
-pub mod answer;
-mod attempt;
-mod best;
-pub mod certificate;
-pub mod controller;
-mod cooperation;
-pub mod decision_table;
-pub mod describe;
-mod endless;
 pub mod evidence;
-pub mod explain;
-pub mod facts;
-mod failure;
-mod fastest;
-mod games;
-pub mod json;
+pub mod format;
 pub mod limits;
-pub mod machine_controller;
-pub mod machine_file;
-pub mod observed;
-pub mod play;
-mod reachable;
-mod shown;
-pub mod simulation;
-pub mod strategies;
-pub mod strategy_file;
-mod strategy_place;
-pub mod strategy_text;
-pub mod timing;
-mod values;
-pub mod verification;
+
+pub mod query;
+pub mod session;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -52,18 +27,18 @@ use crate::syntax::{
 };
 use crate::verify::{self, Effort};
 
-pub use answer::{Answer, Evidence, Verdict};
+use evidence::named_strategies::Due;
+pub use evidence::named_strategies::NamedStrategy;
+pub use evidence::strategy_check::Verification;
+use evidence::strategy_check::{Asked, Played};
 pub use limits::Limits;
-use strategies::Due;
-pub use strategies::NamedStrategy;
-pub use verification::Verification;
-use verification::{Asked, Played};
+pub use query::answer::{Answer, Evidence, Verdict};
 
-use crate::game::closed_loop::ClosedLoop;
-use crate::game::strategy::Under;
+use crate::game::strategy::attractor::Under;
+use crate::game::strategy::closed_loop::ClosedLoop;
 use crate::game::{Forced, Nodes, Player, Priorities};
-pub use crate::search::reach::MOST_THREADS;
-use crate::search::reach::{Manner, Order};
+pub use crate::search::reachability::search::MOST_THREADS;
+use crate::search::reachability::search::{Manner, Order};
 
 /// Codes of what the engine refuses to answer although the model is right.
 pub mod codes {
@@ -351,7 +326,7 @@ impl LoadedModel {
         self.executor().wraps().clear();
         self.load_seconds += start.elapsed().as_secs_f64();
         let mut answer = match (&query.kind, self.constant_failure()) {
-            (_, Some(failure)) => answer::failed(failure),
+            (_, Some(failure)) => query::answer::failed(failure),
             (QueryKind::SaveStrategy { file, strategy }, None) => {
                 self.save_strategy((file, strategy), query.span, options)?
             }
@@ -385,7 +360,7 @@ impl LoadedModel {
         let Some(name) = query.strategy.clone() else {
             return Ok(answer);
         };
-        let text = strategies::unnamed(self.sources.text(query.span)).to_owned();
+        let text = evidence::named_strategies::unnamed(self.sources.text(query.span)).to_owned();
         // Where the query is not satisfied, the strategy is the environment's.
         let is_won = answer.verdict == Verdict::Satisfied;
         let known = is_won.then(|| answer.evidence.strategy.clone()).flatten();
@@ -411,16 +386,16 @@ impl LoadedModel {
         within: Option<&Arc<Under>>,
     ) -> Answer {
         let time_limit = within.and_then(|within| within.strategy.time_limit);
-        let network = timing::with_limit(&self.model.network, time_limit);
+        let network = query::time_clock::with_limit(&self.model.network, time_limit);
         let under = within.map(|within| ClosedLoop::new(&network, &within.strategy));
-        let subject = answer::Subject {
+        let subject = query::answer::Subject {
             network: &network,
             executor: self.executor(),
             under: under.as_ref(),
             within,
             priorities: options.priorities,
         };
-        let mut answer = answer::answer(subject, query, options);
+        let mut answer = query::answer::answer(subject, query, options);
         if time_limit.is_some() && query.strategy.is_none() {
             answer.evidence.forget_last_clock();
         }
@@ -451,7 +426,9 @@ impl LoadedModel {
         let (query, _) = self.compile(text.span)?;
         let network = &self.model.network;
         Ok(match Asked::of(&query.kind) {
-            Some(asked) => verification::verify(network, asked, strategy, rules, effort),
+            Some(asked) => {
+                evidence::strategy_check::verify(network, asked, strategy, rules, effort)
+            }
             None => Err(verify::Error::Unsupported("queries other than control")),
         })
     }
@@ -577,7 +554,7 @@ impl LoadedModel {
                 cooperative,
                 time_optimal,
                 observations,
-            } => games::unsupported_game(
+            } => query::game::unsupported_game(
                 objective,
                 time_optimal.is_some(),
                 *cooperative,
@@ -599,7 +576,7 @@ impl LoadedModel {
         let construct = if is_under && features.stopwatches {
             Some("stopwatches in a query under a strategy")
         } else if is_observed {
-            observed::unsupported(&self.model.network, priorities)
+            query::partial_observation::unsupported(&self.model.network, priorities)
         } else if !features.clock_guarded_urgent {
             None
         } else if features.stopwatches {

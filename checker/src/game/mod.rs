@@ -4,37 +4,12 @@
 //! environment is faster: where both can move at the same instant, it may. It also picks the leg behind a branch point, whoever owns the
 //! edge that leads there.
 
-mod account;
-pub mod allowance;
-mod chance;
-mod choices;
-pub mod closed_loop;
-pub mod cooperation;
-mod dead_ends;
-mod deadlines;
-mod defences;
-pub mod denial;
-mod dives;
-mod evasion;
-mod gains;
-pub mod graph;
-mod hopes;
-mod layers;
-pub mod observed;
-pub mod plans;
-mod predecessors;
-pub mod programs;
-mod prospects;
-pub mod reach;
-pub mod recurrence;
-mod repeats;
-mod sought;
-mod stops;
+pub mod backward;
+pub mod exploration;
+pub mod forward;
+pub mod objectives;
+pub mod partial_observation;
 pub mod strategy;
-mod sweeps;
-mod tasks;
-mod trails;
-mod urgency;
 
 /// Who plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

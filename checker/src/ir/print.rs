@@ -5,7 +5,7 @@
 
 use std::fmt::{Display, Formatter, Result};
 
-use super::{
+use crate::ir::{
     Address, Base, BlockId, ClockOperand, DoubleOperator, Function, FunctionId, Instruction,
     IntegerOperator, Register, RegisterType, Relation, SiteId, Terminator,
 };

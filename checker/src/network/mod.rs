@@ -8,55 +8,23 @@
 //! hold after all updates; a committed location must take part if there is one; a broadcast takes along every process with an
 //! enabled receiving edge.
 
-mod audience;
-pub mod bounds;
-mod combinations;
-mod deadlocks;
-pub mod differences;
-mod enumeration;
-mod exposure;
+pub mod discrete;
 pub mod failure;
-mod fixed;
-mod footprints;
-mod holders;
-mod instances;
-mod interference;
-mod listening;
-pub mod live;
-pub mod moves;
-mod offers;
-mod orbits;
-mod pairing;
-mod partners;
-mod passage;
-pub mod possibility;
-pub mod predicate;
-mod reads;
-mod recurrence;
-pub mod restriction;
-mod scope;
-pub mod selects;
-pub mod stepper;
-pub mod stubborn;
-pub mod symbolic;
-pub mod symmetry;
-mod tables;
-mod valuations;
-mod watched;
-mod zone_memo;
 
-pub use bounds::{Abstraction, ClockBounds};
+pub mod reduction;
+pub mod symbolic;
+
 pub use failure::Failure;
-pub use fixed::FixedMove;
-pub use live::LiveVariables;
-pub use moves::{MoveRef, Moves, Part, is_same_entry};
-pub use offers::{OfferId, VectorId};
-pub use orbits::Obstacle;
-pub use predicate::Extent;
-pub use restriction::{Allowed, Restriction};
-pub use stepper::Stepper;
-pub use stubborn::PartialOrder;
-pub(crate) use stubborn::{Agenda, StubbornSets};
-pub use symbolic::{ClockEffect, Symbolic};
-pub use symmetry::{Permutation, Symmetry};
-pub use zone_memo::{KeptZone, KnownZone, MemoLimits};
+pub use symbolic::constant_effect::FixedMove;
+
+pub use discrete::stepper::Stepper;
+pub use discrete::transition::{MoveRef, Moves, Part, is_same_entry};
+pub use discrete::transition_cache::{OfferId, VectorId};
+pub use reduction::scalar_swaps::Obstacle;
+pub use reduction::stubborn_sets::PartialOrder;
+pub(crate) use reduction::stubborn_sets::{Agenda, StubbornSets};
+pub use reduction::symmetry::{Permutation, Symmetry};
+pub use symbolic::predicate::Extent;
+pub use symbolic::restriction::{Allowed, Restriction};
+pub use symbolic::successor_cache::{KeptZone, KnownZone, MemoLimits};
+pub use symbolic::zone_graph::{ClockEffect, Symbolic};

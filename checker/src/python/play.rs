@@ -6,12 +6,16 @@ use pyo3::exceptions::{PyIndexError, PyLookupError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use super::{Answer, FailedError, Model, forced_rule, priority_rule, rejected};
 use crate::diagnostics::Span;
-use crate::engine::play::{self as engine, Done, Follower, Refused, Unadvised, player_name};
-use crate::engine::strategies::{NamedStrategy, unnamed};
-use crate::engine::{LoadedModel, describe, strategy_file, timing, verification};
-use crate::game::strategy::Selection;
+use crate::engine::LoadedModel;
+use crate::engine::evidence::named_strategies::{NamedStrategy, unnamed};
+use crate::engine::evidence::strategy_check;
+use crate::engine::format::{strategy_json, text};
+use crate::engine::query::time_clock;
+use crate::engine::session::play as engine;
+use crate::engine::session::play::{Done, Follower, Refused, Unadvised, player_name};
+use crate::game::strategy::attractor::Selection;
+use crate::python::{Answer, FailedError, Model, forced_rule, priority_rule, rejected};
 use crate::verify::{self, Effort};
 
 /// A strategy of one of the players.
@@ -81,7 +85,7 @@ impl Strategy {
     /// The names of the model's processes and clocks.
     fn names(&self) -> (Vec<String>, Vec<String>) {
         self.model.get().with(|model| {
-            let network = timing::network_of(model.network(), &self.inner.strategy);
+            let network = time_clock::network_of(model.network(), &self.inner.strategy);
             let processes = network.processes.iter().map(|one| one.name.clone());
             let clocks = network.clocks.iter().skip(1).map(|one| one.name.clone());
             (processes.collect(), clocks.collect())
@@ -139,7 +143,7 @@ impl Strategy {
         let (strategy, query) = (&self.inner.strategy, &self.inner.query);
         self.model
             .get()
-            .with(|model| strategy_file::text(model.network(), strategy, query))
+            .with(|model| strategy_json::text(model.network(), strategy, query))
     }
 
     /// The entry of its file for a state, given as JSON with `locations` and `variables`.
@@ -171,7 +175,7 @@ impl Strategy {
         states: Option<u64>,
     ) -> PyResult<(Option<bool>, Vec<String>)> {
         let rules = (forced_rule(forced)?, priority_rule(priorities)?);
-        let most = states.unwrap_or(verification::MOST_REGIONS);
+        let most = states.unwrap_or(strategy_check::MOST_REGIONS);
         let model = self.model.get();
         let inner = &self.inner;
         let (result, interrupted) = py.detach(|| {
@@ -215,7 +219,7 @@ impl Strategy {
 }
 
 fn failed(model: &LoadedModel, error: verify::Error) -> PyErr {
-    FailedError::new_err(describe::error_text(model, error))
+    FailedError::new_err(text::error_text(model, error))
 }
 
 fn refused(model: &LoadedModel, why: Refused) -> PyErr {

@@ -4,10 +4,11 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use super::{FailedError, Model, StepEntry, rejected, step_entry};
-use crate::engine::simulation::{Point, SIMULATED_TICKS_PER_UNIT};
-use crate::engine::{CodeEngine, LoadedModel, describe, json};
+use crate::engine::format::{json, text};
+use crate::engine::session::walk::{Point, SIMULATED_TICKS_PER_UNIT};
+use crate::engine::{CodeEngine, LoadedModel};
 use crate::network::Failure;
+use crate::python::{FailedError, Model, StepEntry, rejected, step_entry};
 use crate::verify::timed::{Timed, least_multiple};
 
 /// A walk through a model.
@@ -33,7 +34,7 @@ impl Simulation {
     }
 
     pub(super) fn failed(model: &LoadedModel, failure: Failure) -> PyErr {
-        FailedError::new_err(describe::failure_text(model, failure))
+        FailedError::new_err(text::failure_text(model, failure))
     }
 }
 
@@ -43,9 +44,8 @@ impl Simulation {
     fn locations(&self) -> Vec<(String, String)> {
         self.model.get().with(|model| {
             let network = model.network();
-            let name = |index: usize| {
-                describe::location_name(network, index, &self.point.words).to_owned()
-            };
+            let name =
+                |index: usize| text::location_name(network, index, &self.point.words).to_owned();
             let processes = network.processes.iter().enumerate();
             processes
                 .map(|(index, process)| (process.name.clone(), name(index)))
@@ -57,10 +57,10 @@ impl Simulation {
     fn variables(&self, py: Python<'_>) -> PyResult<Vec<(String, Py<PyAny>)>> {
         self.model.get().with(|model| {
             let mut values: Vec<PyResult<(String, Py<PyAny>)>> = Vec::new();
-            describe::for_each_value(model.network(), &self.point.words, |name, value| {
+            text::for_each_value(model.network(), &self.point.words, |name, value| {
                 let value = match value {
-                    describe::Value::Integer(value) => value.into_py_any(py),
-                    describe::Value::Double(value) => value.into_py_any(py),
+                    text::Value::Integer(value) => value.into_py_any(py),
+                    text::Value::Double(value) => value.into_py_any(py),
                 };
                 values.push(value.map(|value| (name.to_owned(), value)));
             });
@@ -72,7 +72,7 @@ impl Simulation {
     fn zone(&self) -> Vec<String> {
         self.model
             .get()
-            .with(|model| describe::zone_constraints(model.network(), &self.point.zone))
+            .with(|model| text::zone_constraints(model.network(), &self.point.zone))
     }
 
     /// The moves: of each, process, edge, branch and select values of the edges that are taken.
@@ -142,7 +142,7 @@ impl ExactWalk {
     }
 
     fn failed(model: &LoadedModel, error: crate::verify::Error) -> PyErr {
-        FailedError::new_err(describe::error_text(model, error))
+        FailedError::new_err(text::error_text(model, error))
     }
 }
 

@@ -1,9 +1,11 @@
-//! One zone that owns its matrix: the comfortable face of [`super::dbm`] and [`super::clocks`] for code that is not
+//! One zone that owns its matrix: the comfortable face of [`crate::zones::dbm`] and [`crate::zones::clocks`] for code that is not
 //! in the innermost loop.
 
-use super::clocks::{self, Assignment};
-use super::dbm::{self, Constraint, Relation};
-use super::{Bound, ClockSet};
+use crate::zones::clocks;
+use crate::zones::clocks::Assignment;
+use crate::zones::dbm;
+use crate::zones::dbm::{Constraint, Relation};
+use crate::zones::{Bound, ClockSet};
 
 /// A zone with its own storage; may be empty.
 ///

@@ -4,7 +4,7 @@
 
 use hashbrown::HashTable;
 
-use super::{Bound, dbm};
+use crate::zones::{Bound, dbm};
 
 /// The index of a stored zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,8 +1,8 @@
 //! Searches in some manner, whose traces are shown to be runs.
 
-use checker::engine::evidence::Proof;
+use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options};
-use checker::search::reach::Order;
+use checker::search::reachability::search::Order;
 
 /// The answer to a query, found in this order by so many threads, with the options that `adjust` leaves; `is_shown` says whether what an
 /// independent replay makes of a trace is all right.

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use checker::engine::LoadedModel;
-use checker::engine::simulation::{Point, successors, symbolic};
+use checker::engine::session::walk::{Point, successors, symbolic};
 use checker::exec::Executor;
 use checker::ir::{Network, Overflow};
 use checker::network::Symbolic;

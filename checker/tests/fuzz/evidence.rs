@@ -8,9 +8,8 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use checker::engine::{
-    Answer, CodeEngine, LoadedModel, Options, Verdict, json, machine_file, strategy_file,
-};
+use checker::engine::format::{json, machine_json, strategy_json};
+use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 use checker::game::{Forced, Priorities};
 use serde_json::Value as Json;
 
@@ -150,10 +149,10 @@ fn texts(model: &LoadedModel, answer: &Answer, query: &str) -> Vec<String> {
         texts.push(certificate.text(network, query));
     }
     if let Some(strategy) = &evidence.strategy {
-        texts.push(strategy_file::text(network, strategy, query));
+        texts.push(strategy_json::text(network, strategy, query));
     }
     if let Some(machine) = &evidence.machine {
-        texts.push(machine_file::write(network, machine, query).to_string());
+        texts.push(machine_json::write(network, machine, query).to_string());
     }
     texts
 }

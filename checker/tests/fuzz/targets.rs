@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use checker::engine::simulation::Point;
+use checker::engine::session::walk::Point;
 use checker::engine::{CodeEngine, LoadedModel, Options};
 
 use super::seeds::Seeds;

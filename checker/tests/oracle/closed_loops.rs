@@ -6,9 +6,10 @@
 
 use std::collections::HashMap;
 
-use checker::engine::{NamedStrategy, Verdict, strategy_file};
+use checker::engine::format::strategy_json;
+use checker::engine::{NamedStrategy, Verdict};
 use checker::game::Player;
-use checker::game::strategy::{Decision, Selection, Start, Strategy, StrategyState};
+use checker::game::strategy::attractor::{Decision, Selection, Start, Strategy, StrategyState};
 use checker::network::Part;
 use checker::verify::regions::Bounding;
 use checker::verify::{Regions, Semantics, State};
@@ -435,9 +436,9 @@ fn compare(
     let Some(closed) = close(&semantics, &regions, &strategy) else {
         return Ok(());
     };
-    let states = strategy_file::write(&ir, &strategy, "");
-    let read = strategy_file::read(&ir, states.to_string().as_bytes());
-    let read = read.map(|(query, strategy)| strategy_file::write(&ir, &strategy, &query));
+    let states = strategy_json::write(&ir, &strategy, "");
+    let read = strategy_json::read(&ir, states.to_string().as_bytes());
+    let read = read.map(|(query, strategy)| strategy_json::write(&ir, &strategy, &query));
     prop_assert_eq!(read.as_ref(), Ok(&states), "{}", text);
     let description = format!("{text}\n{states:#}");
     model.keep_strategy(NamedStrategy::new(

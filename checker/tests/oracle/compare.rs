@@ -4,8 +4,8 @@ use std::cell::Cell;
 use std::io::Write as _;
 
 use checker::engine::Verdict;
-use checker::engine::evidence::Proof;
-use checker::engine::verification;
+use checker::engine::evidence::strategy_check;
+use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Rejection};
 use checker::search::limits::StopReason;
 use proptest::strategy::Strategy;
@@ -254,9 +254,9 @@ pub(crate) fn check_strategy(
             Ok(())
         }
         Some(verification) => {
-            let lines = verification::describe(model.network(), verification).join("\n");
+            let lines = strategy_check::describe(model.network(), verification).join("\n");
             let strategy = evidence.strategy.as_ref();
-            let strategy = strategy.map(|one| verification::decisions(model.network(), one));
+            let strategy = strategy.map(|one| strategy_check::decisions(model.network(), one));
             Err(TestCaseError::fail(format!(
                 "{}\n{lines}\n{strategy:#?}",
                 describe()

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use checker::engine::evidence::{Kind, Proof};
+use checker::engine::evidence::timed_run::{Kind, Proof};
 use checker::engine::{Answer, LoadedModel, Options, TraceWanted, Verdict};
-use checker::search::extremum::{Extreme, Extremes};
 use checker::search::limits::StopReason;
+use checker::search::optimum::extremum::{Extreme, Extremes};
 use checker::verify::replay::{End, Run};
 use proptest::collection::vec;
 use proptest::test_runner::TestCaseError;

@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
-use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict, strategy_file};
-use checker::game::strategy::{self, Start};
+use checker::engine::format::strategy_json;
+use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict};
+use checker::game::strategy::attractor;
+use checker::game::strategy::attractor::Start;
 use checker::game::{Forced, Nodes, Player, Priorities};
-use checker::search::extremum::Extreme;
 use checker::search::limits::StopReason;
+use checker::search::optimum::extremum::Extreme;
 use proptest::strategy::Strategy;
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
@@ -200,7 +202,7 @@ fn enforced(kind: Kind, owner: Player, (goal, keep): (&str, &str)) -> Vec<String
 /// Under a strategy, what it was made for must hold.
 fn check_under(
     model: &mut LoadedModel,
-    strategy: Arc<strategy::Strategy>,
+    strategy: Arc<attractor::Strategy>,
     query: &str,
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
@@ -356,12 +358,12 @@ pub(crate) fn check_file(
         );
         return Ok(());
     };
-    let file = strategy_file::write(model.network(), strategy, query);
-    let read = strategy_file::read(model.network(), file.to_string().as_bytes());
+    let file = strategy_json::write(model.network(), strategy, query);
+    let read = strategy_json::read(model.network(), file.to_string().as_bytes());
     let again =
-        read.map(|(query, strategy)| strategy_file::write(model.network(), &strategy, &query));
+        read.map(|(query, strategy)| strategy_json::write(model.network(), &strategy, &query));
     prop_assert_eq!(again.as_ref(), Ok(&file), "{}", describe());
-    let text = strategy_file::text(model.network(), strategy, query);
+    let text = strategy_json::text(model.network(), strategy, query);
     prop_assert_eq!(text, file.to_string(), "{}", describe());
     Ok(())
 }

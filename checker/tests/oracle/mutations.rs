@@ -5,8 +5,9 @@
 use std::sync::Arc;
 
 use checker::engine::LoadedModel;
-use checker::engine::verification::{self, Played};
-use checker::game::strategy::{Selection, Start, Strategy};
+use checker::engine::evidence::strategy_check;
+use checker::engine::evidence::strategy_check::Played;
+use checker::game::strategy::attractor::{Selection, Start, Strategy};
 use checker::game::{Forced, Player, Priorities};
 use checker::syntax::ast::QueryText;
 use checker::verify::strategy::{Decision, Decisions, Defect, Outcome};
@@ -73,7 +74,7 @@ fn solved(game: &str, query: &str) -> Solved {
     let answer = model.check(&query, &options).expect("the query is right");
     let strategy = answer.evidence.strategy.expect("somebody wins");
     Solved {
-        decisions: verification::decisions(model.network(), &strategy),
+        decisions: strategy_check::decisions(model.network(), &strategy),
         strategy,
         model,
         query,

@@ -7,8 +7,10 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use checker::engine::{LoadedModel, Verdict, machine_file, observed};
-use checker::game::observed::Machine;
+use checker::engine::format::machine_json;
+use checker::engine::query::partial_observation;
+use checker::engine::{LoadedModel, Verdict};
+use checker::game::partial_observation::Machine;
 use checker::game::{Forced, Priorities};
 use checker::ir::QueryKind;
 use checker::verify::Effort;
@@ -218,9 +220,9 @@ fn check_machine(
         panic!("it is a game with observations");
     };
     let network = model.network();
-    let states = machine_file::to_check(machine);
-    let file = machine_file::write(network, machine, query);
-    let again = machine_file::read(network, &file, observations.len());
+    let states = machine_json::to_check(machine);
+    let file = machine_json::write(network, machine, query);
+    let again = machine_json::read(network, &file, observations.len());
     let again = again.map_err(|mismatch| TestCaseError::fail(format!("{mismatch:?}")))?;
     let (before, after) = (format!("{states:?}"), format!("{again:?}"));
     if before != after {
@@ -249,7 +251,7 @@ fn check_machine(
             };
             let asked = (objective, &observations[..]);
             let rules = (forced, Priorities::Ignored);
-            let checked = observed::verify(
+            let checked = partial_observation::verify(
                 network,
                 asked,
                 &states,

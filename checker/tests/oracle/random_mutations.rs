@@ -2,9 +2,10 @@
 //! comes to, and those that lose by it are caught. Those of `E<> control:` have to win after a way, or from everywhere; those of
 //! `control_t*` are about a graph with a clock of its own that nothing resets.
 
-use checker::engine::verification::{self, Played};
+use checker::engine::evidence::strategy_check;
+use checker::engine::evidence::strategy_check::Played;
 use checker::engine::{LoadedModel, Options};
-use checker::game::strategy::{Selection, Start, Way};
+use checker::game::strategy::attractor::{Selection, Start, Way};
 use checker::game::{Forced, Player, Priorities};
 use checker::ir;
 use checker::syntax::ast::QueryText;
@@ -307,7 +308,7 @@ fn compare_query<'g>(
         }
     };
     for round in 0..4 {
-        let mut decisions = verification::decisions(model.network(), &strategy);
+        let mut decisions = strategy_check::decisions(model.network(), &strategy);
         if round > 0 {
             mutate(&mut decisions, random);
         }

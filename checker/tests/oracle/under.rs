@@ -3,8 +3,9 @@
 
 use std::sync::Arc;
 
-use checker::engine::{NamedStrategy, Options, strategy_file};
-use checker::game::strategy::Strategy;
+use checker::engine::format::strategy_json;
+use checker::engine::{NamedStrategy, Options};
+use checker::game::strategy::attractor::Strategy;
 use checker::game::{Player, Priorities};
 use checker::network::Part;
 use checker::verify::{Regions, Semantics};
@@ -60,12 +61,12 @@ fn compare(
             return Ok(());
         };
         // In the file, the decisions of states with the same words are together.
-        let file = strategy_file::write(model.network(), &strategy, "control: A[] true");
-        let read = strategy_file::read(model.network(), file.to_string().as_bytes());
+        let file = strategy_json::write(model.network(), &strategy, "control: A[] true");
+        let read = strategy_json::read(model.network(), file.to_string().as_bytes());
         read.expect("what is written is read").1
     };
     restrict(&mut graph, &strategy);
-    let description = strategy_file::write(model.network(), &strategy, "control: A[] true");
+    let description = strategy_json::write(model.network(), &strategy, "control: A[] true");
     model.keep_strategy(NamedStrategy::new(
         "S".to_owned(),
         "control: A[] true".to_owned(),

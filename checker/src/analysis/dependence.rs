@@ -1,0 +1,418 @@
+//! What the edges of a network read and write, whom they may synchronise with, and so which processes may get in each other's way.
+//!
+//! A *cell* is a word, a clock, or whether some location is committed. The footprint of an edge has the cells that decide
+//! whether its moves are possible and what they do (those that its guard, channel and updates read, and the invariants of the
+//! locations that it leaves and enters), and the cells that they change. Footprints are never too small, and may be too large.
+//!
+//! Two footprints of each location count: *now*, of the edges that leave it, and *future*, of all edges that the process may
+//! take from there on while time stands still. While a process stays in a committed location, a move needs another committed
+//! process, so that processes elsewhere take no internal edges; this makes two of each ([`Still`]).
+//!
+//! An edge that needs more of a clock than any assignment gives it *sleeps* where the clock is lower: only time could wake it.
+
+use crate::ir::{
+    AssignedValue, ClockRange, Edge, FunctionId, LocationId, Network, ProcessId, Urgency,
+};
+
+use crate::zones::Bound;
+use crate::zones::dbm::Constraint;
+
+use super::function_reads::read_words;
+use super::visibility::Watched;
+
+/// Functions that read more words count as reading all.
+const MOST_READ_WORDS: usize = 1 << 16;
+
+/// Why time stands still.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Still {
+    /// A process stays in an urgent location, and no location is committed.
+    Urgent,
+    /// A process stays in a committed location.
+    Committed,
+}
+
+/// Cells as ascending disjoint ranges: the first, and the one after the last.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Cells(Vec<(u32, u32)>);
+
+impl Cells {
+    pub(super) fn add(&mut self, first: u32, count: u32) {
+        if count > 0 {
+            self.0.push((first, first + count));
+        }
+    }
+
+    fn extend(&mut self, other: &Cells) {
+        self.0.extend_from_slice(&other.0);
+    }
+
+    /// Brings the ranges in order; until then they only may be added to.
+    pub(super) fn settle(&mut self) {
+        self.0.sort_unstable();
+        let mut merged: Vec<(u32, u32)> = Vec::with_capacity(self.0.len());
+        for &(first, end) in &self.0 {
+            match merged.last_mut() {
+                Some(last) if first <= last.1 => last.1 = last.1.max(end),
+                _ => merged.push((first, end)),
+            }
+        }
+        self.0 = merged;
+    }
+
+    /// Whether the two have a cell in common.
+    pub(super) fn meet(&self, other: &Cells) -> bool {
+        let (mut own, mut others) = (self.0.iter().peekable(), other.0.iter().peekable());
+        while let (Some(one), Some(two)) = (own.peek(), others.peek()) {
+            if one.1 <= two.0 {
+                own.next();
+            } else if two.1 <= one.0 {
+                others.next();
+            } else {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// The numbers of cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CellNumbers<'n> {
+    network: &'n Network,
+}
+
+impl<'n> CellNumbers<'n> {
+    pub(super) fn new(network: &'n Network) -> CellNumbers<'n> {
+        CellNumbers { network }
+    }
+
+    fn words(self) -> u32 {
+        self.network.layout.words
+    }
+
+    pub(super) fn add_clocks(self, clocks: ClockRange, cells: &mut Cells) {
+        cells.add(self.words() + clocks.first.0, clocks.count);
+    }
+
+    /// Whether some location is committed.
+    fn add_commitment(self, cells: &mut Cells) {
+        cells.add(self.words() + self.network.clocks.len().max(1) as u32, 1);
+    }
+
+    /// The words that functions read.
+    pub(super) fn add_reads(
+        self,
+        functions: impl IntoIterator<Item = FunctionId>,
+        cells: &mut Cells,
+    ) {
+        match read_words(self.network, functions, MOST_READ_WORDS) {
+            Some(words) => words.iter().for_each(|&word| cells.add(word, 1)),
+            None => cells.add(0, self.words()),
+        }
+    }
+
+    /// The cells that decide an invariant.
+    fn add_invariant(self, process: usize, location: LocationId, cells: &mut Cells) {
+        let location = &self.network.processes[process].locations[location.0 as usize];
+        let invariant = &location.invariant;
+        self.add_reads(invariant.function, cells);
+        for atom in &invariant.atoms {
+            self.add_clocks(atom.left, cells);
+            self.add_clocks(atom.right, cells);
+        }
+    }
+}
+
+/// An edge's part in synchronisations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Offer {
+    first: u32,
+    count: u32,
+    sends: bool,
+    is_broadcast: bool,
+    /// Whether it leaves a committed location.
+    is_committed: bool,
+}
+
+impl Offer {
+    /// Whether one may synchronise with the other, where a move must leave a committed location if `still` says so.
+    fn fits(self, other: Offer, still: Still) -> bool {
+        self.sends != other.sends
+            && self.first < other.first + other.count
+            && other.first < self.first + self.count
+            && (still == Still::Urgent
+                || self.is_broadcast
+                || self.is_committed
+                || other.is_committed)
+    }
+}
+
+/// A constraint that an assignment never makes true: the edge that needs it sleeps while it does not hold.
+pub(crate) type Sleeper = Constraint;
+
+/// What some edges of one process do.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Footprint {
+    reads: Cells,
+    writes: Cells,
+    offers: Vec<Offer>,
+    /// Constraints that keep edges asleep as long as they do not hold: one for each edge that may sleep.
+    pub(crate) sleepers: Vec<Sleeper>,
+    /// Whether one of them may make what is watched come true,
+    pub(crate) may_fulfil: bool,
+    /// and whether one may make it false again.
+    pub(crate) may_spoil: bool,
+}
+
+impl Footprint {
+    fn add(&mut self, other: &Footprint) {
+        self.reads.extend(&other.reads);
+        self.writes.extend(&other.writes);
+        for offer in &other.offers {
+            if !self.offers.contains(offer) {
+                self.offers.push(*offer);
+            }
+        }
+        self.sleepers.extend_from_slice(&other.sleepers);
+        self.may_fulfil |= other.may_fulfil;
+        self.may_spoil |= other.may_spoil;
+    }
+
+    fn settle(&mut self) {
+        self.reads.settle();
+        self.writes.settle();
+    }
+
+    /// Whether edges of two processes may depend on each other, or take part in the same move.
+    pub(crate) fn meets(&self, other: &Footprint, still: Still) -> bool {
+        self.writes.meet(&other.reads)
+            || self.reads.meet(&other.writes)
+            || self.writes.meet(&other.writes)
+            || self
+                .offers
+                .iter()
+                .any(|one| other.offers.iter().any(|two| one.fits(*two, still)))
+    }
+}
+
+/// What footprints are taken of, what is watched, and the greatest values that clocks are set to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ground<'n> {
+    pub(crate) network: &'n Network,
+    pub(crate) watched: &'n Watched,
+    pub(crate) greatest: &'n [i32],
+}
+
+/// What moment a footprint is taken for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Moment {
+    pub(crate) still: Still,
+    /// Whether all edges that may sleep do.
+    pub(crate) is_asleep: bool,
+}
+
+/// By clock: the greatest value that an assignment gives it, or that it could get from another one.
+pub(crate) fn greatest_values(network: &Network) -> Vec<i32> {
+    let mut greatest = vec![0; network.clocks.len()];
+    for assignment in network.updates().flat_map(|update| &update.assignments) {
+        let value = match assignment.value {
+            AssignedValue::Integer(_, high) => high,
+            AssignedValue::Clock(..) => i32::MAX,
+        };
+        let ClockRange { first, count } = assignment.target;
+        for clock in &mut greatest[first.0 as usize..(first.0 + count) as usize] {
+            *clock = value.max(*clock);
+        }
+    }
+    greatest
+}
+
+/// The footprints of single edges, taken when they are asked for.
+#[derive(Debug, Default)]
+pub(crate) struct Footprints {
+    /// By process and edge.
+    edges: Vec<Vec<Option<Box<Footprint>>>>,
+}
+
+impl Footprints {
+    /// That of the edges that leave a location, and of what the process hears once it has taken one: a broadcast that left it behind
+    /// would take it along then.
+    pub(crate) fn now(
+        &mut self,
+        ground: Ground<'_>,
+        (process, location): (usize, LocationId),
+        moment: Moment,
+    ) -> Footprint {
+        let mut all = Footprint::default();
+        let leaving = self.add_leaving(ground, (process, location), moment, &mut all);
+        for branch in leaving.iter().flat_map(|edge| &edge.branches) {
+            let definition = &ground.network.processes[process];
+            for &index in &definition.locations[branch.target.0 as usize].edges {
+                let there = &self.edge(ground, process, index.0 as usize).offers;
+                let heard = there.iter().filter(|one| one.is_broadcast && !one.sends);
+                all.offers.extend(heard);
+            }
+        }
+        all.settle();
+        all
+    }
+
+    /// That of all edges that the process may take from a location on while time stands still.
+    pub(crate) fn future(
+        &mut self,
+        ground: Ground<'_>,
+        (process, location): (usize, LocationId),
+        moment: Moment,
+    ) -> Footprint {
+        let definition = &ground.network.processes[process];
+        let mut all = Footprint::default();
+        let mut is_met = vec![false; definition.locations.len()];
+        is_met[location.0 as usize] = true;
+        let mut open = vec![location];
+        while let Some(location) = open.pop() {
+            for edge in self.add_leaving(ground, (process, location), moment, &mut all) {
+                for branch in &edge.branches {
+                    if !std::mem::replace(&mut is_met[branch.target.0 as usize], true) {
+                        open.push(branch.target);
+                    }
+                }
+            }
+            // Cells that come again and again are kept once.
+            all.settle();
+        }
+        all
+    }
+
+    /// Adds the invariant of a location and the edges that leave it, which are returned.
+    fn add_leaving<'n>(
+        &mut self,
+        ground: Ground<'n>,
+        (process, location): (usize, LocationId),
+        Moment { still, is_asleep }: Moment,
+        all: &mut Footprint,
+    ) -> Vec<&'n Edge> {
+        let definition = &ground.network.processes[process];
+        let numbers = CellNumbers::new(ground.network);
+        numbers.add_invariant(process, location, &mut all.reads);
+        let location = &definition.locations[location.0 as usize];
+        let stays_put = still == Still::Committed && location.urgency != Urgency::Committed;
+        let mut leaving = Vec::new();
+        for &index in &location.edges {
+            let edge = &definition.edges[index.0 as usize];
+            let footprint = self.edge(ground, process, index.0 as usize);
+            let sleeps = is_asleep && !footprint.sleepers.is_empty();
+            if sleeps || stays_put && edge.sync.is_none() {
+                continue;
+            }
+            leaving.push(edge);
+            all.add(footprint);
+            if still == Still::Urgent {
+                numbers.add_commitment(&mut all.reads);
+                let enters_committed = edge.branches.iter().any(|branch| {
+                    let target = &definition.locations[branch.target.0 as usize];
+                    target.urgency == Urgency::Committed
+                });
+                if enters_committed {
+                    numbers.add_commitment(&mut all.writes);
+                }
+            }
+        }
+        leaving
+    }
+
+    fn edge(&mut self, ground: Ground<'_>, process: usize, index: usize) -> &Footprint {
+        if self.edges.is_empty() {
+            let processes = ground.network.processes.iter();
+            self.edges = processes
+                .map(|process| vec![None; process.edges.len()])
+                .collect();
+        }
+        self.edges[process][index].get_or_insert_with(|| Box::new(of_edge(ground, process, index)))
+    }
+}
+
+fn of_edge(
+    Ground {
+        network,
+        watched,
+        greatest,
+    }: Ground<'_>,
+    process: usize,
+    index: usize,
+) -> Footprint {
+    let definition = &network.processes[process];
+    let edge = &definition.edges[index];
+    let numbers = CellNumbers::new(network);
+    let mut footprint = Footprint::default();
+    let Footprint { reads, writes, .. } = &mut footprint;
+    let functions = [edge.guard.function, edge.sync.and_then(|sync| sync.index)];
+    numbers.add_reads(functions.into_iter().flatten(), reads);
+    for atom in &edge.guard.atoms {
+        numbers.add_clocks(atom.left, reads);
+        numbers.add_clocks(atom.right, reads);
+    }
+    let branches = edge.branches.iter().map(|branch| &branch.update);
+    for update in std::iter::once(&edge.update).chain(branches) {
+        numbers.add_reads(update.function, reads);
+        for &(first, count) in &update.writes {
+            writes.add(first, count);
+        }
+        for assignment in &update.assignments {
+            numbers.add_clocks(assignment.target, writes);
+            if let AssignedValue::Clock(source, ..) = assignment.value {
+                numbers.add_clocks(source, reads);
+            }
+        }
+    }
+    for branch in &edge.branches {
+        numbers.add_invariant(process, branch.target, reads);
+        if branch.target != edge.source {
+            // Only what is watched reads the location of another process.
+            writes.add(process as u32, 1);
+        }
+    }
+    footprint.settle();
+    let owner = ProcessId(process as u32);
+    let targets = || edge.branches.iter().map(|branch| branch.target);
+    let touches = watched.reads(&footprint.writes);
+    footprint.may_fulfil =
+        touches || targets().any(|target| watched.may_be_fulfilled(owner, edge.source, target));
+    footprint.may_spoil =
+        touches || targets().any(|target| watched.may_be_fulfilled(owner, target, edge.source));
+    footprint.sleepers.extend(sleeper(edge, greatest));
+    let location = &definition.locations[edge.source.0 as usize];
+    footprint.offers = edge
+        .sync
+        .map(|sync| Offer {
+            first: sync.channel.0,
+            count: sync.count,
+            sends: sync.send,
+            is_broadcast: network.channels[sync.channel.0 as usize].broadcast,
+            is_committed: location.urgency == Urgency::Committed,
+        })
+        .into_iter()
+        .collect();
+    footprint
+}
+
+/// What keeps an edge asleep, if anything does.
+pub(super) fn sleeper(edge: &Edge, greatest: &[i32]) -> Option<Sleeper> {
+    edge.guard.fixed.iter().find_map(|one| {
+        let (left, right) = (one.left.0 as usize, one.right.0 as usize);
+        let bound = if one.strict {
+            Bound::strict(one.bound)
+        } else {
+            Bound::weak(one.bound)
+        };
+        let constraint = Constraint {
+            left,
+            right,
+            bound: bound?,
+        };
+        let highest = i64::from(*greatest.get(right)?);
+        let holds_then =
+            -highest < i64::from(one.bound) || !one.strict && -highest == i64::from(one.bound);
+        (left == 0 && right != 0 && !holds_then).then_some(constraint)
+    })
+}

@@ -1,0 +1,223 @@
+//! The way to a run-time error: the states to the one in which it happens, and the move that it happens in.
+//!
+//! Searches give a trace to the state that they were at when the model failed. Some look one move ahead, so that the last state can be
+//! missing; here it is added, and the failing move is found by trying all moves of the last state. A game has no trace of its own:
+//! the shortest way to an error is searched for, among the states that come before the end of play.
+
+use crate::analysis::Abstraction;
+use crate::ir::{Objective, Predicate, Query, QueryKind};
+use crate::network::{Extent, Failure, Part, Symbolic};
+use crate::search::reachability::goal::Goal;
+use crate::search::reachability::search;
+use crate::search::reachability::search::{Order, Trace};
+use crate::zones::Zone;
+
+use super::timed_run;
+use super::timed_run::{Kind, Shows, Witness};
+use crate::engine::limits::{LimitWatch, Limits};
+use crate::engine::query::answer;
+use crate::engine::query::answer::{Answer, Subject, Verdict};
+use crate::engine::session::walk::{Point, successors_or_failure};
+use crate::engine::{LoadedModel, Options};
+
+/// The way to the error in a game is searched for among this many times the states that the game explored,
+const EFFORT: u64 = 10;
+
+/// and at least among so many.
+const LEAST_EFFORT: u64 = 10_000;
+
+impl LoadedModel {
+    /// Completes the trace of an answer that is an error, and finds the move that fails.
+    pub(in crate::engine) fn complete_failure(
+        &self,
+        query: &Query,
+        options: &Options,
+        answer: &mut Answer,
+    ) {
+        let Verdict::Error(failure) = answer.verdict else {
+            return;
+        };
+        let predicates = predicates(&query.kind);
+        let (failure, witness) = match answer.evidence.witnesses.pop() {
+            Some(witness) => (failure, witness),
+            None => match self.shortest_way(&predicates, &query.kind, options, answer) {
+                Some((found, trace)) => (found, Witness::new(trace, None, Kind::Failure)),
+                None => return,
+            },
+        };
+        answer.verdict = Verdict::Error(failure);
+        let witness = self.completed(witness, &predicates, failure, options.runs);
+        answer.evidence.witnesses.push(witness);
+    }
+
+    /// A way to a failure with its last state, the move that fails, and a run that goes so far.
+    fn completed(
+        &self,
+        mut witness: Witness,
+        predicates: &[&Predicate],
+        failure: Failure,
+        has_run: bool,
+    ) -> Witness {
+        let before = witness.trace.states.len();
+        witness.failing = self.failing_move(predicates, &mut witness.trace, failure);
+        let is_timed = witness.run.is_some() && witness.trace.states.len() == before;
+        if has_run && !is_timed && !witness.trace.states.is_empty() {
+            let mut symbolic = self.symbolic();
+            let network = self.network();
+            let (trace, subject) = (&witness.trace, (None, Shows::Possible));
+            let is_doubtful = network.features.stopwatches;
+            let run = timed_run::prove(&mut symbolic, network, trace, subject, is_doubtful);
+            witness.run = Some(run);
+        }
+        if witness.trace.states.is_empty() {
+            // The initial state is where it happens, although nobody can be in it.
+            witness.trace.states.extend(self.symbolic().origin());
+        }
+        witness
+    }
+
+    /// The move at the end of a trace that fails, if it is one that does; a state is added if the failure is one move further on.
+    fn failing_move(
+        &self,
+        predicates: &[&Predicate],
+        trace: &mut Trace,
+        failure: Failure,
+    ) -> Option<Vec<Part>> {
+        let (words, zone) = trace.states.last()?.clone();
+        let last = Point { words, zone };
+        if self.breaks(predicates, &last, failure) {
+            return None;
+        }
+        let mut symbolic = self.symbolic();
+        let successors = match successors_or_failure(&mut symbolic, &last) {
+            Ok(successors) => successors,
+            Err((found, parts)) => return parts.filter(|_| found == failure),
+        };
+        for (parts, point) in successors {
+            let next = match successors_or_failure(&mut symbolic, &point) {
+                Err((found, next)) if found == failure => next,
+                _ if self.breaks(predicates, &point, failure) => None,
+                _ => continue,
+            };
+            trace.moves.push(parts);
+            trace.states.push((point.words, point.zone));
+            return next;
+        }
+        None
+    }
+
+    /// Whether looking at the state for the query is what fails.
+    fn breaks(&self, predicates: &[&Predicate], point: &Point, failure: Failure) -> bool {
+        let mut symbolic = self.symbolic();
+        let mut words = point.words.clone();
+        predicates.iter().any(|predicate| {
+            let found = symbolic.extent(predicate, &mut words, point.zone.bounds());
+            found.is_err_and(|found| found == failure)
+        })
+    }
+
+    /// The shortest way to an error that a game can run into, if it is found with a reasonable effort.
+    fn shortest_way(
+        &self,
+        predicates: &[&Predicate],
+        kind: &QueryKind,
+        options: &Options,
+        answer: &Answer,
+    ) -> Option<(Failure, Trace)> {
+        let QueryKind::Control { objective, .. } = kind else {
+            return None;
+        };
+        let effort = (EFFORT * answer.counters.explored).max(LEAST_EFFORT);
+        let limits = Limits {
+            states: Some(
+                options
+                    .limits
+                    .states
+                    .map_or(effort, |most| most.min(effort)),
+            ),
+            ..options.limits.clone()
+        };
+        let subject = Subject {
+            network: self.network(),
+            executor: self.executor(),
+            under: None,
+            within: None,
+            priorities: options.priorities,
+        };
+        let wanted = Abstraction::LowerUpper;
+        let mut symbolic = answer::symbolic(subject, predicates, &[], wanted);
+        let mut probe = Probe { predicates };
+        let order = Order::BreadthFirst;
+        let watch = &mut LimitWatch::new(limits);
+        let looked_for = watch.bound(|watch| {
+            let report = search::search(&mut symbolic, &mut probe, order, watch);
+            let (failure, trace) = report.outcome.err()?;
+            let is_one = failure != Failure::Interrupted;
+            (is_one && !is_over_before_the_end(&mut symbolic, objective, &trace))
+                .then_some((failure, trace))
+        });
+        looked_for.ok().flatten()
+    }
+}
+
+/// Whether play ends in a state of the trace before its last one.
+fn is_over_before_the_end(
+    symbolic: &mut Symbolic<'_>,
+    objective: &Objective,
+    trace: &Trace,
+) -> bool {
+    let before = trace
+        .states
+        .split_last()
+        .map_or(&[][..], |(_, before)| before);
+    let (goal, keep) = match objective {
+        Objective::Reach(goal) => (Some(goal), None),
+        Objective::Until(keep, goal) | Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep)),
+        Objective::Safe(keep) => (None, Some(keep)),
+        Objective::Buchi(..) => return true,
+    };
+    before.iter().any(|(words, zone)| {
+        let mut words = words.clone();
+        let won = goal.map(|goal| symbolic.extent(goal, &mut words, zone.bounds()));
+        let kept = keep.map(|keep| symbolic.extent(keep, &mut words, zone.bounds()));
+        matches!(won, Some(Ok(Extent::Everywhere))) || matches!(kept, Some(Ok(Extent::Nowhere)))
+    })
+}
+
+/// What a query asks of states.
+fn predicates(kind: &QueryKind) -> Vec<&Predicate> {
+    match kind {
+        QueryKind::Reachable(one)
+        | QueryKind::Invariantly(one)
+        | QueryKind::PotentiallyAlways(one)
+        | QueryKind::Eventually(one) => vec![one],
+        QueryKind::LeadsTo(cause, effect) => vec![cause, effect],
+        QueryKind::Extremum { predicate, .. } => vec![predicate],
+        QueryKind::Control { objective, .. } => match objective {
+            Objective::Reach(one) | Objective::Safe(one) => vec![one],
+            Objective::Until(keep, goal)
+            | Objective::WeakUntil(keep, goal)
+            | Objective::Buchi(keep, goal) => vec![keep, goal],
+        },
+        QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => Vec::new(),
+    }
+}
+
+/// Looks at states as a query does, and finds nothing: only failures end its search.
+struct Probe<'q> {
+    predicates: &'q [&'q Predicate],
+}
+
+impl Goal for Probe<'_> {
+    fn confirms(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<bool, Failure> {
+        for predicate in self.predicates {
+            symbolic.extent(predicate, words, zone.bounds())?;
+        }
+        Ok(false)
+    }
+}

@@ -1,0 +1,9 @@
+//! What backs an answer: runs, certificates, strategies, and their checks.
+
+pub mod certificate;
+pub(super) mod error_trace;
+pub mod named_strategies;
+pub(super) mod shown_states;
+pub mod strategy_check;
+pub(super) mod strategy_place;
+pub mod timed_run;

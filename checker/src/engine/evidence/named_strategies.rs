@@ -1,0 +1,230 @@
+//! Strategies that have a name: what queries define, save, load, and are asked under.
+//!
+//! A name stays for all later queries of the same loaded model. Its strategy is missing if the query that defines it did not come
+//! out satisfied; to be asked under such a name is an error. Who wins is often known long before the whole strategy is, so unless it is
+//! wanted with the answer, it is made when it is first used. Files lie relative to the folder that [`crate::engine::Options`] names, else
+//! to the folder of the model; `strategy_place` says which of them may be written.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::diagnostics::{Diagnostic, Span};
+use crate::game::strategy::attractor::{Strategy, Under};
+use crate::ir::Query;
+
+use super::certificate::stop_text;
+use super::strategy_place;
+use super::strategy_place::Refusal;
+use crate::engine::format::strategy_json;
+use crate::engine::query::answer::{Answer, Evidence, Verdict, new_answer};
+use crate::engine::{LoadedModel, Options, Rejection, codes};
+
+/// A strategy with the query that it answers.
+#[derive(Clone, Debug)]
+pub struct NamedStrategy {
+    /// Its name.
+    pub name: String,
+    /// The text of the query, without the name.
+    pub query: String,
+    /// `None` if the query was not satisfied, or the strategy was not made.
+    pub strategy: Option<Arc<Strategy>>,
+    /// How it is made when it is first used.
+    pub(in crate::engine) due: Option<Box<Due>>,
+}
+
+/// A strategy that is still to be made.
+#[derive(Clone, Debug)]
+pub(in crate::engine) struct Due {
+    pub(in crate::engine) query: Query,
+    pub(in crate::engine) options: Options,
+    /// What the query is asked under.
+    pub(in crate::engine) within: Option<Arc<Under>>,
+}
+
+impl NamedStrategy {
+    /// A strategy that is known, or known to be missing.
+    pub fn new(name: String, query: String, strategy: Option<Arc<Strategy>>) -> NamedStrategy {
+        NamedStrategy {
+            name,
+            query,
+            strategy,
+            due: None,
+        }
+    }
+}
+
+/// The text of a query without the `strategy S =` before it, if it has one.
+pub fn unnamed(query: &str) -> &str {
+    let query = query.trim();
+    let named = query
+        .strip_prefix("strategy")
+        .filter(|rest| rest.starts_with(char::is_whitespace));
+    let parts = named.and_then(|rest| rest.split_once('='));
+    parts.map_or(query, |parts| parts.1.trim())
+}
+
+impl LoadedModel {
+    /// The names of the strategies so far.
+    pub(in crate::engine) fn strategy_names(&self) -> Vec<String> {
+        let names = self.strategies.iter().map(|one| one.name.clone());
+        names.collect()
+    }
+
+    /// The strategy with this name, if a query defined it.
+    pub fn strategy(&self, name: &str) -> Option<&NamedStrategy> {
+        self.strategies.iter().find(|one| one.name == name)
+    }
+
+    /// Keeps a strategy under its name, in the place of an earlier one.
+    pub fn keep_strategy(&mut self, named: NamedStrategy) {
+        self.strategies.retain(|one| one.name != named.name);
+        self.strategies.push(named);
+    }
+
+    /// The strategy that a query is asked under, or that is to be saved; it is made within these limits if that is due.
+    pub(in crate::engine) fn existing_strategy(
+        &mut self,
+        name: &str,
+        span: Span,
+        options: &Options,
+    ) -> Result<Arc<Strategy>, Rejection> {
+        let due = self.strategy(name).and_then(|one| one.due.clone());
+        let remark = match due {
+            Some(due) => {
+                self.model.network.overflow = due.options.overflow;
+                self.prepare_code(due.options.code, span)?;
+                let remark = self.make_strategy(name, *due, options);
+                self.model.network.overflow = options.overflow;
+                remark
+            }
+            None => None,
+        };
+        let known = self.strategy(name);
+        if let Some(strategy) = known.and_then(|one| one.strategy.clone()) {
+            return Ok(strategy);
+        }
+        let query = known.map_or("", |one| one.query.as_str());
+        let remark = remark.unwrap_or_else(|| String::from("its query gave none"));
+        let message = format!("there is no strategy '{name}': {remark}");
+        let diagnostic = Diagnostic::new(codes::NO_STRATEGY, span, message)
+            .help(format!("the query was {query}"));
+        Err(Rejection::new(vec![diagnostic], &self.sources))
+    }
+
+    /// Makes a strategy that is due. Returns what is known of why there is none; then it is tried again with the next use.
+    fn make_strategy(&mut self, name: &str, due: Due, options: &Options) -> Option<String> {
+        let with_strategy = Options {
+            strategy: true,
+            limits: options.limits.clone(),
+            ..due.options
+        };
+        let answer = self.answer_within(&due.query, &with_strategy, due.within.as_ref());
+        let strategy = answer.evidence.strategy;
+        if strategy.is_none() {
+            return match answer.verdict {
+                Verdict::Unknown(reason) => Some(stop_text(reason).to_owned()),
+                _ => answer.message,
+            };
+        }
+        let mut named = self.strategies.iter_mut();
+        if let Some(named) = named.find(|one| one.name == name) {
+            named.strategy = strategy;
+            named.due = None;
+        }
+        None
+    }
+
+    /// Answers `saveStrategy`.
+    pub(in crate::engine) fn save_strategy(
+        &mut self,
+        (file, name): (&str, &str),
+        span: Span,
+        options: &Options,
+    ) -> Result<Answer, Rejection> {
+        let strategy = self.existing_strategy(name, span, options)?;
+        let query = self.strategy(name).map_or("", |one| one.query.as_str());
+        let text = strategy_json::text(self.network(), &strategy, query);
+        let path = self.strategy_path(file, options);
+        strategy_place::save(&path, &(text + "\n"), &options.allow_write).map_err(|refusal| {
+            let Refusal { message, help } = refusal;
+            self.refused(codes::STRATEGY_FILE, span, message, Some(&help))
+        })?;
+        let mut answer = new_answer(
+            Verdict::Satisfied,
+            Evidence::default(),
+            crate::search::Counters::default(),
+        );
+        answer.message = Some(format!("strategy {name} written to {}", path.display()));
+        Ok(answer)
+    }
+
+    /// Answers `strategy S = loadStrategy("file")`.
+    pub(in crate::engine) fn load_strategy(
+        &mut self,
+        (file, name): (&str, &str),
+        span: Span,
+        options: &Options,
+    ) -> Result<Answer, Rejection> {
+        let path = self.strategy_path(file, options);
+        let bytes = strategy_place::load(&path).map_err(|refusal| {
+            let Refusal { message, help } = refusal;
+            self.refused(codes::STRATEGY_FILE, span, message, Some(&help))
+        })?;
+        let (query, strategy) = self.read_strategy(&path.display().to_string(), &bytes, span)?;
+        let strategy = Arc::new(strategy);
+        let states = strategy.states.len();
+        let known = Some(Arc::clone(&strategy));
+        self.keep_strategy(NamedStrategy::new(name.to_owned(), query, known));
+        let evidence = Evidence {
+            strategy: Some(strategy),
+            ..Evidence::default()
+        };
+        let mut answer = new_answer(
+            Verdict::Satisfied,
+            evidence,
+            crate::search::Counters::default(),
+        );
+        answer.message = Some(format!(
+            "strategy {name} with {states} states read from {}",
+            path.display()
+        ));
+        Ok(answer)
+    }
+
+    /// Reads a strategy from the bytes of a file; gives the query that it answers, and the strategy. `path` names the file.
+    pub fn read_strategy(
+        &self,
+        path: &str,
+        bytes: &[u8],
+        span: Span,
+    ) -> Result<(String, Strategy), Rejection> {
+        strategy_json::read(self.network(), bytes).map_err(|mismatch| {
+            let message = if mismatch.place.is_empty() {
+                format!("{path}: {}", mismatch.message)
+            } else {
+                format!("{path}, at {}: {}", mismatch.place, mismatch.message)
+            };
+            self.refused(codes::STRATEGY_FILE, span, message, mismatch.help)
+        })
+    }
+
+    fn refused(
+        &self,
+        code: crate::diagnostics::Code,
+        span: Span,
+        message: String,
+        help: Option<&str>,
+    ) -> Rejection {
+        let diagnostic = Diagnostic::new(code, span, message);
+        let diagnostic = match help {
+            Some(help) => diagnostic.help(help),
+            None => diagnostic,
+        };
+        Rejection::new(vec![diagnostic], &self.sources)
+    }
+
+    fn strategy_path(&self, file: &str, options: &Options) -> PathBuf {
+        let folder = options.folder.as_deref().unwrap_or(&self.folder);
+        folder.join(Path::new(file))
+    }
+}

@@ -1,0 +1,421 @@
+//! From a strategy of the solver to the independent check, and from its outcome to words.
+
+use crate::game::strategy::attractor::{Decision, Selection, Start, Strategy, Under, Way};
+use crate::game::strategy::closed_loop;
+use crate::game::{Forced, Player, Priorities};
+use crate::ir::{FunctionId, Network, Objective, Predicate, QueryKind};
+use crate::network::Part;
+use crate::network::symbolic::predicate;
+use crate::verify::replay::{self, End, Moment, Run};
+use crate::verify::strategy::{
+    self, Aim, Claim, Constraint, Coverage, Decisions, Defect, Forcing, Origin, Owner, Step,
+    Violation,
+};
+use crate::verify::timed::Timed;
+use crate::verify::{self, Effort, GivenUp, Semantics, State, regions};
+use crate::zones::{Bound, Federation, minimal};
+
+use crate::engine::format::text;
+use crate::engine::query::time_clock;
+
+/// Regions that a check explores before it gives up.
+pub const MOST_REGIONS: u64 = 2_000_000;
+
+/// How the check of a strategy ended; an error says why it could not be done.
+pub type Verification = Result<strategy::Outcome, verify::Error>;
+
+/// What a control query asks for.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked<'q> {
+    /// The objective.
+    pub objective: &'q Objective,
+    /// Whether it need be enforced only from some state that both players get to together.
+    pub is_cooperative: bool,
+    /// The bounds u and g of `control_t*(u, g)`; `None` for plain `control`.
+    pub time_optimal: Option<(Option<FunctionId>, Option<FunctionId>)>,
+}
+
+impl<'q> Asked<'q> {
+    /// What a query asks for; `None` if it is no control query, or one with observations.
+    pub fn of(query: &'q QueryKind) -> Option<Asked<'q>> {
+        match query {
+            QueryKind::Control {
+                objective,
+                cooperative,
+                time_optimal,
+                observations: None,
+                ..
+            } => Some(Asked {
+                objective,
+                is_cooperative: *cooperative,
+                time_optimal: *time_optimal,
+            }),
+            _ => None,
+        }
+    }
+
+    /// The game that is played within a limit of time, if there is one.
+    pub(in crate::engine) fn game<'n>(
+        &self,
+        network: &'n Network,
+        limit: Option<i32>,
+    ) -> time_clock::Game<'n>
+    where
+        'q: 'n,
+    {
+        let rest = self.time_optimal.and_then(|(_, rest)| rest);
+        time_clock::game(network, self.objective, limit, rest)
+    }
+}
+
+/// A strategy as it is checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Played<'s> {
+    /// Where play begins.
+    pub start: &'s Start,
+    /// What it decides: see [`decisions`].
+    pub decisions: &'s [Decisions],
+    /// Who plays by it.
+    pub owner: Player,
+    /// Which of the decisions that apply counts.
+    pub selection: Selection,
+    /// The limit of time that it is for, if it is for one.
+    pub time_limit: Option<i32>,
+    /// The strategy under which the game is played, if it is under one.
+    pub under: Option<&'s Under>,
+}
+
+impl<'s> Played<'s> {
+    /// A strategy with these decisions.
+    pub fn new(strategy: &'s Strategy, decisions: &'s [Decisions]) -> Played<'s> {
+        Played {
+            start: &strategy.start,
+            decisions,
+            owner: strategy.owner,
+            selection: strategy.selection,
+            time_limit: strategy.time_limit,
+            under: strategy.under.as_deref(),
+        }
+    }
+}
+
+/// Checks that the owner of a strategy wins, in closed loop. The network must hold the code of the query.
+pub fn verify(
+    network: &Network,
+    asked: Asked<'_>,
+    played: Played<'_>,
+    rules: (Forced, Priorities),
+    effort: &mut Effort<'_>,
+) -> Verification {
+    let violated_at_once = |defect| {
+        let violation = Violation {
+            defect,
+            states: vec![Semantics::new(network, 1).initial()?],
+            steps: Vec::new(),
+            ticks_per_unit: 1,
+        };
+        let outcome = strategy::Outcome::Violated(Box::new(violation), Coverage::default());
+        Ok(outcome)
+    };
+    if !is_for(
+        network,
+        asked,
+        (played.owner, played.start, played.time_limit),
+    )? {
+        return violated_at_once(Defect::OtherGame);
+    }
+    let start = match played.start {
+        Start::Initial => Origin::Initial,
+        Start::Anywhere => Origin::Anywhere,
+        Start::After(way) => match follow(network, way, rules.1)? {
+            Some((_, mut states)) => {
+                let state = states.pop().expect("a run has a state");
+                Origin::State(Timed {
+                    state,
+                    ticks_per_unit: way.ticks_per_unit,
+                })
+            }
+            None => return violated_at_once(Defect::ImpossibleWay),
+        },
+    };
+    let game = asked.game(network, played.time_limit);
+    let mut claim = claim(&game.objective, (played.owner, played.selection), rules);
+    let allowed = played
+        .under
+        .map(|under| decisions(network, &under.strategy));
+    if let (Some(under), Some(allowed)) = (played.under, &allowed) {
+        claim.under = Some((allowed, under.strategy.selection == Selection::Any));
+    }
+    strategy::verify(&game.network, played.decisions, &claim, &start, effort)
+}
+
+/// The run that a way is, with its states in ticks: on entry of each, and after the last wait; `None` if it is not possible.
+pub(in crate::engine) fn follow(
+    network: &Network,
+    way: &Way,
+    priorities: Priorities,
+) -> Result<Option<(Run, Vec<State>)>, verify::Error> {
+    let steps = way.moves.iter().map(|(wait, parts)| replay::Step {
+        wait: *wait,
+        parts: parts.iter().map(|&one| one.into()).collect(),
+    });
+    let run = Run {
+        ticks_per_unit: way.ticks_per_unit,
+        steps: steps.collect(),
+        end: End::After(way.wait),
+        from: Moment { state: 0, wait: 0 },
+    };
+    let equal;
+    let network = if network.features.priorities && priorities == Priorities::Ignored {
+        equal = without_priorities(network);
+        &equal
+    } else {
+        network
+    };
+    Ok(
+        match replay::replay(network, &run, &replay::Claim::Possible)? {
+            replay::Outcome::Replayed(states, _) => Some((run, states)),
+            replay::Outcome::Violated(_) => None,
+        },
+    )
+}
+
+/// The network with all channels and processes of the same priority.
+fn without_priorities(network: &Network) -> Network {
+    let mut equal = network.clone();
+    equal.features.priorities = false;
+    equal.features.default_priority = 0;
+    for channel in &mut equal.channels {
+        channel.priority = 0;
+    }
+    for process in &mut equal.processes {
+        process.priority = 0;
+    }
+    equal
+}
+
+/// Whether a strategy with this start and limit of time answers the query, if it wins.
+pub(in crate::engine) fn is_for(
+    network: &Network,
+    asked: Asked<'_>,
+    (owner, start, time_limit): (Player, &Start, Option<i32>),
+) -> Result<bool, verify::Error> {
+    let has_start = match (asked.is_cooperative, owner) {
+        (false, _) => *start == Start::Initial,
+        (true, Player::Controller) => *start != Start::Anywhere,
+        (true, Player::Environment) => *start == Start::Anywhere,
+    };
+    Ok(has_start && is_for_time(network, asked, owner, time_limit)?)
+}
+
+/// Whether a strategy that wins with a limit of time answers the query: the controller is to need no more time than the query leaves it,
+/// the environment to hold out for as long.
+fn is_for_time(
+    network: &Network,
+    asked: Asked<'_>,
+    owner: Player,
+    time_limit: Option<i32>,
+) -> Result<bool, verify::Error> {
+    let Some((longest, _)) = asked.time_optimal else {
+        return Ok(time_limit.is_none());
+    };
+    let semantics = Semantics::new(network, 1);
+    let initial = semantics.initial()?;
+    let longest = longest.map(|longest| semantics.value(longest, &initial));
+    Ok(match (owner, time_limit, longest.transpose()?) {
+        (Player::Controller, Some(limit), longest) => {
+            longest.is_none_or(|longest| limit <= longest)
+        }
+        (Player::Environment, Some(limit), Some(longest)) => limit >= longest,
+        (Player::Environment, None, None) => true,
+        _ => false,
+    })
+}
+
+/// What is claimed of a strategy for an objective.
+pub(in crate::engine) fn claim(
+    objective: &Objective,
+    (owner, selection): (Player, Selection),
+    (forced, priorities): (Forced, Priorities),
+) -> Claim<'_> {
+    let (goal, keep, aim) = match objective {
+        Objective::Reach(goal) => (Some(goal), None, Aim::Reach),
+        Objective::Until(keep, goal) => (Some(goal), Some(keep), Aim::Reach),
+        Objective::Safe(keep) => (None, Some(keep), Aim::Keep),
+        Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Aim::Keep),
+        Objective::Buchi(keep, goal) => (Some(goal), Some(keep), Aim::Recur),
+    };
+    let (constant, has_differences) = constants(goal.into_iter().chain(keep));
+    Claim {
+        owner: match owner {
+            Player::Controller => Owner::Controller,
+            Player::Environment => Owner::Environment,
+        },
+        is_permissive: selection == Selection::Any,
+        aim,
+        goal,
+        keep,
+        forcing: match forced {
+            Forced::Tiga => Forcing::Component,
+            Forced::Product => Forcing::Network,
+            Forced::Neutral => Forcing::Always,
+        },
+        under: None,
+        has_priorities: priorities == Priorities::Kept,
+        constant,
+        has_differences,
+    }
+}
+
+pub(in crate::engine) fn constants<'p>(
+    predicates: impl Iterator<Item = &'p Predicate>,
+) -> (i64, bool) {
+    let atoms: Vec<_> = predicates.flat_map(predicate::atoms).collect();
+    let constant = atoms.iter().map(regions::greatest_constant).max();
+    let has_differences = atoms
+        .iter()
+        .any(|atom| atom.left.first.0 != 0 && atom.right.first.0 != 0);
+    (constant.unwrap_or(0), has_differences)
+}
+
+/// The decisions of a strategy by words, in the order of their ranks. There are none where play is said to have ended, so that a state
+/// in which it has not is found.
+pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
+    let states = closed_loop::joined(network, strategy).into_iter();
+    let states = states.map(|joined| {
+        let all = |decisions: Vec<&Decision>| -> Vec<strategy::Decision> {
+            let counting = decisions.into_iter().filter(|_| !joined.is_goal);
+            counting.map(decision).collect()
+        };
+        Decisions {
+            words: joined.words.to_vec(),
+            decisions: all(joined.decisions),
+            legs: all(joined.legs),
+        }
+    });
+    states.collect()
+}
+
+fn decision(decision: &Decision) -> strategy::Decision {
+    let action = decision.action.as_ref();
+    strategy::Decision {
+        zones: zones(&decision.zones),
+        action: action.map(|parts| parts.iter().map(|&one| one.into()).collect()),
+    }
+}
+
+impl From<Part> for verify::Part {
+    fn from(part: Part) -> verify::Part {
+        verify::Part {
+            process: part.process,
+            edge: part.edge,
+            branch: part.branch,
+            select: part.select,
+        }
+    }
+}
+
+impl From<verify::Part> for Part {
+    fn from(part: verify::Part) -> Part {
+        Part {
+            process: part.process,
+            edge: part.edge,
+            branch: part.branch,
+            select: part.select,
+        }
+    }
+}
+
+fn zones(federation: &Federation) -> Vec<Vec<Constraint>> {
+    let dimension = federation.dimension();
+    let zones = federation.zones();
+    zones.map(|zone| constraints(zone, dimension)).collect()
+}
+
+/// The fewest constraints that make a zone.
+pub(super) fn constraints(zone: &[Bound], dimension: usize) -> Vec<Constraint> {
+    let mut constraints = Vec::new();
+    minimal::for_each_minimal(zone, dimension, |one| {
+        constraints.push(Constraint {
+            left: one.left,
+            right: one.right,
+            bound: one.bound.value(),
+            strict: one.bound.is_strict(),
+        });
+    });
+    constraints
+}
+
+/// What a check covered, or what is wrong, for the user: one line, then those of the run.
+pub fn describe(network: &Network, verification: &Verification) -> Vec<String> {
+    match verification {
+        Ok(strategy::Outcome::Verified(coverage)) => vec![format!(
+            "strategy verified: {} regions, {} moves of its own, {} of the opponent, {} ends that are won",
+            coverage.regions, coverage.own_moves, coverage.opponent_moves, coverage.goals
+        )],
+        Ok(strategy::Outcome::GivenUp(GivenUp::TooLarge, coverage)) => vec![format!(
+            "strategy not verified: more than {} regions; the limit of states (--states) sets another bound",
+            coverage.regions
+        )],
+        Ok(strategy::Outcome::GivenUp(GivenUp::Ended, coverage)) => vec![format!(
+            "strategy not verified: stopped by the limit of time after {} regions",
+            coverage.regions
+        )],
+        Ok(strategy::Outcome::Violated(violation, _)) => violation_lines(network, violation),
+        Err(verify::Error::Unsupported(what)) => {
+            vec![format!(
+                "strategy not verified: {what} are not covered by the check"
+            )]
+        }
+        Err(error) => vec![format!("strategy not verified: {error:?}")],
+    }
+}
+
+fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
+    let defect = match violation.defect {
+        Defect::NoDecision => "it has no decision here",
+        Defect::ImpossibleAction => "its action is not possible here",
+        Defect::Broken => "what must be kept does not hold here",
+        Defect::GoalReached => "the goal of the controller holds here",
+        Defect::Stuck => "it waits where time cannot pass and it may not",
+        Defect::OtherGame => "it is for another start or limit of time than the query",
+        Defect::ImpossibleWay => "the way to where it begins is not possible",
+        Defect::Recurring => "the goal of the controller comes again and again",
+        Defect::Endless => "the run goes on for ever without what the strategy is for",
+    };
+    let mut lines = vec![format!("strategy violated: {defect}")];
+    let mut clocks = violation.states.iter().map(|state| state.clocks.len());
+    let is_timed = clocks.any(|clocks| clocks > network.clocks.len().max(1));
+    let network = &*time_clock::with_limit(network, is_timed.then_some(0));
+    for (index, state) in violation.states.iter().enumerate() {
+        lines.push(format!(
+            "  {}",
+            text::state_line(network, state, violation.ticks_per_unit)
+        ));
+        match violation.steps.get(index) {
+            Some(Step::Time) => lines.push("    time passes".to_owned()),
+            Some(Step::Move(one)) => {
+                let edges: Vec<String> = one
+                    .parts
+                    .iter()
+                    .map(|part| part_text(network, *part))
+                    .collect();
+                lines.push(format!("    {}", edges.join(", ")));
+            }
+            None => {}
+        }
+    }
+    lines
+}
+
+fn part_text(network: &Network, part: verify::Part) -> String {
+    let process = &network.processes[part.process as usize];
+    let edge = &process.edges[part.edge as usize];
+    let target = edge.branches[part.branch as usize].target;
+    format!(
+        "{}.{} → {}",
+        process.name,
+        process.locations[edge.source.0 as usize].name,
+        process.locations[target.0 as usize].name
+    )
+}

@@ -1,0 +1,354 @@
+//! From a symbolic trace to a run with exact times that was replayed independently.
+//!
+//! The search leaves a sequence of moves, and how it ends. [`crate::search::timed_trace::schedule`] finds times for it, and
+//! [`crate::verify::replay`] follows the run and checks what it is said to show. A run that fails there is a mistake of the engine.
+//!
+//! The loop of a run that never ends is found by taking the loop of the trace ever more often: the earliest times settle into a
+//! pattern, and then two states on entry of the loop lie in the same region.
+
+use crate::ir::{Measure, Network, Predicate};
+use crate::network::{Failure, Part, Symbolic};
+use crate::search::liveness::emptiness::Ending;
+use crate::search::reachability::search::Trace;
+use crate::search::timed_trace::schedule;
+use crate::search::timed_trace::schedule::{Closing, Finish, Schedule, Stays, Unscheduled, Wanted};
+use crate::verify::replay::{self, Claim, Coverage, End, Moment, Outcome, Run, Shown, Step};
+use crate::verify::{self, State, Violation};
+use crate::zones::dbm::Constraint;
+
+/// Times that the loop of a trace is taken, at most.
+const MOST_ROUNDS: usize = 64;
+
+/// Moves of a run, at most, when its loop is taken again.
+const MOST_MOVES: usize = 20_000;
+
+/// What backs a verdict or a value: a witness, a counterexample, or the way to a failure.
+#[derive(Clone, Debug)]
+pub struct Witness {
+    /// What it shows, if the answer has several.
+    pub title: Option<String>,
+    /// The symbolic run.
+    pub trace: Trace,
+    /// Why it never ends, if it does not.
+    pub ending: Option<Ending>,
+    /// The move that fails in the last state, if it leads to a failure that is in one.
+    pub failing: Option<Vec<Part>>,
+    /// Whether it shows what the query asks about, a value, or only the way to a failure.
+    pub kind: Kind,
+    /// The run with exact times, if it was wanted.
+    pub run: Option<Proof>,
+}
+
+/// What a witness is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The way to a failure of the model.
+    Failure,
+    /// What the query asks about.
+    Predicate,
+    /// A value of the item with this index.
+    Value(usize, Shown),
+}
+
+impl Witness {
+    /// A symbolic run without anything.
+    pub fn new(trace: Trace, ending: Option<Ending>, kind: Kind) -> Witness {
+        Witness {
+            title: None,
+            trace,
+            ending,
+            failing: None,
+            kind,
+            run: None,
+        }
+    }
+}
+
+/// What became of the run with exact times.
+#[derive(Clone, Debug)]
+pub enum Proof {
+    /// It was replayed: the states on entry, in ticks, and what was looked at.
+    Replayed(Run, Vec<State>, Coverage),
+    /// The replay shows a mistake in it.
+    Violated(Run, Violation),
+    /// The moves of the trace have no times although its zones are exact.
+    Impossible,
+    /// There is none.
+    Missing(Missing),
+}
+
+/// Why there is no run with exact times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Missing {
+    /// The zones of the trace are too large, and its moves are not possible in this order.
+    Approximate,
+    /// The moves are not possible with the values that `meta` variables have on this way.
+    Meta,
+    /// Too many alternatives.
+    TooHard,
+    /// No two states on the loop were found that lie in the same region.
+    OpenLoop,
+    /// A limit came first, or the user interrupted.
+    Stopped,
+    /// The model failed.
+    Failed(Failure),
+    /// The replay does not cover the model or query.
+    NotCovered(verify::Error),
+}
+
+/// What a trace shows.
+#[derive(Clone, Copy, Debug)]
+pub enum Shows<'q> {
+    /// That the model allows it.
+    Possible,
+    /// A state in which the predicate holds; at the latest at this time: see [`Wanted::deadline`].
+    Reaches(&'q Predicate, Option<(i32, u32)>),
+    /// A run that stays inside a predicate.
+    Stays(Stays<'q>),
+    /// A state in which the predicate holds and an item has a value.
+    Takes(Takes<'q>),
+}
+
+/// What a trace to a value shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Takes<'q> {
+    /// The index of the item.
+    pub item: usize,
+    /// What is measured.
+    pub measure: &'q Measure,
+    /// What holds where it is.
+    pub predicate: &'q Predicate,
+    /// The value.
+    pub shown: Shown,
+    /// What the value asks of the clocks.
+    pub constraints: &'q [Constraint],
+    /// The time of the end at the latest: see [`Wanted::deadline`].
+    pub deadline: Option<(i32, u32)>,
+}
+
+/// Finds times for a trace and replays it. If `is_doubtful`, there may be none.
+pub fn prove(
+    symbolic: &mut Symbolic<'_>,
+    network: &Network,
+    trace: &Trace,
+    (ending, shows): (Option<Ending>, Shows<'_>),
+    is_doubtful: bool,
+) -> Proof {
+    let result = match (shows, ending) {
+        (Shows::Stays(stays), Some(Ending::Loop(start))) if network.features.stopwatches => {
+            closed(symbolic, network, trace, start, stays)
+        }
+        (Shows::Stays(stays), Some(Ending::Loop(start))) => {
+            looped(symbolic, network, trace, start, stays)
+        }
+        (Shows::Stays(stays), ending) => {
+            let finish = if ending == Some(Ending::Waits) {
+                Finish::Waits
+            } else {
+                Finish::Stuck
+            };
+            timed(
+                symbolic,
+                &Wanted {
+                    stays: Some(stays),
+                    ..wanted(&trace.moves, finish)
+                },
+            )
+        }
+        (Shows::Possible, _) => timed(symbolic, &wanted(&trace.moves, Finish::Entry)),
+        (Shows::Reaches(goal, deadline), _) => {
+            let finish = Finish::Holds(goal, Vec::new());
+            timed(
+                symbolic,
+                &Wanted {
+                    deadline,
+                    ..wanted(&trace.moves, finish)
+                },
+            )
+        }
+        (Shows::Takes(takes), _) => {
+            let finish = Finish::Holds(takes.predicate, takes.constraints.to_vec());
+            timed(
+                symbolic,
+                &Wanted {
+                    deadline: takes.deadline,
+                    ..wanted(&trace.moves, finish)
+                },
+            )
+        }
+    };
+    let has_meta = network.layout.variables.iter().any(|one| one.meta);
+    let run = match result {
+        Ok(run) => run,
+        Err(Missing::Approximate) if !is_doubtful && has_meta => {
+            return Proof::Missing(Missing::Meta);
+        }
+        Err(Missing::Approximate) if !is_doubtful => return Proof::Impossible,
+        Err(missing) => return Proof::Missing(missing),
+    };
+    let always = Predicate::Constant(true);
+    let claim = match shows {
+        Shows::Possible => Claim::Possible,
+        Shows::Reaches(goal, _) => Claim::Reaches(goal),
+        Shows::Stays(Stays { from, keep }) => {
+            Claim::Stays(from.map_or(&always, |(_, open)| open), keep)
+        }
+        Shows::Takes(takes) => Claim::Takes(takes.predicate, takes.measure, takes.shown),
+    };
+    match replay::replay(network, &run, &claim) {
+        Ok(Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),
+        Ok(Outcome::Violated(violation)) => Proof::Violated(run, violation),
+        Err(error) => Proof::Missing(Missing::NotCovered(error)),
+    }
+}
+
+impl From<Unscheduled> for Missing {
+    fn from(unscheduled: Unscheduled) -> Missing {
+        match unscheduled {
+            Unscheduled::Impossible => Missing::Approximate,
+            Unscheduled::TooHard => Missing::TooHard,
+            Unscheduled::Failed(Failure::Interrupted) => Missing::Stopped,
+            Unscheduled::Failed(failure) => Missing::Failed(failure),
+        }
+    }
+}
+
+/// A run of these moves that ends so, and of which nothing else is wanted.
+pub(in crate::engine) fn wanted<'t>(moves: &'t [Vec<Part>], finish: Finish<'t>) -> Wanted<'t> {
+    Wanted {
+        moves,
+        stays: None,
+        finish,
+        deadline: None,
+        closing: None,
+    }
+}
+
+/// A run with the earliest times.
+pub(in crate::engine) fn timed(
+    symbolic: &mut Symbolic<'_>,
+    wanted: &Wanted<'_>,
+) -> Result<Run, Missing> {
+    let schedule = schedule::schedule(symbolic, wanted)?;
+    let Schedule {
+        ticks_per_unit,
+        moves: times,
+        from,
+        end,
+    } = schedule;
+    let mut before = 0;
+    let steps = wanted.moves.iter().zip(&times).map(|(parts, &time)| Step {
+        wait: time - std::mem::replace(&mut before, time),
+        parts: parts.iter().map(|&one| verify::Part::from(one)).collect(),
+    });
+    let steps = steps.collect();
+    let entered = |state: usize| state.checked_sub(1).map_or(0, |last| times[last]);
+    let last = end - entered(times.len());
+    let from_state = wanted
+        .stays
+        .and_then(|stays| stays.from)
+        .map_or(0, |from| from.0);
+    Ok(Run {
+        ticks_per_unit,
+        steps,
+        end: match wanted.finish {
+            Finish::Entry | Finish::Holds(..) => End::After(last),
+            Finish::Waits => End::Waits(last),
+            Finish::Stuck => End::Stuck(last),
+        },
+        from: Moment {
+            state: from_state,
+            wait: from - entered(from_state),
+        },
+    })
+}
+
+/// Rounds of a loop, at most, before the one in which a run with stopwatches closes it.
+const MOST_EARLIER_ROUNDS: usize = 3;
+
+/// A run that ends in a loop of a network with stopwatches: after some rounds of the loop of the trace, one more comes back to the same
+/// values.
+fn closed(
+    symbolic: &mut Symbolic<'_>,
+    network: &Network,
+    trace: &Trace,
+    start: usize,
+    stays: Stays<'_>,
+) -> Result<Run, Missing> {
+    let (stem, cycle) = trace.moves.split_at(start);
+    let open = stays.from.map(|(_, open)| open);
+    let predicates: Vec<&Predicate> = open.into_iter().chain([stays.keep]).collect();
+    let above = replay::indifferent_above(network, &predicates);
+    let mut moves = [stem, cycle].concat();
+    for round in 0..=MOST_EARLIER_ROUNDS {
+        let head = start + round * cycle.len();
+        let closing = Some(Closing { head, above });
+        let run = timed(
+            symbolic,
+            &Wanted {
+                stays: Some(stays),
+                closing,
+                ..wanted(&moves, Finish::Entry)
+            },
+        );
+        match run {
+            Ok(mut run)
+                if run.from
+                    <= (Moment {
+                        state: head,
+                        wait: 0,
+                    }) =>
+            {
+                run.end = End::Loop(head);
+                return Ok(run);
+            }
+            Ok(_) | Err(Missing::Approximate) => moves.extend_from_slice(cycle),
+            Err(missing) => return Err(missing),
+        }
+    }
+    Err(Missing::OpenLoop)
+}
+
+/// A run that ends in a loop: the loop of the trace, taken as often as it needs to close.
+fn looped(
+    symbolic: &mut Symbolic<'_>,
+    network: &Network,
+    trace: &Trace,
+    start: usize,
+    stays: Stays<'_>,
+) -> Result<Run, Missing> {
+    let (stem, cycle) = trace.moves.split_at(start);
+    let open = stays.from.map(|(_, open)| open);
+    let predicates: Vec<&Predicate> = open.into_iter().chain([stays.keep]).collect();
+    let mut rounds = 1;
+    while rounds <= MOST_ROUNDS && stem.len() + rounds * cycle.len() <= MOST_MOVES {
+        let mut moves = stem.to_vec();
+        for _ in 0..rounds {
+            moves.extend_from_slice(cycle);
+        }
+        let mut run = timed(
+            symbolic,
+            &Wanted {
+                stays: Some(stays),
+                ..wanted(&moves, Finish::Entry)
+            },
+        )?;
+        let replayed = replay::replay(network, &run, &Claim::Possible);
+        let states = match replayed.map_err(Missing::NotCovered)? {
+            Outcome::Replayed(states, _) => states,
+            // The replay of the whole run says what is wrong.
+            Outcome::Violated(_) => return Ok(run),
+        };
+        let mut heads: Vec<usize> = (0..=rounds).map(|k| start + k * cycle.len()).collect();
+        heads.retain(|&state| run.from <= Moment { state, wait: 0 });
+        let at_heads: Vec<&State> = heads.iter().map(|&head| &states[head]).collect();
+        let found = replay::repeated(network, &at_heads, run.ticks_per_unit, &predicates);
+        if let Some((first, last)) = found.map_err(Missing::NotCovered)? {
+            run.steps.truncate(heads[last]);
+            run.end = End::Loop(heads[first]);
+            return Ok(run);
+        }
+        rounds *= 2;
+    }
+    Err(Missing::OpenLoop)
+}

@@ -1,0 +1,230 @@
+//! Answers as JSON: traces, values and plans in the words of the model. Strategies are in [`super::strategy_json`].
+
+use serde_json::{Map, Value as Json, json};
+
+use crate::cancellation;
+use crate::game::strategy::plans::Plan;
+use crate::ir::Network;
+use crate::network::Part;
+use crate::search::liveness::emptiness::Ending;
+use crate::search::optimum::extremum::{Extreme, Extremes};
+use crate::verify::State;
+use crate::verify::choices::Choice;
+use crate::verify::replay::{End, Run};
+
+use super::text;
+use super::text::Value;
+use crate::engine::evidence::timed_run::{Kind, Proof, Witness};
+use crate::engine::query::answer::Values;
+
+/// An edge.
+pub fn part(network: &Network, part: Part) -> Json {
+    let process = &network.processes[part.process as usize];
+    let edge = &process.edges[part.edge as usize];
+    let target = edge.branches[part.branch as usize].target;
+    let select: Map<String, Json> = text::selects(network, part)
+        .into_iter()
+        .map(|(name, value)| (name.to_owned(), json!(value)))
+        .collect();
+    json!({
+        "process": process.name,
+        "edge": part.edge,
+        "source": process.locations[edge.source.0 as usize].name,
+        "target": process.locations[target.0 as usize].name,
+        "branch": part.branch,
+        "select": select,
+        "guard": edge.labels.guard,
+        "sync": edge.labels.sync,
+        "update": edge.labels.update,
+        "controllable": edge.controllable,
+    })
+}
+
+/// The edges of a move.
+pub fn parts(network: &Network, list: &[Part]) -> Json {
+    Json::Array(list.iter().map(|&one| part(network, one)).collect())
+}
+
+/// What it takes to write the location of a process, with its share of the state: see [`cancellation::work`].
+const UNITS_FOR_LOCATION: usize = 256;
+
+/// The location of each process.
+pub fn locations(network: &Network, words: &[i32]) -> Json {
+    cancellation::work(UNITS_FOR_LOCATION * network.processes.len());
+    let entries = network.processes.iter().enumerate();
+    Json::Object(
+        entries
+            .map(|(index, process)| {
+                (
+                    process.name.clone(),
+                    json!(text::location_name(network, index, words)),
+                )
+            })
+            .collect(),
+    )
+}
+
+/// The value of each scalar part of each variable.
+pub fn variables(network: &Network, words: &[i32]) -> Json {
+    let mut values = Map::new();
+    text::for_each_value(network, words, |name, value| {
+        let value = match value {
+            Value::Integer(value) => json!(value),
+            Value::Double(value) => json!(value),
+        };
+        values.insert(name.to_owned(), value);
+    });
+    Json::Object(values)
+}
+
+/// The values of a query for them: of one item its value, of several a list. A value is a number, or "inf" without a greatest one, or
+/// null if no state counts; for `bounds` it is the pair of the least and the greatest.
+pub fn values(values: &Values) -> Json {
+    let one = |extreme: Option<Extreme>| match extreme {
+        None => Json::Null,
+        Some(Extreme::Infinite) => json!("inf"),
+        Some(Extreme::Value { value, .. }) => json!(value),
+    };
+    let item = |item: &Extremes| match (values.least, values.greatest) {
+        (true, true) if *item == Extremes::default() => Json::Null,
+        (true, true) => json!([one(item.least), one(item.greatest)]),
+        (true, false) => one(item.least),
+        _ => one(item.greatest),
+    };
+    match values.items.as_slice() {
+        [only] => item(only),
+        items => Json::Array(items.iter().map(item).collect()),
+    }
+}
+
+/// The witnesses of an answer: one object, or, for values, one with a list of `traces`.
+///
+/// A trace has `format` "ntagen-trace" and `version` 1. `kind` is "failure" where it leads to a failure of the model, and `value` says
+/// which value it shows. `states` are symbolic, `transitions` the edges between them, `ending` says why
+/// the run never ends: `loop` is the index of the state that its last state leads back to. `run` has exact times, in ticks of
+/// which `ticks_per_unit` make a unit of time: its `steps` each wait and take edges, `end` says what comes then, `from` from which
+/// moment on what must stay does, and `states` are those on entry, with the one after the last wait. On the way to an error, `failing` has
+/// the edges of the transition that fails in the last state; it is not there if looking at guards, invariants or the query fails.
+pub fn witnesses(network: &Network, witnesses: &[Witness], query: &str) -> Json {
+    let mut json = json!({ "format": TRACE_FORMAT, "version": 1, "query": query });
+    let traces = witnesses.iter().map(|one| witness(network, one));
+    match (witnesses, &mut json) {
+        ([only], Json::Object(fields)) if only.title.is_none() => {
+            if let Json::Object(more) = witness(network, only) {
+                fields.extend(more);
+            }
+        }
+        _ => json["traces"] = traces.collect(),
+    }
+    json
+}
+
+/// What a file with traces says that it is.
+pub const TRACE_FORMAT: &str = "ntagen-trace";
+
+fn witness(network: &Network, witness: &Witness) -> Json {
+    let states = witness.trace.states.iter().map(|(words, zone)| {
+        json!({
+            "locations": locations(network, words),
+            "variables": variables(network, words),
+            "zone": text::zone_constraints(network, zone),
+        })
+    });
+    let moves = witness.trace.moves.iter().map(|one| parts(network, one));
+    let mut json = json!({});
+    if let Some(title) = &witness.title {
+        json["title"] = json!(title);
+    }
+    match witness.kind {
+        Kind::Failure => json["kind"] = json!("failure"),
+        Kind::Predicate => {}
+        Kind::Value(item, shown) => {
+            json["value"] = json!({
+                "item": item,
+                "value": shown.value,
+                "greatest": shown.is_greatest,
+                "reached": shown.is_reached,
+            });
+        }
+    }
+    json["states"] = states.collect();
+    json["transitions"] = moves.collect();
+    if let Some(failing) = &witness.failing {
+        json["failing"] = parts(network, failing);
+    }
+    if let Some(ending) = witness.ending {
+        json["ending"] = match ending {
+            Ending::Loop(start) => json!({ "kind": "loop", "loop": start }),
+            Ending::Waits => json!({ "kind": "waits" }),
+            Ending::Stuck => json!({ "kind": "stuck" }),
+        };
+    }
+    if let Some(Proof::Replayed(exact, states, _)) = &witness.run {
+        json["run"] = run(network, exact, states);
+    }
+    json
+}
+
+/// A run with exact times.
+pub fn run(network: &Network, run: &Run, states: &[State]) -> Json {
+    let steps = run.steps.iter().map(|step| {
+        let edges = step.parts.iter().map(|&one| part(network, one.into()));
+        json!({ "wait": step.wait, "edges": edges.collect::<Vec<_>>() })
+    });
+    let end = match run.end {
+        End::After(wait) => json!({ "kind": "after", "wait": wait }),
+        End::Loop(state) => json!({ "kind": "loop", "state": state }),
+        End::Waits(wait) => json!({ "kind": "waits", "wait": wait }),
+        End::Stuck(wait) => json!({ "kind": "stuck", "wait": wait }),
+    };
+    let states = states.iter().map(|one| state(network, one));
+    json!({
+        "ticks_per_unit": run.ticks_per_unit,
+        "steps": steps.collect::<Vec<_>>(),
+        "end": end,
+        "from": { "state": run.from.state, "wait": run.from.wait },
+        "states": states.collect::<Vec<_>>(),
+    })
+}
+
+/// A state with clock values in ticks.
+pub fn state(network: &Network, state: &State) -> Json {
+    let clocks = network.clocks.iter().zip(&state.clocks).skip(1);
+    let clocks = clocks.map(|(clock, value)| (clock.name.clone(), json!(value)));
+    json!({
+        "locations": locations(network, &state.words),
+        "variables": variables(network, &state.words),
+        "clocks": clocks.collect::<Map<_, _>>(),
+    })
+}
+
+/// The discrete part of a state.
+pub fn discrete(network: &Network, words: &[i32]) -> Json {
+    json!({ "locations": locations(network, words), "variables": variables(network, words) })
+}
+
+/// What can happen in a state: of each choice the edges, and the windows of waits in ticks, null for one without end.
+pub fn choices(network: &Network, choices: &[Choice]) -> Json {
+    let list = choices.iter().map(|choice| {
+        let edges = choice.parts.iter().map(|&one| part(network, one.into()));
+        json!({ "edges": edges.collect::<Vec<_>>(), "windows": choice.windows })
+    });
+    list.collect()
+}
+
+/// Plans: of each, the transitions that leave a state without committed locations; all others follow from them.
+pub fn plans(network: &Network, plans: &[Plan], query: &str, has_more: bool) -> Json {
+    let list = plans.iter().map(|plan| {
+        let steps = plan.steps.iter().filter(|step| !step.was_committed);
+        let steps: Vec<Json> = steps.map(|step| json!({ "edges": parts(network, &step.parts) })).collect();
+        json!({ "steps": steps, "end": { "locations": locations(network, &plan.end), "variables": variables(network, &plan.end) } })
+    });
+    json!({
+        "format": "ntagen-model-plans",
+        "version": 1,
+        "query": query,
+        "count": plans.len(),
+        "complete": !has_more,
+        "plans": list.collect::<Vec<_>>(),
+    })
+}

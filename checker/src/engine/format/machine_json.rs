@@ -1,0 +1,287 @@
+//! Strategies that go by observations, as files: written as JSON and as text, and read again to be checked.
+//!
+//! The format is described in `docs/observations.md`. In short: an object with `format` "ntagen-machine", `version` 1, the `query`, the
+//! `observations`, and `states`, the initial one first, each with what is seen in it, the action that is proposed, the next state for
+//! each next observation, and what the controller knows on entry. What is known, and what is seen in a state itself, is for people: reading passes over it.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value as Json, json};
+
+use crate::game::partial_observation::{Action, Knowledge, Machine};
+use crate::ir::Network;
+use crate::network::Part;
+use crate::verify::observed as check;
+use crate::zones::{Federation, Zone};
+
+use super::strategy_json;
+use super::strategy_json::{At, Mismatch, Reader};
+use super::{json, text};
+use crate::engine::evidence::shown_states;
+use crate::engine::evidence::shown_states::Difference;
+
+/// The name of the format.
+pub const FORMAT: &str = "ntagen-machine";
+
+/// The version of the format that is written, and the only one that is read.
+pub const VERSION: u64 = 1;
+
+const SEE_FORMAT: &str = "docs/observations.md describes the format";
+
+const OTHER_MODEL: &str =
+    "the machine was made for another model or query, or they have changed: synthesise it again";
+
+/// The texts of the observations of a query, `{o1, o2, …} control: …`.
+pub fn observations(query: &str) -> Vec<String> {
+    let mut texts = vec![String::new()];
+    let mut depth = 0;
+    for sign in query.chars().skip_while(|&sign| sign != '{').skip(1) {
+        match sign {
+            '(' | '[' | '{' => depth += 1,
+            '}' if depth == 0 => break,
+            ')' | ']' | '}' => depth -= 1,
+            _ => {}
+        }
+        if sign == ',' && depth == 0 {
+            texts.push(String::new());
+        } else if let Some(text) = texts.last_mut() {
+            text.push(sign);
+        }
+    }
+    let texts = texts.iter().map(|text| text.trim().to_owned());
+    texts.filter(|text| !text.is_empty()).collect()
+}
+
+/// A machine as JSON.
+pub fn write(network: &Network, machine: &Machine, query: &str) -> Json {
+    let states = machine.states.iter().map(|state| {
+        let next = state
+            .next
+            .iter()
+            .map(|(observation, next)| json!({ "observation": observation[..], "state": next }));
+        let next: Vec<Json> = next.collect();
+        json!({
+            "observation": state.knowledge.observation[..],
+            "action": action(network, state.action),
+            "next": next,
+            "knowledge": knowledge(network, &state.knowledge),
+        })
+    });
+    let states: Vec<Json> = states.collect();
+    json!({
+        "format": FORMAT,
+        "version": VERSION,
+        "query": query,
+        "observations": observations(query),
+        "states": states,
+    })
+}
+
+fn action(network: &Network, action: Action) -> Json {
+    match action {
+        Action::Wait => Json::Null,
+        Action::Channel(channel) => json!({ "channel": network.channels[channel.0 as usize].name }),
+        Action::Edge {
+            process,
+            edge,
+            select,
+        } => json!({ "edge": json::part(network, part(process, edge, select)) }),
+    }
+}
+
+/// An edge without a channel, by its first branch.
+fn part(process: u32, edge: u32, select: u32) -> Part {
+    Part {
+        process,
+        edge,
+        branch: 0,
+        select,
+    }
+}
+
+fn knowledge(network: &Network, knowledge: &Knowledge) -> Vec<Json> {
+    let states = knowledge.states.iter().map(|(words, zones)| {
+        json!({
+            "locations": json::locations(network, words),
+            "variables": json::variables(network, words),
+            "zones": strategy_json::zones(network, zones),
+        })
+    });
+    states.collect()
+}
+
+/// Reads what a machine does; gives the query that it answers, and its states. `seen` is the number of observations of the query.
+///
+/// # Errors
+/// It is no JSON of the format, or names what the network does not have.
+pub fn read(
+    network: &Network,
+    file: &Json,
+    seen: usize,
+) -> Result<Vec<check::MachineState>, Mismatch> {
+    let whole = At::whole(file);
+    whole.only(&["format", "version", "query", "observations", "states"])?;
+    let names = whole.list("observations")?.len();
+    if names != seen {
+        let message = format!("there are {names} observations, and the query has {seen}");
+        return Err(whole.field("observations")?.wrong(message, OTHER_MODEL));
+    }
+    let right = observations(&whole.text("query")?);
+    if let Err(Difference::False(text) | Difference::Unknown(text)) =
+        shown_states::compare(&file["observations"], &json!(right), "observations")
+    {
+        return Err(whole.field("observations")?.wrong(text, OTHER_MODEL));
+    }
+    let states = whole.list("states")?;
+    let count = states.len();
+    let states = states.iter().map(|state| {
+        state.only(&["observation", "action", "next", "knowledge"])?;
+        let mut next = Vec::new();
+        for one in state.list("next")? {
+            one.only(&["observation", "state"])?;
+            let observation = one.list("observation")?;
+            let values = observation.iter().map(|value| {
+                let truth = value.0.as_bool();
+                truth.ok_or_else(|| value.wrong("this is no truth value", SEE_FORMAT))
+            });
+            let values: Vec<bool> = values.collect::<Result<_, _>>()?;
+            if values.len() != seen {
+                let message = "it has another number of values than the query has observations";
+                return Err(one.field("observation")?.wrong(message, OTHER_MODEL));
+            }
+            let target = one.index("state")? as usize;
+            if target >= count {
+                let message = format!("there is no state {target}");
+                return Err(one.field("state")?.wrong(message, SEE_FORMAT));
+            }
+            next.push((values, target));
+        }
+        Ok(check::MachineState {
+            action: read_action(network, &state.field("action")?)?,
+            next,
+        })
+    });
+    states.collect()
+}
+
+fn read_action(network: &Network, at: &At<'_>) -> Result<check::Action, Mismatch> {
+    if at.0.is_null() {
+        return Ok(check::Action::Wait);
+    }
+    at.only(&["channel", "edge"])?;
+    if at.0.get("channel").is_some() {
+        let name = at.text("channel")?;
+        let mut channels = network.channels.iter();
+        let Some(channel) = channels.position(|one| one.name == name) else {
+            return Err(at.wrong(format!("the model has no channel {name}"), OTHER_MODEL));
+        };
+        return Ok(check::Action::Channel(channel as u32));
+    }
+    let part = Reader::new(network).part(&at.field("edge")?)?;
+    Ok(check::Action::Edge {
+        process: part.process,
+        edge: part.edge,
+        select: part.select,
+    })
+}
+
+/// What a machine does, for the check.
+pub fn to_check(machine: &Machine) -> Vec<check::MachineState> {
+    let states = machine.states.iter();
+    let states = states.map(|state| check::MachineState {
+        action: match state.action {
+            Action::Wait => check::Action::Wait,
+            Action::Channel(channel) => check::Action::Channel(channel.0),
+            Action::Edge {
+                process,
+                edge,
+                select,
+            } => check::Action::Edge {
+                process,
+                edge,
+                select,
+            },
+        },
+        next: state
+            .next
+            .iter()
+            .map(|(observation, next)| (observation.to_vec(), *next))
+            .collect(),
+    });
+    states.collect()
+}
+
+/// A machine as text: a paragraph for each state, with what is seen in it, what is proposed, where each next observation leads, and
+/// where play may be on entry.
+pub fn text(network: &Network, machine: &Machine, query: &str) -> String {
+    let names = observations(query);
+    let seen = |values: &[bool]| {
+        let values = names.iter().zip(values);
+        let values = values.map(|(name, &value)| {
+            if value {
+                name.clone()
+            } else {
+                format!("not ({name})")
+            }
+        });
+        let values: Vec<String> = values.collect();
+        if values.is_empty() {
+            "nothing".to_owned()
+        } else {
+            values.join(", ")
+        }
+    };
+    let mut text = "Strategy over observations:\n".to_owned();
+    if machine.states.is_empty() {
+        text.push_str("\nPlay has ended before it begins.\n");
+    }
+    for (number, state) in machine.states.iter().enumerate() {
+        // Writing to a string cannot fail.
+        let observation = seen(&state.knowledge.observation);
+        let _ = writeln!(text, "\nState {number}: seeing {observation}");
+        for (words, zones) in &state.knowledge.states {
+            let place = text::words_line(network, words);
+            let _ = writeln!(
+                text,
+                "  perhaps in {place} with {}",
+                zones_text(network, zones)
+            );
+        }
+        let _ = writeln!(text, "  {}", action_text(network, state.action));
+        for (observation, next) in &state.next {
+            let _ = writeln!(text, "  when seeing {}, go to {next}", seen(observation));
+        }
+    }
+    text
+}
+
+/// What a state of a machine does.
+pub fn action_text(network: &Network, action: Action) -> String {
+    match action {
+        Action::Wait => "wait".to_owned(),
+        Action::Channel(channel) => {
+            format!("propose {}", network.channels[channel.0 as usize].name)
+        }
+        Action::Edge {
+            process,
+            edge,
+            select,
+        } => {
+            let part = part(process, edge, select);
+            format!("propose {}", text::part_text(network, part))
+        }
+    }
+}
+
+fn zones_text(network: &Network, federation: &Federation) -> String {
+    let zones = federation.zones().map(|bounds| {
+        let zone = Zone::from_bounds(federation.dimension(), bounds);
+        let constraints = text::minimal_constraints(network, &zone);
+        if constraints.is_empty() {
+            "any clock values".to_owned()
+        } else {
+            constraints.join(" and ")
+        }
+    });
+    zones.collect::<Vec<_>>().join(", or ")
+}

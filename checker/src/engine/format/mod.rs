@@ -1,0 +1,12 @@
+//! Text, JSON and C: how answers, models and strategies are written and read.
+
+pub mod decision_table;
+pub mod explain;
+pub mod json;
+pub mod machine_c;
+pub mod machine_json;
+pub mod model_json;
+pub mod strategy_c;
+pub mod strategy_json;
+pub mod strategy_text;
+pub mod text;

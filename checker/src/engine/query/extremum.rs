@@ -1,0 +1,224 @@
+//! Queries for values: `sup`, `inf` and `bounds`.
+
+use std::sync::Arc;
+
+use crate::analysis::Abstraction;
+use crate::cancellation;
+use crate::ir::{ClockAtom, Measure};
+use crate::network::symbolic::predicate;
+use crate::network::{Symbolic, Symmetry};
+use crate::search::optimum::extremum;
+use crate::search::optimum::extremum::{Extreme, Extremes, Question};
+use crate::search::optimum::value_goal::Taking;
+use crate::search::reachability::search;
+use crate::search::reachability::search::Outcome;
+use crate::verify::replay::Shown;
+
+use super::answer::{
+    Answer, Evidence, Subject, Values, Verdict, Witnesses, found, live_variables, new_answer,
+    symbolic,
+};
+use super::optimal_trace::{Sought, best, not_the_best};
+use crate::engine::Options;
+use crate::engine::evidence::timed_run::{Kind, Shows, Takes, Witness};
+use crate::engine::limits::LimitWatch;
+
+/// The least and greatest values.
+pub(super) fn extremum(
+    subject: Subject<'_>,
+    question: Question<'_>,
+    options: &Options,
+    symmetry: Option<&Arc<Symmetry>>,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let read = predicate::functions(question.predicate).into_iter();
+    let read = read.chain(question.items.iter().filter_map(|(item, _)| match *item {
+        Measure::Integer(function) => Some(function),
+        Measure::Clock(clock) => predicate::chooser(clock),
+    }));
+    let live = live_variables(subject, read, options, symmetry);
+    let mut zones = |further: &[ClockAtom]| {
+        let predicates = [question.predicate];
+        symbolic(subject, &predicates, further, Abstraction::LowerUpper)
+            .reduced_by(symmetry.cloned())
+            .forgetting(live.clone())
+    };
+    let report = extremum::search(
+        question,
+        subject.network,
+        &mut zones,
+        options.manner(),
+        watch,
+    );
+    let mut evidence = Evidence::default();
+    let mut values = None;
+    let mut verdict = match report.outcome {
+        Ok(extremum::Outcome::Found(items)) => {
+            values = Some(Values {
+                least: question.least,
+                greatest: question.greatest,
+                items,
+            });
+            Verdict::Satisfied
+        }
+        Ok(extremum::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
+        Err((failure, trace)) => {
+            evidence
+                .witnesses
+                .push(Witness::new(trace, None, Kind::Failure));
+            Verdict::Error(failure)
+        }
+    };
+    let mut message = values
+        .as_ref()
+        .and_then(|values| remark(values, question.items));
+    // Zones that are too large have all that is there; a value is sure if a run has it, and so is that there is none.
+    if let Some(values) = &values
+        && (options.runs || report.is_approximate)
+    {
+        let mut runs = Runs {
+            subject,
+            question,
+            options,
+            witnesses: Vec::new(),
+            why_not_best: None,
+            are_sure: true,
+        };
+        runs.add_all(values, &mut zones, watch);
+        verdict = found(report.is_approximate && !runs.are_sure);
+        if options.runs {
+            evidence.witnesses = runs.witnesses;
+            let remarks: Vec<String> = message.into_iter().chain(runs.why_not_best).collect();
+            message = (!remarks.is_empty()).then(|| remarks.join("; "));
+        }
+    }
+    let mut answer = new_answer(verdict, evidence, report.counters);
+    answer.message = message;
+    answer.value = values;
+    answer
+}
+
+/// Runs to states with the values that were found.
+struct Runs<'q> {
+    subject: Subject<'q>,
+    question: Question<'q>,
+    options: &'q Options,
+    witnesses: Vec<Witness>,
+    /// Why some are any ones where the best were wanted.
+    why_not_best: Option<String>,
+    /// Whether each value is reached, by a run that was replayed.
+    are_sure: bool,
+}
+
+impl Runs<'_> {
+    /// Adds a run to a state with each of the values; none for a clock without limit, and none beyond a limit of the search.
+    fn add_all<'a>(
+        &mut self,
+        values: &Values,
+        zones: &mut dyn FnMut(&[ClockAtom]) -> Symbolic<'a>,
+        watch: &mut LimitWatch,
+    ) {
+        for (index, item) in values.items.iter().enumerate() {
+            for (extreme, is_greatest) in [(item.least, false), (item.greatest, true)] {
+                match extreme {
+                    None => {}
+                    Some(Extreme::Infinite) => self.are_sure = false,
+                    Some(Extreme::Value { value, is_reached }) => {
+                        let taking = Taking {
+                            predicate: self.question.predicate,
+                            measure: &self.question.items[index].0,
+                            value,
+                            is_greatest,
+                            is_reached,
+                        };
+                        let verdict = self.add(index, taking, zones(&taking.atoms()), watch);
+                        self.are_sure &= is_reached && verdict == Some(Verdict::Satisfied);
+                        if verdict.is_none() {
+                            return;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds a run to a state with a value; the verdict on it, or `None` beyond a limit.
+    fn add(
+        &mut self,
+        item: usize,
+        mut taking: Taking<'_>,
+        mut symbolic: Symbolic<'_>,
+        watch: &mut LimitWatch,
+    ) -> Option<Verdict> {
+        let options = self.options;
+        let search = || search::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
+        let report = cancellation::unless_cut(search).ok()?;
+        let Ok(Outcome::Found(trace)) = report.outcome else {
+            return None;
+        };
+        let atoms = taking.atoms();
+        let sought = Sought {
+            target: &mut taking,
+            predicate: self.question.predicate,
+            atoms,
+        };
+        let (trace, deadline) = match best(self.subject, &mut symbolic, sought, options, watch) {
+            Ok(None) => (trace, None),
+            Ok(Some((best, deadline))) => (best, deadline),
+            Err(reason) => {
+                self.why_not_best = Some(not_the_best(&reason));
+                (trace, None)
+            }
+        };
+        let mut words = trace.states.last()?.0.clone();
+        let constraints = taking.constraints(&mut symbolic, &mut words).ok()??;
+        let shows = Shows::Takes(Takes {
+            item,
+            measure: taking.measure,
+            predicate: taking.predicate,
+            shown: Shown {
+                value: taking.value.into(),
+                is_greatest: taking.is_greatest,
+                is_reached: taking.is_reached,
+            },
+            constraints: &constraints,
+            deadline,
+        });
+        let mut witnesses = Witnesses::new(&mut symbolic, options);
+        let verdict = witnesses.add(trace, None, shows);
+        let which = if taking.is_greatest {
+            "greatest"
+        } else {
+            "least"
+        };
+        let text = &self.question.items[item].1;
+        let found = witnesses.into_evidence().witnesses.into_iter();
+        self.witnesses.extend(found.map(|witness| Witness {
+            title: Some(format!("{which} {text}")),
+            ..witness
+        }));
+        Some(verdict)
+    }
+}
+
+/// What the numbers alone do not say: that no state counts, or that a value is not reached.
+fn remark(values: &Values, items: &[(Measure, String)]) -> Option<String> {
+    let mut remarks = Vec::new();
+    for (Extremes { least, greatest }, (_, text)) in values.items.iter().zip(items) {
+        if least.is_none() && greatest.is_none() {
+            return Some("no reachable state satisfies the condition".to_owned());
+        }
+        for (extreme, relation) in [(least, '>'), (greatest, '<')] {
+            if let Some(Extreme::Value {
+                value,
+                is_reached: false,
+            }) = extreme
+            {
+                remarks.push(format!(
+                    "{text} {relation} {value}: the value itself is not reached"
+                ));
+            }
+        }
+    }
+    (!remarks.is_empty()).then(|| remarks.join("; "))
+}

@@ -1,0 +1,175 @@
+//! Is there a run that never ends? `E[]`, `A<>` and `-->`, with the shortest trace if that is wanted.
+//!
+//! A run is first looked for in zones that may be too large, where that is sound for there being none; what they have is looked for
+//! again in exact ones.
+
+use crate::analysis::Abstraction;
+use crate::ir::Predicate;
+use crate::network::{Failure, Symbolic};
+use crate::search::liveness::emptiness;
+use crate::search::liveness::emptiness::{Ending, Liveness};
+use crate::search::liveness::leads_to;
+use crate::search::liveness::leads_to::Unanswered;
+use crate::search::liveness::shortest_lasso;
+use crate::search::liveness::shortest_lasso::Wanted;
+use crate::search::reachability::search;
+use crate::search::reachability::search::{Outcome, Trace};
+use crate::search::timed_trace::schedule::Stays;
+
+use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, negated, new_answer, symbolic};
+use super::optimal_trace::not_the_best;
+use crate::engine::evidence::certificate::stop_text;
+use crate::engine::evidence::timed_run::Shows;
+use crate::engine::limits::{LimitWatch, cut_as_interrupted};
+use crate::engine::{Options, TraceWanted};
+
+/// What a search in coarser zones came to, unless it found something that may not be there; else that of the same search in exact ones.
+fn settle<'a, T>(
+    subject: Subject<'a>,
+    predicates: &[&Predicate],
+    mut search: impl FnMut(Symbolic<'a>) -> T,
+    is_found: impl Fn(&T) -> bool,
+) -> T {
+    let coarse = coarser(subject, predicates).map(&mut search);
+    let settled = coarse.filter(|result| !is_found(result));
+    settled.unwrap_or_else(|| {
+        let exact = symbolic(subject, predicates, &[], Abstraction::Maximum);
+        search(exact)
+    })
+}
+
+/// Is there a run inside the predicate that never leaves it?
+pub(super) fn always<'a>(
+    subject: Subject<'a>,
+    keep: &Predicate,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let search = |mut symbolic: Symbolic<'a>| {
+        let mut search = Liveness::new(&symbolic, keep);
+        let outcome = search.from_start(&mut symbolic, watch);
+        (symbolic, search, outcome)
+    };
+    let is_found =
+        |(.., outcome): &(_, _, Result<_, _>)| matches!(outcome, Ok(emptiness::Outcome::Found(_)));
+    let (mut symbolic, search, outcome) = settle(subject, &[keep], search, is_found);
+    let mut witnesses = Witnesses::new(&mut symbolic, options).doubting(search.is_coarse());
+    let mut message = None;
+    let verdict = match outcome {
+        Ok(emptiness::Outcome::Found(run)) => {
+            let wanted = Wanted { open: None, keep };
+            let any = (run.trace, run.ending, 0);
+            let best = best(&mut witnesses, wanted, options, watch);
+            let (trace, ending, _) = chosen(any, best, &mut message);
+            let shows = Shows::Stays(Stays { from: None, keep });
+            witnesses.add(trace, Some(ending), shows)
+        }
+        Ok(emptiness::Outcome::Exhausted) => Verdict::NotSatisfied,
+        Ok(emptiness::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
+        Err((failure, trace)) => {
+            witnesses.add(trace, None, Shows::Possible);
+            Verdict::Error(failure)
+        }
+    };
+    let mut answer = new_answer(verdict, witnesses.into_evidence(), search.counters());
+    answer.message = message;
+    answer
+}
+
+/// Does every state of `open` lead out of `keep`?
+pub(super) fn leads_to<'a>(
+    subject: Subject<'a>,
+    (open, keep): (&Predicate, &Predicate),
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let search = |mut symbolic: Symbolic<'a>| {
+        let mut goal = Unanswered::new(&symbolic, open, keep);
+        let report = search::search(&mut symbolic, &mut goal, options.order, watch);
+        (symbolic, goal, report)
+    };
+    let is_found =
+        |(.., report): &(_, _, search::Report)| matches!(report.outcome, Ok(Outcome::Found(_)));
+    let (mut symbolic, mut goal, report) = settle(subject, &[open, keep], search, is_found);
+    let mut witnesses = Witnesses::new(&mut symbolic, options).doubting(goal.is_coarse());
+    let mut message = None;
+    let verdict = match report.outcome {
+        Ok(Outcome::Found(way)) => {
+            let run = goal.run.take().expect("the search ended at a run");
+            let (trace, start) = leads_to::joined(way, run.trace);
+            let any = (trace, run.ending.moved(start), start);
+            let wanted = Wanted {
+                open: Some(open),
+                keep,
+            };
+            let best = best(&mut witnesses, wanted, options, watch);
+            let (trace, ending, start) = chosen(any, best, &mut message);
+            let stays = Stays {
+                from: Some((start, open)),
+                keep,
+            };
+            witnesses.add(trace, Some(ending), Shows::Stays(stays))
+        }
+        Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
+        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
+        Err((failure, way)) => {
+            let below = goal.failed.take();
+            let way = match below {
+                None => way,
+                Some(run) => leads_to::joined(way, run).0,
+            };
+            witnesses.add(way, None, Shows::Possible);
+            Verdict::Error(failure)
+        }
+    };
+    let evidence = witnesses.into_evidence();
+    let mut answer = new_answer(verdict, evidence, report.counters);
+    answer.message = message;
+    negated(answer)
+}
+
+/// A trace, how it ends, and the state in which it begins to stay.
+type Endless = (Trace, Ending, usize);
+
+/// The best trace, or any one with a message that says why.
+fn chosen(
+    any: Endless,
+    best: Result<Option<Endless>, String>,
+    message: &mut Option<String>,
+) -> Endless {
+    match best {
+        Ok(best) => best.unwrap_or(any),
+        Err(reason) => {
+            *message = Some(not_the_best(&reason));
+            any
+        }
+    }
+}
+
+/// The trace with the fewest moves; `None` if any trace will do.
+fn best(
+    witnesses: &mut Witnesses<'_, '_>,
+    wanted: Wanted<'_>,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Result<Option<Endless>, String> {
+    match options.trace {
+        TraceWanted::Any => return Ok(None),
+        TraceWanted::Shortest => {}
+        TraceWanted::Fastest => {
+            return Err("a run that never ends takes no least time".to_owned());
+        }
+    }
+    if witnesses.is_doubtful() {
+        return Err("where clocks stand still, what has the fewest moves may be no run".to_owned());
+    }
+    let search = shortest_lasso::Search::new(witnesses.symbolic, wanted);
+    match cut_as_interrupted(|| search.run(watch)) {
+        Ok(shortest_lasso::Outcome::Found(run, start)) => Ok(Some((run.trace, run.ending, start))),
+        Ok(shortest_lasso::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
+        Ok(shortest_lasso::Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
+        Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
+        // The search for any run did not come to the state that fails.
+        Err(_) => Err("the model fails in a state beside it".to_owned()),
+    }
+}

@@ -1,0 +1,99 @@
+//! Traces to a state that are the best: with the fewest moves, or in the least time.
+
+use crate::analysis::Abstraction;
+use crate::ir::{ClockAtom, ClockId, ClockRange, Predicate};
+use crate::network::{Failure, Symbolic};
+use crate::search::limits::Counters;
+use crate::search::optimum::best_first;
+use crate::search::reachability::goal::Target;
+use crate::search::reachability::search::Trace;
+use crate::zones::Bound;
+
+use super::answer::{Subject, symbolic};
+use super::time_clock::with_time;
+use crate::engine::evidence::certificate::stop_text;
+use crate::engine::limits::{LimitWatch, cut_as_interrupted};
+use crate::engine::{Options, TraceWanted};
+
+/// The states that a trace is to lead to.
+pub(super) struct Sought<'q> {
+    pub(super) target: &'q mut dyn Target,
+    /// What holds in them.
+    pub(super) predicate: &'q Predicate,
+    /// Comparisons beside those of the predicate that tell them from others.
+    pub(super) atoms: Vec<ClockAtom>,
+}
+
+/// The remark on a trace that is any one, for this reason.
+pub(super) fn not_the_best(reason: &str) -> String {
+    format!("the trace is not the one wanted: {reason}")
+}
+
+/// The trace with the fewest moves or the least time, and its time; `None` if any trace will do. `zones` keeps the comparisons of what
+/// is sought.
+pub(super) fn best(
+    subject: Subject<'_>,
+    zones: &mut Symbolic<'_>,
+    sought: Sought<'_>,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Result<Option<(Trace, Option<best_first::Cost>)>, String> {
+    let Sought {
+        target,
+        predicate,
+        mut atoms,
+    } = sought;
+    let none = Counters::default();
+    let way = match options.trace {
+        TraceWanted::Any => return Ok(None),
+        TraceWanted::Shortest => {
+            let mut search =
+                best_first::Search::new(zones, &*target, best_first::Measure::Moves, none);
+            cut_as_interrupted(|| search.run(watch))
+        }
+        TraceWanted::Fastest if subject.under.is_some() => {
+            return Err("there is none for fastest traces under a strategy".to_owned());
+        }
+        TraceWanted::Fastest => {
+            let (timed, clock) = with_time(subject.network);
+            let subject = Subject {
+                network: &timed,
+                ..subject
+            };
+            atoms.push(time_atom(clock));
+            let mut zones = symbolic(subject, &[predicate], &atoms, Abstraction::LowerUpper);
+            let measure = best_first::Measure::Time(clock);
+            let mut search = best_first::Search::new(&mut zones, &*target, measure, none);
+            cut_as_interrupted(|| search.run(watch))
+        }
+    };
+    match way {
+        Ok(best_first::Outcome::Found(way)) => {
+            let deadline = (options.trace == TraceWanted::Fastest).then_some(way.cost);
+            Ok(Some((way.trace(zones, target), deadline)))
+        }
+        Ok(best_first::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
+        Ok(best_first::Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
+        Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
+        // The search for any trace did not come to the state that fails.
+        Err(_) => Err("the model fails in a state beside it".to_owned()),
+    }
+}
+
+/// A comparison that keeps the lower bounds of the clock apart.
+fn time_atom(clock: usize) -> ClockAtom {
+    let range = |clock: usize| ClockRange {
+        first: ClockId(clock as u32),
+        count: 1,
+    };
+    ClockAtom {
+        left: range(clock),
+        right: range(0),
+        low: LONGEST_TIME,
+        high: LONGEST_TIME,
+        strict: false,
+    }
+}
+
+/// Up to here times of traces are compared.
+const LONGEST_TIME: i32 = Bound::MAX_VALUE / 4;

@@ -1,0 +1,175 @@
+//! Games under partial observation: who wins, and how.
+
+use std::sync::Arc;
+
+use serde_json::Value as Json;
+
+use crate::analysis::{Abstraction, ClockBounds};
+use crate::exec::Executor;
+use crate::game::partial_observation::{Answer as GameAnswer, Question, Solver};
+use crate::game::strategy::attractor::Selection;
+use crate::game::{Forced, Player, Priorities};
+use crate::ir::{ClockAtom, Network, Objective, Predicate, QueryKind};
+use crate::network::symbolic::predicate;
+use crate::search::limits::{Counters, Watch};
+use crate::verify::Effort;
+use crate::verify::observed::{self, MachineState};
+
+use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
+use super::game;
+use super::game::{objective_atoms, zones_of};
+use crate::engine::evidence::certificate::{Checked, Unreadable};
+use crate::engine::evidence::strategy_check;
+use crate::engine::evidence::strategy_check::Verification;
+use crate::engine::format::machine_json;
+use crate::engine::limits::LimitWatch;
+use crate::engine::{Options, PlansWanted};
+
+/// Answers a game query with observations.
+pub(super) fn game(
+    network: &Network,
+    executor: &dyn Executor,
+    (objective, observations): (&Objective, &[Predicate]),
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let observed = observations.iter().flat_map(predicate::atoms);
+    let atoms: Vec<ClockAtom> = objective_atoms(objective)
+        .into_iter()
+        .chain(observed)
+        .collect();
+    let abstraction = if has_differences(network, &atoms) {
+        Abstraction::Differences
+    } else {
+        Abstraction::Maximum
+    };
+    let bounds = ClockBounds::new(network, &atoms, abstraction);
+    let mut symbolic = zones_of(network, executor, bounds, options);
+    let (goal, keep, must_reach) = match objective {
+        Objective::Reach(goal) => (Some(goal), None, true),
+        Objective::Until(keep, goal) => (Some(goal), Some(keep), true),
+        Objective::Safe(keep) => (None, Some(keep), false),
+        Objective::WeakUntil(keep, goal) | Objective::Buchi(keep, goal) => {
+            (Some(goal), Some(keep), false)
+        }
+    };
+    let question = Question {
+        observations,
+        goal,
+        keep,
+        must_reach,
+        forced: options.forced,
+    };
+    let ignores_priorities = symbolic.ignores_priorities();
+    let mut solver = Solver::new(&mut symbolic, question);
+    let result = solver.solve(watch);
+    let counters = solver.counters();
+    let verdict = match result {
+        Ok(GameAnswer::Won) => Verdict::Satisfied,
+        Ok(GameAnswer::Lost) => Verdict::NotSatisfied,
+        Ok(GameAnswer::Stopped(reason)) => Verdict::Unknown(reason),
+        Err(failure) => Verdict::Error(failure),
+    };
+    let mut answer = new_answer(verdict, Evidence::default(), counters);
+    if ignores_priorities {
+        answer.message = Some(game::IGNORED_PRIORITIES.to_owned());
+    }
+    if options.plans != PlansWanted::No {
+        let message = "a game with observations gives no plans: its strategy is a machine that goes by what it sees";
+        answer.message = Some(message.to_owned());
+    }
+    if !(options.strategy || options.verify) {
+        return answer;
+    }
+    match verdict {
+        Verdict::Satisfied => {
+            let machine = solver.machine();
+            if options.verify {
+                let machine = machine_json::to_check(&machine);
+                let asked = (objective, observations);
+                let rules = (options.forced, options.priorities);
+                let mut ends = || watch.look(&Counters::default()).is_some();
+                let effort = &mut game::effort_of(options).unless(&mut ends);
+                let result = verify(network, asked, &machine, rules, effort);
+                answer.evidence.verification = Some(result);
+            }
+            answer.evidence.machine = Some(Arc::new(machine));
+        }
+        Verdict::NotSatisfied => {
+            let message = "where the controller does not see everything, no single strategy of the environment beats all of its machines, so none is given";
+            answer.message = Some(message.to_owned());
+        }
+        _ => {}
+    }
+    answer
+}
+
+/// Checks in closed loop that a machine of the controller wins. The network must hold the code of the query.
+pub fn verify(
+    network: &Network,
+    (objective, observations): (&Objective, &[Predicate]),
+    machine: &[MachineState],
+    rules: (Forced, Priorities),
+    effort: &mut Effort<'_>,
+) -> Verification {
+    let owner = (Player::Controller, Selection::First);
+    let mut claim = strategy_check::claim(objective, owner, rules);
+    let (constant, has_differences) = strategy_check::constants(observations.iter());
+    claim.constant = claim.constant.max(constant);
+    claim.has_differences |= has_differences;
+    observed::verify(network, machine, observations, &claim, effort)
+}
+
+/// Checks a machine as read from its file.
+pub(in crate::engine) fn check_file(
+    network: &Network,
+    query: &QueryKind,
+    file: &Json,
+    rules: (Forced, Priorities),
+) -> Result<Checked, Unreadable> {
+    let QueryKind::Control {
+        objective,
+        observations: Some(observations),
+        ..
+    } = query
+    else {
+        return Err("the query of a machine has observations".to_owned());
+    };
+    let machine = machine_json::read(network, file, observations.len())
+        .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))?;
+    let asked = (objective, &observations[..]);
+    let effort = &mut Effort::up_to(strategy_check::MOST_REGIONS);
+    let result = verify(network, asked, &machine, rules, effort);
+    Ok(Checked::of_strategy(network, &result)
+        .without("what its states say of where play may be and what is seen there"))
+}
+
+/// Names what a model has that there is no algorithm for under partial observation.
+pub(in crate::engine) fn unsupported(
+    network: &Network,
+    priorities: Priorities,
+) -> Option<&'static str> {
+    let features = &network.features;
+    if features.stopwatches {
+        Some("stopwatches in a game with observations")
+    } else if features.clock_guarded_urgent {
+        Some("clock guards on edges of urgent channels in a game with observations")
+    } else if features.guarded_receivers {
+        Some("clock guards on the receivers of a broadcast in a game with observations")
+    } else if features.priorities && priorities == Priorities::Kept {
+        Some("priorities, which were asked to be kept, in a game with observations")
+    } else if has_strict_lower_invariant(network) {
+        Some("invariants with strict lower bounds in a game with observations")
+    } else {
+        None
+    }
+}
+
+/// Whether some invariant says `x > c`: then an action that leads into its location has no first moment at which it is possible.
+fn has_strict_lower_invariant(network: &Network) -> bool {
+    let mut locations = network.processes.iter().flat_map(|one| &one.locations);
+    locations.any(|location| {
+        let mut atoms = location.invariant.atoms.iter();
+        atoms.any(|atom| atom.strict && atom.left.first.0 == 0 && atom.left.count == 1)
+    })
+}

@@ -1,0 +1,183 @@
+//! What a node wins by what is known of its successors: the formulas at the head of [`super::solver`].
+
+use crate::network::Failure;
+use crate::zones::{ClockSet, Federation, Patience, past};
+
+use super::solver::{Solver, Win};
+use crate::game::Player;
+
+/// What the formulas for a node need to know of its words.
+#[derive(Debug)]
+pub(in crate::game) struct Situation {
+    /// The clocks that stand still.
+    pub(in crate::game) stopped: ClockSet,
+    /// Where time cannot pass; see [`super::forced_moves::stops`].
+    pub(super) stops: Vec<(Option<u32>, Federation)>,
+    /// See [`Solver::controllable_movers`].
+    pub(super) movers: Vec<(Vec<u32>, usize)>,
+}
+
+impl Solver<'_, '_, '_> {
+    /// The situation in a node.
+    pub(in crate::game) fn situation(&mut self, node: u32) -> Result<Situation, Failure> {
+        self.situation_with(node, true)
+    }
+
+    /// The situation in a node, as far as it matters for what is won there: time that stops does so only for who may be forced.
+    pub(super) fn situation_for_win(&mut self, node: u32) -> Result<Situation, Failure> {
+        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let may_be_forced = edges.any(|edge| !self.seeker.owns(edge.controllable));
+        self.situation_with(node, may_be_forced)
+    }
+
+    fn situation_with(&mut self, node: u32, stops_matter: bool) -> Result<Situation, Failure> {
+        let mut words = std::mem::take(&mut self.words);
+        self.graph.load(node, &mut words);
+        let mut situation = Situation {
+            stopped: self.graph.symbolic.stopped(&words)?,
+            stops: Vec::new(),
+            movers: Vec::new(),
+        };
+        if stops_matter {
+            situation.stops = self.stops(node, &mut words)?;
+            if !situation.stops.is_empty() {
+                situation.movers = self.controllable_movers(node, &mut words)?;
+            }
+        }
+        self.words = words;
+        Ok(situation)
+    }
+
+    /// The valuations of a node in this situation that are won by what is known of its successors.
+    pub(in crate::game) fn winnable(
+        &self,
+        node: u32,
+        situation: &Situation,
+        patience: &mut Patience<'_>,
+    ) -> Federation {
+        self.winnable_without(node, situation, &[], patience).0
+    }
+
+    /// The valuations of a node that are won if the evader does not use the edges that are held back, and those in which it does not matter
+    /// what it uses.
+    pub(in crate::game) fn winnable_without(
+        &self,
+        node: u32,
+        situation: &Situation,
+        held: &[usize],
+        patience: &mut Patience<'_>,
+    ) -> (Federation, Federation) {
+        let (mut won, decided) = match self.seeker {
+            Player::Controller => {
+                let nothing = Federation::empty(self.graph.dimension());
+                (self.controllers_gain(node, situation, patience), nothing)
+            }
+            Player::Environment => self.environments_gain(node, situation, held, patience),
+        };
+        match self.graph.urgent(node) {
+            None => won.intersect_zone(self.graph.zone(node)),
+            Some(urgent) => won = won.intersection(&urgent.reached),
+        }
+        (won, decided)
+    }
+
+    /// What the controller wins as the seeker, as far as known.
+    fn controllers_gain(
+        &self,
+        node: u32,
+        situation: &Situation,
+        patience: &mut Patience<'_>,
+    ) -> Federation {
+        let mut good = self.known(node);
+        let goal = self.goal(node);
+        let mut bad = self.broken(node);
+        for index in self.graph.edges_of(node) {
+            let edge = self.graph.edges[index];
+            if edge.is_leg {
+                continue;
+            }
+            if edge.controllable {
+                let before = self.before(&edge, &self.win[edge.target as usize]);
+                good.unite_within(&before, patience);
+            } else {
+                let spoiling = self.spoiling(&edge, patience);
+                bad.unite_within(&spoiling, patience);
+            }
+        }
+        for legs in self.graph.chances.of(node) {
+            let legs = self.targets_of(legs, &self.win);
+            good.unite_within(&self.before_all(legs, patience), patience);
+        }
+        bad.subtract_within(&goal, patience);
+        let forced = self.forced_environment(node, &bad, situation, patience);
+        good.unite_within(&forced, patience);
+        let mut won = self.safe_past(node, good, &bad, situation, patience);
+        won.unite_within(&goal, patience);
+        won
+    }
+
+    /// What the environment wins as the seeker, as far as known, and what of it it has at once.
+    fn environments_gain(
+        &self,
+        node: u32,
+        situation: &Situation,
+        held: &[usize],
+        patience: &mut Patience<'_>,
+    ) -> (Federation, Federation) {
+        let goal = self.goal(node);
+        let mut now = self.broken(node);
+        let mut escape = Federation::empty(self.graph.dimension());
+        for index in self.graph.edges_of(node) {
+            let edge = self.graph.edges[index];
+            if edge.is_leg || held.contains(&index) {
+                continue;
+            }
+            if edge.controllable {
+                let spoiling = self.spoiling(&edge, patience);
+                escape.unite_within(&spoiling, patience);
+            } else {
+                let before = self.before(&edge, &self.win[edge.target as usize]);
+                now.unite_within(&before, patience);
+            }
+        }
+        for legs in self.graph.chances.of(node) {
+            escape.unite_within(&self.spoiling_all(legs, patience), patience);
+        }
+        now.subtract_within(&goal, patience);
+        let mut good = self.forced_controller(node, situation, patience);
+        good.subtract_within(&escape, patience);
+        good.unite_within(&now, patience);
+        good.unite_within(&self.known(node), patience);
+        escape.subtract_within(&now, patience);
+        escape.unite_within(&goal, patience);
+        let won = self.safe_past(node, good, &escape, situation, patience);
+        (won, now)
+    }
+
+    /// What was won in a node so far, as far as it is a part of it.
+    fn known(&self, node: u32) -> Federation {
+        match &self.win[node as usize] {
+            Win::Part(part) => part.clone(),
+            _ => Federation::empty(self.graph.dimension()),
+        }
+    }
+
+    /// The valuations of a node that get into `good` without meeting `bad`, by waiting if time may pass.
+    pub(in crate::game) fn safe_past(
+        &self,
+        node: u32,
+        mut good: Federation,
+        bad: &Federation,
+        situation: &Situation,
+        patience: &mut Patience<'_>,
+    ) -> Federation {
+        if self.graph.nodes[node as usize].delays {
+            if let Some(urgent) = self.graph.urgent(node) {
+                return urgent.predecessors(&good, bad, patience);
+            }
+            return past::predecessors_within(&good, bad, &situation.stopped, patience);
+        }
+        good.subtract_within(bad, patience);
+        good
+    }
+}

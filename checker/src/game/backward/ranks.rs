@@ -1,0 +1,106 @@
+//! Stamps by layers: how far valuations are from what is sought.
+//!
+//! The solver computes nodes in an order that suits it, and the stamps of gains follow that order. A strategy that is read from them is
+//! right, but may go a longer way than it has to, and another order gives another one. In layers, all nodes gain at once what the
+//! layers before give them. So a stamp is the least number of turns (to wait and then move, or be moved) after which play has got
+//! there, whatever the order of the search was.
+//!
+//! Cost: as much as computing what the explored nodes win.
+
+use crate::network::Failure;
+use crate::search::limits::Watch;
+use crate::zones::Federation;
+
+use super::memory::table_bytes;
+use super::solver::{Gain, Solver, Win};
+
+/// Computations between two looks at the limits.
+const BETWEEN_LOOKS: u32 = 64;
+
+impl Solver<'_, '_, '_> {
+    /// Gives the gains of a game that the seeker wins stamps by layers, up to the first in which the initial valuation is won. They stay
+    /// as they are if a limit comes first, and where what is sought is to come again and again.
+    ///
+    /// # Errors
+    /// The model fails in computing what a node wins.
+    pub fn put_into_layers(&mut self, watch: &mut dyn Watch) -> Result<(), Failure> {
+        if self.targets.is_some() || !self.is_won() {
+            return Ok(());
+        }
+        let win = std::mem::take(&mut self.win);
+        let gains = std::mem::take(&mut self.gains);
+        let rest = std::mem::take(&mut self.rest);
+        let (gained_bytes, stamp) = (self.gained_bytes, self.stamp);
+        let by_node = size_of::<Win>() + size_of::<Vec<Gain>>();
+        let tables = win.len() * by_node + table_bytes::<(u32, Federation)>(rest.capacity());
+        self.aside_bytes += gained_bytes + tables as u64;
+        self.begin_anew();
+        let is_layered = match self.gain_in_layers(watch) {
+            Err(Failure::Interrupted) => false,
+            result => result?,
+        };
+        self.aside_bytes -= gained_bytes + tables as u64;
+        if !is_layered {
+            self.win = win;
+            self.gains = gains;
+            self.rest = rest;
+            (self.gained_bytes, self.stamp) = (gained_bytes, stamp);
+        }
+        Ok(())
+    }
+
+    /// Whether the initial valuation is won before a limit comes.
+    fn gain_in_layers(&mut self, watch: &mut dyn Watch) -> Result<bool, Failure> {
+        let mut until_look = BETWEEN_LOOKS;
+        for layer in 0.. {
+            if self.is_won() {
+                break;
+            }
+            let nodes = self.take_updates();
+            if nodes.is_empty() {
+                return Ok(false);
+            }
+            let mut gained = Vec::new();
+            for node in nodes {
+                let is_settled = self.is_decided(node)
+                    || matches!(self.win[node as usize], Win::Everything)
+                    || !self.graph.nodes[node as usize].is_expanded;
+                if is_settled {
+                    continue;
+                }
+                match self.quick(node) {
+                    Some(true) => gained.push((node, None)),
+                    Some(false) => {}
+                    None => {
+                        let situation = self.situation_for_win(node)?;
+                        let (one, reason) = self.patiently(watch, |solver, patience| {
+                            let won = solver.winnable(node, &situation, patience);
+                            solver.gained(node, won, patience)
+                        });
+                        if reason.is_some() {
+                            return Ok(false);
+                        }
+                        gained.push((node, Some(one)));
+                    }
+                }
+                until_look -= 1;
+                if until_look == 0 {
+                    until_look = BETWEEN_LOOKS;
+                    self.graph.counted_zones = self.graph.zones.len();
+                    if watch.look(&self.counters()).is_some() {
+                        return Ok(false);
+                    }
+                }
+            }
+            for (node, one) in gained {
+                // What is gained in a layer has one stamp.
+                self.stamp = layer;
+                match one {
+                    None => self.gain_everything(node),
+                    Some(one) => self.gain(node, one),
+                }
+            }
+        }
+        Ok(true)
+    }
+}

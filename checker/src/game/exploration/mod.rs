@@ -1,0 +1,5 @@
+//! What is explored when.
+
+pub(super) mod lazy_safety;
+pub(super) mod lazy_zero_time;
+pub(super) mod waiting;

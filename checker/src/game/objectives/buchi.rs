@@ -1,0 +1,243 @@
+//! Games with a goal that is to come again and again: `A[] (p && A<> q)`.
+//!
+//! The controller wins a play if p always holds and q holds at some instant from every one on. A play that ends wins if q holds
+//! at its end. What it wins is the greatest X such that from every valuation in X it can get, within p, into q, and go on from there
+//! without leaving X:
+//!
+//! ```text
+//! leave  = what the controller cannot keep from leaving X: Pred_t(not X ∪ Pre_u(not X) ∪ held, ⋃ Pre_c(X), less Pre_u(not X))
+//! target = p ∩ q, less leave
+//! X      = from where the controller can force play into the target, within p ([`crate::game::backward::solver`])
+//! ```
+//!
+//! The graph is explored before. X begins with what the controller wins of the game in which it has to keep p only, and shrinks until it stays;
+//! what breaks p would else come off it round by round. With the goals that are met at the start of
+//! each round, the strategy of the last one is a strategy for the whole: see [`crate::game::strategy::attractor`]. What each round takes away shows how
+//! the environment wins there, if X begins with everything: see [`crate::game::strategy::co_buchi`]. So it does in a second solution, once it is known that the
+//! environment wins.
+//!
+//! Source: L. de Alfaro, M. Faella, T. Henzinger, R. Majumdar, M. Stoelinga, "The Element of Surprise in Timed Games", CONCUR 2003
+//! (nested fixpoints over timed predecessors).
+
+use crate::network::Failure;
+use crate::search::limits::Watch;
+use crate::zones::{Federation, Patience};
+
+use crate::game::Player;
+use crate::game::backward::memory::wins_bytes;
+use crate::game::backward::solver::{Answer, Solver, Win};
+use crate::game::forward::graph::Standing;
+
+/// Nodes between two looks at the limits.
+const NODES_BETWEEN_LOOKS: u32 = 64;
+
+/// Solves the game of a new solver with the controller as its seeker. The goal of its graph must be p ∩ q, and p what is kept.
+/// On a win, the strategy can be read from it. If the players work together, it is enough that it can be won from somewhere.
+/// `rounds`, if wanted, becomes the sets X by node, the first one first, unless the controller wins.
+pub fn solve(
+    solver: &mut Solver<'_, '_, '_>,
+    is_cooperative: bool,
+    rounds: Option<&mut Vec<Vec<Win>>>,
+    watch: &mut dyn Watch,
+) -> Result<Answer, Failure> {
+    solver.go_on(is_cooperative);
+    if let Some(reason) = solver.explore(watch)? {
+        return Ok(Answer::Stopped(reason));
+    }
+    if let Some(reason) = solver.seek_to_break(watch)? {
+        return Ok(Answer::Stopped(reason));
+    }
+    let nodes = 0..solver.graph.nodes.len() as u32;
+    let safe: Vec<Win> = nodes.clone().map(|node| solver.lost(node)).collect();
+    solver.seeker = Player::Controller;
+    let answer = shrink(solver, safe, is_cooperative, None, watch)?;
+    match rounds {
+        Some(rounds) if answer == Answer::Won(Player::Environment) => {
+            let unbroken = nodes.map(|node| unbroken(solver, node)).collect();
+            shrink(solver, unbroken, is_cooperative, Some(rounds), watch)
+        }
+        _ => Ok(answer),
+    }
+}
+
+/// Lets X begin with what is kept, and shrink until it stays or it is clear who wins.
+fn shrink(
+    solver: &mut Solver<'_, '_, '_>,
+    mut kept: Vec<Win>,
+    is_cooperative: bool,
+    mut rounds: Option<&mut Vec<Vec<Win>>>,
+    watch: &mut dyn Watch,
+) -> Result<Answer, Failure> {
+    let mut rounds_bytes = 0;
+    loop {
+        let mut targets = Vec::with_capacity(kept.len());
+        for node in 0..kept.len() as u32 {
+            let (target, reason) = solver.patiently(watch, |solver, patience| {
+                target(solver, node, &kept, patience)
+            });
+            if let Some(reason) = reason {
+                return Ok(Answer::Stopped(reason));
+            }
+            targets.push(target?);
+            if node.is_multiple_of(NODES_BETWEEN_LOOKS)
+                && let Some(reason) = solver.look(watch)
+            {
+                return Ok(Answer::Stopped(reason));
+            }
+        }
+        let kept_bytes = wins_bytes(&kept);
+        if let Some(rounds) = &mut rounds {
+            rounds.push(kept.clone());
+            rounds_bytes += kept_bytes;
+        }
+        solver.aside_bytes = wins_bytes(&targets) + kept_bytes + rounds_bytes;
+        solver.restart(targets);
+        if let Some(reason) = solver.sweep(watch)? {
+            return Ok(Answer::Stopped(reason));
+        }
+        if !is_cooperative && !solver.is_won() {
+            if let Some(rounds) = rounds {
+                rounds.push(solver.win.clone());
+            }
+            return Ok(Answer::Won(Player::Environment));
+        }
+        let mut has_shrunk = false;
+        for (node, old) in kept.iter_mut().enumerate() {
+            if !has_shrunk {
+                let node = node as u32;
+                let (is_same, reason) = solver.patiently(watch, |solver, patience| {
+                    is_within(solver, node, (old, &solver.win[node as usize]), patience)
+                });
+                if let Some(reason) = reason {
+                    return Ok(Answer::Stopped(reason));
+                }
+                has_shrunk = !is_same;
+            }
+            old.clone_from(&solver.win[node]);
+        }
+        if !has_shrunk {
+            let is_won = if is_cooperative {
+                solver.has_won_somewhere()
+            } else {
+                solver.is_won()
+            };
+            return Ok(Answer::Won(if is_won {
+                Player::Controller
+            } else {
+                Player::Environment
+            }));
+        }
+        if let Some(reason) = solver.look(watch) {
+            return Ok(Answer::Stopped(reason));
+        }
+    }
+}
+
+/// The part of a node in which what must be kept holds.
+fn unbroken(solver: &Solver<'_, '_, '_>, node: u32) -> Win {
+    match solver.graph.nodes[node as usize].standing {
+        Standing::Broken | Standing::Dead => Win::Nothing,
+        Standing::Open | Standing::Goal => Win::Everything,
+        Standing::Mixed => {
+            let mut rest = solver.whole(node);
+            rest.subtract(&solver.broken(node));
+            as_win(rest)
+        }
+    }
+}
+
+fn as_win(part: Federation) -> Win {
+    if part.is_empty() {
+        Win::Nothing
+    } else {
+        Win::Part(part)
+    }
+}
+
+pub(in crate::game) fn to_federation(
+    solver: &Solver<'_, '_, '_>,
+    node: u32,
+    win: &Win,
+) -> Federation {
+    match win {
+        Win::Nothing => Federation::empty(solver.graph.dimension()),
+        Win::Everything => solver.whole(node),
+        Win::Part(part) => part.clone(),
+    }
+}
+
+fn is_within(
+    solver: &Solver<'_, '_, '_>,
+    node: u32,
+    (one, other): (&Win, &Win),
+    patience: &mut Patience<'_>,
+) -> bool {
+    match (one, other) {
+        (Win::Nothing, _) | (_, Win::Everything) => true,
+        (_, Win::Nothing) => false,
+        _ => {
+            let other = to_federation(solver, node, other);
+            to_federation(solver, node, one).is_subset_within(&other, patience)
+        }
+    }
+}
+
+/// The part of a node in which the goal holds, and from which the controller can go on without leaving what is kept.
+fn target(
+    solver: &mut Solver<'_, '_, '_>,
+    node: u32,
+    kept: &[Win],
+    patience: &mut Patience<'_>,
+) -> Result<Win, Failure> {
+    let mut goal = match solver.graph.nodes[node as usize].standing {
+        Standing::Open | Standing::Broken | Standing::Dead => return Ok(Win::Nothing),
+        Standing::Goal => solver.whole(node),
+        Standing::Mixed => {
+            let parts = solver.graph.parts(node);
+            parts.map_or_else(
+                || Federation::empty(solver.graph.dimension()),
+                |parts| parts.goal.clone(),
+            )
+        }
+    };
+    goal.subtract_within(&leave(solver, node, kept, patience)?, patience);
+    if goal.includes_zone_within(solver.graph.zone(node), patience) {
+        return Ok(Win::Everything);
+    }
+    Ok(as_win(goal))
+}
+
+/// The part of a node from which the controller cannot keep play from leaving what is kept.
+pub(in crate::game) fn leave(
+    solver: &mut Solver<'_, '_, '_>,
+    node: u32,
+    kept: &[Win],
+    patience: &mut Patience<'_>,
+) -> Result<Federation, Failure> {
+    let mut out = solver.whole(node);
+    out.subtract_within(&to_federation(solver, node, &kept[node as usize]), patience);
+    let mut back = Federation::empty(solver.graph.dimension());
+    for index in solver.graph.edges_of(node) {
+        let edge = solver.graph.edges[index];
+        let kept = &kept[edge.target as usize];
+        if edge.is_leg {
+            continue;
+        }
+        if edge.controllable {
+            back.unite_within(&solver.before(&edge, kept), patience);
+        } else {
+            let missing = solver.missing(&edge, (kept, None), patience);
+            out.unite_within(&missing, patience);
+        }
+    }
+    for legs in solver.graph.chances.of(node) {
+        let legs = solver.targets_of(legs, kept);
+        back.unite_within(&solver.before_all(legs, patience), patience);
+    }
+    back.subtract_within(&out, patience);
+    let situation = solver.situation(node)?;
+    let mut held = solver.forced_controller(node, &situation, patience);
+    held.subtract_within(&back, patience);
+    out.unite_within(&held, patience);
+    Ok(solver.safe_past(node, out, &back, &situation, patience))
+}

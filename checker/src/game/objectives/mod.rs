@@ -1,0 +1,4 @@
+//! Objectives beyond reachability and safety.
+
+pub mod buchi;
+pub mod cooperative;

@@ -1,0 +1,369 @@
+//! From the edges that take part to moves: the receivers of a broadcast, combined, and the branches of edges.
+//!
+//! Invariant: moves come in a fixed order and each has a *rank*, its place among all that could be put together, counting those that a
+//! [`Scope`] leaves out. So the rank of a move of a state is the same in every scope.
+//!
+//! Cost: without a scope as many steps as there are combinations; within a zone every choice that is looked at leads to a
+//! combination that is possible, or is the last that is looked at.
+
+use crate::cancellation;
+use crate::exec::EmittedConstraint;
+use crate::ir::Network;
+
+use super::broadcast_filter::{Demand, Scope};
+use super::enabled_edges::Candidate;
+use super::stepper::Stepper;
+use super::transition::{Label, Moves, Part};
+use crate::network::failure::Failure;
+
+/// The most moves of a state: receivers of a broadcast that have a choice each multiply.
+const MOST_MOVES: usize = 1 << 20;
+
+/// After so many moves it is asked whether there may be more.
+const MANY_MOVES: usize = 1 << 12;
+
+/// What it takes to put a move together, beside what is done with zones for it.
+const UNITS_FOR_MOVE: usize = 256;
+
+/// The greatest rank, of what no scope would come to the end of.
+const MOST_RANKS: u64 = 1 << 62;
+
+/// As many combinations are put together without looking whether the zone allows them: this is seen later.
+const FEW_COMBINATIONS: u64 = 2;
+
+/// A receiving process of a broadcast: its candidates, and what it does in the combination at hand.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Group {
+    first: usize,
+    last: usize,
+    /// One past the last pick.
+    end: usize,
+    /// A candidate, or `last` for abstaining.
+    pick: usize,
+    /// How many moves the choices before it stand for, by the branches of their edges.
+    before: u64,
+    /// How many moves the groups after it stand for.
+    after: u64,
+    /// How many ways there are to choose: candidates by the branches of their edges.
+    ways: u64,
+}
+
+/// What a process does in a move that is being put together.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Choice {
+    /// It takes part by this candidate.
+    Takes(u32),
+    /// It abstains: none of these clock-guarded candidates holds.
+    Abstains(u32, u32),
+}
+
+impl Group {
+    /// The place of its first candidate.
+    pub(super) fn first(&self) -> usize {
+        self.first
+    }
+
+    /// How many choices there are.
+    pub(super) fn picks(&self) -> u64 {
+        (self.end - self.first) as u64
+    }
+
+    /// How many moves its choices stand for.
+    pub(super) fn ways(&self) -> u64 {
+        self.ways
+    }
+
+    /// The same of candidates that begin at another place.
+    pub(super) fn starting_at(&self, first: usize) -> Group {
+        Group {
+            first,
+            last: first + (self.last - self.first),
+            end: first + (self.end - self.first),
+            pick: first,
+            ..*self
+        }
+    }
+
+    /// Puts it before groups that stand for so many moves; returns for how many they stand with it.
+    pub(super) fn put_before(&mut self, after: u64) -> u64 {
+        self.after = after;
+        after.saturating_mul(self.ways)
+    }
+
+    fn choice(&self) -> Choice {
+        if self.pick < self.last {
+            Choice::Takes(self.pick as u32)
+        } else {
+            Choice::Abstains(self.first as u32, self.last as u32)
+        }
+    }
+}
+
+impl Stepper<'_> {
+    /// Joins the candidate 0 with one enabled receiving edge of every process that has one.
+    pub(super) fn broadcast(
+        &mut self,
+        sender: u32,
+        channel: u32,
+        needs_committed: bool,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        // Whoever records wants to see all that is evaluated.
+        let is_shared = self.record.is_none();
+        if is_shared && self.has_audience(channel) {
+            return self.broadcast_again(sender, needs_committed, words, scope, out);
+        }
+        let mut groups = std::mem::take(&mut self.groups);
+        groups.clear();
+        let mut has_committed = !needs_committed;
+        for index in 0..self.receivers[channel as usize].len() {
+            let receiver = self.receivers[channel as usize][index];
+            if receiver == sender {
+                continue;
+            }
+            let first = self.candidates.len();
+            self.enabled_receives(receiver, channel, words)?;
+            if self.candidates.len() > first {
+                has_committed |= self.is_process_committed(receiver, words);
+                groups.push(self.group(first));
+            }
+        }
+        if is_shared {
+            self.note_audience(sender, channel, &groups);
+        }
+        if has_committed {
+            self.combine(&mut groups, needs_committed, words, scope, out)?;
+        }
+        self.groups = groups;
+        Ok(())
+    }
+
+    /// The candidates from `first` on, all of one receiving process.
+    pub(super) fn group(&self, first: usize) -> Group {
+        let last = self.candidates.len();
+        // A receiver whose edges all have clock guards may have none that is open: abstaining comes after its candidates.
+        let guarded = |candidate: &Candidate| candidate.constraints.0 < candidate.constraints.1;
+        let may_abstain = self.candidates[first..last].iter().all(guarded);
+        let ways = (first..last).map(|candidate| self.ways(Choice::Takes(candidate as u32)));
+        Group {
+            ways: ways.sum::<u64>() + u64::from(may_abstain),
+            first,
+            last,
+            end: last + usize::from(may_abstain),
+            pick: first,
+            before: 0,
+            after: 0,
+        }
+    }
+
+    /// Emits every combination of the receivers' alternatives with the sender that is in the scope; the last receiver's change
+    /// fastest.
+    fn combine(
+        &mut self,
+        groups: &mut [Group],
+        needs_committed: bool,
+        words: &[i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        let (mut combinations, mut after) = (1_u64, 1_u64);
+        for group in groups.iter_mut().rev() {
+            combinations = combinations.saturating_mul(group.picks());
+            after = group.put_before(after);
+        }
+        let (rank_after, scope) = self.ranks_and_scope(combinations, after, scope)?;
+        self.chosen.clear();
+        self.sieve.begin(scope);
+        if self.choose(Choice::Takes(0), scope)? {
+            self.combine_from(groups, needs_committed, words, scope, out)?;
+        }
+        self.rank = rank_after;
+        Ok(())
+    }
+
+    /// The rank after all moves of a broadcast whose receivers can be combined in so many ways, which stand for so many moves, and the
+    /// scope in which they are.
+    pub(super) fn ranks_and_scope<'z>(
+        &self,
+        combinations: u64,
+        after: u64,
+        scope: Scope<'z>,
+    ) -> Result<(u64, Scope<'z>), Failure> {
+        let ways = self.ways(Choice::Takes(0));
+        let rank_after = self.rank.saturating_add(ways.saturating_mul(after));
+        if rank_after > MOST_RANKS {
+            return Err(Failure::Moves(MOST_RANKS as usize));
+        }
+        if combinations <= FEW_COMBINATIONS {
+            return Ok((rank_after, Scope::Everything));
+        }
+        Ok((rank_after, scope))
+    }
+
+    /// Goes through the choices of the groups, after the sender was chosen.
+    pub(super) fn combine_from(
+        &mut self,
+        groups: &mut [Group],
+        needs_committed: bool,
+        words: &[i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        let is_possible = matches!(scope, Scope::Within(_));
+        let mut ways = self.ways(Choice::Takes(0));
+        // The groups before this one have made their choices.
+        let mut depth = 0;
+        loop {
+            if let Some(group) = groups.get_mut(depth)
+                && group.pick < group.end
+            {
+                let choice = group.choice();
+                group.before = ways;
+                let own = ways * self.ways(choice);
+                if self.choose(choice, scope)? {
+                    ways = own;
+                    depth += 1;
+                } else {
+                    self.rank += own * group.after;
+                    group.pick += 1;
+                }
+                continue;
+            }
+            if let Some(group) = groups.get_mut(depth) {
+                group.pick = group.first;
+            } else if !needs_committed || self.has_committed_choice(words) {
+                self.emit(is_possible, out);
+                check_count(out)?;
+                cancellation::work(UNITS_FOR_MOVE);
+                if out.len().is_multiple_of(MANY_MOVES) {
+                    // The lists are about to grow to more than this, and may double while the old ones are still there.
+                    cancellation::ask_for(3 * out.heap_bytes() + self.moves_beside);
+                }
+            } else {
+                self.rank += ways;
+            }
+            if depth == 0 {
+                return Ok(());
+            }
+            depth -= 1;
+            ways = groups[depth].before;
+            groups[depth].pick += 1;
+            self.chosen.pop();
+            self.sieve.take_back();
+        }
+    }
+
+    /// Adds a choice to the combination; returns false, with nothing added, if the scope has none with it.
+    pub(super) fn choose(&mut self, choice: Choice, scope: Scope<'_>) -> Result<bool, Failure> {
+        let (candidates, constraints) = (&self.candidates, &self.constraints);
+        let constraints_of = |candidate: &Candidate| {
+            let (first, last) = candidate.constraints;
+            &constraints[first as usize..last as usize]
+        };
+        let is_chosen = match choice {
+            Choice::Takes(index) => {
+                let candidate = &candidates[index as usize];
+                let demand = Demand::Takes(candidate.part(), constraints_of(candidate));
+                self.sieve.choose(scope, [demand])?
+            }
+            Choice::Abstains(first, last) => {
+                let candidates = candidates[first as usize..last as usize].iter();
+                let demands = candidates.map(|candidate| {
+                    Demand::Abstains(candidate.process, constraints_of(candidate))
+                });
+                self.sieve.choose(scope, demands)?
+            }
+        };
+        if is_chosen {
+            self.chosen.push(choice);
+        }
+        Ok(is_chosen)
+    }
+
+    /// How many moves a choice stands for: the branches of its edge.
+    fn ways(&self, choice: Choice) -> u64 {
+        match choice {
+            Choice::Takes(index) => {
+                let edge = self.edge(self.candidates[index as usize].part());
+                edge.branches.len() as u64
+            }
+            Choice::Abstains(..) => 1,
+        }
+    }
+
+    fn has_committed_choice(&self, words: &[i32]) -> bool {
+        self.chosen.iter().any(|choice| match *choice {
+            Choice::Takes(index) => {
+                self.is_process_committed(self.candidates[index as usize].process, words)
+            }
+            Choice::Abstains(..) => false,
+        })
+    }
+
+    /// Emits the chosen combination, once for each combination of branches. `is_possible`: some valuation of the scope's zone allows it.
+    pub(super) fn emit(&mut self, is_possible: bool, out: &mut Moves) {
+        let network = self.network;
+        self.parts.clear();
+        let mut controllable = true;
+        for choice in &self.chosen {
+            if let Choice::Takes(index) = *choice {
+                let candidate = &self.candidates[index as usize];
+                controllable &= candidate.is_controllable;
+                self.parts.push(candidate.part());
+            }
+        }
+        loop {
+            let taken = self.chosen.iter().filter_map(|choice| match *choice {
+                Choice::Takes(index) => Some(self.constraints_of(index)),
+                Choice::Abstains(..) => None,
+            });
+            let excluded = self.chosen.iter().flat_map(|choice| match *choice {
+                Choice::Takes(_) => 0..0,
+                Choice::Abstains(first, last) => first..last,
+            });
+            let label = Label {
+                channel: self.channel,
+                controllable,
+                rank: self.rank,
+                is_possible,
+            };
+            out.push(
+                &self.parts,
+                taken,
+                excluded.map(|index| self.constraints_of(index)),
+                label,
+            );
+            self.rank += 1;
+            if !next_branches(network, &mut self.parts) {
+                return;
+            }
+        }
+    }
+
+    fn constraints_of(&self, candidate: u32) -> &[EmittedConstraint] {
+        let (first, last) = self.candidates[candidate as usize].constraints;
+        &self.constraints[first as usize..last as usize]
+    }
+}
+
+pub(super) fn check_count(moves: &Moves) -> Result<(), Failure> {
+    if moves.len() > MOST_MOVES {
+        return Err(Failure::Moves(MOST_MOVES));
+    }
+    Ok(())
+}
+
+/// Goes to the next combination of branches, the last part fastest; false after the last one.
+fn next_branches(network: &Network, parts: &mut [Part]) -> bool {
+    for part in parts.iter_mut().rev() {
+        let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+        if part.branch as usize + 1 < edge.branches.len() {
+            part.branch += 1;
+            return true;
+        }
+        part.branch = 0;
+    }
+    false
+}

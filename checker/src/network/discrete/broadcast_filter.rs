@@ -1,0 +1,186 @@
+//! Which combinations of broadcast receivers are wanted, decided while they are put together.
+//!
+//! Where n receivers have clock guards there are up to 2^n combinations of who takes part, and a zone leaves most of them without a
+//! valuation. So a combination is given up with its first choice that leaves nothing.
+//!
+//! Invariant: what a scope leaves out is never possible, or not wanted; what it lets pass may still turn out to be impossible.
+
+use crate::exec::EmittedConstraint;
+use crate::zones::dbm::{self, Constraint};
+use crate::zones::{Bound, Federation};
+
+use crate::network::symbolic::zone_graph::add_constraints;
+use crate::network::{Failure, Part};
+
+/// Which moves are wanted; only combinations of a broadcast are left out.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::network) enum Scope<'z> {
+    /// All.
+    Everything,
+    /// Those that are possible at some valuation of the zone.
+    Within(&'z [Bound]),
+    /// Those that are possible whatever the clocks say.
+    Unconditional,
+    /// Those with these edges.
+    Of(&'z [Part]),
+}
+
+/// A choice of a process in a broadcast, with what must hold for it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Demand<'c> {
+    /// It takes part by this edge instance, whose guard emitted the constraints.
+    Takes(Part, &'c [EmittedConstraint]),
+    /// This process abstains: the conjunction does not hold; asked for each of its candidates.
+    Abstains(u32, &'c [EmittedConstraint]),
+}
+
+/// Follows the choices of a combination under a scope. Holds the buffers.
+#[derive(Debug)]
+pub(super) struct Sieve {
+    dimension: usize,
+    /// After each choice that took something away the valuations at which all choices are possible, for [`Scope::Within`].
+    left: Vec<Federation>,
+    /// By choice, the first of which is none: the one of them that counts after it.
+    places: Vec<usize>,
+    constraints: Vec<Constraint>,
+    /// Whether clocks have decided anything since this was false.
+    pub(super) has_narrowed: bool,
+}
+
+/// What a demand leaves of valuations.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Leaves {
+    All,
+    Nothing,
+    Some,
+}
+
+impl Sieve {
+    pub(super) fn new(dimension: usize) -> Sieve {
+        Sieve {
+            dimension,
+            left: Vec::new(),
+            places: Vec::new(),
+            constraints: Vec::new(),
+            has_narrowed: false,
+        }
+    }
+
+    /// Begins a combination.
+    pub(super) fn begin(&mut self, scope: Scope<'_>) {
+        self.places.clear();
+        if let Scope::Within(zone) = scope {
+            self.grow(0);
+            self.left[0].clear();
+            self.left[0].push(zone);
+            self.places.push(0);
+        }
+    }
+
+    /// Makes a choice; returns false, with nothing chosen, if the scope leaves out everything with it.
+    pub(super) fn choose<'c>(
+        &mut self,
+        scope: Scope<'_>,
+        demands: impl IntoIterator<Item = Demand<'c>>,
+    ) -> Result<bool, Failure> {
+        // Where nothing is taken away, nothing is copied.
+        let before = self.places.last().copied().unwrap_or_default();
+        let mut place = before;
+        for demand in demands {
+            let passes = match scope {
+                Scope::Everything => true,
+                Scope::Unconditional => match demand {
+                    Demand::Takes(_, constraints) => constraints.is_empty(),
+                    Demand::Abstains(..) => false,
+                },
+                Scope::Of(parts) => match demand {
+                    Demand::Takes(part, _) => parts.iter().any(|wanted| {
+                        Part {
+                            branch: 0,
+                            ..*wanted
+                        } == part
+                    }),
+                    Demand::Abstains(process, _) => {
+                        parts.iter().all(|wanted| wanted.process != process)
+                    }
+                },
+                Scope::Within(_) => match self.leaves(place, demand)? {
+                    Leaves::All => true,
+                    Leaves::Nothing => false,
+                    Leaves::Some => {
+                        if place == before {
+                            place = before + 1;
+                            self.grow(place);
+                            let (before, after) = self.left.split_at_mut(place);
+                            after[0].clone_from(&before[place - 1]);
+                        }
+                        self.narrow(place, demand)
+                    }
+                },
+            };
+            if !passes {
+                return Ok(false);
+            }
+        }
+        if matches!(scope, Scope::Within(_)) {
+            self.places.push(place);
+        }
+        Ok(true)
+    }
+
+    /// Takes the last choice back.
+    pub(super) fn take_back(&mut self) {
+        self.places.pop();
+    }
+
+    /// What a demand leaves of the valuations at hand, as far as that is seen at a glance; reads its constraints.
+    fn leaves(&mut self, place: usize, demand: Demand<'_>) -> Result<Leaves, Failure> {
+        let (Demand::Takes(_, emitted) | Demand::Abstains(_, emitted)) = demand;
+        self.has_narrowed |= !emitted.is_empty();
+        // A conjunction in which a clock is less than itself never holds.
+        let may_hold = add_constraints(emitted, &mut self.constraints)?;
+        let mut zones = self.left[place].zones();
+        let (zone, is_one) = (zones.next(), zones.next().is_none());
+        let holds = match zone {
+            _ if !may_hold => Leaves::Nothing,
+            Some(zone) if is_one => part_within(zone, self.dimension, &self.constraints),
+            _ => Leaves::Some,
+        };
+        Ok(match (demand, holds) {
+            (Demand::Takes(..), holds) => holds,
+            (Demand::Abstains(..), Leaves::All) => Leaves::Nothing,
+            (Demand::Abstains(..), Leaves::Nothing) => Leaves::All,
+            (Demand::Abstains(..), Leaves::Some) => Leaves::Some,
+        })
+    }
+
+    /// Takes away what the demand does not leave, the constraints of which were read; returns whether something is left.
+    fn narrow(&mut self, place: usize, demand: Demand<'_>) -> bool {
+        let left = &mut self.left[place];
+        match demand {
+            Demand::Takes(..) => left.constrain_all(&self.constraints),
+            Demand::Abstains(..) => left.subtract_conjunction(&self.constraints),
+        }
+        !left.is_empty()
+    }
+
+    fn grow(&mut self, place: usize) {
+        if self.left.len() <= place {
+            self.left.push(Federation::empty(self.dimension));
+        }
+    }
+}
+
+/// In how much of a zone some constraints hold, as far as each says for itself.
+fn part_within(zone: &[Bound], dimension: usize, constraints: &[Constraint]) -> Leaves {
+    let mut part = Leaves::All;
+    for one in constraints {
+        if !dbm::satisfies(zone, dimension, one) {
+            return Leaves::Nothing;
+        }
+        if zone[one.left * dimension + one.right] > one.bound {
+            part = Leaves::Some;
+        }
+    }
+    part
+}

@@ -1,0 +1,372 @@
+//! Which edge instances are enabled, and who synchronises with whom.
+//!
+//! Invariants:
+//! * The order of the moves is that of processes, then edges, select values, partners, branches.
+//! * Where the guard of an edge does not hold, its channel is not looked at: it may have none.
+
+use crate::cancellation;
+use crate::exec::{Context, EmittedConstraint, Executor, RunTimeError};
+use crate::ir::{ChannelId, FunctionId, Guard, RunTimeErrorKind};
+
+use super::broadcast::{Choice, check_count};
+use super::broadcast_filter::Scope;
+use super::edge_tables::EdgeEntry;
+use super::selects::select_values;
+use super::stepper::Stepper;
+use super::transition::{Moves, Part};
+use crate::network::failure::Failure;
+
+/// The number of no channel.
+const NO_CHANNEL: u32 = u32::MAX;
+
+/// What it takes to look at the location of a process, to ask whether one receives, and to put a move together: see
+/// [`cancellation::work`].
+const UNITS_FOR_PROCESS: usize = 8;
+const UNITS_FOR_RECEIVER: usize = 16;
+const UNITS_FOR_MOVE: usize = 256;
+
+/// One enabled edge instance: a process, an edge, its select values and its clock constraints.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    pub(super) process: u32,
+    pub(super) edge: u32,
+    pub(super) select: u32,
+    pub(super) is_controllable: bool,
+    pub(super) constraints: (u32, u32),
+}
+
+impl Candidate {
+    /// Its share in a move, by its first branch.
+    pub(super) fn part(&self) -> Part {
+        Part {
+            process: self.process,
+            edge: self.edge,
+            branch: 0,
+            select: self.select,
+        }
+    }
+}
+
+impl<'a> Stepper<'a> {
+    /// As [`Stepper::moves`], without remembering, and without combinations that the scope leaves out.
+    pub(in crate::network) fn put_together(
+        &mut self,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        out.clear();
+        self.round += 1;
+        self.rank = 0;
+        let committed = self.is_committed(words);
+        for process in 0..self.tables.len() {
+            let location = words[process] as usize;
+            let table = &self.tables[process][location];
+            let own = table.is_committed();
+            let (internal, sends) = (table.internal.len(), table.sends.len());
+            if own || !committed {
+                for index in 0..internal {
+                    let entry = self.tables[process][location].internal[index];
+                    self.internal_moves(process as u32, entry, words, out)?;
+                }
+            }
+            for index in 0..sends {
+                let entry = self.tables[process][location].sends[index];
+                self.synchronisations(process as u32, entry, committed && !own, words, scope, out)?;
+            }
+            check_count(out)?;
+        }
+        cancellation::work(UNITS_FOR_PROCESS * self.tables.len() + UNITS_FOR_MOVE * out.len());
+        Ok(())
+    }
+
+    fn internal_moves(
+        &mut self,
+        process: u32,
+        entry: EdgeEntry<'a>,
+        words: &mut [i32],
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        self.candidates.clear();
+        self.constraints.clear();
+        self.channel = None;
+        match self.set_of(process, entry, words) {
+            Some(set) => self.add_candidates(process, entry, set, None),
+            None => self.enabled_instances(process, entry, words)?,
+        }
+        for index in 0..self.candidates.len() {
+            self.chosen.clear();
+            self.chosen.push(Choice::Takes(index as u32));
+            self.emit(false, out);
+        }
+        Ok(())
+    }
+
+    /// The moves in which `edge` of `process` sends. `needs_committed`: another process must leave a committed location.
+    fn synchronisations(
+        &mut self,
+        process: u32,
+        entry: EdgeEntry<'a>,
+        needs_committed: bool,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        let (executor, definition) = (self.executor, entry.edge);
+        let Some(sync) = definition.sync else {
+            return Ok(());
+        };
+        if let Some(set) = self.set_of(process, entry, words) {
+            return self.remembered_synchronisations(
+                process,
+                entry,
+                set,
+                needs_committed,
+                words,
+                scope,
+                out,
+            );
+        }
+        for select in 0..entry.instances {
+            self.candidates.clear();
+            self.constraints.clear();
+            if !self.enabled_instance(process, entry, select, words)? {
+                continue;
+            }
+            let offset = match sync.index {
+                Some(function) => {
+                    select_values(definition, select, &mut self.arguments);
+                    self.call(executor, function, words)? as u32
+                }
+                None => 0,
+            };
+            let channel = sync.channel.0 + offset;
+            self.synchronisations_on(process, channel, needs_committed, words, scope, out)?;
+        }
+        Ok(())
+    }
+
+    /// The moves in which the candidate 0 sends on a channel.
+    pub(super) fn synchronisations_on(
+        &mut self,
+        process: u32,
+        channel: u32,
+        needs_committed: bool,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        self.channel = Some(ChannelId(channel));
+        if self.network.channels[channel as usize].broadcast {
+            self.broadcast(process, channel, needs_committed, words, scope, out)
+        } else {
+            Ok(self.handshakes(process, channel, needs_committed, words, out)?)
+        }
+    }
+
+    /// Pairs the candidate 0 with every enabled receiver on a binary channel.
+    fn handshakes(
+        &mut self,
+        sender: u32,
+        channel: u32,
+        needs_committed: bool,
+        words: &mut [i32],
+        out: &mut Moves,
+    ) -> Result<(), RunTimeError> {
+        let receivers = self.receivers[channel as usize].len();
+        cancellation::work(UNITS_FOR_RECEIVER * receivers);
+        for index in 0..receivers {
+            let receiver = self.receivers[channel as usize][index];
+            if receiver == sender
+                || (needs_committed && !self.is_process_committed(receiver, words))
+            {
+                continue;
+            }
+            let first = self.candidates.len();
+            self.enabled_receives(receiver, channel, words)?;
+            for candidate in first..self.candidates.len() {
+                self.chosen.clear();
+                self.chosen
+                    .extend([Choice::Takes(0), Choice::Takes(candidate as u32)]);
+                self.emit(false, out);
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn is_process_committed(&self, process: u32, words: &[i32]) -> bool {
+        self.tables[process as usize][words[process as usize] as usize].is_committed()
+    }
+
+    /// Adds every enabled receiving instance of a process on a channel to the candidates.
+    pub(super) fn enabled_receives(
+        &mut self,
+        process: u32,
+        channel: u32,
+        words: &mut [i32],
+    ) -> Result<(), RunTimeError> {
+        let location = words[process as usize] as usize;
+        for index in 0..self.tables[process as usize][location].receives.len() {
+            let entry = self.tables[process as usize][location].receives[index];
+            let listens = entry.edge.sync.is_some_and(|sync| {
+                (sync.channel.0..sync.channel.0 + sync.count).contains(&channel)
+            });
+            if !listens {
+                continue;
+            }
+            if let Some(set) = self.set_of(process, entry, words) {
+                self.add_candidates(process, entry, set, Some(channel));
+                continue;
+            }
+            if !self.hears(process, index, words)? {
+                self.enabled_instances(process, entry, words)?;
+                continue;
+            }
+            for place in self.listening[process as usize].listeners(index, channel) {
+                let select = self.listening[process as usize].instance(place);
+                self.enabled_instance(process, entry, select, words)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes sure that the channels of the instances of a receiving edge, the one with this index in its location, are known;
+    /// returns false if all have the same channel.
+    fn hears(
+        &mut self,
+        process: u32,
+        index: usize,
+        words: &mut [i32],
+    ) -> Result<bool, RunTimeError> {
+        let receives = &self.tables[process as usize][words[process as usize] as usize].receives;
+        let entry = receives[index];
+        let Some((sync, function)) = entry.edge.sync.and_then(|sync| Some((sync, sync.index?)))
+        else {
+            return Ok(false);
+        };
+        let listening = &mut self.listening[process as usize];
+        listening.turn_to(self.round, receives.len());
+        if listening.knows(index) {
+            return Ok(true);
+        }
+        let mut channels = std::mem::take(&mut self.channels);
+        channels.clear();
+        for select in 0..entry.instances {
+            select_values(entry.edge, select, &mut self.arguments);
+            channels.push(match self.call(self.executor, function, words) {
+                Ok(offset) => sync.channel.0 + offset as u32,
+                Err(error) => self.unheard(entry, error, words)?,
+            });
+        }
+        self.listening[process as usize].learn(index, &channels);
+        self.channels = channels;
+        Ok(true)
+    }
+
+    /// What an instance of a receiving edge listens to whose channel cannot be computed: nothing if its guard does not hold, for then
+    /// the channel does not count; else it is an error. The select values are in the buffer.
+    fn unheard(
+        &mut self,
+        entry: EdgeEntry<'a>,
+        error: RunTimeError,
+        words: &mut [i32],
+    ) -> Result<u32, RunTimeError> {
+        if let Some(record) = &mut self.record {
+            record.spoil();
+        }
+        let first = self.constraints.len();
+        let is_enabled =
+            error.kind == RunTimeErrorKind::Interrupted || self.guard(&entry.edge.guard, words)?;
+        self.constraints.truncate(first);
+        if is_enabled {
+            return Err(error);
+        }
+        Ok(NO_CHANNEL)
+    }
+
+    /// Adds every enabled instance of an edge to the candidates.
+    fn enabled_instances(
+        &mut self,
+        process: u32,
+        entry: EdgeEntry<'a>,
+        words: &mut [i32],
+    ) -> Result<(), RunTimeError> {
+        for select in 0..entry.instances {
+            self.enabled_instance(process, entry, select, words)?;
+        }
+        Ok(())
+    }
+
+    /// Adds one instance to the candidates if the words allow it.
+    fn enabled_instance(
+        &mut self,
+        process: u32,
+        entry: EdgeEntry<'a>,
+        select: u32,
+        words: &mut [i32],
+    ) -> Result<bool, RunTimeError> {
+        let guard = &entry.edge.guard;
+        let first = self.constraints.len() as u32;
+        if guard.function.is_some() {
+            select_values(entry.edge, select, &mut self.arguments);
+        }
+        if !guard.is_trivial() && !self.guard(guard, words)? {
+            return Ok(false);
+        }
+        let constraints = (first, self.constraints.len() as u32);
+        self.candidates.push(Candidate {
+            process,
+            edge: entry.index,
+            select,
+            is_controllable: entry.edge.controllable,
+            constraints,
+        });
+        Ok(true)
+    }
+
+    /// Evaluates a guard with the arguments in the buffer; its clock constraints are appended to the buffer.
+    pub(super) fn guard(&mut self, guard: &Guard, words: &mut [i32]) -> Result<bool, RunTimeError> {
+        let first = self.constraints.len();
+        if guard.emits
+            && let Some(record) = &mut self.record
+        {
+            record.spoil();
+        }
+        if let Some(function) = guard.function
+            && self.call(self.executor, function, words)? == 0
+        {
+            self.constraints.truncate(first);
+            return Ok(false);
+        }
+        self.constraints.extend(
+            guard
+                .fixed
+                .iter()
+                .map(|&fixed| EmittedConstraint::from(fixed)),
+        );
+        Ok(true)
+    }
+
+    pub(super) fn call(
+        &mut self,
+        executor: &dyn Executor,
+        function: FunctionId,
+        words: &mut [i32],
+    ) -> Result<i32, RunTimeError> {
+        if let Some(record) = &self.record
+            && let Some(answer) = record.answer(function, &self.arguments)
+        {
+            return Ok(answer);
+        }
+        let mut context = Context {
+            state: words,
+            constraints: &mut self.constraints,
+            assignments: &mut self.assignments,
+        };
+        let answer = executor.call(function, &self.arguments, &mut context)?;
+        if let Some(record) = &mut self.record {
+            record.note(function, &self.arguments, answer);
+        }
+        Ok(answer)
+    }
+}

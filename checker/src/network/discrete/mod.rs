@@ -1,0 +1,14 @@
+//! Enabled edges, synchronisations and broadcasts of a discrete state, and what taking them does to its words.
+
+pub(super) mod broadcast;
+pub(super) mod broadcast_filter;
+pub(super) mod broadcast_receivers;
+pub(super) mod edge_tables;
+pub(super) mod enabled_edges;
+pub(super) mod listening;
+pub(super) mod pairing;
+pub(super) mod select_cache;
+pub mod selects;
+pub mod stepper;
+pub mod transition;
+pub(super) mod transition_cache;

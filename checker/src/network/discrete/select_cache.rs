@@ -1,0 +1,289 @@
+//! The enabled instances of edges with `select`, remembered by the words that decide them.
+//!
+//! Guards and channel expressions of an edge often read few words, whose values come again and again: for each combination of
+//! values met so far there is a *set* of the edge's enabled instances, with their channels and clock constraints. Where two processes
+//! synchronise, who fits whom depends on two sets only, and is remembered too.
+//!
+//! Invariants:
+//! * A set is what evaluating the edge's functions in the state gives, since these read no other words. Where evaluating fails there
+//!   is no set, and whoever asks evaluates one instance after the other, so that only what is needed can fail.
+//! * Sets stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes later is not remembered, nor are
+//!   edges whose words seldom come again.
+
+use std::hash::{Hash, Hasher};
+use std::ops::Range;
+
+use hashbrown::HashTable;
+use rustc_hash::FxHasher;
+
+use crate::exec::EmittedConstraint;
+use crate::ir::{Edge, Network};
+
+use super::selects::select_count;
+use crate::analysis::function_reads::read_words;
+
+/// What is remembered takes at most about so many bytes.
+const MOST_BYTES: usize = 16 << 20;
+/// Edges whose functions read more words are not remembered.
+const MOST_WORDS: usize = 16;
+/// After so many new sets an edge is given up unless [`LEAST_USES`] states on average asked for each.
+const TRIAL: u32 = 256;
+const LEAST_USES: u64 = 4;
+
+/// No set; no edge.
+const NONE: u32 = u32::MAX;
+
+/// The index of a set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct SetId(u32);
+
+/// An enabled instance of an edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Instance {
+    /// The channel; 0 without synchronisation.
+    pub(super) channel: u32,
+    /// Its combination of select values.
+    pub(super) select: u32,
+    /// Its constraints among those of the set.
+    pub(super) constraints: (u32, u32),
+}
+
+/// The enabled instances of an edge in some states.
+#[derive(Debug, Default)]
+pub(super) struct Set {
+    /// Of a receiving edge by channel, then by select values; else by select values.
+    pub(super) instances: Vec<Instance>,
+    constraints: Vec<EmittedConstraint>,
+}
+
+impl Set {
+    /// Adds an instance.
+    pub(super) fn push(&mut self, channel: u32, select: u32, constraints: &[EmittedConstraint]) {
+        let first = self.constraints.len() as u32;
+        self.constraints.extend_from_slice(constraints);
+        self.instances.push(Instance {
+            channel,
+            select,
+            constraints: (first, self.constraints.len() as u32),
+        });
+    }
+
+    /// The clock constraints of an instance.
+    pub(super) fn constraints(&self, instance: Instance) -> &[EmittedConstraint] {
+        &self.constraints[instance.constraints.0 as usize..instance.constraints.1 as usize]
+    }
+
+    /// The instances of a receiving edge that listen to a channel.
+    pub(super) fn listeners(&self, channel: u32) -> Range<usize> {
+        let first = self.instances.partition_point(|one| one.channel < channel);
+        let rest = &self.instances[first..];
+        let count = rest.iter().take_while(|one| one.channel == channel).count();
+        first..first + count
+    }
+
+    fn bytes(&self) -> usize {
+        size_of::<Set>() + size_of_val(&*self.instances) + size_of_val(&*self.constraints)
+    }
+}
+
+/// What is remembered of an edge.
+#[derive(Debug)]
+struct Memory {
+    /// The words that decide its instances.
+    words: Vec<u32>,
+    /// The values of these words, by number of set of this edge.
+    keys: Vec<i32>,
+    sets: Vec<SetId>,
+    table: HashTable<u32>,
+    /// The set of the state that was asked for last, by its number.
+    latest: (u64, SetId),
+    uses: u64,
+    is_given_up: bool,
+}
+
+/// What is known before asking.
+pub(super) enum Known {
+    Set(SetId),
+    /// It is not remembered yet.
+    New,
+    /// The edge is not remembered.
+    Never,
+}
+
+/// All that is remembered.
+#[derive(Debug)]
+pub(super) struct Instances {
+    /// By process and edge: its memory.
+    places: Vec<Vec<u32>>,
+    memories: Vec<Memory>,
+    sets: Vec<Set>,
+    key: Vec<i32>,
+    /// By two sets, of a sender and of a receiver: where in `matches` the pairs of their instances with the same channel lie.
+    pairs: HashTable<(SetId, SetId, u32, u32)>,
+    matches: Vec<(u32, u32)>,
+    bytes: usize,
+}
+
+impl Instances {
+    pub(super) fn new(network: &Network) -> Instances {
+        let mut memories = Vec::new();
+        let places = network.processes.iter().map(|process| {
+            let edges = process.edges.iter().map(|edge| {
+                let Some(words) = deciding_words(network, edge) else {
+                    return NONE;
+                };
+                memories.push(Memory {
+                    words,
+                    keys: Vec::new(),
+                    sets: Vec::new(),
+                    table: HashTable::new(),
+                    latest: (0, SetId(NONE)),
+                    uses: 0,
+                    is_given_up: false,
+                });
+                memories.len() as u32 - 1
+            });
+            edges.collect()
+        });
+        Instances {
+            places: places.collect(),
+            memories,
+            sets: Vec::new(),
+            key: Vec::new(),
+            pairs: HashTable::new(),
+            matches: Vec::new(),
+            bytes: 0,
+        }
+    }
+
+    /// The bytes that are taken, about.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// The set of an edge in a state with this number.
+    #[inline]
+    pub(super) fn find(&mut self, process: u32, edge: u32, round: u64, words: &[i32]) -> Known {
+        let place = self.places[process as usize][edge as usize];
+        if place == NONE {
+            return Known::Never;
+        }
+        let memory = &mut self.memories[place as usize];
+        if memory.latest.0 == round || memory.words.is_empty() && memory.latest.1 != SetId(NONE) {
+            return Known::Set(memory.latest.1);
+        }
+        if memory.is_given_up {
+            return Known::Never;
+        }
+        memory.uses += 1;
+        self.key.clear();
+        let values = memory.words.iter().map(|&word| words[word as usize]);
+        self.key.extend(values);
+        let (key, keys, size) = (&self.key, &memory.keys, memory.words.len());
+        let is_key = |&index: &u32| &keys[index as usize * size..][..size] == key.as_slice();
+        let Some(&index) = memory.table.find(hash(key), is_key) else {
+            return Known::New;
+        };
+        memory.latest = (round, memory.sets[index as usize]);
+        Known::Set(memory.latest.1)
+    }
+
+    /// Remembers the set of the edge that was asked for last and found new; `None` if there is no place for it.
+    pub(super) fn remember(
+        &mut self,
+        process: u32,
+        edge: u32,
+        round: u64,
+        set: Set,
+    ) -> Option<SetId> {
+        let memory = &mut self.memories[self.places[process as usize][edge as usize] as usize];
+        let number = memory.sets.len() as u32;
+        if number >= TRIAL && memory.uses < u64::from(number) * LEAST_USES
+            || self.bytes > MOST_BYTES
+        {
+            memory.is_given_up = true;
+            return None;
+        }
+        let id = SetId(self.sets.len() as u32);
+        self.bytes += set.bytes() + size_of_val(&*self.key) + 3 * size_of::<u32>();
+        self.sets.push(set);
+        memory.sets.push(id);
+        memory.keys.extend_from_slice(&self.key);
+        let (keys, size) = (&memory.keys, memory.words.len());
+        let key_of = |&index: &u32| hash(&keys[index as usize * size..][..size]);
+        memory.table.insert_unique(hash(&self.key), number, key_of);
+        memory.latest = (round, id);
+        Some(id)
+    }
+
+    /// A set.
+    pub(super) fn set(&self, SetId(id): SetId) -> &Set {
+        &self.sets[id as usize]
+    }
+
+    /// Which instances of a sending and of a receiving edge have the same channel: adds the pairs of their places, by that of the
+    /// sender, then by that of the receiver.
+    #[inline]
+    pub(super) fn add_matches(
+        &mut self,
+        sender: SetId,
+        receiver: SetId,
+        out: &mut impl FnMut(u32, u32),
+    ) {
+        let hash = hash(&[sender.0 as i32, receiver.0 as i32]);
+        let is_pair = |one: &(SetId, SetId, u32, u32)| one.0 == sender && one.1 == receiver;
+        if let Some(&(_, _, first, last)) = self.pairs.find(hash, is_pair) {
+            for &(own, other) in &self.matches[first as usize..last as usize] {
+                out(own, other);
+            }
+            return;
+        }
+        let (senders, receivers) = (
+            &self.sets[sender.0 as usize],
+            &self.sets[receiver.0 as usize],
+        );
+        let first = self.matches.len();
+        for (own, instance) in senders.instances.iter().enumerate() {
+            for other in receivers.listeners(instance.channel) {
+                self.matches.push((own as u32, other as u32));
+                out(own as u32, other as u32);
+            }
+        }
+        if self.bytes > MOST_BYTES {
+            self.matches.truncate(first);
+            return;
+        }
+        self.bytes += (self.matches.len() - first) * size_of::<(u32, u32)>();
+        self.bytes += size_of::<(SetId, SetId, u32, u32)>() * 2;
+        let pair = (sender, receiver, first as u32, self.matches.len() as u32);
+        self.pairs.insert_unique(hash, pair, |one| {
+            self::hash(&[one.0.0 as i32, one.1.0 as i32])
+        });
+    }
+}
+
+/// The words that decide the instances of an edge; `None` if it is not worth remembering, or they are not known.
+fn deciding_words(network: &Network, edge: &Edge) -> Option<Vec<u32>> {
+    let index = edge.sync.and_then(|sync| sync.index);
+    let is_broadcast = |sync: crate::ir::Sync| network.channels[sync.channel.0 as usize].broadcast;
+    let is_asked_often = edge
+        .sync
+        .is_some_and(|sync| !sync.send && is_broadcast(sync));
+    let has_code = edge.guard.function.is_some() || index.is_some();
+    if !has_code || (select_count(edge) == 1 && index.is_none() && !is_asked_often) {
+        return None;
+    }
+    read_words(
+        network,
+        edge.guard.function.into_iter().chain(index),
+        MOST_WORDS,
+    )
+}
+
+fn hash(key: &[i32]) -> u64 {
+    let mut hasher = FxHasher::default();
+    for &value in key {
+        value.hash(&mut hasher);
+    }
+    hasher.finish()
+}

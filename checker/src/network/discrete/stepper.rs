@@ -1,0 +1,405 @@
+//! Enabled moves of a state and their effect on its words.
+//!
+//! Invariants:
+//! * The words handed in are those of a whole state; queries for moves do not change them.
+//! * Moves come in a fixed order: by sending process, then edge, select values, partners, branches. Nothing depends on hashes.
+//! * Clock guards are not decided here: each move carries the constraints under which it is possible.
+//!
+//! Cost: proportional to the edges that leave the current locations; no allocation once the buffers have grown.
+
+use std::ops::Range;
+
+use crate::cancellation;
+use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
+use crate::ir::{ChannelId, Edge, FunctionId, Network, RunTimeErrorKind, Update, Urgency};
+
+use super::broadcast::{Choice, Group};
+use super::broadcast_filter::{Scope, Sieve};
+use super::broadcast_receivers::Audience;
+use super::edge_tables::{LocationTable, receivers};
+use super::enabled_edges::Candidate;
+use super::listening::Listening;
+use super::pairing::{Pair, Partners, partners};
+use super::select_cache::Instances;
+use super::selects::select_values;
+use super::transition::{MoveRef, Moves, Part};
+use super::transition_cache::{Next, OfferId, Offers, Record, VectorId};
+use crate::network::failure::Failure;
+
+/// Computes moves and their effects. Holds the buffers, so one per thread.
+pub struct Stepper<'a> {
+    pub(super) network: &'a Network,
+    pub(super) executor: &'a dyn Executor,
+    pub(super) tables: Vec<Vec<LocationTable<'a>>>,
+    /// By channel: the processes that may receive on it.
+    pub(super) receivers: Vec<Vec<u32>>,
+    /// Whether any channel is urgent.
+    pub(super) has_urgent_channels: bool,
+    pub(super) constraints: Vec<EmittedConstraint>,
+    pub(super) assignments: Vec<EmittedAssignment>,
+    pub(super) arguments: Vec<i32>,
+    pub(super) candidates: Vec<Candidate>,
+    /// The channel of the moves that are being put together.
+    pub(super) channel: Option<ChannelId>,
+    pub(super) chosen: Vec<Choice>,
+    /// The receiving processes of the broadcast that is being put together.
+    pub(super) groups: Vec<Group>,
+    pub(super) parts: Vec<Part>,
+    /// The rank of the next move; see [`super::broadcast`].
+    pub(super) rank: u64,
+    pub(super) sieve: Sieve,
+    /// The receivers of the channel that was sent on last, and the buffer for their constraints.
+    pub(super) audience: Audience,
+    pub(super) heard: Vec<EmittedConstraint>,
+    /// The enabled instances of edges that are remembered.
+    pub(super) instances: Instances,
+    pub(super) partners: Partners,
+    /// The pairs of the sending edge at hand.
+    pub(super) pairs: Vec<Pair<'a>>,
+    /// By process: the channels of its receiving instances in the state at hand, whose number is `round`.
+    pub(super) listening: Vec<Listening>,
+    pub(super) round: u64,
+    /// The channels of the instances of one edge.
+    pub(super) channels: Vec<u32>,
+    /// The bytes of moves that whoever asks for more has at hand.
+    pub(crate) moves_beside: usize,
+    /// Moves that were put together before.
+    pub(super) offers: Offers,
+    /// What is evaluated while moves are put together to be remembered.
+    pub(super) record: Option<Record>,
+}
+
+/// What is remembered of the moves of a state.
+enum Found {
+    Offer(OfferId),
+    Nothing,
+    /// A question failed, and so the moves cannot be remembered beside those of the tree.
+    Failure,
+}
+
+impl<'a> Stepper<'a> {
+    /// A stepper for a network, running its code by `executor`.
+    pub fn new(network: &'a Network, executor: &'a dyn Executor) -> Stepper<'a> {
+        let tables = network.processes.iter().map(|process| {
+            let locations = process.locations.iter();
+            locations
+                .map(|location| LocationTable::new(process, location))
+                .collect()
+        });
+        let receivers = receivers(network);
+        Stepper {
+            instances: Instances::new(network),
+            partners: partners(network, &receivers),
+            pairs: Vec::new(),
+            network,
+            executor,
+            tables: tables.collect(),
+            receivers,
+            has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
+            constraints: Vec::new(),
+            assignments: Vec::new(),
+            arguments: Vec::new(),
+            candidates: Vec::new(),
+            channel: None,
+            chosen: Vec::new(),
+            groups: Vec::new(),
+            parts: Vec::new(),
+            rank: 0,
+            sieve: Sieve::new(network.clocks.len().max(1)),
+            audience: Audience::default(),
+            heard: Vec::new(),
+            listening: network
+                .processes
+                .iter()
+                .map(|_| Listening::default())
+                .collect(),
+            round: 0,
+            channels: Vec::new(),
+            moves_beside: 0,
+            offers: Offers::new(network.processes.len()),
+            record: None,
+        }
+    }
+
+    /// One for another thread.
+    #[must_use]
+    pub fn another(&self) -> Stepper<'a> {
+        Stepper::new(self.network, self.executor)
+    }
+
+    /// The network.
+    pub fn network(&self) -> &'a Network {
+        self.network
+    }
+
+    /// Whether some process is in a committed location.
+    pub fn is_committed(&self, words: &[i32]) -> bool {
+        self.tables
+            .iter()
+            .zip(words)
+            .any(|(tables, &location)| tables[location as usize].is_committed())
+    }
+
+    /// Whether some process is in an urgent or committed location.
+    pub fn is_urgent(&self, words: &[i32]) -> bool {
+        self.tables
+            .iter()
+            .zip(words)
+            .any(|(tables, &location)| tables[location as usize].urgency != Urgency::Normal)
+    }
+
+    /// Whether time may pass as far as locations and urgent channels say. `moves` are the moves of the state.
+    ///
+    /// Synchronisations on urgent channels whose guards have clocks do not count here: see [`crate::network::Symbolic::barriers`].
+    pub fn may_delay(&self, words: &[i32], moves: &Moves) -> bool {
+        if self.is_urgent(words) {
+            return false;
+        }
+        !self.has_urgent_channels
+            || !moves
+                .iter()
+                .any(|one| one.is_unconditional() && self.is_urgent_move(one))
+    }
+
+    /// Whether the move synchronises on an urgent channel.
+    pub fn is_urgent_move(&self, one: MoveRef<'_>) -> bool {
+        one.channel
+            .is_some_and(|channel| self.network.channels[channel.0 as usize].urgent)
+    }
+
+    /// The level of a move: that of its channel, then the greatest of its processes; greater is more urgent.
+    pub fn level(&self, one: MoveRef<'_>) -> (u32, u32) {
+        let default = self.network.features.default_priority;
+        let priority = |channel: ChannelId| self.network.channels[channel.0 as usize].priority;
+        let channel = one.channel.map_or(default, priority);
+        let processes = one.parts.iter();
+        let levels = processes.map(|part| self.network.processes[part.process as usize].priority);
+        (channel, levels.max().unwrap_or(0))
+    }
+
+    /// The edge of a part.
+    pub fn edge(&self, part: Part) -> &'a Edge {
+        &self.network.processes[part.process as usize].edges[part.edge as usize]
+    }
+
+    /// All moves of the state, as far as the words decide, into `out`.
+    pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
+        if let Some(vector) = self.offers.vector(words)
+            && let Some(offer) = self.offer(vector, words)?
+        {
+            out.copy_from(self.offers.moves(offer));
+            return Ok(());
+        }
+        self.put_together(words, Scope::Everything, out)
+    }
+
+    /// The location vector of the state, if it is known; it is after the first time that it was asked for.
+    pub fn vector(&mut self, words: &[i32]) -> Option<VectorId> {
+        self.offers.vector(words)
+    }
+
+    /// As [`Stepper::moves`], without combinations that the scope leaves out: for a search, which cannot know whether remembering pays.
+    pub(in crate::network) fn moves_in(
+        &mut self,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<(), Failure> {
+        if self.offers.is_worth_asking()
+            && let Some(vector) = self.offers.vector(words)
+        {
+            match self.known_offer(vector, words)? {
+                Found::Offer(offer) => {
+                    self.offers.note_found();
+                    out.copy_from(self.offers.moves(offer));
+                    return Ok(());
+                }
+                Found::Nothing if self.offers.is_suited(vector) => {
+                    return self.remember(vector, words, scope, out).map(|_| ());
+                }
+                Found::Nothing | Found::Failure => {}
+            }
+        }
+        self.put_together(words, scope, out)
+    }
+
+    /// The moves of a state with this location vector, if they depend on locations and answers of guards alone and there is place
+    /// to remember them.
+    pub fn offer(
+        &mut self,
+        vector: VectorId,
+        words: &mut [i32],
+    ) -> Result<Option<OfferId>, Failure> {
+        match self.known_offer(vector, words)? {
+            Found::Offer(offer) => Ok(Some(offer)),
+            Found::Nothing if self.offers.is_suited(vector) => {
+                self.remember(vector, words, Scope::Everything, &mut Moves::default())
+            }
+            Found::Nothing | Found::Failure => Ok(None),
+        }
+    }
+
+    /// The moves of a state with this location vector, if they are remembered.
+    fn known_offer(&mut self, vector: VectorId, words: &mut [i32]) -> Result<Found, Failure> {
+        let Some(mut way) = self.offers.start(vector) else {
+            return Ok(Found::Nothing);
+        };
+        loop {
+            match self.offers.next(way) {
+                Next::Offer(offer) => return Ok(Found::Offer(offer)),
+                Next::Ask(function, arguments) => {
+                    let mut context = Context {
+                        state: words,
+                        constraints: &mut self.constraints,
+                        assignments: &mut self.assignments,
+                    };
+                    match self.executor.call(function, arguments, &mut context) {
+                        Ok(answer) => self.offers.answer(&mut way, answer),
+                        Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
+                            return Err(error.into());
+                        }
+                        // Whether it counts shows where the moves are put together.
+                        Err(_) => return Ok(Found::Failure),
+                    }
+                }
+                Next::Unknown => return Ok(Found::Nothing),
+            }
+        }
+    }
+
+    /// Puts the moves of a state with this location vector together and remembers them if they do not depend on the scope.
+    fn remember(
+        &mut self,
+        vector: VectorId,
+        words: &mut [i32],
+        scope: Scope<'_>,
+        out: &mut Moves,
+    ) -> Result<Option<OfferId>, Failure> {
+        self.sieve.has_narrowed = false;
+        self.record = Some(Record::default());
+        // Where it is cut off, what was recorded so far must not be taken for that of another state.
+        let put_together = || self.put_together(words, scope, out);
+        let result = cancellation::unless_cut(put_together).unwrap_or(Err(Failure::Interrupted));
+        let mut record = self.record.take().unwrap_or_default();
+        result?;
+        if self.sieve.has_narrowed {
+            record.spoil();
+        }
+        Ok(self.offers.remember(vector, record, out))
+    }
+
+    /// The moves of an offer.
+    pub fn offered(&self, offer: OfferId) -> &Moves {
+        self.offers.moves(offer)
+    }
+
+    /// The bytes that remembered moves take, about.
+    pub fn bytes(&self) -> usize {
+        self.offers.bytes() + self.instances.bytes()
+    }
+
+    /// Takes the move: changes locations and variables. The clock assignments, in order, are in the result.
+    pub fn fire(
+        &mut self,
+        parts: &[Part],
+        words: &mut [i32],
+    ) -> Result<&[EmittedAssignment], RunTimeError> {
+        let network = self.network;
+        self.assignments.clear();
+        self.arguments.clear();
+        if let Some(update) = &network.before_update {
+            self.update(update, words)?;
+        }
+        for &part in parts {
+            let edge = self.edge(part);
+            let branch = &edge.branches[part.branch as usize];
+            if edge.update.function.is_some() || branch.update.function.is_some() {
+                select_values(edge, part.select, &mut self.arguments);
+            }
+            self.update(&edge.update, words)?;
+            self.update(&branch.update, words)?;
+        }
+        for &part in parts {
+            let branch = &self.edge(part).branches[part.branch as usize];
+            words[part.process as usize] = branch.target.0 as i32;
+        }
+        if let Some(update) = &network.after_update {
+            self.arguments.clear();
+            self.update(update, words)?;
+        }
+        Ok(&self.assignments)
+    }
+
+    fn update(&mut self, update: &Update, words: &mut [i32]) -> Result<(), RunTimeError> {
+        if let Some(function) = update.function {
+            self.call(self.executor, function, words)?;
+        }
+        let fixed = update.fixed.iter();
+        self.assignments
+            .extend(fixed.map(|&(target, value)| EmittedAssignment {
+                target,
+                source: crate::ir::ClockId(0),
+                value,
+            }));
+        Ok(())
+    }
+
+    /// Runs a function on the state.
+    pub(in crate::network) fn run(
+        &mut self,
+        function: FunctionId,
+        arguments: &[i32],
+        words: &mut [i32],
+    ) -> Result<i32, RunTimeError> {
+        let mut context = Context {
+            state: words,
+            constraints: &mut self.constraints,
+            assignments: &mut self.assignments,
+        };
+        self.executor.call(function, arguments, &mut context)
+    }
+
+    /// Evaluates all invariants: `None` if the words break one, else the clock constraints that must hold.
+    pub fn invariants(
+        &mut self,
+        words: &mut [i32],
+    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+        self.invariants_of(0..self.network.processes.len(), words)
+    }
+
+    /// Evaluates the invariant of one process: `None` if the words break it.
+    pub fn invariant_of(
+        &mut self,
+        process: usize,
+        words: &mut [i32],
+    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+        self.invariants_of(process..process + 1, words)
+    }
+
+    fn invariants_of(
+        &mut self,
+        processes: Range<usize>,
+        words: &mut [i32],
+    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+        self.constraints.clear();
+        self.arguments.clear();
+        for index in processes {
+            if let Some(invariant) = self.tables[index][words[index] as usize].invariant
+                && !self.guard(invariant, words)?
+            {
+                return Ok(None);
+            }
+        }
+        Ok(Some(&self.constraints))
+    }
+
+    /// Runs a function of a query on the state.
+    pub fn evaluate(
+        &mut self,
+        function: FunctionId,
+        words: &mut [i32],
+    ) -> Result<i32, RunTimeError> {
+        self.arguments.clear();
+        self.call(self.executor, function, words)
+    }
+}

@@ -1,0 +1,202 @@
+//! Moves: one composed transition each, kept in flat buffers that are used again from state to state.
+
+use crate::exec::EmittedConstraint;
+use crate::ir::ChannelId;
+use crate::zones::federation::block_bytes;
+
+use super::transition_cache::OfferId;
+
+/// One process's share in a move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Part {
+    /// Index of the process.
+    pub process: u32,
+    /// Index of the edge in its process.
+    pub edge: u32,
+    /// Index of the branch of the edge.
+    pub branch: u32,
+    /// Which combination of `select` values: the mixed-radix number over the bindings, the last binding fastest.
+    pub select: u32,
+}
+
+/// Whether two moves take the same edges with the same `select` values, whatever the branches.
+pub fn is_same_entry(one: &[Part], other: &[Part]) -> bool {
+    let key = |part: &Part| (part.process, part.edge, part.select);
+    one.len() == other.len() && one.iter().map(key).eq(other.iter().map(key))
+}
+
+/// Ranges into the buffers of [`Moves`].
+#[derive(Clone, Copy, Debug)]
+struct Header {
+    parts: (u32, u32),
+    constraints: (u32, u32),
+    excluded: (u32, u32),
+    label: Label,
+}
+
+/// What is said of a move beside its parts and constraints.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::network) struct Label {
+    /// The channel of the synchronisation.
+    pub(super) channel: Option<ChannelId>,
+    /// Whether the controller owns it.
+    pub(super) controllable: bool,
+    /// See [`MoveRef::rank`].
+    pub(super) rank: u64,
+    /// Whether it is known that its guards leave something of the zone that the moves are asked for.
+    pub(in crate::network) is_possible: bool,
+}
+
+impl Label {
+    /// The same for a move whose constraints were changed.
+    pub(in crate::network) fn unsettled(self) -> Label {
+        Label {
+            is_possible: false,
+            ..self
+        }
+    }
+}
+
+/// The moves of a state, by ascending rank.
+#[derive(Clone, Debug, Default)]
+pub struct Moves {
+    headers: Vec<Header>,
+    parts: Vec<Part>,
+    constraints: Vec<EmittedConstraint>,
+    /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast receivers that abstain.
+    excluded: Vec<(u32, u32)>,
+    /// The offer that they are, if they are remembered.
+    pub(super) offer: Option<OfferId>,
+}
+
+/// One move of [`Moves`].
+#[derive(Clone, Copy, Debug)]
+pub struct MoveRef<'a> {
+    /// The parts: the sender (or the only process) first, then receivers in process order.
+    pub parts: &'a [Part],
+    /// The clock constraints of the participants' guards.
+    pub constraints: &'a [EmittedConstraint],
+    /// The channel of the synchronisation; `None` for an internal edge.
+    pub channel: Option<ChannelId>,
+    /// Whether the controller owns the move: all participating edges are controllable.
+    pub controllable: bool,
+    /// The place of the move among all that the locations and variables of the state allow, whatever the zone.
+    pub rank: u64,
+    pub(in crate::network) label: Label,
+    /// Of remembered moves: the offer and the place in it.
+    pub(in crate::network) offered: Option<(OfferId, u32)>,
+    moves: &'a Moves,
+    excluded: (u32, u32),
+}
+
+impl<'a> MoveRef<'a> {
+    /// The conjunctions of clock constraints that must not hold.
+    pub fn excluded(&self) -> impl Iterator<Item = &'a [EmittedConstraint]> {
+        let moves = self.moves;
+        moves.excluded[self.excluded.0 as usize..self.excluded.1 as usize]
+            .iter()
+            .map(move |&(first, last)| &moves.constraints[first as usize..last as usize])
+    }
+
+    /// Whether the move is possible at every clock valuation.
+    pub fn is_unconditional(&self) -> bool {
+        self.constraints.is_empty() && self.excluded.0 == self.excluded.1
+    }
+}
+
+impl Moves {
+    /// Forgets all moves and keeps the memory.
+    pub fn clear(&mut self) {
+        self.headers.clear();
+        self.parts.clear();
+        self.constraints.clear();
+        self.excluded.clear();
+        self.offer = None;
+    }
+
+    /// The bytes that the moves take beside the value itself.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        block_bytes(size_of_val(&*self.headers))
+            + block_bytes(size_of_val(&*self.parts))
+            + block_bytes(size_of_val(&*self.constraints))
+            + block_bytes(size_of_val(&*self.excluded))
+    }
+
+    /// Replaces the moves by others and keeps the memory.
+    pub fn copy_from(&mut self, other: &Moves) {
+        self.headers.clone_from(&other.headers);
+        self.parts.clone_from(&other.parts);
+        self.constraints.clone_from(&other.constraints);
+        self.excluded.clone_from(&other.excluded);
+        self.offer = other.offer;
+    }
+
+    /// How many moves there are.
+    pub fn len(&self) -> usize {
+        self.headers.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.headers.is_empty()
+    }
+
+    /// The move with this index.
+    pub fn get(&self, index: usize) -> MoveRef<'_> {
+        let header = self.headers[index];
+        MoveRef {
+            parts: &self.parts[header.parts.0 as usize..header.parts.1 as usize],
+            constraints: &self.constraints
+                [header.constraints.0 as usize..header.constraints.1 as usize],
+            channel: header.label.channel,
+            controllable: header.label.controllable,
+            rank: header.label.rank,
+            label: header.label,
+            offered: self.offer.map(|offer| (offer, index as u32)),
+            moves: self,
+            excluded: header.excluded,
+        }
+    }
+
+    /// All moves, in order.
+    pub fn iter(&self) -> impl Iterator<Item = MoveRef<'_>> {
+        (0..self.len()).map(|index| self.get(index))
+    }
+
+    /// The move with this rank.
+    pub fn with_rank(&self, rank: u64) -> Option<MoveRef<'_>> {
+        let found = self
+            .headers
+            .binary_search_by_key(&rank, |header| header.label.rank);
+        found.ok().map(|index| self.get(index))
+    }
+
+    /// Adds a move.
+    pub(in crate::network) fn push<'c>(
+        &mut self,
+        parts: &[Part],
+        constraints: impl IntoIterator<Item = &'c [EmittedConstraint]>,
+        excluded: impl IntoIterator<Item = &'c [EmittedConstraint]>,
+        label: Label,
+    ) {
+        let first_part = self.parts.len() as u32;
+        self.parts.extend_from_slice(parts);
+        let first_constraint = self.constraints.len() as u32;
+        for group in constraints {
+            self.constraints.extend_from_slice(group);
+        }
+        let last_constraint = self.constraints.len() as u32;
+        let first_excluded = self.excluded.len() as u32;
+        for group in excluded {
+            let first = self.constraints.len() as u32;
+            self.constraints.extend_from_slice(group);
+            self.excluded.push((first, self.constraints.len() as u32));
+        }
+        self.headers.push(Header {
+            parts: (first_part, self.parts.len() as u32),
+            constraints: (first_constraint, last_constraint),
+            excluded: (first_excluded, self.excluded.len() as u32),
+            label,
+        });
+    }
+}

@@ -1,0 +1,323 @@
+//! Moves by location vector, remembered.
+//!
+//! The locations and the answers of guards decide which moves a state has. So each location vector keeps a tree of *questions*,
+//! the functions that [`crate::network::Stepper`] evaluates for it in their order, with a branch for each answer met so far. At a leaf
+//! stands an [`OfferId`]: the moves, put together once. For a state whose answers were met before, only guards are evaluated.
+//!
+//! Invariants:
+//! * A tree asks what putting the moves together asks, in the same order, so that the first run-time error is the same; only what was
+//!   asked before, with the same arguments, is not asked again.
+//! * The moves of an offer do not depend on variables otherwise. A location vector where some guard emits clock constraints
+//!   is *unsuited* and has no tree.
+//! * Ids stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes later is not remembered.
+
+use std::hash::{Hash, Hasher};
+
+use hashbrown::HashTable;
+use rustc_hash::FxHasher;
+
+use crate::ir::FunctionId;
+use crate::zones::federation::block_bytes;
+
+use crate::network::Moves;
+
+/// What is remembered takes at most about so many bytes.
+const MOST_BYTES: usize = 24 << 20;
+/// A location vector with more offers is unsuited: its guards seldom answer the same.
+const MOST_OFFERS: u32 = 64;
+/// A location vector that asks more is unsuited.
+const MOST_QUESTIONS: usize = 256;
+
+/// A question has few answers, mostly no and yes.
+const USUAL_ANSWERS: usize = 2;
+
+/// So many states of a search make a trial of whether remembering pays; one of [`LEAST_FOUND`] must find its moves.
+const TRIAL: u32 = 1024;
+const LEAST_FOUND: u32 = 4;
+/// After a trial that failed so many states do not ask, and four times as many after each further one.
+const FIRST_PAUSE: u32 = 16 * TRIAL;
+const LONGEST_PAUSE: u32 = 256 * TRIAL;
+
+/// The index of a remembered location vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct VectorId(u32);
+
+/// The index of remembered moves. Each belongs to one location vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct OfferId(u32);
+
+/// A function that is evaluated, with its arguments.
+#[derive(Clone, Debug)]
+struct Question {
+    function: FunctionId,
+    arguments: Box<[i32]>,
+    /// Where to go on, by answer.
+    answers: Vec<(i32, Point)>,
+}
+
+/// A point of a tree.
+#[derive(Clone, Copy, Debug)]
+enum Point {
+    Ask(u32),
+    Offer(OfferId),
+}
+
+/// What is known of a location vector.
+#[derive(Clone, Copy, Debug)]
+enum Knowledge {
+    /// It was met once.
+    Met,
+    /// It has a tree with so many offers.
+    Tree(Point, u32),
+    Unsuited,
+}
+
+/// What the tree of a location vector says next.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Next<'o> {
+    /// Evaluate this, and answer.
+    Ask(FunctionId, &'o [i32]),
+    /// These are the moves.
+    Offer(OfferId),
+    /// Nothing is known: the moves must be put together.
+    Unknown,
+}
+
+/// A way through a tree.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way(Option<Point>);
+
+/// The functions that were evaluated while moves were put together.
+#[derive(Debug, Default)]
+pub(super) struct Record {
+    asked: Vec<(FunctionId, Box<[i32]>, i32)>,
+    is_unsuited: bool,
+}
+
+impl Record {
+    /// The answer, if the question was asked before.
+    pub(super) fn answer(&self, function: FunctionId, arguments: &[i32]) -> Option<i32> {
+        let known = self
+            .asked
+            .iter()
+            .find(|(other, values, _)| *other == function && **values == *arguments);
+        known.map(|known| known.2)
+    }
+
+    /// Takes down an answer.
+    pub(super) fn note(&mut self, function: FunctionId, arguments: &[i32], answer: i32) {
+        self.is_unsuited |= self.asked.len() == MOST_QUESTIONS;
+        if !self.is_unsuited {
+            self.asked.push((function, arguments.into(), answer));
+        }
+    }
+
+    /// Says that the moves depend on more than answers.
+    pub(super) fn spoil(&mut self) {
+        self.is_unsuited = true;
+    }
+}
+
+/// All that is remembered.
+#[derive(Debug)]
+pub(super) struct Offers {
+    /// How many processes there are.
+    processes: usize,
+    /// The location vectors, one after the other.
+    locations: Vec<i32>,
+    table: HashTable<u32>,
+    known: Vec<Knowledge>,
+    questions: Vec<Question>,
+    /// The moves of every offer.
+    moves: Vec<Moves>,
+    bytes: usize,
+    trial: Trial,
+}
+
+/// Whether remembering pays where nobody knows beforehand: for a search, which may meet most location vectors a few times only.
+#[derive(Debug, Default)]
+struct Trial {
+    /// How many states asked in this trial, and how many of them found their moves.
+    asked: u32,
+    found: u32,
+    /// How many states will not ask, and how many after the last trial that failed did not.
+    pause: u32,
+    last_pause: u32,
+}
+
+impl Offers {
+    /// Nothing, for a network of so many processes.
+    pub(super) fn new(processes: usize) -> Offers {
+        Offers {
+            processes,
+            locations: Vec::new(),
+            table: HashTable::new(),
+            known: Vec::new(),
+            questions: Vec::new(),
+            moves: Vec::new(),
+            bytes: 0,
+            trial: Trial::default(),
+        }
+    }
+
+    /// Whether a state of a search should ask; to be called for each of them.
+    pub(super) fn is_worth_asking(&mut self) -> bool {
+        let trial = &mut self.trial;
+        if trial.pause > 0 {
+            trial.pause -= 1;
+            return false;
+        }
+        if trial.asked == TRIAL {
+            let is_worth = trial.found > TRIAL / LEAST_FOUND;
+            (trial.asked, trial.found) = (0, 0);
+            if !is_worth {
+                trial.last_pause = (4 * trial.last_pause).clamp(FIRST_PAUSE, LONGEST_PAUSE);
+                trial.pause = trial.last_pause;
+                return false;
+            }
+        }
+        trial.asked += 1;
+        true
+    }
+
+    /// Says that a state of a search found its moves.
+    pub(super) fn note_found(&mut self) {
+        self.trial.found += 1;
+    }
+
+    /// The bytes that are taken, about.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// The id of the state's location vector; `None` if it is new, as most that are met once are never met again.
+    pub(super) fn vector(&mut self, words: &[i32]) -> Option<VectorId> {
+        let key = &words[..self.processes];
+        let (locations, processes) = (&self.locations, self.processes);
+        let of = |id: u32| &locations[id as usize * processes..][..processes];
+        if let Some(&id) = self.table.find(hash(key), |&id| of(id) == key) {
+            return Some(VectorId(id));
+        }
+        if self.bytes > MOST_BYTES {
+            return None;
+        }
+        let id = self.known.len() as u32;
+        self.table.insert_unique(hash(key), id, |&id| hash(of(id)));
+        self.known.push(Knowledge::Met);
+        self.locations.extend_from_slice(key);
+        self.bytes += size_of_val(key) + size_of::<Knowledge>() + 5;
+        None
+    }
+
+    /// Starts through the tree of a location vector; `None` if it is unsuited.
+    pub(super) fn start(&self, vector: VectorId) -> Option<Way> {
+        match self.known[vector.0 as usize] {
+            Knowledge::Met => Some(Way(None)),
+            Knowledge::Tree(root, _) => Some(Way(Some(root))),
+            Knowledge::Unsuited => None,
+        }
+    }
+
+    /// Whether the moves of a location vector may be remembered.
+    pub(super) fn is_suited(&self, vector: VectorId) -> bool {
+        !matches!(self.known[vector.0 as usize], Knowledge::Unsuited)
+    }
+
+    /// What comes next on the way.
+    pub(super) fn next(&self, way: Way) -> Next<'_> {
+        match way.0 {
+            None => Next::Unknown,
+            Some(Point::Offer(offer)) => Next::Offer(offer),
+            Some(Point::Ask(question)) => {
+                let question = &self.questions[question as usize];
+                Next::Ask(question.function, &question.arguments)
+            }
+        }
+    }
+
+    /// Goes on with the answer to the question that came next.
+    pub(super) fn answer(&self, way: &mut Way, answer: i32) {
+        if let Some(Point::Ask(question)) = way.0 {
+            way.0 = follow(&self.questions[question as usize], answer);
+        }
+    }
+
+    /// The moves of an offer.
+    pub(super) fn moves(&self, offer: OfferId) -> &Moves {
+        &self.moves[offer.0 as usize]
+    }
+
+    /// Remembers moves with the questions that led to them, and tells them so; `None` if the location vector is unsuited.
+    pub(super) fn remember(
+        &mut self,
+        vector: VectorId,
+        record: Record,
+        moves: &mut Moves,
+    ) -> Option<OfferId> {
+        let (root, count) = match self.known[vector.0 as usize] {
+            Knowledge::Met => (None, 0),
+            Knowledge::Tree(root, count) => (Some(root), count),
+            Knowledge::Unsuited => return None,
+        };
+        if record.is_unsuited || count == MOST_OFFERS || self.bytes > MOST_BYTES {
+            self.known[vector.0 as usize] = Knowledge::Unsuited;
+            return None;
+        }
+        let offer = OfferId(self.moves.len() as u32);
+        self.bytes += moves.heap_bytes() + size_of::<Moves>();
+        moves.offer = Some(offer);
+        self.moves.push(moves.clone());
+        let root = self.graft(root, record, Point::Offer(offer));
+        self.known[vector.0 as usize] = Knowledge::Tree(root, count + 1);
+        Some(offer)
+    }
+
+    /// Adds to a tree the branch on which the questions have the recorded answers; returns the root.
+    fn graft(&mut self, root: Option<Point>, record: Record, leaf: Point) -> Point {
+        let mut way = root;
+        let mut parent: Option<(u32, i32)> = None;
+        let mut first = root;
+        for (function, arguments, answer) in record.asked {
+            let question = if let Some(Point::Ask(question)) = way {
+                question
+            } else {
+                self.bytes += size_of::<Question>()
+                    + block_bytes(size_of_val(&*arguments))
+                    + block_bytes(USUAL_ANSWERS * size_of::<(i32, Point)>());
+                self.questions.push(Question {
+                    function,
+                    arguments,
+                    answers: Vec::with_capacity(USUAL_ANSWERS),
+                });
+                let question = self.questions.len() as u32 - 1;
+                self.attach(parent, &mut first, Point::Ask(question));
+                question
+            };
+            way = follow(&self.questions[question as usize], answer);
+            parent = Some((question, answer));
+        }
+        self.attach(parent, &mut first, leaf);
+        first.unwrap_or(leaf)
+    }
+
+    fn attach(&mut self, parent: Option<(u32, i32)>, first: &mut Option<Point>, point: Point) {
+        match parent {
+            Some((question, answer)) => self.questions[question as usize]
+                .answers
+                .push((answer, point)),
+            None => *first = Some(point),
+        }
+    }
+}
+
+/// Where an answer leads, if it was met before.
+fn follow(question: &Question, answer: i32) -> Option<Point> {
+    let known = question.answers.iter().find(|known| known.0 == answer);
+    known.map(|known| known.1)
+}
+
+fn hash(locations: &[i32]) -> u64 {
+    let mut hasher = FxHasher::default();
+    locations.hash(&mut hasher);
+    hasher.finish()
+}

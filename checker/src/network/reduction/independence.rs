@@ -1,0 +1,183 @@
+//! Which processes may get in each other's way in a state in which time stands still, learnt when it is asked for.
+//!
+//! A *situation* of a process is its location, and whether the edges that may sleep do; situations alone decide.
+
+use crate::ir::{LocationId, Network};
+use crate::zones::{Zone, dbm};
+
+use crate::analysis::dependence::{Footprint, Footprints, Ground, Moment, Sleeper, Still};
+
+/// A situation: twice the number of the location among all, and one more if edges sleep.
+pub(super) type Situation = u32;
+
+/// What is known of the processes of a network.
+#[derive(Debug)]
+pub(super) struct Interference {
+    footprints: Footprints,
+    /// By process: the number of its first location among all.
+    first: Vec<u32>,
+    /// By location: its process.
+    owners: Vec<u32>,
+    tables: Tables,
+}
+
+/// What is known of each of the ways in which time stands still.
+#[derive(Debug)]
+struct Tables {
+    urgent: Table,
+    committed: Table,
+}
+
+impl Tables {
+    fn of(&mut self, still: Still) -> &mut Table {
+        match still {
+            Still::Urgent => &mut self.urgent,
+            Still::Committed => &mut self.committed,
+        }
+    }
+}
+
+/// What is known of one of the ways in which time stands still.
+#[derive(Debug, Default)]
+struct Table {
+    /// By location: what keeps edges that the process may come to asleep.
+    sleepers: Vec<Option<Vec<Sleeper>>>,
+    /// By situation: the footprints now and in the future.
+    now: Vec<Option<Box<Footprint>>>,
+    future: Vec<Option<Box<Footprint>>>,
+    /// By situation of one process, then of another: whether what the other may do gets in the way of what the one can do now.
+    meets: Vec<Vec<Option<bool>>>,
+}
+
+impl Table {
+    fn new(locations: usize) -> Table {
+        Table {
+            sleepers: vec![None; locations],
+            now: vec![None; 2 * locations],
+            future: vec![None; 2 * locations],
+            meets: vec![Vec::new(); 2 * locations],
+        }
+    }
+}
+
+impl Interference {
+    pub(super) fn new(network: &Network) -> Interference {
+        let (mut first, mut owners) = (Vec::new(), Vec::new());
+        for (index, process) in (0..).zip(&network.processes) {
+            first.push(owners.len() as u32);
+            owners.resize(owners.len() + process.locations.len(), index);
+        }
+        Interference {
+            footprints: Footprints::default(),
+            first,
+            tables: Tables {
+                urgent: Table::new(owners.len()),
+                committed: Table::new(owners.len()),
+            },
+            owners,
+        }
+    }
+
+    /// By process: the situations of a state with these words and this zone.
+    pub(super) fn situations(
+        &mut self,
+        ground: Ground<'_>,
+        (words, zone): (&[i32], &Zone),
+        still: Still,
+        out: &mut Vec<Situation>,
+    ) {
+        out.clear();
+        for (process, &location) in words[..self.first.len()].iter().enumerate() {
+            let number = self.first[process] + location as u32;
+            let sleeps = |one: &Sleeper| !dbm::satisfies(zone.bounds(), zone.dimension(), one);
+            let sleepers = self.sleepers(ground, number, still);
+            let are_asleep = !sleepers.is_empty() && sleepers.iter().all(sleeps);
+            out.push(2 * number + u32::from(are_asleep));
+        }
+    }
+
+    fn sleepers(&mut self, ground: Ground<'_>, location: u32, still: Still) -> &[Sleeper] {
+        if self.tables.of(still).sleepers[location as usize].is_none() {
+            let found = self.future(ground, 2 * location, still).sleepers.clone();
+            self.tables.of(still).sleepers[location as usize] = Some(found);
+        }
+        self.tables.of(still).sleepers[location as usize]
+            .as_deref()
+            .unwrap_or_default()
+    }
+
+    /// Whether what a process in the situation `other` may do may get in the way of what one in the situation `member` can do now.
+    #[inline]
+    pub(super) fn meets(
+        &mut self,
+        ground: Ground<'_>,
+        (member, other): (Situation, Situation),
+        still: Still,
+    ) -> bool {
+        let row = &self.tables.of(still).meets[member as usize];
+        match row.get(other as usize) {
+            Some(&Some(known)) => known,
+            _ => self.learn(ground, (member, other), still),
+        }
+    }
+
+    #[cold]
+    fn learn(
+        &mut self,
+        ground: Ground<'_>,
+        (member, other): (Situation, Situation),
+        still: Still,
+    ) -> bool {
+        self.now(ground, member, still);
+        self.future(ground, other, still);
+        let situations = 2 * self.owners.len();
+        let table = self.tables.of(still);
+        let now = &table.now[member as usize];
+        let future = &table.future[other as usize];
+        let meets = now
+            .iter()
+            .zip(future)
+            .any(|(now, future)| now.meets(future, still));
+        let row = &mut table.meets[member as usize];
+        row.resize(situations, None);
+        row[other as usize] = Some(meets);
+        meets
+    }
+
+    /// What a process in the situation can do now.
+    pub(super) fn now(
+        &mut self,
+        ground: Ground<'_>,
+        situation: Situation,
+        still: Still,
+    ) -> &Footprint {
+        let (place, moment) = self.place(situation, still);
+        let footprints = &mut self.footprints;
+        self.tables.of(still).now[situation as usize]
+            .get_or_insert_with(|| Box::new(footprints.now(ground, place, moment)))
+    }
+
+    /// What a process in the situation may do while time stands still.
+    pub(super) fn future(
+        &mut self,
+        ground: Ground<'_>,
+        situation: Situation,
+        still: Still,
+    ) -> &Footprint {
+        let (place, moment) = self.place(situation, still);
+        let footprints = &mut self.footprints;
+        self.tables.of(still).future[situation as usize]
+            .get_or_insert_with(|| Box::new(footprints.future(ground, place, moment)))
+    }
+
+    fn place(&self, situation: Situation, still: Still) -> ((usize, LocationId), Moment) {
+        let number = situation / 2;
+        let process = self.owners[number as usize] as usize;
+        let location = LocationId(number - self.first[process]);
+        let moment = Moment {
+            still,
+            is_asleep: situation % 2 == 1,
+        };
+        ((process, location), moment)
+    }
+}

@@ -1,0 +1,423 @@
+//! What changes places with what when two members of a scalar set are exchanged.
+//!
+//! A set is left out if the model tells its members apart ([`crate::ir::ScalarSet::told_apart_by`]), if words that nothing writes
+//! do, or if the receivers of a broadcast run updates whose order matters: they run in the order of processes, which exchanging
+//! members would change.
+//!
+//! Invariant: every exchange is an involution, and it only moves words of the same range to each other.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use crate::diagnostics::Span;
+use crate::ir::{AssignedValue, ClockRange, Coordinate, Edge, Network, Process, Shape, Update};
+
+use super::symmetry::{Exchange, Members, Swap, Symmetry};
+use crate::analysis::function_reads::read_words;
+
+/// The most members of a set that is reduced: all pairs of them are tried.
+const MOST_MEMBERS: u32 = 64;
+
+impl Symmetry {
+    /// The exchanges of members that leave the behaviour of a network as it is; `None` if there are none.
+    pub fn of_network(network: &Network) -> Option<Arc<Symmetry>> {
+        let places = Places::new(network);
+        let mut symmetry = Symmetry {
+            sets: Vec::new(),
+            swaps: Vec::new(),
+            dimension: network.clocks.len().max(1),
+        };
+        for number in 0..network.scalar_sets.len() as u32 {
+            if let Ok((members, swaps)) = symmetry.exchanges_of(&places, number) {
+                symmetry.sets.push(members);
+                symmetry.swaps.extend(swaps);
+            }
+        }
+        (!symmetry.sets.is_empty()).then(|| Arc::new(symmetry))
+    }
+
+    /// By scalar set: why it is not reduced, if it is not.
+    pub fn obstacles(network: &Network) -> Vec<Option<Obstacle>> {
+        let places = Places::new(network);
+        let none = Symmetry {
+            sets: Vec::new(),
+            swaps: Vec::new(),
+            dimension: network.clocks.len().max(1),
+        };
+        let sets = 0..network.scalar_sets.len() as u32;
+        sets.map(|number| none.exchanges_of(&places, number).err())
+            .collect()
+    }
+
+    /// The exchanges of the members of a set, which would come after those that are there.
+    fn exchanges_of(
+        &self,
+        places: &Places<'_>,
+        number: u32,
+    ) -> Result<(Members, Vec<Swap>), Obstacle> {
+        let set = &places.network.scalar_sets[number as usize];
+        if let Some(span) = set.told_apart_by {
+            return Err(Obstacle::ToldApart(span));
+        }
+        if set.size < 2 {
+            return Err(Obstacle::OneMember);
+        }
+        if set.size > MOST_MEMBERS {
+            return Err(Obstacle::ManyMembers(MOST_MEMBERS));
+        }
+        if has_ordered_receivers(places.network, number) {
+            return Err(Obstacle::OrderedReceivers);
+        }
+        let members = Members {
+            set: number,
+            count: set.size,
+            first: self.sets.iter().map(|set| set.count as usize).sum(),
+            first_swap: self.swaps.len(),
+        };
+        let pairs = (0..set.size).flat_map(|a| (a + 1..set.size).map(move |b| (a, b)));
+        let swaps: Option<Vec<Swap>> = pairs
+            .map(|pair| places.swap(self.sets.len(), members, pair))
+            .collect();
+        let swaps = swaps.ok_or(Obstacle::FirstValues)?;
+        let moves = |swap: &Swap| !(swap.words.is_empty() && swap.clock_pairs.is_empty());
+        if !swaps.iter().any(moves) {
+            return Err(Obstacle::Unused);
+        }
+        Ok((members, swaps))
+    }
+}
+
+/// Why members of a scalar set are not exchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Obstacle {
+    /// This tells them apart.
+    ToldApart(Span),
+    /// There is only one.
+    OneMember,
+    /// There are more than this number.
+    ManyMembers(u32),
+    /// Receivers of a broadcast run updates whose order matters.
+    OrderedReceivers,
+    /// Processes or values that never change differ.
+    FirstValues,
+    /// Nothing in a state depends on them.
+    Unused,
+}
+
+/// Receivers whose updates read more words count as reading all.
+const MOST_READ_WORDS: usize = 1 << 16;
+
+/// A word as exchanges see it.
+#[derive(Clone, Debug)]
+struct Word {
+    /// Its process, if it is local to one, with the number of the word among those of the process.
+    local: Option<(usize, usize)>,
+    coordinates: Vec<Coordinate>,
+    /// The set whose members are its values.
+    values: Option<u32>,
+}
+
+/// The words and clocks of a network by where they belong.
+struct Places<'n> {
+    network: &'n Network,
+    words: Vec<Word>,
+    /// By process: its words, then its clocks, in order.
+    of_process: Vec<(Vec<u32>, Vec<u32>)>,
+    /// By clock: its number among those of its process.
+    numbers: Vec<usize>,
+    written: Vec<bool>,
+}
+
+impl<'n> Places<'n> {
+    fn new(network: &'n Network) -> Places<'n> {
+        let mut of_process = vec![(Vec::new(), Vec::new()); network.processes.len()];
+        let mut words: Vec<Word> = (0..network.processes.len())
+            .map(|process| {
+                of_process[process].0.push(process as u32);
+                Word {
+                    local: Some((process, 0)),
+                    coordinates: Vec::new(),
+                    values: None,
+                }
+            })
+            .collect();
+        for variable in &network.layout.variables {
+            let before = words.len();
+            add_words(&variable.shape, &mut Vec::new(), &mut words);
+            let Some(owner) = variable.owner else {
+                continue;
+            };
+            let own = &mut of_process[owner.0 as usize].0;
+            for (index, word) in words.iter_mut().enumerate().skip(before) {
+                word.local = Some((owner.0 as usize, own.len()));
+                own.push(index as u32);
+            }
+        }
+        let mut numbers = vec![0; network.clocks.len()];
+        for (index, clock) in network.clocks.iter().enumerate() {
+            if let Some(owner) = clock.owner {
+                let own = &mut of_process[owner.0 as usize].1;
+                numbers[index] = own.len();
+                own.push(index as u32);
+            }
+        }
+        Places {
+            network,
+            words,
+            of_process,
+            numbers,
+            written: network.written_words(),
+        }
+    }
+
+    /// The exchange of two members; `None` if it is none of the network.
+    fn swap(&self, number: usize, set: Members, pair: (u32, u32)) -> Option<Swap> {
+        let mut swap = Swap {
+            set: number,
+            members: (pair.0 as i32, pair.1 as i32),
+            words: Vec::new(),
+            identity_words: 0,
+            clocks: Vec::new(),
+            clock_pairs: Vec::new(),
+        };
+        let identity_words = self.network.layout.identity_words;
+        for (index, word) in (0..).zip(&self.words) {
+            let source = self.image_of_word(index, set.set, pair)?;
+            let is_member = word.values == Some(set.set);
+            let exchange = Exchange {
+                word: index,
+                source,
+                is_member,
+            };
+            if source != index || is_member {
+                self.is_movable(exchange, pair).then_some(())?;
+                swap.words.push(exchange);
+                swap.identity_words += usize::from(index < identity_words);
+            }
+        }
+        for clock in 0..self.network.clocks.len() as u32 {
+            let image = self.image_of_clock(clock, set.set, pair)?;
+            swap.clocks.push(image);
+            if clock < image {
+                swap.clock_pairs.push((clock, image));
+            }
+        }
+        Some(swap)
+    }
+
+    /// Whether a word may get another value: something writes it, or it would get the value that it has.
+    fn is_movable(&self, exchange: Exchange, (first, second): (u32, u32)) -> bool {
+        let (word, source) = (exchange.word as usize, exchange.source as usize);
+        let initial = &self.network.initial;
+        let value = match initial[source] {
+            value if exchange.is_member && value == first as i32 => second as i32,
+            value if exchange.is_member && value == second as i32 => first as i32,
+            value => value,
+        };
+        self.written[word] == self.written[source] && (self.written[word] || initial[word] == value)
+    }
+
+    fn image_of_process(&self, process: usize, set: u32, pair: (u32, u32)) -> Option<usize> {
+        let one = &self.network.processes[process];
+        let image = moved(process as u32, &one.coordinates, set, pair) as usize;
+        let other = &self.network.processes[image];
+        let is_alike = one.locations.len() == other.locations.len()
+            && one.edges.len() == other.edges.len()
+            && one.priority == other.priority
+            && self.of_process[process].0.len() == self.of_process[image].0.len()
+            && self.of_process[process].1.len() == self.of_process[image].1.len();
+        is_alike.then_some(image)
+    }
+
+    fn image_of_word(&self, index: u32, set: u32, pair: (u32, u32)) -> Option<u32> {
+        let word = &self.words[index as usize];
+        let index = moved(index, &word.coordinates, set, pair);
+        let Some((process, _)) = word.local else {
+            return Some(index);
+        };
+        let image = self.image_of_process(process, set, pair)?;
+        let (_, number) = self.words[index as usize].local?;
+        Some(self.of_process[image].0[number])
+    }
+
+    fn image_of_clock(&self, index: u32, set: u32, pair: (u32, u32)) -> Option<u32> {
+        let clock = &self.network.clocks[index as usize];
+        let index = moved(index, &clock.coordinates, set, pair);
+        let Some(owner) = clock.owner else {
+            return Some(index);
+        };
+        let image = self.image_of_process(owner.0 as usize, set, pair)?;
+        Some(self.of_process[image].1[self.numbers[index as usize]])
+    }
+}
+
+/// Adds the words of a value, with their coordinates within it.
+fn add_words(shape: &Shape, coordinates: &mut Vec<Coordinate>, words: &mut Vec<Word>) {
+    let mut add = |values| {
+        words.push(Word {
+            local: None,
+            coordinates: coordinates.clone(),
+            values,
+        });
+    };
+    match shape {
+        Shape::Integer { .. } | Shape::Bool => add(None),
+        Shape::Scalar { set, .. } => add(Some(*set)),
+        Shape::Double => {
+            add(None);
+            add(None);
+        }
+        Shape::Array {
+            part, length, set, ..
+        } => {
+            for member in 0..*length {
+                coordinates.extend(set.map(|set| Coordinate {
+                    set,
+                    member,
+                    stride: part.words(),
+                }));
+                add_words(part, coordinates, words);
+                if set.is_some() {
+                    coordinates.pop();
+                }
+            }
+        }
+        Shape::Struct(fields) => {
+            for (_, shape) in fields {
+                add_words(shape, coordinates, words);
+            }
+        }
+    }
+}
+
+/// Where something is moved to when two members are exchanged.
+fn moved(place: u32, coordinates: &[Coordinate], set: u32, (first, second): (u32, u32)) -> u32 {
+    let own = coordinates.iter().filter(|one| one.set == set);
+    own.fold(place, |place, one| match one.member {
+        member if member == first => place + (second - first) * one.stride,
+        member if member == second => place - (second - first) * one.stride,
+        _ => place,
+    })
+}
+
+/// Whether two processes that exchanging members of a set reorders may receive the same broadcast, with updates whose order
+/// matters.
+fn has_ordered_receivers(network: &Network, set: u32) -> bool {
+    let mut groups: HashMap<u32, Vec<&Process>> = HashMap::new();
+    for process in &network.processes {
+        if process.coordinates.iter().any(|one| one.set == set) {
+            groups.entry(process.group.0).or_default().push(process);
+        }
+    }
+    let mut groups: Vec<_> = groups.into_iter().collect();
+    groups.sort_unstable_by_key(|(first, _)| *first);
+    groups.iter().any(|(_, processes)| {
+        let received: Vec<Vec<Effects>> = processes
+            .iter()
+            .map(|process| {
+                let edges = process.edges.iter();
+                let edges = edges.filter(|edge| receives_broadcast(network, edge));
+                edges.map(|edge| Effects::new(network, edge)).collect()
+            })
+            .collect();
+        received.iter().enumerate().any(|(index, own)| {
+            let others = received[index + 1..].iter().flatten();
+            others
+                .into_iter()
+                .any(|other| own.iter().any(|one| !one.commutes_with(other)))
+        })
+    })
+}
+
+fn receives_broadcast(network: &Network, edge: &Edge) -> bool {
+    edge.sync.is_some_and(|sync| {
+        let first = sync.channel.0 as usize;
+        let channels = &network.channels[first..first + sync.count as usize];
+        !sync.send && channels.iter().any(|channel| channel.broadcast)
+    })
+}
+
+/// What the updates of an edge touch.
+struct Effects {
+    channels: (u32, u32),
+    /// The words that are read, if they are known.
+    reads: Option<Vec<u32>>,
+    writes: Vec<(u32, u32)>,
+    /// The clocks that are set, to what constant if it is always the same.
+    sets: Vec<(ClockRange, Option<i32>)>,
+    /// The clocks that are copied.
+    copies: Vec<ClockRange>,
+}
+
+impl Effects {
+    fn new(network: &Network, edge: &Edge) -> Effects {
+        let branches = edge.branches.iter().map(|branch| &branch.update);
+        let updates: Vec<&Update> = std::iter::once(&edge.update).chain(branches).collect();
+        let functions = updates.iter().filter_map(|update| update.function);
+        let assignments = || updates.iter().flat_map(|update| &update.assignments);
+        Effects {
+            channels: edge
+                .sync
+                .map_or((0, 0), |sync| (sync.channel.0, sync.count)),
+            reads: read_words(network, functions, MOST_READ_WORDS),
+            writes: updates.iter().flat_map(|one| one.writes.clone()).collect(),
+            sets: assignments()
+                .map(|one| match one.value {
+                    AssignedValue::Integer(low, high) => (one.target, (low == high).then_some(low)),
+                    AssignedValue::Clock(..) => (one.target, None),
+                })
+                .collect(),
+            copies: assignments()
+                .filter_map(|one| match one.value {
+                    AssignedValue::Clock(source, ..) => Some(source),
+                    AssignedValue::Integer(..) => None,
+                })
+                .collect(),
+        }
+    }
+
+    fn reads_any(&self, written: &[(u32, u32)]) -> bool {
+        let Some(reads) = &self.reads else {
+            return !written.is_empty();
+        };
+        written.iter().any(|&(first, count)| {
+            let next = reads.partition_point(|&word| word < first);
+            reads.get(next).is_some_and(|&word| word < first + count)
+        })
+    }
+
+    /// Whether the order of the two does not matter, or they never run together.
+    fn commutes_with(&self, other: &Effects) -> bool {
+        if !meet(self.channels, other.channels) {
+            return true;
+        }
+        let words_are_apart = !meet_any(&self.writes, &other.writes)
+            && !self.reads_any(&other.writes)
+            && !other.reads_any(&self.writes);
+        let range = |clocks: &ClockRange| (clocks.first.0, clocks.count);
+        let are_set_alike = self.sets.iter().all(|(clocks, value)| {
+            other.sets.iter().all(|(others, other)| {
+                !meet(range(clocks), range(others)) || (value.is_some() && value == other)
+            })
+        });
+        let is_copied = |one: &Effects, two: &Effects| {
+            let mut copies = one.copies.iter();
+            copies.any(|copied| {
+                two.sets
+                    .iter()
+                    .any(|(set, _)| meet(range(copied), range(set)))
+            })
+        };
+        words_are_apart && are_set_alike && !is_copied(self, other) && !is_copied(other, self)
+    }
+}
+
+fn meet(one: (u32, u32), other: (u32, u32)) -> bool {
+    one.0 < other.0 + other.1 && other.0 < one.0 + one.1
+}
+
+fn meet_any(ranges: &[(u32, u32)], others: &[(u32, u32)]) -> bool {
+    ranges
+        .iter()
+        .any(|&one| others.iter().any(|&other| meet(one, other)))
+}

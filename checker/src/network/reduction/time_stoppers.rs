@@ -1,0 +1,178 @@
+//! Who keeps time from passing in a state: which processes, as long as they do not move, leave it no way.
+//!
+//! * Who stays in an urgent location, or in a committed one.
+//! * Who stays in a location whose invariant bounds a clock from above, where all valuations have reached the bound.
+//! * Who takes part in a synchronisation on an urgent channel that is possible whatever the clocks say.
+//!
+//! The last two can also end because of others: who writes what the invariant, or the guards of the synchronisation, read. Those are the
+//! ones that get in the way of the holder (see [`crate::analysis::dependence`]).
+//!
+//! Where the rate of a clock may be 0, bounds of invariants do not count.
+
+use crate::ir::{Location, Network, Urgency};
+use crate::zones::{Bound, Zone};
+
+use crate::analysis::dependence::Still;
+use crate::network::symbolic::zone_graph::to_constraint;
+use crate::network::{Failure, Moves, Symbolic};
+
+/// A weak upper bound of some of consecutive clocks, at least `low`.
+#[derive(Clone, Copy, Debug)]
+struct Limit {
+    first: usize,
+    count: usize,
+    low: i32,
+}
+
+/// Why processes may keep time from passing, by process and location.
+#[derive(Debug)]
+pub(super) struct Holders {
+    urgencies: Vec<Vec<Urgency>>,
+    limits: Vec<Vec<Vec<Limit>>>,
+    has_urgent_channels: bool,
+}
+
+impl Holders {
+    pub(super) fn new(network: &Network) -> Holders {
+        let processes = || network.processes.iter();
+        let has_rates = processes().any(|process| {
+            let mut locations = process.locations.iter();
+            locations.any(|location| !location.rates.is_empty())
+        });
+        let of_process = |locations: &[Location]| -> Vec<Vec<Limit>> {
+            locations
+                .iter()
+                .map(|location| {
+                    if has_rates {
+                        Vec::new()
+                    } else {
+                        limits(location)
+                    }
+                })
+                .collect()
+        };
+        Holders {
+            urgencies: processes()
+                .map(|process| process.locations.iter().map(|one| one.urgency).collect())
+                .collect(),
+            limits: processes()
+                .map(|process| of_process(&process.locations))
+                .collect(),
+            has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
+        }
+    }
+
+    /// Whether something but a committed location may keep time from passing.
+    pub(super) fn are_possible(&self) -> bool {
+        self.has_urgent_channels
+            || self
+                .limits
+                .iter()
+                .flatten()
+                .any(|limits| !limits.is_empty())
+            || self
+                .urgencies
+                .iter()
+                .flatten()
+                .any(|one| *one == Urgency::Urgent)
+    }
+
+    /// Notes by process whether it keeps time from passing in a state with these words, zone and moves; returns why it stands still.
+    /// If some location is committed, only who stays in one counts.
+    pub(super) fn find(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        (words, zone): (&mut [i32], &Zone),
+        moves: &Moves,
+        holds: &mut Vec<bool>,
+    ) -> Result<Option<Still>, Failure> {
+        holds.clear();
+        holds.resize(self.urgencies.len(), false);
+        let mut still = None;
+        for (process, urgencies) in self.urgencies.iter().enumerate() {
+            match urgencies[words[process] as usize] {
+                Urgency::Committed => {
+                    if still != Some(Still::Committed) {
+                        holds.fill(false);
+                    }
+                    still = Some(Still::Committed);
+                    holds[process] = true;
+                }
+                Urgency::Urgent if still != Some(Still::Committed) => {
+                    still = Some(Still::Urgent);
+                    holds[process] = true;
+                }
+                _ => {}
+            }
+        }
+        if still == Some(Still::Committed) {
+            return Ok(still);
+        }
+        for (process, limits) in self.limits.iter().enumerate() {
+            let limits = &limits[words[process] as usize];
+            if limits.iter().any(|limit| limit.may_be_reached(zone))
+                && has_reached_limit(symbolic, process, words, zone)?
+            {
+                still = Some(Still::Urgent);
+                holds[process] = true;
+            }
+        }
+        if self.has_urgent_channels {
+            let stepper = &symbolic.stepper;
+            let is_urgent = |one: &crate::network::MoveRef<'_>| {
+                one.is_unconditional() && stepper.is_urgent_move(*one)
+            };
+            for part in moves.iter().filter(is_urgent).flat_map(|one| one.parts) {
+                still = Some(Still::Urgent);
+                holds[part.process as usize] = true;
+            }
+        }
+        Ok(still)
+    }
+}
+
+/// The weak upper bounds of single clocks in an invariant.
+fn limits(location: &Location) -> Vec<Limit> {
+    let atoms = location.invariant.atoms.iter();
+    let bounds_clock = |atom: &&crate::ir::ClockAtom| {
+        !atom.strict && atom.right.first.0 == 0 && atom.right.count == 1
+    };
+    let limits = atoms.filter(bounds_clock).map(|atom| Limit {
+        first: atom.left.first.0 as usize,
+        count: atom.left.count as usize,
+        low: atom.low,
+    });
+    limits.collect()
+}
+
+impl Limit {
+    /// Whether all valuations of the zone have come to a value that the bound may have.
+    fn may_be_reached(self, zone: &Zone) -> bool {
+        let mut clocks = self.first..self.first + self.count;
+        clocks.any(|clock| clock != 0 && is_at_least(zone, clock, self.low))
+    }
+}
+
+fn is_at_least(zone: &Zone, clock: usize, value: i32) -> bool {
+    Bound::weak(value).is_some_and(|value| zone.bound(0, clock) + value <= Bound::LE_ZERO)
+}
+
+/// Whether all valuations of the zone have come to an upper bound that the invariant of a process has now.
+fn has_reached_limit(
+    symbolic: &mut Symbolic<'_>,
+    process: usize,
+    words: &mut [i32],
+    zone: &Zone,
+) -> Result<bool, Failure> {
+    let Some(emitted) = symbolic.stepper.invariant_of(process, words)? else {
+        return Ok(false);
+    };
+    for one in emitted {
+        let one = to_constraint(one)?;
+        let is_limit = one.right == 0 && one.left != 0 && !one.bound.is_strict();
+        if is_limit && is_at_least(zone, one.left, one.bound.value()) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}

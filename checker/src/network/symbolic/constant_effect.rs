@@ -1,0 +1,137 @@
+//! Moves whose effect on clocks and locations does not depend on variables, worked out once.
+//!
+//! Invariant: taking a [`FixedMove`] runs the functions that taking the move runs, in the same order, and gives the same words;
+//! what it does to clocks is [`FixedMove::effect`] in every state of its location vector.
+
+use crate::exec::{EmittedConstraint, RunTimeError};
+use crate::ir::{FunctionId, Update};
+
+use super::zone_graph::to_constraints;
+use crate::network::discrete::selects::select_values;
+use crate::network::{ClockEffect, MoveRef, Stepper, Symbolic};
+use crate::zones::clocks::Assignment;
+use crate::zones::dbm::Constraint;
+use crate::zones::federation::block_bytes;
+
+/// A move that is worked out.
+#[derive(Clone, Debug)]
+pub struct FixedMove {
+    /// The functions that change variables, with their arguments.
+    calls: Vec<(FunctionId, Vec<i32>)>,
+    /// The processes that move, each with the location that it enters.
+    targets: Vec<(u32, i32)>,
+    /// What the move does to clocks.
+    pub effect: ClockEffect,
+}
+
+impl FixedMove {
+    /// The bytes that it takes beside the value itself, arguments of functions excepted.
+    pub fn heap_bytes(&self) -> usize {
+        block_bytes(size_of_val(&*self.calls))
+            + block_bytes(size_of_val(&*self.targets))
+            + self.effect.heap_bytes()
+    }
+
+    /// Enters the locations of the target, and leaves variables as they are.
+    pub fn enter_locations(&self, words: &mut [i32]) {
+        for &(process, location) in &self.targets {
+            words[process as usize] = location;
+        }
+    }
+
+    fn add(&mut self, update: &Update, arguments: &[i32]) -> Option<()> {
+        if update.emits {
+            return None;
+        }
+        let call = update
+            .function
+            .map(|function| (function, arguments.to_vec()));
+        self.calls.extend(call);
+        for &(clock, value) in &update.fixed {
+            let clock = clock.0 as usize;
+            let is_allowed = crate::zones::Bound::is_allowed(value);
+            self.effect
+                .assignments
+                .push(is_allowed.then_some(Assignment::Value { clock, value })?);
+        }
+        Some(())
+    }
+}
+
+impl Stepper<'_> {
+    /// Takes a move that is worked out: changes locations and variables.
+    pub fn take(&mut self, one: &FixedMove, words: &mut [i32]) -> Result<(), RunTimeError> {
+        for (function, arguments) in &one.calls {
+            self.run(*function, arguments, words)?;
+        }
+        one.enter_locations(words);
+        Ok(())
+    }
+}
+
+impl Symbolic<'_> {
+    /// Works out a move of a state with these words; `None` if its effect on clocks, or whether it is possible, may depend on variables.
+    pub fn fix(&self, one: MoveRef<'_>, words: &[i32]) -> Option<FixedMove> {
+        let network = self.stepper.network();
+        let mut fixed = FixedMove {
+            calls: Vec::new(),
+            targets: Vec::new(),
+            effect: ClockEffect::default(),
+        };
+        if one.excluded().next().is_some() {
+            return None;
+        }
+        fixed.effect.guard = to_constraints(one.constraints).ok()??;
+        if let Some(update) = &network.before_update {
+            fixed.add(update, &[])?;
+        }
+        let mut arguments = Vec::new();
+        for &part in one.parts {
+            let edge = self.stepper.edge(part);
+            let branch = &edge.branches[part.branch as usize];
+            select_values(edge, part.select, &mut arguments);
+            fixed.add(&edge.update, &arguments)?;
+            fixed.add(&branch.update, &arguments)?;
+            fixed.targets.push((part.process, branch.target.0 as i32));
+        }
+        if let Some(update) = &network.after_update {
+            fixed.add(update, &[])?;
+        }
+        let mut locations = words[..network.processes.len()].to_vec();
+        fixed.enter_locations(&mut locations);
+        fixed.effect.invariant = self.fixed_invariant(&locations)?;
+        Some(fixed)
+    }
+
+    /// The invariants of a location vector; `None` if they depend on variables or never hold.
+    fn fixed_invariant(&self, locations: &[i32]) -> Option<Vec<Constraint>> {
+        let mut emitted = Vec::new();
+        for (process, &location) in self.stepper.network().processes.iter().zip(locations) {
+            let invariant = &process.locations[location as usize].invariant;
+            if invariant.function.is_some() {
+                return None;
+            }
+            let fixed = invariant.fixed.iter().copied();
+            emitted.extend(fixed.map(EmittedConstraint::from));
+        }
+        to_constraints(&emitted).ok()?
+    }
+
+    /// Whether locations and the answers of guards decide which moves there are, and locations alone how time passes.
+    pub fn is_fixed(&self) -> bool {
+        if self.has_priorities || self.restriction.is_some() {
+            return false;
+        }
+        let network = self.stepper.network();
+        let is_urgent = network.channels.iter().any(|channel| channel.urgent);
+        let locations = network
+            .processes
+            .iter()
+            .flat_map(|process| &process.locations);
+        !is_urgent
+            && locations
+                .map(|location| location.rates.len())
+                .sum::<usize>()
+                == 0
+    }
+}

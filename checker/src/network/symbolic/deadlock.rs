@@ -1,0 +1,259 @@
+//! Deadlocks: the valuations of a state from which no move is possible, now or after any delay.
+//!
+//! Most states have a move that every valuation of the zone can wait for. Whether a move is one, its guard tells without an operation on
+//! zones ([`hold_sometime`]): a valuation v can wait until lower bounds `x >= l` and upper bounds `y <= u` hold, those of the invariant
+//! among these, exactly if `y - x <= u - l` holds of v for all pairs of them, and `y <= u` for the upper bounds of the guard. That is
+//! Fourier and Motzkin's elimination of the delay; the bound of a closed zone on `y - x` is what decides it for all its valuations.
+//!
+//! Only where no move is within reach of the whole zone, the valuations before each move are made, and whether they cover the zone is
+//! decided part by part ([`Federation::includes_zone`]), so that no list of what is left grows. What is left is only computed where it
+//! is asked for.
+
+use crate::zones::clocks::Assignment;
+use crate::zones::dbm::Constraint;
+use crate::zones::future::{self, Barriers};
+use crate::zones::{Bound, Federation, Zone};
+
+use super::predicate::Extent;
+use super::zone_graph::add_constraints;
+use crate::network::{ClockEffect, Failure, Moves, Symbolic};
+
+/// Buffers for looks at deadlocks, which are used again.
+#[derive(Debug, Default)]
+pub(super) struct Lookout {
+    moves: Moves,
+    target: Vec<i32>,
+    effect: ClockEffect,
+    needs: Vec<Constraint>,
+    invariant: Vec<Constraint>,
+}
+
+/// The valuations of a zone from which a move is possible.
+enum Alive {
+    /// All.
+    Everywhere,
+    /// Those that are in the zone and in this federation.
+    Within(Federation),
+}
+
+impl Symbolic<'_> {
+    /// The valuations of the zone from which no move is possible, now or after any delay.
+    pub(super) fn deadlock_extent(
+        &mut self,
+        words: &mut [i32],
+        zone: &[Bound],
+    ) -> Result<Extent, Failure> {
+        Ok(match self.alive(words, zone)? {
+            Alive::Everywhere => Extent::Nowhere,
+            Alive::Within(alive) => {
+                let whole = Federation::of_zone(self.dimension(), zone);
+                let mut rest = whole.clone();
+                rest.subtract(&alive);
+                Extent::of(rest, &whole)
+            }
+        })
+    }
+
+    /// Whether the zone has a valuation from which no move is possible, now or after any delay.
+    pub(super) fn has_deadlock(
+        &mut self,
+        words: &mut [i32],
+        zone: &[Bound],
+    ) -> Result<bool, Failure> {
+        Ok(match self.alive(words, zone)? {
+            Alive::Everywhere => false,
+            Alive::Within(alive) => !alive.includes_zone(zone),
+        })
+    }
+
+    fn alive(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Alive, Failure> {
+        let mut lookout = std::mem::take(&mut self.lookout);
+        let alive = self.alive_by(words, zone, &mut lookout);
+        self.lookout = lookout;
+        alive
+    }
+
+    fn alive_by(
+        &mut self,
+        words: &mut [i32],
+        own: &[Bound],
+        lookout: &mut Lookout,
+    ) -> Result<Alive, Failure> {
+        let may_delay = self.may_delay(words)?;
+        let stopped = self.stopped(words)?;
+        // Beside barriers the zone may be one of several pieces of what time reaches.
+        let future = self.future_beside_barriers(may_delay, words, own)?;
+        let zone = future.as_ref().map_or(own, Zone::bounds);
+        let barriers = if may_delay {
+            self.barriers(words, zone)?
+        } else {
+            Barriers::none(self.dimension())
+        };
+        self.moves_within(words, zone, &mut lookout.moves)?;
+        if barriers.is_empty() && stopped.is_empty() {
+            // Moves without guards are the likeliest to be within reach.
+            for is_first in [true, false] {
+                if self.is_one_within_reach((words, zone), may_delay, is_first, lookout)? {
+                    return Ok(Alive::Everywhere);
+                }
+            }
+        }
+        let Lookout {
+            moves,
+            target,
+            effect,
+            needs,
+            ..
+        } = lookout;
+        let mut alive = Federation::empty(self.dimension());
+        for one in moves.iter() {
+            if !self.is_enabled(one, zone)? {
+                continue;
+            }
+            target.clear();
+            target.extend_from_slice(words);
+            if self.fire_into(one, target, effect)? {
+                let mut before = if add_needs(effect, needs) {
+                    let mut part = Federation::of_zone(self.dimension(), zone);
+                    part.constrain_all(needs);
+                    part
+                } else {
+                    effect.enabled_part(zone, self.dimension())
+                };
+                if !barriers.is_empty() {
+                    before = future::predecessors_within(&before, &barriers);
+                } else if may_delay {
+                    before.down(&stopped);
+                }
+                alive.unite(&before);
+            }
+        }
+        Ok(Alive::Within(alive))
+    }
+
+    /// Whether one of the moves without guards, or of the others, is surely possible, now or later, from all of the zone.
+    fn is_one_within_reach(
+        &mut self,
+        (words, zone): (&mut [i32], &[Bound]),
+        may_delay: bool,
+        is_unconditional: bool,
+        lookout: &mut Lookout,
+    ) -> Result<bool, Failure> {
+        let Lookout {
+            moves,
+            target,
+            effect,
+            needs,
+            invariant,
+        } = lookout;
+        let mut has_invariant = false;
+        for one in moves.iter() {
+            if one.is_unconditional() != is_unconditional || !self.is_enabled(one, zone)? {
+                continue;
+            }
+            target.clear();
+            target.extend_from_slice(words);
+            if !self.fire_into(one, target, effect)? || !add_needs(effect, needs) {
+                continue;
+            }
+            let bounds = (zone, self.dimension());
+            if !may_delay {
+                if hold_now(needs, bounds) {
+                    return Ok(true);
+                }
+                continue;
+            }
+            if !has_invariant && needs.iter().any(is_lower) {
+                has_invariant = true;
+                invariant.clear();
+                if let Some(emitted) = self.stepper.invariants(words)? {
+                    add_constraints(emitted, invariant)?;
+                }
+            }
+            if hold_sometime(needs, bounds, invariant) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// All that time reaches from the zone within the invariants if barriers may have cut it; `None` if the zone is that.
+    fn future_beside_barriers(
+        &mut self,
+        may_delay: bool,
+        words: &mut [i32],
+        zone: &[Bound],
+    ) -> Result<Option<Zone>, Failure> {
+        if !may_delay || !self.has_barriers() {
+            return Ok(None);
+        }
+        let Some(invariant) = self.invariant(words)? else {
+            return Ok(None);
+        };
+        let mut future = Zone::from_bounds(self.dimension(), zone);
+        self.delay(words, may_delay, &invariant, future.bounds_mut())?;
+        Ok(Some(future))
+    }
+}
+
+/// Whether all valuations of a closed zone meet the needs.
+fn hold_now(needs: &[Constraint], (zone, dimension): (&[Bound], usize)) -> bool {
+    let holds = |one: &Constraint| zone[one.left * dimension + one.right] <= one.bound;
+    needs.iter().all(holds)
+}
+
+/// Whether every valuation of a closed zone can wait, within the invariant, until it meets the needs. The invariant only counts where
+/// there are lower bounds among them.
+fn hold_sometime(
+    needs: &[Constraint],
+    (zone, dimension): (&[Bound], usize),
+    invariant: &[Constraint],
+) -> bool {
+    let bound = |left: usize, right: usize| zone[left * dimension + right];
+    // Upper bounds must not have passed yet, and time does not change differences.
+    let holds_still = |one: &Constraint| is_lower(one) || bound(one.left, one.right) <= one.bound;
+    let comes_in_time = |low: &Constraint| {
+        let mut uppers = needs.iter().chain(invariant).filter(|one| one.right == 0);
+        uppers.all(|high| bound(high.left, low.right) <= high.bound + low.bound)
+    };
+    needs.iter().all(holds_still) && needs.iter().filter(|one| is_lower(one)).all(comes_in_time)
+}
+
+fn is_lower(constraint: &Constraint) -> bool {
+    constraint.left == 0
+}
+
+/// Replaces `needs` by what must hold of a valuation for the move to be possible; returns false if that is not known, or never holds.
+fn add_needs(effect: &ClockEffect, needs: &mut Vec<Constraint>) -> bool {
+    if !effect.excluded.is_empty() {
+        return false;
+    }
+    needs.clear();
+    needs.extend_from_slice(&effect.guard);
+    let is_value = |one: &Assignment| matches!(one, Assignment::Value { value, .. } if *value >= 0);
+    if !effect.assignments.iter().all(is_value) {
+        return false;
+    }
+    // What a clock has after the assignments, of which the last one counts.
+    let after = |clock: usize| {
+        let mut last_first = effect.assignments.iter().rev();
+        last_first.find_map(|one| match *one {
+            Assignment::Value { clock: set, value } if set == clock => Some(value),
+            _ => None,
+        })
+    };
+    for one in &effect.invariant {
+        let (left, right) = (after(one.left), after(one.right));
+        let shifted = Constraint {
+            left: left.map_or(one.left, |_| 0),
+            right: right.map_or(one.right, |_| 0),
+            bound: one.bound.shifted(right.unwrap_or(0) - left.unwrap_or(0)),
+        };
+        if shifted.left != shifted.right {
+            needs.push(shifted);
+        } else if shifted.bound < Bound::LE_ZERO {
+            return false;
+        }
+    }
+    true
+}

@@ -1,0 +1,9 @@
+//! The zone graph: delay, successors, predicates and deadlocks of symbolic states.
+
+pub(super) mod constant_effect;
+pub(super) mod deadlock;
+pub(super) mod delay;
+pub mod predicate;
+pub mod restriction;
+pub(super) mod successor_cache;
+pub mod zone_graph;

@@ -1,0 +1,94 @@
+//! What one player allows itself: moves are left out and delays cut short before any search sees them.
+//!
+//! Under a restriction the moves of its owner are possible only where it allows them, and time passes only where it allows
+//! waiting. All other moves stay as they are. Where waiting ends without a first moment (wait while `x <= 1`, act when `x > 1`),
+//! time runs on inside the valuations of one decision to act: the restriction leaves open which of its moments is taken.
+//!
+//! The controller chooses edges, and the environment picks the legs of branch points. So what is said of a move of the controller counts for all
+//! legs of its edges, and a restriction of the environment may say which leg of a move of the controller is picked.
+//!
+//! What priorities leave of the moves is restricted further: a move that the restriction forbids still goes before those of lower
+//! levels. Whether priorities count is said elsewhere ([`crate::network::Symbolic::without_priorities`]).
+
+use crate::exec::EmittedConstraint;
+use crate::ir::ClockAtom;
+use crate::zones::Federation;
+use crate::zones::future::Barriers;
+
+use crate::network::{MoveRef, Moves, Part, is_same_entry};
+
+/// What is allowed in the states with the same words.
+#[derive(Clone, Debug)]
+pub struct Allowed {
+    /// Where time must not pass.
+    pub barriers: Barriers,
+    /// By move: where it is forbidden.
+    pub forbidden: Vec<(Vec<Part>, Federation)>,
+    /// Where every move that is not listed is forbidden.
+    pub others: Federation,
+    /// By move of the other player: where it is the one that is picked of those that take the same edges.
+    pub legs: Vec<(Vec<Part>, Federation)>,
+}
+
+/// Restricts one player. Threads share it.
+pub trait Restriction: Sync {
+    /// What is allowed in a state with these words; `None` is everything.
+    fn allowed(&self, words: &[i32]) -> Option<&Allowed>;
+
+    /// Whether the player owns a move that is, or is not, controllable.
+    fn owns(&self, controllable: bool) -> bool;
+
+    /// The comparisons with which the restriction tells clock values apart.
+    fn atoms(&self) -> &[ClockAtom];
+}
+
+impl Allowed {
+    /// Where a move of the player is forbidden; one of the controller's is known by its entry.
+    fn forbidden(&self, one: &MoveRef<'_>) -> &Federation {
+        let is_it = |parts: &[Part]| {
+            parts == one.parts || one.controllable && is_same_entry(parts, one.parts)
+        };
+        let listed = self.forbidden.iter().find(|listed| is_it(&listed.0));
+        listed.map_or(&self.others, |listed| &listed.1)
+    }
+
+    /// Where another leg is picked than that of a move of the other player.
+    fn picked_otherwise(&self, one: &MoveRef<'_>) -> impl Iterator<Item = &Federation> {
+        let others = self
+            .legs
+            .iter()
+            .filter(|leg| leg.0 != one.parts && is_same_entry(&leg.0, one.parts));
+        others.map(|leg| &leg.1)
+    }
+}
+
+/// Cuts the moves of a state down to what is allowed.
+pub(super) fn apply(restriction: &dyn Restriction, words: &[i32], moves: &mut Moves) {
+    let Some(allowed) = restriction.allowed(words) else {
+        return;
+    };
+    let is_own = |one: &MoveRef<'_>| restriction.owns(one.controllable);
+    if allowed.legs.is_empty() && !moves.iter().any(|one| is_own(&one)) {
+        return;
+    }
+    let mut rest = Moves::default();
+    for one in moves.iter() {
+        let forbidden: Vec<Vec<EmittedConstraint>> = if is_own(&one) {
+            super::delay::conjunctions(allowed.forbidden(&one))
+        } else {
+            let others = allowed.picked_otherwise(&one);
+            others.flat_map(super::delay::conjunctions).collect()
+        };
+        // A conjunction of nothing holds always.
+        if !forbidden.iter().any(Vec::is_empty) {
+            let excluded = one.excluded().chain(forbidden.iter().map(Vec::as_slice));
+            rest.push(
+                one.parts,
+                [one.constraints],
+                excluded,
+                one.label.unsettled(),
+            );
+        }
+    }
+    *moves = rest;
+}

@@ -1,0 +1,270 @@
+//! How a run stays inside a predicate in one state.
+//!
+//! Where the predicate holds in a part of a zone only, that part is cut out exactly ([`crate::zones::future`]), so that a delay never
+//! crosses its outside. With stopped clocks it may, and beside two clocks that run a wait from which something is possible later may
+//! count as being stuck: every doubt is taken for a run, so that there being none is certain.
+
+use crate::ir::Predicate;
+use crate::network::{Extent, Failure, Moves, Symbolic};
+use crate::zones::dbm::{self, Constraint};
+use crate::zones::future::{self, Barriers};
+use crate::zones::{Bound, ClockSet, Federation, Zone};
+
+use super::emptiness::Ending;
+
+/// The part of a state that a run inside the predicate can reach.
+pub(super) struct Inside {
+    /// Its zones before extrapolation; those in which a run can end, if one can.
+    pub(super) zones: Vec<Zone>,
+    /// Whether a run can end in it.
+    pub(super) ending: Option<Ending>,
+    /// Whether a doubt was counted as a run.
+    pub(super) is_coarse: bool,
+}
+
+impl Inside {
+    /// What a run inside the predicate can reach by delay from a zone on entry of a state. Where that lies in an open part of a barrier,
+    /// `is_running` says whether time runs in it.
+    pub(super) fn of(
+        symbolic: &mut Symbolic<'_>,
+        keep: &Predicate,
+        words: &mut [i32],
+        (entry, is_running): (&Zone, bool),
+        invariant: &[Constraint],
+    ) -> Result<Inside, Failure> {
+        let dimension = symbolic.dimension();
+        let may_delay = symbolic.may_delay(words)?;
+        let mut whole = entry.clone();
+        symbolic.delay(words, may_delay, invariant, whole.bounds_mut())?;
+        let outside = match symbolic.extent(keep, words, whole.bounds())? {
+            Extent::Nowhere => {
+                return Ok(Inside {
+                    zones: Vec::new(),
+                    ending: None,
+                    is_coarse: false,
+                });
+            }
+            Extent::Everywhere => Federation::empty(dimension),
+            Extent::Part(part) => {
+                let mut outside = Federation::of_zone(dimension, whole.bounds());
+                outside.subtract(&part);
+                outside
+            }
+        };
+        let passage = Passage::new(symbolic, keep, words, whole, outside)?;
+        let mut inside = passage.reached(entry, is_running);
+        inside.reduce();
+        let end = passage.end(symbolic, words, &inside)?;
+        let (ending, part) = match end {
+            Some((ending, part)) => (Some(ending), part),
+            None => (None, inside),
+        };
+        let zones = part.zones().map(|zone| Zone::from_bounds(dimension, zone));
+        Ok(Inside {
+            zones: zones.collect(),
+            ending,
+            is_coarse: passage.is_coarse(),
+        })
+    }
+}
+
+/// The valuations of a state inside the predicate from which time can pass without limit, and those from which no wait leads to a
+/// move or out of the predicate; where clocks stand still, only such. `whole` is what the invariants allow.
+pub(in crate::search) fn endings(
+    symbolic: &mut Symbolic<'_>,
+    keep: &Predicate,
+    words: &mut [i32],
+    whole: Zone,
+) -> Result<(Federation, Federation), Failure> {
+    let dimension = whole.dimension();
+    let extent = symbolic.extent(keep, words, whole.bounds())?;
+    let inside = extent.to_federation(whole.bounds(), dimension);
+    let mut outside = Federation::of_zone(dimension, whole.bounds());
+    outside.subtract(&inside);
+    let mut passage = Passage::new(symbolic, keep, words, whole, outside)?;
+    passage.counts_doubts = false;
+    let stuck = passage.stuck(symbolic, words, &inside)?;
+    Ok((passage.waiting(&inside), stuck))
+}
+
+/// How a run inside a predicate passes through a state.
+struct Passage {
+    /// All that delay within the invariants reaches.
+    whole: Zone,
+    /// The part of it in which the predicate does not hold.
+    outside: Federation,
+    /// Where what time leads to is looked for: the same, or where a clock stands still beside two that run all that the invariants allow;
+    /// and its part in which the predicate does not hold. A set of which no comparison cuts corners has an exact past there.
+    frame: Zone,
+    left: Federation,
+    /// The part of it in which an urgent synchronisation or a restriction stops time.
+    barriers: Barriers,
+    may_delay: bool,
+    stopped: ClockSet,
+    /// Whether a doubt counts as staying; else as leaving.
+    counts_doubts: bool,
+}
+
+impl Passage {
+    fn new(
+        symbolic: &mut Symbolic<'_>,
+        keep: &Predicate,
+        words: &mut [i32],
+        whole: Zone,
+        outside: Federation,
+    ) -> Result<Passage, Failure> {
+        let may_delay = symbolic.may_delay(words)?;
+        let dimension = whole.dimension();
+        let stopped = symbolic.stopped(words)?;
+        let (mut frame, mut left) = (whole.clone(), outside.clone());
+        if has_crooked_pasts(&stopped, dimension) {
+            frame = Zone::universe(dimension);
+            frame.constrain_all(&symbolic.invariant(words)?.unwrap_or_default());
+            let inside = symbolic.extent(keep, words, frame.bounds())?;
+            left = Federation::of_zone(dimension, frame.bounds());
+            left.subtract(&inside.to_federation(frame.bounds(), dimension));
+        }
+        Ok(Passage {
+            barriers: if may_delay {
+                symbolic.barriers(words, whole.bounds())?
+            } else {
+                Barriers::none(whole.dimension())
+            },
+            stopped,
+            whole,
+            outside,
+            frame,
+            left,
+            may_delay,
+            counts_doubts: true,
+        })
+    }
+
+    /// The valuations from which time leads into a part of the frame; where that cannot be told, those of the part alone if doubts count
+    /// as staying, and else more.
+    fn past(&self, part: &Federation) -> Federation {
+        let dimension = part.dimension();
+        let mut past = part.clone();
+        if !self.counts_doubts || !has_crooked_pasts(&self.stopped, dimension) {
+            past.down(&self.stopped);
+            return past;
+        }
+        for zone in part.zones() {
+            if is_straight(zone, dimension, &self.stopped) {
+                let mut one = Federation::of_zone(dimension, zone);
+                one.down(&self.stopped);
+                past.unite(&one);
+            }
+        }
+        past
+    }
+
+    /// What delay inside the predicate reaches.
+    fn reached(&self, entry: &Zone, is_running: bool) -> Federation {
+        let dimension = self.whole.dimension();
+        let mut reached = Federation::of_zone(dimension, self.whole.bounds());
+        if !self.may_delay || !self.stopped.is_empty() {
+            reached.subtract(&self.outside);
+        } else if !self.outside.is_empty() || !self.barriers.is_empty() {
+            let from = Federation::of_zone(dimension, entry.bounds());
+            reached = future::successors(&from, &self.outside, &self.barriers);
+            if is_running {
+                let on = future::successors_inside(&from, &self.outside, &self.barriers);
+                reached.unite(&on);
+            }
+            reached.intersect_zone(self.whole.bounds());
+        }
+        reached
+    }
+
+    /// Whether the state is treated as if more runs stayed in it than do.
+    fn is_coarse(&self) -> bool {
+        let is_crossed = !self.stopped.is_empty() && !self.outside.is_empty();
+        self.may_delay && (is_crossed || has_crooked_pasts(&self.stopped, self.whole.dimension()))
+    }
+
+    /// Why a run may end in the part that is reached, and from which valuations of it.
+    fn end(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        inside: &Federation,
+    ) -> Result<Option<(Ending, Federation)>, Failure> {
+        if inside.is_empty() {
+            return Ok(None);
+        }
+        let waiting = self.waiting(inside);
+        if !waiting.is_empty() {
+            return Ok(Some((Ending::Waits, waiting)));
+        }
+        let stuck = self.stuck(symbolic, words, inside)?;
+        Ok((!stuck.is_empty()).then_some((Ending::Stuck, stuck)))
+    }
+
+    /// The valuations of the part that is reached from which time can pass without limit.
+    fn waiting(&self, inside: &Federation) -> Federation {
+        let dimension = self.whole.dimension();
+        let is_bounded = dbm::is_delay_bounded(self.whole.bounds(), dimension, &self.stopped);
+        if !self.may_delay || is_bounded {
+            return Federation::empty(dimension);
+        }
+        let mut waiting = inside.clone();
+        let mut leaving = self.left.clone();
+        leaving.unite(&self.barriers.stops);
+        waiting.subtract(&self.past(&leaving));
+        waiting
+    }
+
+    /// The valuations of the part that is reached from which no wait leads to a move or out of the predicate.
+    fn stuck(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        inside: &Federation,
+    ) -> Result<Federation, Failure> {
+        let dimension = self.whole.dimension();
+        let mut moves = Moves::default();
+        symbolic.moves_within(words, self.whole.bounds(), &mut moves)?;
+        let mut exits = self.left.clone();
+        let mut target = words.to_vec();
+        for one in moves.iter() {
+            if !symbolic.is_enabled(one, self.whole.bounds())? {
+                continue;
+            }
+            target.copy_from_slice(words);
+            if let Some(effect) = symbolic.fire(one, &mut target)? {
+                exits.unite(&effect.enabled_part(self.frame.bounds(), dimension));
+                if inside.is_subset(&exits) {
+                    return Ok(Federation::empty(dimension));
+                }
+            }
+        }
+        if self.may_delay && self.barriers.is_empty() {
+            exits = self.past(&exits);
+        } else if self.may_delay {
+            exits = future::predecessors_within(&exits, &self.barriers);
+        }
+        let mut stuck = inside.clone();
+        stuck.subtract(&exits);
+        Ok(stuck)
+    }
+}
+
+/// Whether the past of a zone need not be a zone: a clock stands still beside two that run.
+fn has_crooked_pasts(stopped: &ClockSet, dimension: usize) -> bool {
+    !stopped.is_empty() && dimension - 1 > stopped.len() + 1
+}
+
+/// Whether the past of this zone is one: its bounds on differences between running and stopped clocks say no more than those on each.
+fn is_straight(zone: &[Bound], dimension: usize, stopped: &ClockSet) -> bool {
+    let implied = |left: usize, right: usize| {
+        zone[left * dimension + right] >= zone[left * dimension] + zone[right]
+    };
+    let mut running = (1..dimension).filter(|&clock| !stopped.contains(clock));
+    running.all(|runs| {
+        let mut stands = stopped
+            .iter()
+            .filter(|&clock| clock > 0 && clock < dimension);
+        stands.all(|stands| implied(runs, stands) && implied(stands, runs))
+    })
+}

@@ -1,0 +1,431 @@
+//! Is there a run that stays inside a predicate for ever?
+//!
+//! A run counts if the predicate holds at all its moments and it cannot leave: it has infinitely many moves (in however little
+//! time), or from some moment on time can pass without limit inside predicate and invariants, or at some moment neither a move nor
+//! any wait that the invariants allow leads to a move or out of the predicate.
+//!
+//! The nodes of the search are words with a zone of valuations that lie inside the predicate and that some delay inside it reaches from
+//! the entry of the state ([`super::delay_inside`]). Every node is accepting, so one depth-first search is
+//! enough: there is a run with infinitely many moves exactly if the search comes back to a node on its stack, or to one that contains the zone of
+//! such a node (every valuation of that has a predecessor in itself, around and around, and the regions are finitely many). A
+//! node that was left without success starts no such run, nor does any that it contains.
+//!
+//! For a run that is found, extrapolation must have kept all that comparisons can tell (Extra-M+), with those of the predicate
+//! among them. That there is none holds with any larger zones too.
+//!
+//! Source: S. Tripakis, "Checking Timed Büchi Automata Emptiness on Simulation Graphs", ACM TOCL 10, 2009 (cycles of zones are
+//! cycles of runs); A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G. Larsen, J. van de Pol, "Multi-Core Emptiness Checking of Timed Büchi
+//! Automata using Inclusion Abstraction", CAV 2013 (which inclusions are sound).
+//! Where we differ: with stopped clocks the cut is left out and every doubt counts as a run, so that only the absence of one is certain.
+
+use crate::ir::Predicate;
+use crate::network::{Failure, Moves, Part, Symbolic};
+use crate::zones::Zone;
+use crate::zones::dbm;
+use crate::zones::zone_table::{ZoneId, ZoneTable};
+
+use super::delay_inside::Inside;
+use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
+use crate::search::reachability::search::Trace;
+use crate::search::store::discrete_states::{DiscreteId, StateStore};
+
+/// States between two looks at the limits, at most.
+const LOOK_EVERY: u64 = 256;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// Why a run inside a predicate never leaves it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Its last state leads back to the state with this index by the last move.
+    Loop(usize),
+    /// Time passes for ever in its last state.
+    Waits,
+    /// No move is possible any more, and time cannot take it out of the predicate.
+    Stuck,
+}
+
+impl Ending {
+    /// The same for a trace with so many more states before it.
+    #[must_use]
+    pub fn moved(self, before: usize) -> Ending {
+        match self {
+            Ending::Loop(start) => Ending::Loop(start + before),
+            other => other,
+        }
+    }
+}
+
+/// A run inside a predicate that never leaves it.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Its states and moves; the zones are those of the search.
+    pub trace: Trace,
+    /// Why it never leaves.
+    pub ending: Ending,
+}
+
+/// What a search found.
+#[derive(Debug)]
+pub enum Outcome {
+    /// A run.
+    Found(Run),
+    /// There is none.
+    Exhausted,
+    /// A limit came first.
+    Stopped(StopReason),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    discrete: DiscreteId,
+    zone: ZoneId,
+    /// The next node with the same words.
+    next: u32,
+    /// Its place on the stack, [`NONE`] once it was left.
+    depth: u32,
+}
+
+/// A node on the stack.
+struct Frame {
+    node: u32,
+    words: Vec<i32>,
+    zone: Zone,
+    moves: Moves,
+    next_move: usize,
+    /// The target of the move at hand, and its nodes that are still to be visited.
+    target: Vec<i32>,
+    pending: Vec<Zone>,
+    /// The move at hand.
+    parts: Vec<Part>,
+}
+
+/// Searches for runs inside `keep`; remembers over several searches from which nodes there is none.
+pub struct Liveness<'p> {
+    keep: &'p Predicate,
+    store: StateStore,
+    zones: ZoneTable,
+    nodes: Vec<Node>,
+    /// By discrete state: its first node.
+    heads: Vec<u32>,
+    frames: Vec<Frame>,
+    explored: u64,
+    next_look: u64,
+    is_coarse: bool,
+}
+
+impl<'p> Liveness<'p> {
+    /// Searches in the network of `symbolic` for runs inside `keep`.
+    pub fn new(symbolic: &Symbolic<'_>, keep: &'p Predicate) -> Liveness<'p> {
+        Liveness {
+            keep,
+            store: StateStore::new(symbolic.stepper.network()),
+            zones: ZoneTable::new(symbolic.dimension()),
+            nodes: Vec::new(),
+            heads: Vec::new(),
+            frames: Vec::new(),
+            explored: 0,
+            next_look: states_between_looks(LOOK_EVERY, symbolic.dimension()),
+            is_coarse: false,
+        }
+    }
+
+    /// Whether a doubt was counted as a run: what was found is certain only if not.
+    pub fn is_coarse(&self) -> bool {
+        self.is_coarse
+    }
+
+    /// What was done so far.
+    pub fn counters(&self) -> Counters {
+        let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
+        let words = self
+            .frames
+            .first()
+            .map_or(0, |frame| 2 * frame.words.len() * 4);
+        let frames = self.frames.len() * (size_of::<Frame>() + words);
+        Counters {
+            explored: self.explored,
+            stored: self.nodes.len() as u64,
+            waiting: self.frames.len() as u64,
+            bytes: (self.store.bytes() + self.zones.bytes() + nodes + frames) as u64,
+        }
+    }
+
+    /// Searches for a run from the initial state.
+    pub fn from_start(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        watch: &mut dyn Watch,
+    ) -> Result<Outcome, (Failure, Trace)> {
+        let start = symbolic.start();
+        let (words, zone, _) = start.map_err(|failure| (failure, Trace::default()))?;
+        self.from_entry(symbolic, (&words, &zone), false, Counters::default(), watch)
+    }
+
+    /// Searches for a run that begins with some valuation of a zone. Where that lies in an open part of a barrier, `is_running` says
+    /// whether time runs in it. `before` is what was done outside this search, for the limits.
+    pub fn from_entry(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        (words, zone): (&[i32], &Zone),
+        is_running: bool,
+        before: Counters,
+        watch: &mut dyn Watch,
+    ) -> Result<Outcome, (Failure, Trace)> {
+        let mut words = words.to_vec();
+        let entry = (zone, is_running);
+        let outcome = self.run(symbolic, &mut words, entry, before, watch);
+        let outcome = outcome.map_err(|failure| (failure, self.stack_trace()));
+        self.frames.clear();
+        outcome
+    }
+
+    fn run(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        (zone, is_running): (&Zone, bool),
+        before: Counters,
+        watch: &mut dyn Watch,
+    ) -> Result<Outcome, Failure> {
+        let Some(invariant) = symbolic.invariant(words)? else {
+            return Ok(Outcome::Exhausted);
+        };
+        let entry = (zone, is_running);
+        let mut inside = Inside::of(symbolic, self.keep, words, entry, &invariant)?;
+        self.is_coarse |= inside.is_coarse;
+        if let Some(ending) = inside.ending {
+            let mut trace = Trace::default();
+            push_state(&mut trace, words, &inside.zones);
+            return Ok(Outcome::Found(Run { trace, ending }));
+        }
+        symbolic.extrapolate_all(words, &mut inside.zones);
+        for zone in inside.zones {
+            if self.is_left(words, &zone) {
+                continue;
+            }
+            self.push(symbolic, words, zone)?;
+            while !self.frames.is_empty() {
+                if let Some(ending) = self.step(symbolic)? {
+                    return Ok(Outcome::Found(self.found(ending)));
+                }
+                if self.explored >= self.next_look {
+                    let dimension = symbolic.dimension();
+                    self.next_look = self.explored + states_between_looks(LOOK_EVERY, dimension);
+                    if let Some(reason) = watch.look(&(self.counters() + before)) {
+                        return Ok(Outcome::Stopped(reason));
+                    }
+                }
+            }
+        }
+        Ok(Outcome::Exhausted)
+    }
+
+    /// Goes one node down, to the next move, or one node up.
+    fn step(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<Ending>, Failure> {
+        let Some(frame) = self.frames.last_mut() else {
+            return Ok(None);
+        };
+        if let Some(zone) = frame.pending.pop() {
+            let words = frame.target.clone();
+            return self.visit(symbolic, &words, zone);
+        }
+        if frame.next_move < frame.moves.len() {
+            return self.take_next(symbolic);
+        }
+        let node = frame.node;
+        self.frames.pop();
+        self.leave(node);
+        Ok(None)
+    }
+
+    /// Takes the next move of the node on top: fills its pending nodes.
+    fn take_next(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<Ending>, Failure> {
+        let mut frame = self.frames.pop().expect("there is a node on top");
+        let result = self.take(symbolic, &mut frame);
+        self.frames.push(frame);
+        result
+    }
+
+    fn take(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        frame: &mut Frame,
+    ) -> Result<Option<Ending>, Failure> {
+        let one = frame.moves.get(frame.next_move);
+        frame.next_move += 1;
+        if !symbolic.is_enabled(one, frame.zone.bounds())? {
+            return Ok(None);
+        }
+        frame.target.copy_from_slice(&frame.words);
+        frame.parts.clear();
+        frame.parts.extend_from_slice(one.parts);
+        let Some(effect) = symbolic.fire(one, &mut frame.target)? else {
+            return Ok(None);
+        };
+        let mut entries = Vec::new();
+        effect.entry_zones(frame.zone.bounds(), symbolic.dimension(), &mut entries);
+        for entry in &entries {
+            let entry = (entry, false);
+            let target = &mut frame.target;
+            let inside = Inside::of(symbolic, self.keep, target, entry, &effect.invariant)?;
+            self.is_coarse |= inside.is_coarse;
+            frame.pending.extend(inside.zones);
+            if inside.ending.is_some() {
+                return Ok(inside.ending);
+            }
+        }
+        symbolic.extrapolate_all(&frame.target, &mut frame.pending);
+        Ok(None)
+    }
+
+    /// Goes to a node, unless it is known to be the start of no run; finds out whether it closes a loop.
+    fn visit(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &[i32],
+        zone: Zone,
+    ) -> Result<Option<Ending>, Failure> {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        let mut node = self.heads[discrete.0 as usize];
+        let mut is_left = false;
+        while node != NONE {
+            let Node {
+                zone: other,
+                next,
+                depth,
+                ..
+            } = self.nodes[node as usize];
+            let other = self.zones.get(other);
+            if depth == NONE {
+                is_left |= dbm::is_subset(zone.bounds(), other);
+            } else if dbm::is_subset(other, zone.bounds()) {
+                let top = self
+                    .frames
+                    .last_mut()
+                    .expect("the move was taken from a node");
+                top.pending = vec![zone];
+                return Ok(Some(Ending::Loop(depth as usize)));
+            }
+            node = next;
+        }
+        if !is_left {
+            self.push(symbolic, words, zone)?;
+        }
+        Ok(None)
+    }
+
+    /// Whether no run starts in the zone, as far as is known.
+    fn is_left(&mut self, words: &[i32], zone: &Zone) -> bool {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        let mut node = self.heads[discrete.0 as usize];
+        while node != NONE {
+            let Node {
+                zone: other,
+                next,
+                depth,
+                ..
+            } = self.nodes[node as usize];
+            if depth == NONE && dbm::is_subset(zone.bounds(), self.zones.get(other)) {
+                return true;
+            }
+            node = next;
+        }
+        false
+    }
+
+    fn push(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &[i32],
+        zone: Zone,
+    ) -> Result<(), Failure> {
+        self.explored += 1;
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        let node = self.nodes.len() as u32;
+        self.nodes.push(Node {
+            discrete,
+            zone: self.zones.intern(zone.bounds()),
+            next: std::mem::replace(&mut self.heads[discrete.0 as usize], node),
+            depth: self.frames.len() as u32,
+        });
+        let mut frame = Frame {
+            node,
+            words: words.to_vec(),
+            zone,
+            moves: Moves::default(),
+            next_move: 0,
+            target: words.to_vec(),
+            pending: Vec::new(),
+            parts: Vec::new(),
+        };
+        let moves = symbolic.moves_within(&mut frame.words, frame.zone.bounds(), &mut frame.moves);
+        self.frames.push(frame);
+        moves
+    }
+
+    /// Notes that no run starts in a node, and drops the nodes whose zones it contains from the list of its words.
+    fn leave(&mut self, node: u32) {
+        self.nodes[node as usize].depth = NONE;
+        let Node { discrete, zone, .. } = self.nodes[node as usize];
+        let mut previous = NONE;
+        let mut other = self.heads[discrete.0 as usize];
+        while other != NONE {
+            let Node {
+                zone: inner,
+                next,
+                depth,
+                ..
+            } = self.nodes[other as usize];
+            let is_covered = other != node
+                && depth == NONE
+                && dbm::is_subset(self.zones.get(inner), self.zones.get(zone));
+            if !is_covered {
+                previous = other;
+            } else if previous == NONE {
+                self.heads[discrete.0 as usize] = next;
+            } else {
+                self.nodes[previous as usize].next = next;
+            }
+            other = next;
+        }
+    }
+
+    /// The run on the stack, with the state in which it ends.
+    fn found(&self, ending: Ending) -> Run {
+        let mut trace = self.stack_trace();
+        if let Some(top) = self.frames.last() {
+            trace.moves.push(top.parts.clone());
+            push_state(&mut trace, &top.target, &top.pending);
+        }
+        Run { trace, ending }
+    }
+
+    fn stack_trace(&self) -> Trace {
+        let states = self.frames.iter();
+        let states = states.map(|frame| (frame.words.clone(), frame.zone.clone()));
+        let moves = self.frames.iter().map(|frame| frame.parts.clone());
+        let count = self.frames.len().saturating_sub(1);
+        Trace {
+            states: states.collect(),
+            moves: moves.take(count).collect(),
+        }
+    }
+}
+
+/// Adds a state of a trace: the words with the last of their zones.
+pub(super) fn push_state(trace: &mut Trace, words: &[i32], zones: &[Zone]) {
+    if let Some(zone) = zones.last() {
+        trace.states.push((words.to_vec(), zone.clone()));
+    }
+}

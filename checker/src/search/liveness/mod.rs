@@ -1,0 +1,6 @@
+//! Runs without end: emptiness, leads-to, the shortest lasso.
+
+pub(super) mod delay_inside;
+pub mod emptiness;
+pub mod leads_to;
+pub mod shortest_lasso;

@@ -1,0 +1,371 @@
+//! A search without short cuts, least costs first: for shortest and fastest traces, and for the reached set of a certificate.
+//!
+//! Every state is stored, those with committed locations too, and one is left out only if a stored one with the same words contains
+//! its zone. So the stored zones, extrapolated as they are, contain the successors of each of them: they are closed under all
+//! moves and delays, which is what a certificate claims. And since what contains a new state was met at no greater cost, nothing
+//! of least cost is lost.
+//!
+//! *Moves* as costs make it a breadth-first search. *Time* as cost is the lower bound of a clock that is never set: the caller adds
+//! it to the network. Its upper bounds are forgotten in every state, as if any more time might have passed before: then
+//! states that differ in how much time may be wasted are the same, and those with bounded cost are finitely many.
+//!
+//! Source: G. Behrmann, A. Fehnker, T. Hune, K. G. Larsen, P. Pettersson, J. Romijn, F. Vaandrager, "Efficient Guiding Towards
+//! Cost-Optimality in UPPAAL", TACAS 2001 (least time by a clock of its own, best first).
+//!
+//! Cost: as a search with inclusion, times the states that short cuts would save.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::network::{Failure, Moves, Part, Symbolic};
+use crate::zones::{Bound, Zone, dbm};
+
+use crate::search::limits::{
+    Counters, StopReason, Watch, moves_between_looks, states_between_looks,
+};
+use crate::search::reachability::goal::{Goal, Target};
+use crate::search::reachability::retrace;
+use crate::search::reachability::retrace::Step;
+use crate::search::reachability::search::Trace;
+use crate::search::store::discrete_states::{DiscreteId, StateStore};
+
+/// States between two looks at the limits, at most.
+const LOOK_EVERY: u64 = 256;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// What is to be least.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// The number of moves.
+    Moves,
+    /// The value of the clock with this index, which nothing sets or compares.
+    Time(usize),
+}
+
+/// A cost: a number, and 1 if it is only come near to.
+pub type Cost = (i32, u32);
+
+/// A way of least cost: the indices of its moves among those of its states.
+#[derive(Clone, Debug)]
+pub struct Way {
+    pub(super) steps: Vec<Step>,
+    /// Its cost.
+    pub cost: Cost,
+}
+
+impl Way {
+    /// The trace of the way. `symbolic` may be without the clock that measures time.
+    pub fn trace(&self, symbolic: &mut Symbolic<'_>, goal: &mut dyn Goal) -> Trace {
+        retrace::retrace(symbolic, &self.steps, Some(goal))
+    }
+}
+
+/// How a search ended.
+#[derive(Debug)]
+pub enum Outcome {
+    /// A way of least cost to a state that was looked for.
+    Found(Way),
+    /// There is none.
+    Exhausted,
+    /// A limit came first.
+    Stopped(StopReason),
+}
+
+/// The stored states: words with their zones.
+pub type Reached = Vec<(Vec<i32>, Vec<Zone>)>;
+
+/// A state as it was met.
+#[derive(Clone, Debug)]
+pub struct Met {
+    /// Its words.
+    pub words: Vec<i32>,
+    /// Its zone, extrapolated.
+    pub zone: Zone,
+    /// Which state was left for it, an earlier one, and by which move; `None` for the initial one.
+    pub from: Option<(usize, Vec<Part>)>,
+}
+
+struct Node {
+    discrete: DiscreteId,
+    zone: Zone,
+    parent: u32,
+    step: Step,
+    cost: Cost,
+}
+
+/// What waits: a node to be explored, or one that was looked for.
+type Waiting = Reverse<(Cost, bool, u32)>;
+
+/// A search for a state of least cost.
+pub struct Search<'s, 'a> {
+    symbolic: &'s mut Symbolic<'a>,
+    goal: &'s dyn Target,
+    measure: Measure,
+    store: StateStore,
+    nodes: Vec<Node>,
+    /// By discrete state: its nodes.
+    lists: Vec<Vec<u32>>,
+    waiting: BinaryHeap<Waiting>,
+    explored: u64,
+    before: Counters,
+}
+
+impl<'s, 'a> Search<'s, 'a> {
+    /// A search for the goal. `before` is what was done outside this search, for the limits.
+    pub fn new(
+        symbolic: &'s mut Symbolic<'a>,
+        goal: &'s dyn Target,
+        measure: Measure,
+        before: Counters,
+    ) -> Search<'s, 'a> {
+        Search {
+            store: StateStore::new(symbolic.stepper.network()),
+            symbolic,
+            goal,
+            measure,
+            nodes: Vec::new(),
+            lists: Vec::new(),
+            waiting: BinaryHeap::new(),
+            explored: 0,
+            before,
+        }
+    }
+
+    /// What was done, with what was done before.
+    pub fn counters(&self) -> Counters {
+        let dimension = self.symbolic.dimension();
+        let zone = dimension * dimension * size_of::<Bound>();
+        let node = size_of::<Node>() + zone + 2 * size_of::<Waiting>();
+        let own = Counters {
+            explored: self.explored,
+            stored: self.nodes.len() as u64,
+            waiting: self.waiting.len() as u64,
+            bytes: (self.store.bytes() + self.nodes.len() * node) as u64,
+        };
+        own + self.before
+    }
+
+    /// Searches.
+    pub fn run(&mut self, watch: &mut dyn Watch) -> Result<Outcome, Failure> {
+        let (mut words, zone, invariant) = self.symbolic.start()?;
+        let mut zones = vec![zone];
+        self.symbolic
+            .let_time_pass(&mut words, &invariant, &mut zones)?;
+        self.enter(&mut words, &mut zones, NONE, 0)?;
+        let look_every = states_between_looks(LOOK_EVERY, self.symbolic.dimension());
+        let mut next_look = look_every;
+        while let Some(Reverse((cost, is_goal, node))) = self.waiting.pop() {
+            if is_goal {
+                return Ok(Outcome::Found(self.way(node, cost)));
+            }
+            if let Some(reason) = self.explore(node, watch)? {
+                return Ok(Outcome::Stopped(reason));
+            }
+            if self.explored >= next_look {
+                next_look = self.explored + look_every;
+                if let Some(reason) = watch.look(&self.counters()) {
+                    return Ok(Outcome::Stopped(reason));
+                }
+            }
+        }
+        Ok(Outcome::Exhausted)
+    }
+
+    /// Comes to the successors of a node; a limit may come first.
+    fn explore(&mut self, node: u32, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
+        let dimension = self.symbolic.dimension();
+        let nodes_between = moves_between_looks(LOOK_EVERY, dimension) as usize;
+        let mut nodes_at_look = self.nodes.len() + nodes_between;
+        self.explored += 1;
+        let network = self.symbolic.stepper.network();
+        let mut words = network.initial.clone();
+        let Node { discrete, zone, .. } = &self.nodes[node as usize];
+        self.store.load(*discrete, &mut words);
+        let zone = zone.clone();
+        let mut moves = Moves::default();
+        self.symbolic
+            .moves_within(&mut words, zone.bounds(), &mut moves)?;
+        let mut target = words.clone();
+        let mut zones = Vec::new();
+        for one in moves.iter() {
+            if !self.symbolic.is_enabled(one, zone.bounds())? {
+                continue;
+            }
+            target.copy_from_slice(&words);
+            let Some(effect) = self.symbolic.fire(one, &mut target)? else {
+                continue;
+            };
+            effect.entry_zones(zone.bounds(), self.symbolic.dimension(), &mut zones);
+            self.symbolic
+                .let_time_pass(&mut target, &effect.invariant, &mut zones)?;
+            self.enter(&mut target, &mut zones, node, one.rank)?;
+            if self.nodes.len() >= nodes_at_look {
+                nodes_at_look = self.nodes.len() + nodes_between;
+                let reason = watch.look(&self.counters());
+                if reason.is_some() {
+                    return Ok(reason);
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Stores the zones of a state that was come to, unless a stored one contains them, and looks for the goal in them.
+    fn enter(
+        &mut self,
+        words: &mut [i32],
+        zones: &mut Vec<Zone>,
+        parent: u32,
+        step: Step,
+    ) -> Result<(), Failure> {
+        if let Measure::Time(clock) = self.measure {
+            for zone in &mut *zones {
+                forget_upper_bounds(zone, clock);
+            }
+        }
+        // The goal is looked for before extrapolation; where it holds, nothing is explored any more.
+        for zone in &*zones {
+            if let Some(cost) = self.goal_cost(words, zone, parent)? {
+                let goal = self.push(words, zone.clone(), parent, step, cost);
+                self.waiting.push(Reverse((cost, true, goal)));
+            }
+        }
+        self.symbolic.extrapolate_all(words, zones);
+        for zone in zones.drain(..) {
+            let (discrete, is_new) = self.store.intern(words);
+            if is_new {
+                self.lists.push(Vec::new());
+            }
+            let (nodes, list) = (&self.nodes, &mut self.lists[discrete.0 as usize]);
+            let bounds_of = |node: u32| nodes[node as usize].zone.bounds();
+            if list
+                .iter()
+                .any(|&one| dbm::is_subset(zone.bounds(), bounds_of(one)))
+            {
+                continue;
+            }
+            // What the new zone contains was met before, at no greater cost: it stays for the ways through it, but not in the list.
+            list.retain(|&one| !dbm::is_subset(bounds_of(one), zone.bounds()));
+            let cost = match self.measure {
+                Measure::Moves => self.moves_after(parent),
+                Measure::Time(clock) => least_value(&zone, clock),
+            };
+            let node = self.push(words, zone, parent, step, cost);
+            self.lists[discrete.0 as usize].push(node);
+            self.waiting.push(Reverse((cost, false, node)));
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, words: &[i32], zone: Zone, parent: u32, step: Step, cost: Cost) -> u32 {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.lists.push(Vec::new());
+        }
+        self.nodes.push(Node {
+            discrete,
+            zone,
+            parent,
+            step,
+            cost,
+        });
+        self.nodes.len() as u32 - 1
+    }
+
+    fn moves_after(&self, parent: u32) -> Cost {
+        match self.nodes.get(parent as usize) {
+            None => (0, 0),
+            Some(parent) => (parent.cost.0 + 1, 0),
+        }
+    }
+
+    /// The least cost of a valuation of the zone that was looked for.
+    fn goal_cost(
+        &mut self,
+        words: &mut [i32],
+        zone: &Zone,
+        parent: u32,
+    ) -> Result<Option<Cost>, Failure> {
+        let dimension = zone.dimension();
+        let part = self.goal.part(self.symbolic, words, zone)?;
+        let costs = part.zones().map(|bounds| match self.measure {
+            Measure::Moves => self.moves_after(parent),
+            Measure::Time(clock) => least_value(&Zone::from_bounds(dimension, bounds), clock),
+        });
+        Ok(costs.min())
+    }
+
+    fn way(&self, mut node: u32, cost: Cost) -> Way {
+        let mut steps = Vec::new();
+        while let Some(one) = self.nodes.get(node as usize) {
+            if one.parent != NONE {
+                steps.push(one.step);
+            }
+            node = one.parent;
+        }
+        steps.reverse();
+        Way { steps, cost }
+    }
+
+    /// The stored states, none of which contains another.
+    pub fn into_reached(self) -> Reached {
+        let initial = &self.symbolic.stepper.network().initial;
+        let mut reached = Reached::new();
+        for (index, list) in self.lists.iter().enumerate() {
+            let mut words = initial.clone();
+            self.store.load(DiscreteId(index as u32), &mut words);
+            let zones = list.iter();
+            let zones = zones.map(|&node| self.nodes[node as usize].zone.clone());
+            reached.push((words, zones.collect()));
+        }
+        reached
+    }
+
+    /// The first `most` states in the order in which they were met, also those that a later one contains.
+    pub fn into_met(self, most: usize) -> Result<Vec<Met>, Failure> {
+        let initial = &self.symbolic.stepper.network().initial;
+        let mut moves = Moves::default();
+        let mut moves_of = NONE;
+        let mut met: Vec<Met> = Vec::new();
+        for node in self.nodes.into_iter().take(most) {
+            let mut words = initial.clone();
+            self.store.load(node.discrete, &mut words);
+            let mut from = None;
+            if node.parent != NONE {
+                let parent = node.parent as usize;
+                // What a state leads to was met in one go.
+                if moves_of != node.parent {
+                    let mut source = met[parent].words.clone();
+                    self.symbolic.moves(&mut source, &mut moves)?;
+                    moves_of = node.parent;
+                }
+                let taken = moves.with_rank(node.step);
+                from = taken.map(|one| (parent, one.parts.to_vec()));
+            }
+            met.push(Met {
+                words,
+                zone: node.zone,
+                from,
+            });
+        }
+        Ok(met)
+    }
+}
+
+/// Lets the clock have any greater value, whatever the others have.
+fn forget_upper_bounds(zone: &mut Zone, clock: usize) {
+    let dimension = zone.dimension();
+    let row = &mut zone.bounds_mut()[clock * dimension..][..dimension];
+    for (right, bound) in row.iter_mut().enumerate() {
+        if right != clock {
+            *bound = Bound::INFINITY;
+        }
+    }
+}
+
+fn least_value(zone: &Zone, clock: usize) -> Cost {
+    let lower = zone.bound(0, clock);
+    (-lower.value(), u32::from(lower.is_strict()))
+}

@@ -1,0 +1,312 @@
+//! Reachability: is there a state that a [`Goal`] finds, for example one in which a predicate holds?
+//!
+//! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one with the same words contains
+//! its zone, and stored ones that a new one contains are dropped from the waiting list. Which committed states are stored
+//! is told in [`super::expand`].
+//!
+//! Each stored state remembers its parent and the moves from it, so that a trace is found by taking the moves again.
+//!
+//! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 3.
+
+use std::collections::VecDeque;
+
+use crate::network::{Failure, Part, Symbolic};
+use crate::zones::{Bound, Zone};
+
+use super::expand;
+use super::expand::{Explorer, Scene, Sink, Visit};
+use super::goal::{Goal, Look, SharedGoal};
+use super::parallel;
+use super::retrace;
+use super::retrace::Step;
+use super::tree;
+use super::tree::{MOST_SHARDS, Origin, Tree};
+use crate::search::limits::{
+    Counters, StopReason, Watch, moves_between_looks, states_between_looks,
+};
+use crate::search::store::packed_zones::Kept;
+use crate::search::store::passed_list::Stored;
+
+/// States between two looks at the limits, at most.
+const LOOK_EVERY: u64 = 256;
+/// Moves between two looks at the limits, at most.
+const LOOK_EVERY_MOVES: u64 = 1 << 12;
+
+/// In which order states are explored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Breadth first: traces are shortest in stored states.
+    BreadthFirst,
+    /// Depth first.
+    DepthFirst,
+    /// Depth first among the successors of a state in random order, from this seed.
+    Random(u64),
+}
+
+/// How to search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Manner {
+    /// In which order states are explored.
+    pub order: Order,
+    /// How many threads share the work, from 1 to [`MOST_THREADS`]. Only breadth first is there more than one.
+    pub threads: usize,
+}
+
+/// The most threads of a search.
+pub const MOST_THREADS: usize = MOST_SHARDS;
+
+/// What a search found.
+#[derive(Debug)]
+pub enum Outcome {
+    /// A state in which the predicate holds; the way to it.
+    Found(Trace),
+    /// There is none.
+    Exhausted,
+    /// A limit came first.
+    Stopped(StopReason),
+}
+
+/// The end of a search.
+#[derive(Debug)]
+pub struct Report {
+    /// What was found, or the failure and the way to the state whose exploration failed.
+    pub outcome: Result<Outcome, (Failure, Trace)>,
+    /// What was done.
+    pub counters: Counters,
+}
+
+/// A symbolic run: states, and the moves between them (one less).
+#[derive(Clone, Debug, Default)]
+pub struct Trace {
+    /// Words and zone of each state.
+    pub states: Vec<(Vec<i32>, Zone)>,
+    /// The parts of each move.
+    pub moves: Vec<Vec<Part>>,
+}
+
+/// Searches for a state that `goal` finds.
+pub fn search(
+    symbolic: &mut Symbolic<'_>,
+    goal: &mut dyn Goal,
+    order: Order,
+    watch: &mut dyn Watch,
+) -> Report {
+    let mut search = Search::new(symbolic, goal, order, watch);
+    let outcome = match search.run() {
+        Ok(outcome) => Ok(outcome),
+        Err(failure) => Err((failure, search.trace(false))),
+    };
+    Report {
+        outcome,
+        counters: search.counters(),
+    }
+}
+
+/// As [`search`], by several threads if they are wanted and the order is breadth first: see [`super::parallel`].
+pub fn search_shared<G: SharedGoal>(
+    symbolic: &mut Symbolic<'_>,
+    goal: &mut G,
+    manner: Manner,
+    watch: &mut dyn Watch,
+) -> Report {
+    if manner.threads > 1 && manner.order == Order::BreadthFirst {
+        return parallel::search(symbolic, goal, manner.threads, watch);
+    }
+    search(symbolic, goal, manner.order, watch)
+}
+
+struct Search<'s, 'a> {
+    symbolic: &'s mut Symbolic<'a>,
+    goal: &'s mut dyn Goal,
+    watch: &'s mut dyn Watch,
+    order: Order,
+    explorer: Explorer,
+    store: Store,
+    random: u64,
+}
+
+/// All stored states, and those of them that wait.
+struct Store {
+    tree: Tree,
+    waiting: VecDeque<Stored>,
+    /// The state that is being explored.
+    current: Origin,
+}
+
+impl Sink for Store {
+    fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
+        let stored = self.tree.add(words, zone, self.current, way);
+        self.waiting.extend(stored);
+        stored.is_some()
+    }
+
+    fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
+        self.tree.add(words, zone, self.current, way).is_some()
+    }
+
+    fn pack(&mut self, words: &[i32]) -> &[u8] {
+        self.tree.passed.pack(words)
+    }
+
+    fn stored(&self) -> usize {
+        self.tree.passed.len()
+    }
+}
+
+impl<'s, 'a> Search<'s, 'a> {
+    fn new(
+        symbolic: &'s mut Symbolic<'a>,
+        goal: &'s mut dyn Goal,
+        order: Order,
+        watch: &'s mut dyn Watch,
+    ) -> Search<'s, 'a> {
+        let network = symbolic.stepper.network();
+        Search {
+            explorer: Explorer::new(symbolic, goal),
+            store: Store {
+                tree: Tree::new(network, symbolic.dimension(), symbolic.greatest_constant()),
+                waiting: VecDeque::new(),
+                current: Origin::NOWHERE,
+            },
+            random: if let Order::Random(seed) = order {
+                seed | 1
+            } else {
+                1
+            },
+            symbolic,
+            goal,
+            watch,
+            order,
+        }
+    }
+
+    fn counters(&self) -> Counters {
+        self.own_counters() + self.goal.counters()
+    }
+
+    fn own_counters(&self) -> Counters {
+        let Store { tree, waiting, .. } = &self.store;
+        let bytes = tree.bytes()
+            + self.explorer.bytes()
+            + self.symbolic.bytes()
+            + waiting.capacity() * size_of::<Stored>();
+        Counters {
+            explored: self.explorer.explored(),
+            stored: tree.passed.len() as u64,
+            waiting: waiting.len() as u64,
+            bytes: bytes as u64,
+        }
+    }
+
+    fn run(&mut self) -> Result<Outcome, Failure> {
+        let counters = self.own_counters();
+        match expand::start(&mut self.scene(counters))? {
+            Look::Continue => {}
+            Look::Found => return Ok(Outcome::Found(self.trace(true))),
+            Look::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
+        }
+        let dimension = self.symbolic.dimension();
+        let look_every = states_between_looks(LOOK_EVERY, dimension);
+        let mut next_look = look_every;
+        let mut moves = moves_between_looks(LOOK_EVERY_MOVES, dimension);
+        while let Some(stored) = self.next_waiting() {
+            if self.store.tree.passed.is_covered(stored) {
+                continue;
+            }
+            self.store.current = Origin {
+                shard: 0,
+                node: stored.node,
+            };
+            let first = self.store.waiting.len();
+            match self.visit(stored, &mut moves)? {
+                Visit::Found => return Ok(Outcome::Found(self.trace(true))),
+                Visit::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
+                Visit::Done | Visit::Paused => {}
+            }
+            self.shuffle_from(first);
+            if self.explorer.explored() >= next_look {
+                next_look = self.explorer.explored() + look_every;
+                let counters = self.counters();
+                if let Some(reason) = self.watch.look(&counters) {
+                    return Ok(Outcome::Stopped(reason));
+                }
+            }
+        }
+        Ok(Outcome::Exhausted)
+    }
+
+    fn next_waiting(&mut self) -> Option<Stored> {
+        match self.order {
+            Order::BreadthFirst => self.store.waiting.pop_front(),
+            Order::DepthFirst | Order::Random(_) => self.store.waiting.pop_back(),
+        }
+    }
+
+    /// Puts the newest waiting nodes into an order that fits the search order.
+    fn shuffle_from(&mut self, first: usize) {
+        let Order::Random(_) = self.order else { return };
+        let first = first.saturating_sub(1).min(self.store.waiting.len());
+        for index in (first + 1..self.store.waiting.len()).rev() {
+            let other = first + (self.next_random() % (index - first + 1) as u64) as usize;
+            self.store.waiting.swap(index, other);
+        }
+    }
+
+    /// Xorshift; only the order of the search depends on it.
+    fn next_random(&mut self) -> u64 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 7;
+        self.random ^= self.random << 17;
+        self.random >> 16
+    }
+
+    fn scene(&mut self, counters: Counters) -> Scene<'_, 'a, Store> {
+        Scene {
+            counters,
+            symbolic: self.symbolic,
+            goal: self.goal,
+            watch: self.watch,
+            sink: &mut self.store,
+        }
+    }
+
+    /// Explores a stored state to the end. So many moves may be taken until the next look.
+    fn visit(&mut self, stored: Stored, moves: &mut u64) -> Result<Visit, Failure> {
+        let counters = self.own_counters();
+        let passed = &self.store.tree.passed;
+        let load = |words: &mut [i32], zone: &mut [Bound]| passed.load(stored, words, zone);
+        self.explorer.begin(self.symbolic, load)?;
+        loop {
+            let mut scene = Scene {
+                counters,
+                symbolic: self.symbolic,
+                goal: self.goal,
+                watch: self.watch,
+                sink: &mut self.store,
+            };
+            match self.explorer.explore(&mut scene, moves)? {
+                Visit::Paused => {
+                    *moves = moves_between_looks(LOOK_EVERY_MOVES, self.symbolic.dimension());
+                    let counters = self.counters();
+                    if let Some(reason) = self.watch.look(&counters) {
+                        return Ok(Visit::Stopped(reason));
+                    }
+                }
+                end => return Ok(end),
+            }
+        }
+    }
+
+    /// The way to the state at hand: the parents of the current node, then the moves below it. The states are computed anew;
+    /// what fails on the way is left out.
+    fn trace(&mut self, is_found: bool) -> Trace {
+        let Store { tree, current, .. } = &self.store;
+        let steps = tree::way(&[tree], *current, self.explorer.way());
+        let goal: Option<&mut dyn Goal> = if is_found {
+            Some(&mut *self.goal)
+        } else {
+            None
+        };
+        retrace::retrace(self.symbolic, &steps, goal)
+    }
+}

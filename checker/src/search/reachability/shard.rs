@@ -1,0 +1,234 @@
+//! A shard of the stored states, and the mail between shards.
+//!
+//! The hash of its words decides to which shard a state belongs, so that states with the same words meet in one: what contains
+//! what is decided there, and shards share nothing. States for other shards are collected in [`Mail`], packed words and
+//! zones one after the other.
+//!
+//! Cost: a state for another shard is copied twice.
+
+use std::collections::VecDeque;
+
+use crate::ir::Network;
+use crate::zones::Bound;
+
+use super::expand::Sink;
+use super::retrace::Step;
+use super::tree::{Origin, Tree};
+use crate::search::store::packed_zones::Kept;
+use crate::search::store::passed_list::Stored;
+
+/// A state that is sent.
+#[derive(Clone, Copy, Debug)]
+struct Head {
+    hash: u32,
+    /// The node that it was reached from, in the shard that sends it.
+    origin: u32,
+    /// How many moves lead from there, with [`IS_CHOICE`].
+    steps: u32,
+}
+
+/// Marks a committed state, which belongs to the level of the state that it was reached from.
+const IS_CHOICE: u32 = 1 << 31;
+
+/// States from one shard to another.
+#[derive(Debug, Default)]
+pub(super) struct Mail {
+    heads: Vec<Head>,
+    records: Vec<u8>,
+    zones: Vec<Bound>,
+    /// The limits of each, or nothing.
+    limits: Vec<Bound>,
+    steps: Vec<Step>,
+    has_choices: bool,
+}
+
+impl Mail {
+    /// How many states it has.
+    pub(super) fn len(&self) -> usize {
+        self.heads.len()
+    }
+
+    /// Whether there are states that belong to the level at hand.
+    pub(super) fn has_choices(&self) -> bool {
+        self.has_choices
+    }
+
+    /// The bytes that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        self.heads.capacity() * size_of::<Head>()
+            + self.records.capacity()
+            + (self.zones.capacity() + self.limits.capacity()) * size_of::<Bound>()
+            + self.steps.capacity() * size_of::<Step>()
+    }
+
+    fn clear(&mut self) {
+        self.heads.clear();
+        self.records.clear();
+        self.zones.clear();
+        self.limits.clear();
+        self.steps.clear();
+        self.has_choices = false;
+    }
+}
+
+/// The stored states of one shard. As a sink it takes all states, and puts aside those of others.
+#[derive(Debug)]
+pub(super) struct Shard {
+    pub(super) tree: Tree,
+    /// The state that is being explored, one of this shard.
+    pub(super) current: Origin,
+    index: usize,
+    /// The states that wait in the level at hand.
+    now: VecDeque<Stored>,
+    /// Those of the next level.
+    next: VecDeque<Stored>,
+    /// By shard: what is to be sent to it.
+    pub(super) outgoing: Vec<Mail>,
+    /// The bytes of the states that were put aside since [`Shard::begin_round`].
+    pub(super) sent_bytes: usize,
+}
+
+impl Shard {
+    /// The shard with this index of so many.
+    pub(super) fn new(
+        network: &Network,
+        dimension: usize,
+        greatest: i32,
+        (index, count): (usize, usize),
+    ) -> Shard {
+        Shard {
+            tree: Tree::new(network, dimension, greatest),
+            current: Origin::NOWHERE,
+            index,
+            now: VecDeque::new(),
+            next: VecDeque::new(),
+            outgoing: (0..count).map(|_| Mail::default()).collect(),
+            sent_bytes: 0,
+        }
+    }
+
+    /// Begins a round; what was put aside has been handed over.
+    pub(super) fn begin_round(&mut self) {
+        self.sent_bytes = 0;
+    }
+
+    /// Takes the next state of the level at hand, which is to be explored.
+    pub(super) fn take(&mut self) -> Option<Stored> {
+        while let Some(stored) = self.now.pop_front() {
+            if !self.tree.passed.is_covered(stored) {
+                self.current = Origin {
+                    shard: self.index as u32,
+                    node: stored.node,
+                };
+                return Some(stored);
+            }
+        }
+        None
+    }
+
+    /// How many states wait in the level at hand, and how many in the next.
+    pub(super) fn waiting(&self) -> (usize, usize) {
+        (self.now.len(), self.next.len())
+    }
+
+    /// Begins the next level; nothing waits in the level at hand.
+    pub(super) fn advance(&mut self) {
+        std::mem::swap(&mut self.now, &mut self.next);
+    }
+
+    /// Stores the states of a mail from another shard, and empties it.
+    pub(super) fn deliver(&mut self, mail: &mut Mail, sender: usize) {
+        let count = mail.heads.len().max(1);
+        let record_bytes = mail.records.len() / count;
+        let zone_bounds = mail.zones.len() / count;
+        let limit_bounds = mail.limits.len() / count;
+        let mut steps = mail.steps.as_slice();
+        for (index, head) in mail.heads.iter().enumerate() {
+            let record = &mail.records[index * record_bytes..][..record_bytes];
+            let zone = Kept {
+                matrix: &mail.zones[index * zone_bounds..][..zone_bounds],
+                limits: &mail.limits[index * limit_bounds..][..limit_bounds],
+                known: None,
+            };
+            let (way, rest) = steps.split_at((head.steps & !IS_CHOICE) as usize);
+            steps = rest;
+            let origin = Origin {
+                shard: sender as u32,
+                node: head.origin,
+            };
+            self.tree.passed.propose_record(record);
+            let stored = self.tree.add_proposed(head.hash, zone, origin, way);
+            let queue = if head.steps & IS_CHOICE == 0 {
+                &mut self.next
+            } else {
+                &mut self.now
+            };
+            queue.extend(stored);
+        }
+        mail.clear();
+    }
+
+    /// The bytes that the shard takes.
+    pub(super) fn bytes(&self) -> usize {
+        let waiting = self.now.capacity() + self.next.capacity();
+        self.tree.bytes()
+            + waiting * size_of::<Stored>()
+            + self.outgoing.iter().map(Mail::bytes).sum::<usize>()
+    }
+
+    /// Stores a state that belongs here unless a stored one contains it, and gives it back; puts any other aside.
+    fn store_or_send(
+        &mut self,
+        words: &[i32],
+        zone: Kept<'_>,
+        way: &[Step],
+        is_choice: bool,
+    ) -> Option<Stored> {
+        let hash = self.tree.passed.propose(words);
+        let owner = owner(hash, self.outgoing.len());
+        if owner == self.index {
+            return self.tree.add_proposed(hash, zone, self.current, way);
+        }
+        let mail = &mut self.outgoing[owner];
+        mail.heads.push(Head {
+            hash,
+            origin: self.current.node,
+            steps: way.len() as u32 | if is_choice { IS_CHOICE } else { 0 },
+        });
+        let record = self.tree.passed.proposed();
+        mail.records.extend_from_slice(record);
+        mail.zones.extend_from_slice(zone.matrix);
+        mail.limits.extend_from_slice(zone.limits);
+        mail.steps.extend_from_slice(way);
+        mail.has_choices |= is_choice;
+        let zone_bytes = size_of_val(zone.matrix) + size_of_val(zone.limits);
+        self.sent_bytes += size_of::<Head>() + record.len() + zone_bytes + size_of_val(way);
+        None
+    }
+}
+
+impl Sink for Shard {
+    fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
+        let stored = self.store_or_send(words, zone, way, false);
+        self.next.extend(stored);
+        stored.is_some()
+    }
+
+    fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
+        self.store_or_send(words, zone, way, true).is_some()
+    }
+
+    fn pack(&mut self, words: &[i32]) -> &[u8] {
+        self.tree.passed.pack(words)
+    }
+
+    fn stored(&self) -> usize {
+        self.tree.passed.len()
+    }
+}
+
+/// The shard of states with this hash.
+fn owner(hash: u32, shards: usize) -> usize {
+    // The upper bits decide, so that the tables of the shards still tell the lower ones apart.
+    ((u64::from(hash) * shards as u64) >> 32) as usize
+}

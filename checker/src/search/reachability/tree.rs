@@ -1,0 +1,147 @@
+//! The tree of a search: stored states, each with the one that it was reached from and the moves from there.
+//!
+//! Several trees make one where the states of a search are divided: each is a *shard* of the whole, and a state may have been
+//! reached from one of another shard.
+//!
+//! Cost: eight bytes a state; the moves of a way of more than one take four bytes each and four more.
+
+use crate::ir::Network;
+
+use super::retrace::Step;
+use crate::search::store::packed_paths;
+use crate::search::store::packed_zones::Kept;
+use crate::search::store::passed_list::{PassedList, Stored};
+
+/// The most trees that make one.
+pub(super) const MOST_SHARDS: usize = 1 << (31 - SHARD_SHIFT);
+
+/// Where the shard of the parent begins in a word, above a single move or the length of a way.
+const SHARD_SHIFT: u32 = 20;
+
+/// Marks a node to which several moves lead from its parent.
+const MANY_STEPS: u32 = 1 << 31;
+
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// A node of one of the trees.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Origin {
+    /// The tree.
+    pub(super) shard: u32,
+    /// The node in it.
+    pub(super) node: u32,
+}
+
+impl Origin {
+    /// Where the initial states come from.
+    pub(super) const NOWHERE: Origin = Origin {
+        shard: 0,
+        node: NONE,
+    };
+}
+
+/// How a stored state was reached.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    parent: u32,
+    /// The only move from the parent with the parent's shard; or, with [`MANY_STEPS`], where in `paths` the number of moves stands
+    /// with the shard, and then they, packed (see [`paths`]): the number is that of their words.
+    path: u32,
+}
+
+/// Stored states with how they were reached.
+#[derive(Debug)]
+pub(super) struct Tree {
+    pub(super) passed: PassedList,
+    nodes: Vec<Node>,
+    paths: Vec<u32>,
+}
+
+impl Tree {
+    /// An empty tree; see [`PassedList::new`].
+    pub(super) fn new(network: &Network, dimension: usize, greatest: i32) -> Tree {
+        Tree {
+            passed: PassedList::new(network, dimension, greatest),
+            nodes: Vec::new(),
+            paths: Vec::new(),
+        }
+    }
+
+    /// The bytes that the tree takes.
+    pub(super) fn bytes(&self) -> usize {
+        let ways = self.nodes.len() * size_of::<Node>() + size_of_val(&*self.paths);
+        self.passed.bytes() + ways
+    }
+
+    /// Stores a state with the way to it, unless a stored one contains it.
+    pub(super) fn add(
+        &mut self,
+        words: &[i32],
+        zone: Kept<'_>,
+        origin: Origin,
+        path: &[Step],
+    ) -> Option<Stored> {
+        let stored = self.passed.add(words, zone)?;
+        self.add_node(origin, path);
+        Some(stored)
+    }
+
+    /// As [`Tree::add`], for the words that were proposed last, which have this hash.
+    pub(super) fn add_proposed(
+        &mut self,
+        hash: u32,
+        zone: Kept<'_>,
+        origin: Origin,
+        path: &[Step],
+    ) -> Option<Stored> {
+        let stored = self.passed.add_proposed(hash, zone)?;
+        self.add_node(origin, path);
+        Some(stored)
+    }
+
+    fn add_node(&mut self, origin: Origin, path: &[Step]) {
+        let shard = origin.shard << SHARD_SHIFT;
+        let path = if let [step] = *path
+            && step < 1 << SHARD_SHIFT
+        {
+            step as u32 | shard
+        } else {
+            let first = self.paths.len();
+            self.paths.push(0);
+            packed_paths::pack(path, &mut self.paths);
+            let words = self.paths.len() - first - 1;
+            self.paths[first] = words as u32 | shard;
+            first as u32 | MANY_STEPS
+        };
+        self.nodes.push(Node {
+            parent: origin.node,
+            path,
+        });
+    }
+}
+
+/// The moves from an initial state to a node, and after it the last ones.
+pub(super) fn way(trees: &[&Tree], mut origin: Origin, last: &[Step]) -> Vec<Step> {
+    const LENGTH: u32 = (1 << SHARD_SHIFT) - 1;
+    let mut steps: Vec<Step> = last.iter().rev().copied().collect();
+    while origin.node != NONE {
+        let Tree { nodes, paths, .. } = trees[origin.shard as usize];
+        let Node { parent, path } = nodes[origin.node as usize];
+        let shard = if path < MANY_STEPS {
+            steps.push(Step::from(path & LENGTH));
+            path >> SHARD_SHIFT
+        } else {
+            let first = (path - MANY_STEPS) as usize;
+            let length = (paths[first] & LENGTH) as usize;
+            packed_paths::unpack_reversed(&paths[first + 1..=first + length], &mut steps);
+            paths[first] >> SHARD_SHIFT
+        };
+        origin = Origin {
+            shard,
+            node: parent,
+        };
+    }
+    steps.reverse();
+    steps
+}

@@ -1,0 +1,463 @@
+//! Discrete states, each stored once.
+//!
+//! Invariants:
+//! * Two states get the same [`DiscreteId`] exactly if their identity words are equal; no hash stands in for a state.
+//! * Words that no update ever writes are not stored: they have their initial value in every state. `meta` words are stored
+//!   with the first state of an identity, and not compared.
+//! * Ids count from 0 in the order of first insertion.
+//!
+//! A word takes one, two or four bytes, as the range of its variable or the number of locations needs; that a value lies in
+//! its range is checked where it is assigned, and once more where it is packed.
+//!
+//! Cost: a state takes its written words; records lie in blocks that are never moved. A look-up hashes the bytes once and
+//! compares them once, on a match of 32 bits of the hash.
+
+use crate::ir::{Network, Shape};
+
+use super::segmented_table::PiecedTable;
+
+/// The index of a stored discrete state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct DiscreteId(pub u32);
+
+/// An entry of the table: the state and a part of its hash, from which the table is rebuilt when it grows.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    id: u32,
+    hash: u32,
+}
+
+/// Bytes of records in one block, at least; a block holds a power of two of records.
+const BLOCK_BYTES: usize = 1 << 16;
+
+/// What a word is stored as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Width {
+    Byte,
+    SignedByte,
+    Short,
+    SignedShort,
+    Whole,
+}
+
+impl Width {
+    /// The least width for values from `low` to `high`.
+    fn of(low: i32, high: i32) -> Width {
+        let fits = |least: i32, greatest: i32| least <= low && high <= greatest;
+        if fits(0, 0xff) {
+            Width::Byte
+        } else if fits(-0x80, 0x7f) {
+            Width::SignedByte
+        } else if fits(0, 0xffff) {
+            Width::Short
+        } else if fits(-0x8000, 0x7fff) {
+            Width::SignedShort
+        } else {
+            Width::Whole
+        }
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Width::Byte | Width::SignedByte => 1,
+            Width::Short | Width::SignedShort => 2,
+            Width::Whole => 4,
+        }
+    }
+}
+
+/// Neighbouring words that are stored alike.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    first: usize,
+    count: usize,
+    width: Width,
+}
+
+impl Run {
+    fn bytes(&self) -> usize {
+        self.count * self.width.bytes()
+    }
+
+    /// Writes the words of the run into as many bytes as it takes; returns whether all of them fit.
+    fn pack(&self, words: &[i32], bytes: &mut [u8]) -> bool {
+        let words = &words[self.first..self.first + self.count];
+        match self.width {
+            Width::Byte => narrow(words, bytes, |word| [word as u8], |[byte]| byte.into()),
+            Width::SignedByte => narrow(words, bytes, |word| (word as i8).to_le_bytes(), from_byte),
+            Width::Short => narrow(words, bytes, |word| (word as u16).to_le_bytes(), from_short),
+            Width::SignedShort => narrow(
+                words,
+                bytes,
+                |word| (word as i16).to_le_bytes(),
+                from_signed_short,
+            ),
+            Width::Whole => narrow(words, bytes, i32::to_le_bytes, i32::from_le_bytes),
+        }
+    }
+
+    /// Writes the words of the run from its bytes.
+    fn unpack(&self, bytes: &[u8], words: &mut [i32]) {
+        let words = &mut words[self.first..self.first + self.count];
+        match self.width {
+            Width::Byte => widen(bytes, words, |[byte]| byte.into()),
+            Width::SignedByte => widen(bytes, words, from_byte),
+            Width::Short => widen(bytes, words, from_short),
+            Width::SignedShort => widen(bytes, words, from_signed_short),
+            Width::Whole => widen(bytes, words, i32::from_le_bytes),
+        }
+    }
+}
+
+fn from_byte(bytes: [u8; 1]) -> i32 {
+    i8::from_le_bytes(bytes).into()
+}
+
+fn from_short(bytes: [u8; 2]) -> i32 {
+    u16::from_le_bytes(bytes).into()
+}
+
+fn from_signed_short(bytes: [u8; 2]) -> i32 {
+    i16::from_le_bytes(bytes).into()
+}
+
+fn narrow<const N: usize>(
+    words: &[i32],
+    bytes: &mut [u8],
+    to: impl Fn(i32) -> [u8; N],
+    from: impl Fn([u8; N]) -> i32,
+) -> bool {
+    let mut lost = 0;
+    for (word, target) in words.iter().zip(bytes.as_chunks_mut::<N>().0) {
+        *target = to(*word);
+        lost |= from(*target) ^ word;
+    }
+    lost == 0
+}
+
+fn widen<const N: usize>(bytes: &[u8], words: &mut [i32], from: impl Fn([u8; N]) -> i32) {
+    for (word, bytes) in words.iter_mut().zip(bytes.as_chunks::<N>().0) {
+        *word = from(*bytes);
+    }
+}
+
+/// Stored discrete states.
+#[derive(Debug)]
+pub struct StateStore {
+    /// The words that are stored; those of the identity first.
+    runs: Vec<Run>,
+    /// The bytes of a record that decide identity.
+    identity: usize,
+    /// The bytes of a record.
+    stride: usize,
+    /// Records in a block, as a power of two.
+    block_bits: u32,
+    blocks: Vec<Vec<u8>>,
+    table: PiecedTable<Entry>,
+    scratch: Vec<u8>,
+    count: u32,
+}
+
+impl StateStore {
+    /// An empty store for the states of a network.
+    pub fn new(network: &Network) -> StateStore {
+        let written = network.written_words();
+        let widths = widths(network);
+        let identity_words = network.layout.identity_words as usize;
+        let mut runs = runs_of(&written, &widths, 0, identity_words);
+        let identity = runs.iter().map(Run::bytes).sum();
+        runs.extend(runs_of(&written, &widths, identity_words, written.len()));
+        let stride = runs.iter().map(Run::bytes).sum::<usize>().max(1);
+        let block_bits = (BLOCK_BYTES / stride).max(1).ilog2();
+        StateStore {
+            runs,
+            identity,
+            stride,
+            block_bits,
+            blocks: Vec::new(),
+            table: PiecedTable::new(),
+            scratch: vec![0; stride],
+            count: 0,
+        }
+    }
+
+    /// How many states are stored.
+    pub fn len(&self) -> usize {
+        self.count as usize
+    }
+
+    /// Whether no state is stored.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The bytes that the store takes.
+    pub fn bytes(&self) -> usize {
+        let block = self.stride << self.block_bits;
+        self.blocks.len() * block + self.table.bytes()
+    }
+
+    /// The bytes of the state that decide identity, valid until the next call.
+    ///
+    /// # Panics
+    /// If a word lies outside the range of its variable.
+    pub fn pack(&mut self, words: &[i32]) -> &[u8] {
+        let fits = pack(&self.runs, words, &mut self.scratch);
+        assert!(fits, "every word lies in the range of its variable");
+        &self.scratch[..self.identity]
+    }
+
+    /// The id of a state, and whether it is new.
+    pub fn intern(&mut self, words: &[i32]) -> (DiscreteId, bool) {
+        let hash = self.propose(words);
+        self.intern_proposed(hash)
+    }
+
+    /// Packs a state, to be interned by [`StateStore::intern_proposed`] or handed to another store of the same network; returns
+    /// its hash, which only its identity decides.
+    pub(super) fn propose(&mut self, words: &[i32]) -> u32 {
+        hash_bytes(self.pack(words))
+    }
+
+    /// The record of the state that was packed last.
+    pub(super) fn proposed(&self) -> &[u8] {
+        &self.scratch
+    }
+
+    /// Takes over a record that another store of the same network has packed.
+    pub(super) fn propose_record(&mut self, record: &[u8]) {
+        self.scratch.copy_from_slice(record);
+    }
+
+    /// The id of the state that was packed or taken over last, which has this hash, and whether it is new.
+    pub(super) fn intern_proposed(&mut self, hash: u32) -> (DiscreteId, bool) {
+        let (blocks, stride, bits, identity) =
+            (&self.blocks, self.stride, self.block_bits, self.identity);
+        let key = &self.scratch[..identity];
+        let is_same = |entry: &Entry| {
+            entry.hash == hash && &record(blocks, stride, bits, entry.id)[..identity] == key
+        };
+        if let Some(entry) = self.table.find(spread(hash), is_same) {
+            return (DiscreteId(entry.id), false);
+        }
+        let id = self.count;
+        self.count += 1;
+        if id as usize >> self.block_bits == self.blocks.len() {
+            self.blocks
+                .push(Vec::with_capacity(self.stride << self.block_bits));
+        }
+        let block = self
+            .blocks
+            .last_mut()
+            .expect("a block was just made if there was none");
+        block.extend_from_slice(&self.scratch);
+        self.table
+            .insert_unique(spread(hash), Entry { id, hash }, |entry| spread(entry.hash));
+        (DiscreteId(id), true)
+    }
+
+    /// The id of a stored state.
+    pub fn find(&self, words: &[i32]) -> Option<DiscreteId> {
+        let mut packed = vec![0; self.stride];
+        if !pack(&self.runs, words, &mut packed) {
+            return None;
+        }
+        let key = &packed[..self.identity];
+        let hash = hash_bytes(key);
+        let is_same = |entry: &Entry| {
+            entry.hash == hash
+                && &record(&self.blocks, self.stride, self.block_bits, entry.id)[..self.identity]
+                    == key
+        };
+        let entry = self.table.find(spread(hash), is_same);
+        entry.map(|entry| DiscreteId(entry.id))
+    }
+
+    /// Writes the stored words of a state over those of another state of the same network.
+    pub fn load(&self, id: DiscreteId, words: &mut [i32]) {
+        let mut record = record(&self.blocks, self.stride, self.block_bits, id.0);
+        for run in &self.runs {
+            let (bytes, rest) = record.split_at(run.bytes());
+            run.unpack(bytes, words);
+            record = rest;
+        }
+    }
+}
+
+/// Packs the words of all runs; returns whether all of them fit.
+fn pack(runs: &[Run], words: &[i32], bytes: &mut [u8]) -> bool {
+    let mut rest = bytes;
+    let mut fits = true;
+    for run in runs {
+        let (own, others) = std::mem::take(&mut rest).split_at_mut(run.bytes());
+        fits &= run.pack(words, own);
+        rest = others;
+    }
+    fits
+}
+
+fn record(blocks: &[Vec<u8>], stride: usize, bits: u32, id: u32) -> &[u8] {
+    let within = (id as usize & ((1 << bits) - 1)) * stride;
+    &blocks[id as usize >> bits][within..within + stride]
+}
+
+/// By word: what it is stored as.
+fn widths(network: &Network) -> Vec<Width> {
+    let mut widths = vec![Width::Whole; network.layout.words as usize];
+    for (width, process) in widths.iter_mut().zip(&network.processes) {
+        *width = Width::of(0, process.locations.len() as i32 - 1);
+    }
+    for variable in &network.layout.variables {
+        let mut of_variable = Vec::new();
+        add_widths(&variable.shape, &mut of_variable);
+        let first = variable.offset as usize;
+        widths[first..first + of_variable.len()].copy_from_slice(&of_variable);
+    }
+    widths
+}
+
+fn add_widths(shape: &Shape, widths: &mut Vec<Width>) {
+    match shape {
+        Shape::Integer { low, high } => widths.push(Width::of(*low, *high)),
+        Shape::Bool => widths.push(Width::Byte),
+        Shape::Double => widths.extend([Width::Whole; 2]),
+        Shape::Scalar { size, .. } => widths.push(Width::of(0, *size as i32)),
+        Shape::Array { part, length, .. } => {
+            let first = widths.len();
+            add_widths(part, widths);
+            let of_part = widths.split_off(first);
+            widths.extend((0..*length).flat_map(|_| &of_part));
+        }
+        Shape::Struct(fields) => fields
+            .iter()
+            .for_each(|(_, shape)| add_widths(shape, widths)),
+    }
+}
+
+/// The maximal runs of written words of the same width from `first` up to `last`.
+fn runs_of(written: &[bool], widths: &[Width], first: usize, last: usize) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for word in (first..last).filter(|&word| written[word]) {
+        let width = widths[word];
+        match runs.last_mut() {
+            Some(run) if run.first + run.count == word && run.width == width => run.count += 1,
+            _ => runs.push(Run {
+                first: word,
+                count: 1,
+                width,
+            }),
+        }
+    }
+    runs
+}
+
+/// A hash of bytes: four lanes of multiply and fold, so that the multiplications overlap.
+pub(in crate::search) fn hash_bytes(bytes: &[u8]) -> u32 {
+    const FACTORS: [u64; 4] = [
+        0x9e37_79b9_7f4a_7c15,
+        0xc2b2_ae3d_27d4_eb4f,
+        0x1656_67b1_9e37_79f9,
+        0xd6e8_feb8_6659_fd93,
+    ];
+    let mut lanes = FACTORS;
+    let (words, rest) = bytes.as_chunks::<8>();
+    let (blocks, others) = words.as_chunks::<4>();
+    let mut absorb = |lane: usize, word: [u8; 8]| {
+        lanes[lane] = fold(lanes[lane] ^ u64::from_le_bytes(word), FACTORS[lane]);
+    };
+    for block in blocks {
+        (0..4).for_each(|lane| absorb(lane, block[lane]));
+    }
+    for (lane, word) in others.iter().enumerate() {
+        absorb(lane, *word);
+    }
+    let mut last = [0; 8];
+    last[..rest.len()].copy_from_slice(rest);
+    absorb(3, last);
+    let all = lanes.iter().fold(bytes.len() as u64, |hash, lane| {
+        fold(hash ^ lane, FACTORS[0])
+    });
+    (all ^ (all >> 32)) as u32
+}
+
+fn fold(value: u64, factor: u64) -> u64 {
+    let product = value.wrapping_mul(factor);
+    product ^ (product >> 29)
+}
+
+/// The 64 bits that the table wants, from the 32 bits that are kept.
+pub(in crate::search) fn spread(hash: u32) -> u64 {
+    u64::from(hash).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::Layout;
+    use crate::ir::Update;
+    use crate::ir::Variable;
+
+    /// A network without processes, with one variable of this shape that an update writes.
+    fn network(shape: Shape) -> Network {
+        let words = shape.words();
+        let update = Update {
+            writes: vec![(0, words)],
+            ..Update::default()
+        };
+        Network {
+            layout: Layout {
+                words,
+                identity_words: words,
+                variables: vec![Variable {
+                    name: "v".to_owned(),
+                    owner: None,
+                    offset: 0,
+                    shape,
+                    meta: false,
+                }],
+            },
+            before_update: Some(update),
+            ..Network::default()
+        }
+    }
+
+    #[test]
+    fn words_come_back_at_both_ends_of_every_range() {
+        let ranges = [
+            (0, 1, 1),
+            (0, 255, 1),
+            (-1, 1, 1),
+            (-128, 127, 1),
+            (0, 256, 2),
+            (-1, 200, 2),
+            (-32_768, 32_767, 2),
+            (0, 65_535, 2),
+            (0, 65_536, 4),
+            (i32::MIN, i32::MAX, 4),
+        ];
+        for (low, high, bytes) in ranges {
+            let part = Box::new(Shape::Integer { low, high });
+            let mut store = StateStore::new(&network(Shape::Array {
+                part,
+                length: 3,
+                first: 0,
+                set: None,
+            }));
+            assert_eq!(store.stride, 3 * bytes);
+            for state in [[low, high, 0], [high, high, low]] {
+                let (id, is_new) = store.intern(&state);
+                assert!(is_new && store.intern(&state) == (id, false));
+                let mut loaded = [7; 3];
+                store.load(id, &mut loaded);
+                assert_eq!(loaded, state);
+            }
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "every word lies in the range of its variable")]
+    fn word_outside_its_range_is_no_other_state() {
+        let shape = Shape::Integer { low: 0, high: 9 };
+        StateStore::new(&network(shape)).intern(&[256]);
+    }
+}

@@ -1,0 +1,8 @@
+//! Where states are kept: discrete states, packed zones, the passed list.
+
+pub mod discrete_states;
+pub(super) mod packed_paths;
+pub(super) mod packed_zones;
+pub(super) mod passed_list;
+pub(super) mod segmented_table;
+pub(super) mod zone_lists;

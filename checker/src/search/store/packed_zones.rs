@@ -1,0 +1,896 @@
+//! Zones, each stored once, in as few bytes a bound as the widest one needs; reduced (see [`simulation`]), if zones are compared by
+//! what comparisons can tell.
+//!
+//! Invariants:
+//! * Two zones get the same [`ZoneId`] exactly if their matrices are equal.
+//! * All matrices have entries of the same width: one byte until a bound does not fit, then two, then four. The order of
+//!   bounds is that of the entries, so inclusion is decided on the packed form.
+//! * A zone counts how often it is in use; after the last use its place is used again.
+//!
+//! Cost: packing and comparing touch each bound once, a vector of them at a time.
+
+use crate::cancellation;
+use crate::network::KeptZone;
+use crate::zones::simulation::{self, NO_DEMAND};
+use crate::zones::zone_table::ZoneId;
+use crate::zones::{Bound, dbm};
+
+use super::discrete_states::{hash_bytes, spread};
+use super::segmented_table::PiecedTable;
+
+/// Sums of bytes with at most such a sum of weights are below 2^15.
+const NARROW: i32 = 255;
+
+/// How many bytes a bound takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Width {
+    One,
+    Two,
+    Four,
+}
+
+/// A zone as it is stored.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::search) struct Kept<'r> {
+    /// Its closed matrix, or its reduced form if there are limits.
+    pub(in crate::search) matrix: &'r [Bound],
+    /// The limits of its ceilings if zones count as contained in what simulates them. Whether there are any is the same for all
+    /// zones, and they are the same for zones that are compared.
+    pub(in crate::search) limits: &'r [Bound],
+    /// By what it is known, if it is.
+    pub(in crate::search) known: Option<KeptZone>,
+}
+
+/// How the packed matrices of two zones lie to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Comparison {
+    /// No entry of the first exceeds its counterpart.
+    Within,
+    /// Only infinite entries do.
+    InfinitelyAbove,
+    /// Others do.
+    Above,
+}
+
+/// A bound packed into `N` bytes; the greatest value stands for infinity, the least for no demand.
+trait Entry<const N: usize>: Copy + Ord {
+    const INFINITY: Self;
+
+    /// The least value.
+    const LEAST: Self;
+
+    /// The lower bits of an encoded bound.
+    fn truncated(raw: i32) -> Self;
+
+    /// The encoded bound; meaningless for infinity.
+    fn raw(self) -> i32;
+
+    fn to_bytes(self) -> [u8; N];
+
+    fn of_bytes(bytes: [u8; N]) -> Self;
+}
+
+macro_rules! entry {
+    ($type:ty, $bytes:literal) => {
+        impl Entry<$bytes> for $type {
+            const INFINITY: $type = <$type>::MAX;
+            const LEAST: $type = <$type>::MIN;
+
+            #[inline]
+            fn truncated(raw: i32) -> $type {
+                raw as $type
+            }
+
+            #[inline]
+            fn raw(self) -> i32 {
+                self.into()
+            }
+
+            #[inline]
+            fn to_bytes(self) -> [u8; $bytes] {
+                self.to_le_bytes()
+            }
+
+            #[inline]
+            fn of_bytes(bytes: [u8; $bytes]) -> $type {
+                <$type>::from_le_bytes(bytes)
+            }
+        }
+    };
+}
+entry!(i8, 1);
+entry!(i16, 2);
+entry!(i32, 4);
+
+/// Packs a zone; returns whether all bounds fit.
+fn pack<T: Entry<N>, const N: usize>(zone: &[Bound], target: &mut [u8]) -> bool {
+    let (least, infinity) = (T::LEAST.raw(), T::INFINITY.raw());
+    let mut lost = 0;
+    for (bytes, bound) in target.as_chunks_mut::<N>().0.iter_mut().zip(zone) {
+        let raw = bound.raw();
+        let is_no_demand = -i32::from(raw == NO_DEMAND.raw());
+        let is_lost = raw <= least || raw >= infinity && raw != i32::MAX;
+        lost |= i32::from(is_lost) & !is_no_demand;
+        let fitting = raw.clamp(least, infinity);
+        *bytes = T::truncated(fitting & !is_no_demand | least & is_no_demand).to_bytes();
+    }
+    lost == 0
+}
+
+/// Where zones have fewer clocks than this, with the reference clock, hardly more than one bound counts for each number of a signature,
+/// whichever way they are shared out.
+const FEW_CLOCKS: usize = 6;
+
+/// How many bounds lie side by side before the numbers of a signature begin anew with the first one, and whether bounds have weights.
+///
+/// Where a clock was reset a little later, the bounds of its column are greater and those of its row smaller, or the other way round.
+/// So a number is the sum of columns: those of one clock show it in one direction, all others in the other one. In sums that mix rows and
+/// columns it would cancel out.
+fn period(dimension: usize) -> (usize, bool) {
+    if dimension < FEW_CLOCKS {
+        (dimension * dimension, true)
+    } else {
+        (dimension, false)
+    }
+}
+
+/// The factor of the bounds of a block of eight in the sums of a signature.
+///
+/// Bounds on a difference and on its negative often lie in the same lane, and would cancel out where a difference is exact.
+fn weight(block: usize, is_weighted: bool) -> i32 {
+    if is_weighted {
+        1 + (block & 3) as i32
+    } else {
+        1
+    }
+}
+
+/// The weighted sums of every eighth bound of a period. A bound counts from the negated greatest one on, and up to one more than that.
+fn sums(matrix: &[Bound], greatest: i32, (period, is_weighted): (usize, bool)) -> [i32; 8] {
+    let mut sums = [0; 8];
+    let mut add = |bounds: &[Bound], index| {
+        for (sum, bound) in sums.iter_mut().zip(bounds) {
+            *sum += weight(index, is_weighted) * bound.raw().clamp(-greatest, greatest + 1);
+        }
+    };
+    for row in matrix.chunks_exact(period) {
+        let (blocks, rest) = row.as_chunks::<8>();
+        for (index, block) in blocks.iter().enumerate() {
+            add(block, index);
+        }
+        add(rest, blocks.len());
+    }
+    sums
+}
+
+/// As [`sums`] for entries whose greatest sum is below 2^15, in as narrow lanes.
+fn narrow_sums(matrix: &[i16], greatest: i16, (period, is_weighted): (usize, bool)) -> [i32; 8] {
+    let mut sums = [0_i16; 8];
+    let mut add = |entries: &[i16], index| {
+        let weight = weight(index, is_weighted) as i16;
+        for (sum, entry) in sums.iter_mut().zip(entries) {
+            *sum += weight * (*entry).clamp(-greatest, greatest + 1);
+        }
+    };
+    for row in matrix.chunks_exact(period) {
+        let (blocks, rest) = row.as_chunks::<8>();
+        for (index, block) in blocks.iter().enumerate() {
+            add(block, index);
+        }
+        add(rest, blocks.len());
+    }
+    sums.map(i32::from)
+}
+
+/// The entries of a matrix packed into bytes, or its demands if there are limits, as far as [`narrow_sums`] tells them apart.
+fn widen_narrow(matrix: &[u8], limits: &[Bound], dimension: usize, target: &mut [i16]) {
+    const NONE: i16 = -1 << 14;
+    for (entry, byte) in target.iter_mut().zip(matrix) {
+        let byte = *byte as i8;
+        let is_infinite = -i16::from(byte == i8::MAX);
+        let is_no_demand = -i16::from(byte == i8::MIN);
+        let wide = i16::from(byte) & !is_infinite | i16::MAX & is_infinite;
+        *entry = wide & !is_no_demand | NONE & is_no_demand;
+    }
+    let (lower_bounds, others) = target.split_at_mut(dimension);
+    // Without limits there is nothing to do.
+    for (row, limit) in others
+        .chunks_exact_mut(dimension)
+        .zip(limits.iter().skip(1))
+    {
+        let limit = limit.raw().clamp(NONE.into(), -i32::from(NONE) - 1) as i16;
+        for (entry, lower) in row.iter_mut().zip(&*lower_bounds) {
+            *entry = (*entry).min((limit + lower) & !1);
+        }
+    }
+}
+
+fn unpack<T: Entry<N>, const N: usize>(bytes: &[u8], zone: &mut [Bound]) {
+    for (bound, bytes) in zone.iter_mut().zip(bytes.as_chunks::<N>().0) {
+        let entry = T::of_bytes(*bytes);
+        *bound = if entry == T::INFINITY {
+            Bound::INFINITY
+        } else if entry == T::LEAST {
+            NO_DEMAND
+        } else {
+            Bound::from_raw(entry.raw())
+        };
+    }
+}
+
+fn compare<T: Entry<N>, const N: usize>(zone: &[u8], other: &[u8]) -> Comparison {
+    // Blocks are compared without a branch; most comparisons end in the first one.
+    const BLOCK_BYTES: usize = 32;
+    let mut is_above = 0;
+    let mut exceeds = |block: &[u8], other: &[u8]| {
+        let entries = block.as_chunks::<N>().0.iter();
+        let mut exceeds = 0;
+        for (entry, other) in entries.zip(other.as_chunks::<N>().0) {
+            let (entry, other) = (T::of_bytes(*entry), T::of_bytes(*other));
+            is_above |= u8::from(entry > other);
+            exceeds |= u8::from(entry > other) & u8::from(entry != T::INFINITY);
+        }
+        exceeds != 0
+    };
+    let (blocks, rest) = zone.as_chunks::<BLOCK_BYTES>();
+    let (other_blocks, other_rest) = other.as_chunks::<BLOCK_BYTES>();
+    let mut pairs = blocks.iter().zip(other_blocks);
+    if pairs.any(|(block, other)| exceeds(block, other)) || exceeds(rest, other_rest) {
+        Comparison::Above
+    } else if is_above == 0 {
+        Comparison::Within
+    } else {
+        Comparison::InfinitelyAbove
+    }
+}
+
+/// A digest of a zone, or of its demands if it is reduced, that grows with it: eight numbers of fifteen bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Signature([u32; 4]);
+
+impl Signature {
+    /// Whether a zone with this signature may be a subset of one with the other; false is certain.
+    #[inline]
+    pub(super) fn may_be_within(self, other: Signature) -> bool {
+        // No number borrows from its neighbour, and the sixteenth bit is left where it is not greater.
+        const SIXTEENTH_BITS: u64 = 0x8000_8000_8000_8000;
+        let left = |half: usize| (other.half(half) | SIXTEENTH_BITS) - self.half(half);
+        left(0) & left(1) & SIXTEENTH_BITS == SIXTEENTH_BITS
+    }
+
+    /// By number, the first lowest: whether it is at least that of the other.
+    #[inline]
+    pub(super) fn reaches(self, other: Signature) -> u8 {
+        const SIXTEENTH_BITS: u64 = 0x8000_8000_8000_8000;
+        // Brings the bits 0, 16, 32 and 48 to 48 to 51.
+        const GATHER: u64 = 1 << 48 | 1 << 33 | 1 << 18 | 1 << 3;
+        let bits = |half: usize| {
+            let left = (self.half(half) | SIXTEENTH_BITS) - other.half(half);
+            ((left & SIXTEENTH_BITS) >> 15).wrapping_mul(GATHER) >> 48 & 15
+        };
+        (bits(0) | bits(1) << 4) as u8
+    }
+
+    /// The numbers in the middle of those of others, rounded up; `None` if these are all the same.
+    pub(super) fn mean(
+        signatures: &(impl Iterator<Item = Signature> + Clone),
+    ) -> Option<Signature> {
+        let first = signatures.clone().next()?;
+        if signatures.clone().all(|one| one == first) {
+            return None;
+        }
+        let count = signatures.clone().count() as u64;
+        let sum = |lane| {
+            signatures
+                .clone()
+                .map(|one| u64::from(one.number(lane)))
+                .sum()
+        };
+        let mean = |lane: usize| u64::div_ceil(sum(lane), count) as u32;
+        Some(Signature::of(std::array::from_fn(mean)))
+    }
+
+    /// One with these numbers, which have fifteen bits.
+    pub(super) fn of(numbers: [u32; 8]) -> Signature {
+        Signature(std::array::from_fn(|pair| {
+            numbers[2 * pair] | numbers[2 * pair + 1] << 16
+        }))
+    }
+
+    fn number(self, lane: usize) -> u32 {
+        self.0[lane / 2] >> (16 * (lane % 2)) & 0xffff
+    }
+
+    #[inline]
+    fn half(self, half: usize) -> u64 {
+        u64::from(self.0[2 * half]) | u64::from(self.0[2 * half + 1]) << 32
+    }
+}
+
+/// The packed matrices and signatures of zones by what they are known by.
+#[derive(Debug, Default)]
+struct Known {
+    age: u32,
+    matrices: Vec<u8>,
+    signatures: Vec<Option<Signature>>,
+}
+
+impl Known {
+    fn bytes(&self) -> usize {
+        self.matrices.len() + size_of_val(&*self.signatures)
+    }
+
+    /// Writes the matrix of a zone and gives its signature, if it was added.
+    fn copy_into(&self, known: KeptZone, candidate: &mut [u8]) -> Option<Signature> {
+        let index = known.zone.0 as usize;
+        let signature = *self.signatures.get(index)?;
+        let size = candidate.len();
+        if known.age == self.age && signature.is_some() {
+            candidate.copy_from_slice(&self.matrices[index * size..][..size]);
+            return signature;
+        }
+        None
+    }
+
+    fn add(&mut self, known: KeptZone, matrix: &[u8], signature: Signature) {
+        if known.age != self.age {
+            *self = Known {
+                age: known.age,
+                ..Known::default()
+            };
+        }
+        let (index, size) = (known.zone.0 as usize, matrix.len());
+        if self.signatures.len() <= index {
+            self.signatures.resize(index + 1, None);
+            self.matrices.resize((index + 1) * size, 0);
+        }
+        self.signatures[index] = Some(signature);
+        self.matrices[index * size..][..size].copy_from_slice(matrix);
+    }
+}
+
+/// Bytes of matrices in one block, at least; a block holds a power of two of matrices.
+const BLOCK_BYTES: usize = 1 << 16;
+
+/// Packed matrices of one size, by number from 0, in blocks that are never moved.
+#[derive(Debug)]
+struct Matrices {
+    size: usize,
+    /// Matrices in a block, as a power of two.
+    block_bits: u32,
+    blocks: Vec<Vec<u8>>,
+    count: u32,
+}
+
+impl Matrices {
+    fn new(size: usize) -> Matrices {
+        Matrices {
+            size,
+            block_bits: (BLOCK_BYTES / size).max(1).ilog2(),
+            blocks: Vec::new(),
+            count: 0,
+        }
+    }
+
+    #[inline]
+    fn get(&self, id: u32) -> &[u8] {
+        let (block, first) = self.place(id);
+        &self.blocks[block][first..first + self.size]
+    }
+
+    fn get_mut(&mut self, id: u32) -> &mut [u8] {
+        let (block, first) = self.place(id);
+        &mut self.blocks[block][first..first + self.size]
+    }
+
+    /// The block of a matrix, and where it begins there.
+    #[inline]
+    fn place(&self, id: u32) -> (usize, usize) {
+        let within = id as usize & ((1 << self.block_bits) - 1);
+        (id as usize >> self.block_bits, within * self.size)
+    }
+
+    fn push(&mut self, matrix: &[u8]) -> u32 {
+        let id = self.count;
+        self.count += 1;
+        if id as usize >> self.block_bits == self.blocks.len() {
+            self.blocks
+                .push(Vec::with_capacity(self.size << self.block_bits));
+        }
+        let block = self.blocks.last_mut();
+        block
+            .expect("a block was just made if there was none")
+            .extend_from_slice(matrix);
+        id
+    }
+
+    /// Gives entries twice as many bytes, block by block, so that the old and the new ones never stand side by side.
+    fn widen(&mut self, widened: impl Fn(&[u8], &mut Vec<u8>)) {
+        cancellation::ask_for(self.bytes());
+        self.size *= 2;
+        for block in &mut self.blocks {
+            let mut wide = Vec::with_capacity(self.size << self.block_bits);
+            widened(block, &mut wide);
+            *block = wide;
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.blocks.len() * (self.size << self.block_bits)
+    }
+}
+
+/// Stored zones of one dimension.
+#[derive(Debug)]
+pub(super) struct PackedZones {
+    dimension: usize,
+    width: Width,
+    matrices: Matrices,
+    /// The matrix that was proposed last.
+    candidate: Vec<u8>,
+    known: Known,
+    /// The demands of a zone; empty until zones have limits.
+    demands: Vec<Bound>,
+    /// What [`widen_narrow`] makes of the candidate; empty until it is asked for.
+    narrow: Vec<i16>,
+    /// What demands are to be met by; empty until zones have limits.
+    other: Vec<Bound>,
+    /// By zone: how often it is in use.
+    uses: Vec<u32>,
+    free: Vec<u32>,
+    table: PiecedTable<u32>,
+    /// The greatest encoded bound that signatures tell from greater ones.
+    greatest: i32,
+    /// By lane of a signature: the sum of the weights of its bounds.
+    weights: [i32; 8],
+    /// The factor from sums of bounds to the numbers of a signature, over 2^32.
+    scale: u64,
+}
+
+impl PackedZones {
+    /// An empty table of zones of this dimension, most of whose constants are at most `greatest`; signatures are best then.
+    pub(super) fn new(dimension: usize, greatest: i32) -> PackedZones {
+        let mut weights = [0; 8];
+        let (period, is_weighted) = period(dimension);
+        for entry in 0..dimension * dimension {
+            let place = entry % period;
+            weights[place % 8] += weight(place / 8, is_weighted);
+        }
+        // So that sums of so many bounds fit into a word.
+        let greatest = (2 * greatest.clamp(0, Bound::MAX_VALUE) + 1).min((1 << 29) / weights[0]);
+        let most = i64::from(weights[0]) * i64::from(2 * greatest + 1);
+        PackedZones {
+            dimension,
+            width: Width::One,
+            matrices: Matrices::new(dimension * dimension),
+            candidate: vec![0; dimension * dimension],
+            known: Known::default(),
+            demands: Vec::new(),
+            narrow: Vec::new(),
+            other: Vec::new(),
+            uses: Vec::new(),
+            free: Vec::new(),
+            table: PiecedTable::new(),
+            greatest,
+            weights,
+            scale: ((0x7fff << 32) / most as u64).min(1 << 32),
+        }
+    }
+
+    fn get(&self, id: u32) -> &[u8] {
+        self.matrices.get(id)
+    }
+
+    /// Makes a zone the candidate, which the following questions are about; returns its signature.
+    pub(super) fn propose(&mut self, zone: Kept<'_>) -> Signature {
+        if let Some(known) = zone.known
+            && let Some(signature) = self.known.copy_into(known, &mut self.candidate)
+        {
+            return signature;
+        }
+        while !self.pack(zone.matrix) {
+            self.widen();
+        }
+        let (dimension, greatest) = (self.dimension, self.greatest);
+        let is_narrow =
+            self.width == Width::One && greatest < i8::MAX.into() && self.weights[0] <= NARROW;
+        let size = dimension * dimension;
+        let sums = if is_narrow {
+            self.narrow.resize(size, 0);
+            widen_narrow(&self.candidate, zone.limits, dimension, &mut self.narrow);
+            narrow_sums(&self.narrow, greatest as i16, period(dimension))
+        } else if zone.limits.is_empty() {
+            sums(zone.matrix, greatest, period(dimension))
+        } else {
+            self.demands.resize(size, Bound::INFINITY);
+            simulation::demands(zone.matrix, dimension, zone.limits, &mut self.demands);
+            sums(&self.demands, greatest, period(dimension))
+        };
+        let signature = self.signature_of(sums);
+        if let Some(known) = zone.known {
+            self.known.add(known, &self.candidate, signature);
+        }
+        signature
+    }
+
+    fn signature_of(&self, sums: [i32; 8]) -> Signature {
+        let number = |lane: usize| {
+            let above_least = sums[lane] + self.greatest * self.weights[lane];
+            ((above_least as u64 * self.scale) >> 32) as u32
+        };
+        Signature::of(std::array::from_fn(number))
+    }
+
+    fn pack(&mut self, zone: &[Bound]) -> bool {
+        match self.width {
+            Width::One => pack::<i8, 1>(zone, &mut self.candidate),
+            Width::Two => pack::<i16, 2>(zone, &mut self.candidate),
+            Width::Four => pack::<i32, 4>(zone, &mut self.candidate),
+        }
+    }
+
+    /// Whether a stored zone contains the candidate, which has these limits.
+    pub(super) fn contains_candidate(&mut self, id: ZoneId, limits: &[Bound]) -> bool {
+        match self.compare(&self.candidate, self.get(id.0)) {
+            Comparison::Within => true,
+            Comparison::Above => false,
+            Comparison::InfinitelyAbove => {
+                self.is_within(|zones| [&zones.candidate, zones.get(id.0)], limits)
+            }
+        }
+    }
+
+    /// Whether the candidate, which has these limits, contains a stored zone.
+    pub(super) fn is_in_candidate(&mut self, id: ZoneId, limits: &[Bound]) -> bool {
+        match self.compare(self.get(id.0), &self.candidate) {
+            Comparison::Within => true,
+            Comparison::Above => false,
+            Comparison::InfinitelyAbove => {
+                self.is_within(|zones| [zones.get(id.0), &zones.candidate], limits)
+            }
+        }
+    }
+
+    fn compare(&self, zone: &[u8], other: &[u8]) -> Comparison {
+        match self.width {
+            Width::One => compare::<i8, 1>(zone, other),
+            Width::Two => compare::<i16, 2>(zone, other),
+            Width::Four => compare::<i32, 4>(zone, other),
+        }
+    }
+
+    /// Whether the second of two packed zones contains the first, of which only infinite entries exceed their counterparts.
+    fn is_within(&mut self, of: impl Fn(&PackedZones) -> [&[u8]; 2], limits: &[Bound]) -> bool {
+        if limits.is_empty() {
+            return false;
+        }
+        let mut other = std::mem::take(&mut self.other);
+        let mut demands = std::mem::take(&mut self.demands);
+        other.resize(self.dimension * self.dimension, Bound::INFINITY);
+        demands.resize(other.len(), Bound::INFINITY);
+        let [first, second] = of(self);
+        unpack_as(self.width, first, &mut other);
+        simulation::demands(&other, self.dimension, limits, &mut demands);
+        unpack_as(self.width, second, &mut other);
+        let is_within = dbm::is_subset(&demands, &other);
+        (self.other, self.demands) = (other, demands);
+        is_within
+    }
+
+    /// Keeps the candidate, or counts one more use of it if it is stored.
+    pub(super) fn keep(&mut self) -> ZoneId {
+        let new_hash = hash(&self.candidate);
+        let is_candidate = |&id: &u32| self.get(id) == self.candidate;
+        if let Some(&id) = self.table.find(new_hash, is_candidate) {
+            self.uses[id as usize] += 1;
+            return ZoneId(id);
+        }
+        let id = if let Some(id) = self.free.pop() {
+            self.matrices.get_mut(id).copy_from_slice(&self.candidate);
+            self.uses[id as usize] = 1;
+            id
+        } else {
+            self.uses.push(1);
+            self.matrices.push(&self.candidate)
+        };
+        let matrices = &self.matrices;
+        self.table
+            .insert_unique(new_hash, id, |&id| hash(matrices.get(id)));
+        ZoneId(id)
+    }
+
+    /// Gives up one use of a zone; without any it is forgotten. The candidate stays.
+    pub(super) fn release(&mut self, id: ZoneId) {
+        let uses = &mut self.uses[id.0 as usize];
+        *uses -= 1;
+        if *uses > 0 {
+            return;
+        }
+        let hash = hash(self.get(id.0));
+        let entry = self.table.find_entry(hash, |&other| other == id.0);
+        entry.expect("a zone in use is in the table").remove();
+        self.free.push(id.0);
+    }
+
+    /// Writes a stored zone.
+    pub(super) fn load(&self, id: ZoneId, zone: &mut [Bound]) {
+        unpack_as(self.width, self.get(id.0), zone);
+    }
+
+    /// The bytes that the zones and their table take.
+    pub(super) fn bytes(&self) -> usize {
+        let ids = (self.uses.len() + self.free.capacity()) * size_of::<u32>();
+        let buffers = self.candidate.len()
+            + size_of_val(&*self.narrow)
+            + size_of_val(&*self.demands)
+            + size_of_val(&*self.other);
+        self.matrices.bytes() + ids + self.table.bytes() + self.known.bytes() + buffers
+    }
+
+    /// Gives all matrices entries of twice as many bytes.
+    fn widen(&mut self) {
+        self.width = match self.width {
+            Width::One => {
+                self.matrices.widen(widened::<i8, i16, 1, 2>);
+                Width::Two
+            }
+            Width::Two => {
+                self.matrices.widen(widened::<i16, i32, 2, 4>);
+                Width::Four
+            }
+            Width::Four => unreachable!("every bound fits into four bytes"),
+        };
+        self.candidate.resize(2 * self.candidate.len(), 0);
+        self.known = Known::default();
+        let ids: Vec<u32> = self.table.drain().collect();
+        let hash_of = |&id: &u32| hash(self.matrices.get(id));
+        for id in ids {
+            self.table.insert_unique(hash_of(&id), id, hash_of);
+        }
+    }
+}
+
+fn unpack_as(width: Width, bytes: &[u8], zone: &mut [Bound]) {
+    match width {
+        Width::One => unpack::<i8, 1>(bytes, zone),
+        Width::Two => unpack::<i16, 2>(bytes, zone),
+        Width::Four => unpack::<i32, 4>(bytes, zone),
+    }
+}
+
+fn hash(matrix: &[u8]) -> u64 {
+    spread(hash_bytes(matrix))
+}
+
+fn widened<T: Entry<N>, W: Entry<M>, const N: usize, const M: usize>(
+    bytes: &[u8],
+    wide: &mut Vec<u8>,
+) {
+    let entries = bytes.as_chunks::<N>().0.iter();
+    let widen = |bytes: &[u8; N]| {
+        let entry = T::of_bytes(*bytes);
+        if entry == T::INFINITY {
+            W::INFINITY.to_bytes()
+        } else if entry == T::LEAST {
+            W::LEAST.to_bytes()
+        } else {
+            W::truncated(entry.raw()).to_bytes()
+        }
+    };
+    entries.for_each(|entry| wide.extend_from_slice(&widen(entry)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::zones::Zone;
+    use crate::zones::extrapolate::Ceilings;
+
+    /// Zones of three clocks with constants up to about `scale`, in a fixed order.
+    fn zones(scale: i32) -> Vec<Zone> {
+        let mut zones = Vec::new();
+        for index in 0..60_i32 {
+            let mut zone = Zone::universe(4);
+            let bound = |seed: i32| Bound::weak((index * seed) % 7 * scale / 7);
+            for clock in 1..4 {
+                let upper = bound(clock as i32 + 2).expect("a constant within the range");
+                zone.constrain(clock, index as usize % clock, upper);
+            }
+            zones.push(zone);
+        }
+        zones
+    }
+
+    fn whole(matrix: &[Bound]) -> Kept<'_> {
+        Kept {
+            matrix,
+            limits: &[],
+            known: None,
+        }
+    }
+
+    #[test]
+    fn reduced_zones_are_compared_by_their_demands_in_every_width() {
+        let ceilings = Ceilings::lower_upper(
+            &[None, Some(40), None, Some(90)],
+            &[None, Some(9), Some(30), None],
+        );
+        let limits = ceilings.limits();
+        let mut packed = PackedZones::new(4, 9);
+        let mut kept: Vec<(ZoneId, Vec<Bound>, Vec<Bound>, Signature)> = Vec::new();
+        let mut beyond_entries = 0;
+        for scale in [9, 40, 62 * 7 / 6, 64 * 7 / 6, 400, 100_000] {
+            for (index, mut zone) in (0..).zip(zones(scale)) {
+                let least = Bound::weak(-(index % 5) * scale.min(60) / 10);
+                let least = least.expect("a constant within the range");
+                if !zone.constrain(0, index as usize % 3 + 1, least) {
+                    continue;
+                }
+                let mut matrix = zone.bounds().to_vec();
+                simulation::reduce(&mut matrix, 4, &ceilings);
+                let mut demands = matrix.clone();
+                simulation::demands(&matrix, 4, limits, &mut demands);
+                let own = packed.propose(Kept {
+                    matrix: &matrix,
+                    limits,
+                    known: None,
+                });
+                for (id, other, others, signature) in &kept {
+                    let is_within = dbm::is_subset(&demands, other);
+                    assert_eq!(packed.contains_candidate(*id, limits), is_within);
+                    let contains = dbm::is_subset(others, &matrix);
+                    assert_eq!(packed.is_in_candidate(*id, limits), contains);
+                    assert!(!is_within || own.may_be_within(*signature));
+                    assert!(!contains || signature.may_be_within(own));
+                    beyond_entries += i32::from(is_within && !dbm::is_subset(&matrix, other));
+                }
+                let id = packed.keep();
+                for (other_id, other, ..) in &kept {
+                    assert_eq!(*other_id == id, *other == matrix);
+                }
+                kept.push((id, matrix, demands, own));
+            }
+        }
+        assert!(
+            beyond_entries > 0,
+            "some inclusions show only in the demands"
+        );
+        for (id, matrix, ..) in &kept {
+            let mut loaded = vec![Bound::LE_ZERO; 16];
+            packed.load(*id, &mut loaded);
+            assert_eq!(&loaded, matrix);
+        }
+    }
+
+    type Known = (ZoneId, Zone, Signature);
+
+    fn check_zones(packed: &mut PackedZones, zones: &[Zone], kept: &mut Vec<Known>) {
+        for zone in zones {
+            let own = packed.propose(whole(zone.bounds()));
+            for (id, other, signature) in &*kept {
+                let is_within = dbm::is_subset(zone.bounds(), other.bounds());
+                assert_eq!(packed.contains_candidate(*id, &[]), is_within);
+                let contains = dbm::is_subset(other.bounds(), zone.bounds());
+                assert_eq!(packed.is_in_candidate(*id, &[]), contains);
+                assert!(!is_within || own.may_be_within(*signature));
+                assert!(!contains || signature.may_be_within(own));
+            }
+            let id = packed.keep();
+            for (other_id, other, _) in &*kept {
+                assert_eq!(*other_id == id, other == zone);
+            }
+            kept.push((id, zone.clone(), own));
+        }
+        for (id, zone, _) in kept {
+            let mut loaded = Zone::zero(4);
+            packed.load(*id, loaded.bounds_mut());
+            assert_eq!(&loaded, zone);
+        }
+    }
+
+    #[test]
+    fn zones_stay_the_same_when_bounds_outgrow_their_width() {
+        let mut packed = PackedZones::new(4, 9);
+        let mut kept = Vec::new();
+        // Encoded, 63 is the greatest constant for one byte, 64 the first for two; 16383 and 16384 likewise.
+        for scale in [
+            9,
+            62 * 7 / 6,
+            64 * 7 / 6,
+            16_383 * 7 / 6,
+            16_384 * 7 / 6,
+            1_000_000,
+        ] {
+            check_zones(&mut packed, &zones(scale), &mut kept);
+        }
+        assert_eq!(packed.width, Width::Four);
+        // Nothing beyond the account was made room for.
+        let room = packed.matrices.blocks.iter().map(Vec::capacity);
+        assert_eq!(room.sum::<usize>(), packed.matrices.bytes());
+    }
+
+    #[test]
+    fn released_zones_are_forgotten_and_their_places_used_again() {
+        let mut packed = PackedZones::new(4, 9);
+        let mut kept = Vec::new();
+        check_zones(&mut packed, &zones(9), &mut kept);
+        let places = packed.uses.len();
+        for (id, ..) in kept.drain(..) {
+            packed.release(id);
+        }
+        assert!(packed.table.len() == 0);
+        check_zones(&mut packed, &zones(10), &mut kept);
+        assert!(packed.uses.len() <= places.max(packed.table.len()));
+    }
+
+    #[test]
+    fn signatures_tell_zones_apart_without_comparing_them() {
+        let mut packed = PackedZones::new(4, 9);
+        let mut signature = |upper: i32| {
+            let mut zone = Zone::universe(4);
+            zone.constrain(
+                1,
+                0,
+                Bound::weak(upper).expect("a constant within the range"),
+            );
+            packed.propose(whole(zone.bounds()))
+        };
+        assert!(signature(3).may_be_within(signature(9)));
+        assert!(!signature(9).may_be_within(signature(3)));
+    }
+
+    #[test]
+    fn signatures_tell_apart_what_clock_was_reset_later() {
+        for (dimension, greatest) in [(8, 60), (21, 60), (40, 60), (40, 1000)] {
+            let mut packed = PackedZones::new(dimension, greatest);
+            let mut signature = |later: usize| {
+                let value = |clock: usize| match clock {
+                    0 => 0,
+                    _ => (clock as i32 * 7 % 23) + 9 * i32::from(clock == later),
+                };
+                let bounds = (0..dimension * dimension).map(|entry| {
+                    let difference = value(entry / dimension) - value(entry % dimension);
+                    Bound::weak(difference).expect("a constant within the range")
+                });
+                packed.propose(whole(&bounds.collect::<Vec<_>>()))
+            };
+            let signatures: Vec<_> = (0..dimension).map(&mut signature).collect();
+            for (index, one) in signatures.iter().enumerate() {
+                for other in &signatures[..index] {
+                    // The numbers count clocks modulo eight.
+                    let is_told = !one.may_be_within(*other) && !other.may_be_within(*one);
+                    assert!(is_told || one == other, "{dimension} {greatest} {index}");
+                }
+            }
+            assert!(signatures[1..].iter().all(|one| *one != signatures[0]));
+        }
+    }
+
+    #[test]
+    fn every_bound_near_the_end_of_a_width_is_told_from_infinity() {
+        for raw in [
+            i32::MIN + 1,
+            NO_DEMAND.raw(),
+            -32_769,
+            -32_768,
+            -129,
+            -128,
+            126,
+            127,
+            128,
+            32_766,
+            32_767,
+            32_768,
+        ] {
+            let mut packed = PackedZones::new(1, 9);
+            let zone = [Bound::from_raw(raw)];
+            packed.propose(whole(&zone));
+            let id = packed.keep();
+            let mut loaded = [Bound::LE_ZERO];
+            packed.load(id, &mut loaded);
+            assert_eq!(loaded, zone);
+            packed.propose(whole(&[Bound::INFINITY]));
+            assert!(!packed.contains_candidate(id, &[]) && packed.is_in_candidate(id, &[]));
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The passed list: stored symbolic states, none of which contains another.
+//!
+//! Invariants:
+//! * Of two stored states with the same words neither zone contains the other, as a set or, where zones are stored reduced, by
+//!   what simulates what (see [`crate::zones::simulation`]). A state that a new one contains is forgotten, and its node is
+//!   covered from then on.
+//! * Nodes are numbered in the order in which they were stored; a number is never used again.
+//!
+//! Source: G. Behrmann, J. Bengtsson, A. David, K. G. Larsen, P. Pettersson, W. Yi, "UPPAAL Implementation Secrets", 2002
+//! (one list for passed and waiting states, by discrete state).
+//!
+//! Cost: one look-up of the words, one or two comparisons of zones for each zone stored with the same words, and a look-up
+//! of the zone if it is to be stored.
+
+use crate::ir::Network;
+use crate::zones::Bound;
+use crate::zones::zone_table::ZoneId;
+
+use super::discrete_states::{DiscreteId, StateStore};
+use super::packed_zones::{Kept, PackedZones, Signature};
+use super::zone_lists::{Entry, Lists};
+
+/// A stored state with its number.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::search) struct Stored {
+    /// The number of the state among all that were ever stored.
+    pub(in crate::search) node: u32,
+    discrete: DiscreteId,
+    zone: ZoneId,
+}
+
+/// Stored symbolic states.
+#[derive(Debug)]
+pub(in crate::search) struct PassedList {
+    store: StateStore,
+    zones: PackedZones,
+    lists: Lists,
+    /// By node: whether it is covered.
+    covered: Vec<u64>,
+    nodes: u32,
+    covered_count: u32,
+    /// Without clocks the words are the whole state.
+    has_clocks: bool,
+}
+
+impl PassedList {
+    /// An empty list for the states of a network, with zones of this dimension, most of whose constants are at most `greatest`.
+    pub(in crate::search) fn new(network: &Network, dimension: usize, greatest: i32) -> PassedList {
+        PassedList {
+            store: StateStore::new(network),
+            zones: PackedZones::new(dimension, greatest),
+            lists: Lists::default(),
+            covered: Vec::new(),
+            nodes: 0,
+            covered_count: 0,
+            has_clocks: dimension > 1,
+        }
+    }
+
+    /// How many states are stored now.
+    pub(in crate::search) fn len(&self) -> usize {
+        (self.nodes - self.covered_count) as usize
+    }
+
+    /// The bytes that the list takes.
+    pub(in crate::search) fn bytes(&self) -> usize {
+        let covered = self.covered.len() * size_of::<u64>();
+        self.store.bytes() + self.zones.bytes() + self.lists.bytes() + covered
+    }
+
+    /// Whether a state was contained by one that was stored later.
+    pub(in crate::search) fn is_covered(&self, stored: Stored) -> bool {
+        let node = stored.node as usize;
+        self.covered
+            .get(node / 64)
+            .is_some_and(|bits| bits >> (node % 64) & 1 == 1)
+    }
+
+    /// Writes a stored state that is not covered, its zone as it is stored, over another state of the same network.
+    pub(in crate::search) fn load(&self, stored: Stored, words: &mut [i32], zone: &mut [Bound]) {
+        self.store.load(stored.discrete, words);
+        if self.has_clocks {
+            self.zones.load(stored.zone, zone);
+        }
+    }
+
+    /// The bytes of a state's words that decide identity; see [`StateStore::pack`].
+    pub(in crate::search) fn pack(&mut self, words: &[i32]) -> &[u8] {
+        self.store.pack(words)
+    }
+
+    /// Stores a state, unless a stored one contains it.
+    pub(in crate::search) fn add(&mut self, words: &[i32], zone: Kept<'_>) -> Option<Stored> {
+        let hash = self.store.propose(words);
+        self.add_proposed(hash, zone)
+    }
+
+    /// Packs the words of a state, to be stored by [`PassedList::add_proposed`] or sent to another list; returns their hash.
+    pub(in crate::search) fn propose(&mut self, words: &[i32]) -> u32 {
+        self.store.propose(words)
+    }
+
+    /// The packed words of the state that was proposed last.
+    pub(in crate::search) fn proposed(&self) -> &[u8] {
+        self.store.proposed()
+    }
+
+    /// Takes over words that another list for the same network has packed.
+    pub(in crate::search) fn propose_record(&mut self, record: &[u8]) {
+        self.store.propose_record(record);
+    }
+
+    /// As [`PassedList::add`], for the words that were proposed last, which have this hash.
+    pub(in crate::search) fn add_proposed(&mut self, hash: u32, zone: Kept<'_>) -> Option<Stored> {
+        let (discrete, is_new) = self.store.intern_proposed(hash);
+        if !self.has_clocks {
+            return is_new.then(|| self.stored(discrete, ZoneId(0)));
+        }
+        if is_new {
+            self.lists.open();
+        }
+        let signature = self.zones.propose(zone);
+        if !is_new {
+            // None of the stored ones lies within another, so that what one contains contains none of them.
+            let zones = &mut self.zones;
+            let contains = |other| zones.contains_candidate(other, zone.limits);
+            if self.lists.any_above(discrete, signature, contains) {
+                return None;
+            }
+            self.forget_within(discrete, signature, zone.limits);
+        }
+        let zone = self.zones.keep();
+        let stored = self.stored(discrete, zone);
+        let entry = Entry {
+            signature,
+            zone,
+            node: stored.node,
+        };
+        self.lists.push(discrete, entry);
+        Some(stored)
+    }
+
+    fn stored(&mut self, discrete: DiscreteId, zone: ZoneId) -> Stored {
+        let node = self.nodes;
+        self.nodes += 1;
+        Stored {
+            node,
+            discrete,
+            zone,
+        }
+    }
+
+    /// Forgets the zones of a discrete state that the proposed one contains.
+    fn forget_within(&mut self, discrete: DiscreteId, proposed: Signature, limits: &[Bound]) {
+        let PassedList {
+            zones,
+            lists,
+            covered,
+            covered_count,
+            ..
+        } = self;
+        lists.remove_below(discrete, proposed, |entry| {
+            let is_within = zones.is_in_candidate(entry.zone, limits);
+            if is_within {
+                cover(covered, entry.node);
+                *covered_count += 1;
+                zones.release(entry.zone);
+            }
+            is_within
+        });
+    }
+}
+
+/// Notes that a node is covered.
+fn cover(covered: &mut Vec<u64>, node: u32) {
+    let word = node as usize / 64;
+    if covered.len() <= word {
+        covered.resize(word + 1, 0);
+    }
+    covered[word] |= 1 << (node % 64);
+}
