@@ -1,6 +1,6 @@
 """`ntagen explain`, and that every page shows its mistake and the way out.
 
-The examples of the engine's pages are tried in ``checker/tests/explanations.rs``.
+The examples of the engine's pages are tried in ``checker/tests/language/explanations.rs``.
 """
 
 from __future__ import annotations

@@ -8,14 +8,8 @@ use std::time::Duration;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::search::StopReason;
 
-#[path = "common/games.rs"]
-mod games;
-
-#[path = "common/plates.rs"]
-mod plates;
-
-use games::{ONE_ON_THE_BRIDGE, trains};
-use plates::{NONE_FALLEN, plates};
+use crate::families::{ONE_ON_THE_BRIDGE, trains};
+use crate::plates::{NONE_FALLEN, plates};
 
 fn check(text: &str, query: &str, options: &Options) -> Answer {
     let mut model = LoadedModel::load("trains.xta", text.as_bytes())

@@ -4,20 +4,16 @@
 //! over the set, and constructs that tell members apart. Every run that is found must pass its replay, which knows nothing of
 //! symmetry.
 //!
-//! `NETWORKS=50000 cargo test --release --test symmetry` runs more of them than the usual number.
+//! `NETWORKS=50000 cargo test --release --test models symmetry::` runs more of them than the usual number.
 
-#[path = "common/random.rs"]
-mod random;
-#[path = "common/searches.rs"]
-mod searches;
-
+use crate::searches;
 use std::fmt::Write as _;
 
 use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 use checker::search::reachability::search::Order;
 
-use random::{Random, networks};
+use crate::random::{Random, networks};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 120;

@@ -3,20 +3,16 @@
 //! Random networks have urgent and committed locations, invariants, variables and clocks of their own and in common, and channels of every
 //! kind; in some of them mostly urgent locations keep time from passing, in others mostly invariants and urgent channels. Every run that is found must pass its replay, which knows nothing of the reduction.
 //!
-//! `NETWORKS=50000 cargo test --release --test partial_order` runs more of them than the usual number.
+//! `NETWORKS=50000 cargo test --release --test models partial_order::` runs more of them than the usual number.
 
-#[path = "common/random.rs"]
-mod random;
-#[path = "common/searches.rs"]
-mod searches;
-
+use crate::searches;
 use std::fmt::Write as _;
 
 use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, Options, Verdict};
 use checker::search::reachability::search::Order;
 
-use random::{Random, networks};
+use crate::random::{Random, networks};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 250;

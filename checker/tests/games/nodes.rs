@@ -5,10 +5,7 @@ use std::time::Duration;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::game::Nodes;
 
-#[path = "common/plates.rs"]
-mod plates;
-
-use plates::{NONE_FALLEN, plates};
+use crate::plates::{NONE_FALLEN, plates};
 
 fn played(nodes: Nodes) -> Answer {
     let mut model =

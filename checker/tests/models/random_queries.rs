@@ -5,11 +5,7 @@
 //! (Alur and Dill, "A Theory of Timed Automata", 1994). Networks have two processes of two or three locations, two clocks, one channel
 //! of any kind, constants up to 3, committed and urgent locations, and priorities.
 //!
-//! `NETWORKS=50000 cargo test --release --test random_queries` runs more of them than the usual number.
-
-#[path = "common/random.rs"]
-#[expect(dead_code, reason = "other tests have a generator for each network")]
-mod random;
+//! `NETWORKS=50000 cargo test --release --test models random_queries::` runs more of them than the usual number.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -19,7 +15,7 @@ use checker::engine::{CodeEngine, Limits, LoadedModel, Options, TraceWanted, Ver
 use checker::search::optimum::extremum::Extreme;
 use checker::verify::replay::End;
 
-use random::{Random, networks};
+use crate::random::{Random, networks};
 
 /// No network needs so many states: a search that stores them does not end.
 const MOST_STATES: u64 = 5000;

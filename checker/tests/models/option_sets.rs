@@ -5,11 +5,7 @@
 //! twice, with two random sets of options. If both answers are definite, they must be the same, and all evidence must pass its
 //! independent check.
 //!
-//! `NETWORKS=20000 cargo test --release --test option_sets` tries more pairs than the usual number.
-
-#[path = "common/random.rs"]
-#[expect(dead_code, reason = "other tests have a generator for each network")]
-mod random;
+//! `NETWORKS=20000 cargo test --release --test models option_sets::` tries more pairs than the usual number.
 
 use std::fs;
 use std::path::Path;
@@ -19,7 +15,7 @@ use checker::engine::{Answer, CodeEngine, LoadedModel, Options, TraceWanted, Ver
 use checker::game::Nodes;
 use checker::search::reachability::search::Order;
 
-use random::{Random, networks};
+use crate::random::{Random, networks};
 
 /// A model of the corpus with its queries.
 struct Model {

@@ -4,13 +4,9 @@
 //! That nothing is lost by it, random networks show: they must give the same answers with a process beside them that could write the
 //! flags and take part in the synchronisations, as far as the analysis of a single process knows.
 
-#[path = "common/random.rs"]
-#[expect(dead_code, reason = "other tests throw dice")]
-mod random;
-
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 
-use random::{Random, networks};
+use crate::random::{Random, networks};
 
 fn check(text: &str, query: &str) -> Answer {
     let mut model = LoadedModel::load("activity.xta", text.as_bytes())

@@ -8,10 +8,7 @@ use std::path::{Path, PathBuf};
 
 use checker::engine::format::strategy_text;
 
-#[path = "common/solved.rs"]
-mod solved;
-
-use solved::solved;
+use crate::solved::solved;
 
 fn games() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/games")

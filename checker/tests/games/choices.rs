@@ -1,11 +1,9 @@
 //! Of several ways to evade, a verdict needs one: the others are explored only where the seeker wins against those before. Where time
 //! passes, the evader may wait: no way is explored before there is something to evade.
 
+use crate::families;
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
 use checker::game::Nodes;
-
-#[path = "common/games.rs"]
-mod games;
 
 /// Every round the controller gives and the environment takes, both up to four.
 const TEXT: &str = "
@@ -100,8 +98,8 @@ fn losses_that_come_late_are_found() {
 #[test]
 fn while_time_passes_moves_are_explored_as_they_are_needed() {
     for (trains, nodes) in [(3, Nodes::Symbolic), (4, Nodes::Discrete)] {
-        let text = games::trains(trains, "-u->");
-        let query = games::ONE_ON_THE_BRIDGE;
+        let text = families::trains(trains, "-u->");
+        let query = families::ONE_ON_THE_BRIDGE;
         let options = |strategy| Options {
             strategy,
             nodes,

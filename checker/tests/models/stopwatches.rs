@@ -5,10 +5,7 @@
 //! clocks and a number of states. It takes steps of half a unit, which meets all values that closed and strict bounds on two
 //! clocks tell apart.
 //!
-//! `NETWORKS=20000 cargo test --release --test stopwatches` runs more of them than the usual number.
-
-#[path = "common/random.rs"]
-mod random;
+//! `NETWORKS=20000 cargo test --release --test models stopwatches::` runs more of them than the usual number.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -22,7 +19,7 @@ use checker::search::optimum::extremum::{Extreme, Extremes};
 use checker::verify::certificate::States;
 use checker::verify::{Semantics, State};
 
-use random::{Random, networks};
+use crate::random::{Random, networks};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 400;

@@ -3,11 +3,6 @@
 //! Each is asked in all discrete states of its strategy and in some beside them, at all clock values of a grid and at random ones. What
 //! is expected is looked up in the strategy itself, decision by decision.
 
-#[path = "common/c_programs.rs"]
-mod c_programs;
-#[path = "common/solved.rs"]
-mod solved;
-
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -21,8 +16,8 @@ use checker::game::strategy::attractor::{Decision, Selection, Strategy};
 use checker::game::strategy::closed_loop;
 use checker::network::{Part, is_same_entry};
 
-use c_programs::{compiled, games, in_folder};
-use solved::solved;
+use crate::c_programs::{compiled, games, in_folder};
+use crate::solved::solved;
 
 /// Ticks of a unit of time. Clock values are whole numbers of two of them, so that every bound and the middle between is met.
 const TICKS_PER_UNIT: i64 = 4;

@@ -1,6 +1,6 @@
 //! Properties over generated texts: printing and parsing are inverse, and no text crashes a reader.
 
-use crate::support::{expression, shape};
+use crate::syntax::support::{expression, shape};
 use checker::diagnostics::{Diagnostic, SourceMap, Span};
 use checker::syntax::ast::{
     BinaryOp, Expr, ExprKind, Name, Prefixes, Quantifier, TypeExpr, TypeKind, UnaryOp,

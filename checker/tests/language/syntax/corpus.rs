@@ -6,9 +6,9 @@
 //! * `templates: N`, `edges: N`, `processes: N`, `queries: N`: what was read.
 //! * `unsupported: NAME`: a construct that was recognised.
 //!
-//! `UPDATE_EXPECT=1 cargo test --test syntax` rewrites the `expect:` lines.
+//! `UPDATE_EXPECT=1 cargo test --test language` rewrites the `expect:` lines.
 
-use crate::support::shown;
+use crate::syntax::support::shown;
 use checker::diagnostics::SourceMap;
 use checker::syntax::ast::Document;
 use checker::syntax::{parse_query, read_model, read_queries};

@@ -1,6 +1,8 @@
 //! Precedence and associativity, literals, and the forms that only some dialects know.
 
-use crate::support::{document, expression, mistakes, query, query_shape, shape, with_guard};
+use crate::syntax::support::{
+    document, expression, mistakes, query, query_shape, shape, with_guard,
+};
 use checker::syntax::ast::{Declaration, Initialiser, Statement};
 
 fn check(text: &str, expected: &str) {

@@ -1,6 +1,6 @@
 //! Trees of queries, the splitting of `.q` files, and what is wrong with queries.
 
-use crate::support::{document, query, query_shape, shown, whole};
+use crate::syntax::support::{document, query, query_shape, shown, whole};
 use checker::diagnostics::SourceMap;
 use checker::syntax::ast::Expectation;
 use checker::syntax::read_queries;

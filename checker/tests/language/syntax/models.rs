@@ -1,6 +1,6 @@
 //! The three formats: what the tree holds, and where things stand in the file.
 
-use crate::support::{document, mistakes, shape};
+use crate::syntax::support::{document, mistakes, shape};
 use checker::diagnostics::SourceMap;
 use checker::syntax::ast::{Declaration, Expectation, Expr, Point, SystemItem};
 use checker::syntax::{prelude, read_model};

@@ -1,6 +1,6 @@
 //! Hostile input: whatever is too deep, too long or no text at all ends in a diagnostic and not in a crash.
 
-use crate::support::{mistakes, query, with_guard};
+use crate::syntax::support::{mistakes, query, with_guard};
 
 fn check(text: &str, expected: &str) {
     let found = mistakes(text.as_bytes());

@@ -2,11 +2,6 @@
 //!
 //! Of each, all states are asked for all observations.
 
-#[path = "common/c_programs.rs"]
-mod c_programs;
-#[path = "common/solved.rs"]
-mod solved;
-
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
@@ -16,8 +11,8 @@ use checker::engine::LoadedModel;
 use checker::engine::format::{machine_c, machine_json};
 use checker::game::partial_observation::Machine;
 
-use c_programs::{compiled, games, in_folder};
-use solved::solved;
+use crate::c_programs::{compiled, games, in_folder};
+use crate::solved::solved;
 
 /// Writes what each state proposes, and where it goes on, observation by observation.
 const DRIVER: &str = r#"

@@ -6,10 +6,7 @@ use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict}
 use checker::verify::strategy::Outcome;
 use checker::verify::{Effort, GivenUp};
 
-#[path = "common/games.rs"]
-mod games;
-
-use games::{ONE_ON_THE_BRIDGE, trains};
+use crate::families::{ONE_ON_THE_BRIDGE, trains};
 
 fn check(text: &str, query: &str, limits: Limits) -> Answer {
     let mut model = LoadedModel::load("trains.xta", text.as_bytes())

@@ -4,20 +4,16 @@
 //! show what must be kept; random networks that pass values in all ways show that verdicts and values stay what they are. Every run
 //! that is found must pass its replay, which knows nothing of the reduction.
 //!
-//! `NETWORKS=50000 cargo test --release --test live_variables` runs more of them than the usual number.
+//! `NETWORKS=50000 cargo test --release --test models live_variables::` runs more of them than the usual number.
 
-#[path = "common/random.rs"]
-mod random;
-#[path = "common/searches.rs"]
-mod searches;
-
+use crate::searches;
 use std::fmt::Write as _;
 
 use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, Options, Verdict};
 use checker::search::reachability::search::Order;
 
-use random::{Random, networks};
+use crate::random::{Random, networks};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 200;

@@ -1,0 +1,5 @@
+//! The language: reading, names and types, and the pages that explain diagnostics.
+
+mod explanations;
+mod semantics;
+mod syntax;

@@ -1,0 +1,25 @@
+//! Models and their queries: verdicts, traces, certificates, reductions, threads and limits, on the corpus and on random networks.
+
+mod activity;
+mod certificates;
+mod interrupts;
+mod live_variables;
+mod option_sets;
+mod partial_order;
+mod patience;
+#[path = "../common/random.rs"]
+mod random;
+mod random_queries;
+mod replay;
+#[path = "../common/searches.rs"]
+mod searches;
+mod shown;
+mod stopwatches;
+mod stored;
+mod subsumption;
+mod symmetry;
+mod threads;
+mod verdicts;
+mod zone_memo;
+mod zones;
+mod zones_at_the_limits;
