@@ -17,7 +17,6 @@ use pyo3::types::PyBytes;
 
 use crate::cancellation::{self, Cut, Look};
 use crate::diagnostics::Severity;
-use crate::engine;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{
     explain, json, machine_c, machine_json, model_json, strategy_c, strategy_json, strategy_text,
@@ -25,8 +24,8 @@ use crate::engine::format::{
 };
 use crate::engine::limits::Observer;
 use crate::engine::{
-    CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection, TraceWanted,
-    Verdict,
+    self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
+    TraceWanted, Verdict,
 };
 use crate::game::{Forced, Nodes, Priorities};
 use crate::ir::Overflow;

@@ -21,8 +21,7 @@ use crate::zones::{Bound, Federation, extrapolate};
 use rustc_hash::FxHashMap;
 
 use super::clock_differences::Differences;
-use super::joint_resets;
-use super::joint_resets::Partners;
+use super::joint_resets::{self, Partners};
 use super::location_splitting::{Analysis, Step, Tracked, Valuations};
 
 /// No comparison: the clock is inactive in this direction.

@@ -16,11 +16,10 @@ use crate::ir::{
     MathFunction, Overflow, Register, RegisterType, RunTimeErrorKind, SiteId, Terminator,
 };
 
-use crate::exec::arithmetic::Wrapping;
-use crate::exec::math;
-use crate::exec::math::MathCode;
-use crate::exec::rounds::{ROUND_LIMIT, count_rounds};
-use crate::exec::{
+use super::arithmetic::Wrapping;
+use super::math::{self, MathCode};
+use super::rounds::{ROUND_LIMIT, count_rounds};
+use super::{
     Context, EmittedAssignment, EmittedConstraint, Executor, ROUNDS_BETWEEN_LOOKS, RunTimeError,
     Wraps, arithmetic,
 };

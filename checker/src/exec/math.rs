@@ -9,7 +9,7 @@
 
 use crate::ir::{MathFunction, RunTimeErrorKind};
 
-use crate::exec::arithmetic::canonical;
+use super::arithmetic::canonical;
 
 /// The squares of whole numbers up to this one are exact in doubles.
 const WHOLE_ROOT: f64 = 67_108_864.0;

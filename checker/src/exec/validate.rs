@@ -387,7 +387,7 @@ fn raise_limits(function: &Function, limits: &mut [Option<u64>], give_up: bool) 
                         .map(|(a, b)| a.saturating_add(b)),
                 )
             }
-            _ => match crate::exec::optimise::target(instruction) {
+            _ => match super::optimise::target(instruction) {
                 Some(target) => (target, None),
                 None => continue,
             },

@@ -1,6 +1,6 @@
 //! Which words updates write; for static analysis.
 
-use crate::ir::{Network, Update};
+use super::{Network, Update};
 
 impl Network {
     /// All updates: of edges, of their branches, and those around every transition.

@@ -14,7 +14,7 @@
 /// [`RunTimeErrorKind::ClockValue`]. The limit of zones, whose operations add several bounds before they check.
 pub const CLOCK_LIMIT: i32 = (1 << 27) - 1;
 
-/// Index of a function in [`crate::ir::Network::functions`].
+/// Index of a function in [`super::Network::functions`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FunctionId(pub u32);
 
@@ -26,7 +26,7 @@ pub struct Register(pub u32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BlockId(pub u32);
 
-/// Index of a site in [`crate::ir::Network::sites`].
+/// Index of a site in [`super::Network::sites`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SiteId(pub u32);
 
@@ -118,7 +118,7 @@ pub enum Base {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClockOperand {
     /// The first clock; 0 where the register holds the clock itself (a clock parameter of a function).
-    pub first: crate::ir::ClockId,
+    pub first: super::ClockId,
     /// A computed offset.
     pub index: Option<Register>,
 }

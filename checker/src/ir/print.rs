@@ -5,7 +5,7 @@
 
 use std::fmt::{Display, Formatter, Result};
 
-use crate::ir::{
+use super::{
     Address, Base, BlockId, ClockOperand, DoubleOperator, Function, FunctionId, Instruction,
     IntegerOperator, Register, RegisterType, Relation, SiteId, Terminator,
 };

@@ -6,16 +6,17 @@ use pyo3::exceptions::{PyIndexError, PyLookupError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use super::{Answer, FailedError, Model, forced_rule, priority_rule, rejected};
 use crate::diagnostics::Span;
 use crate::engine::LoadedModel;
 use crate::engine::evidence::named_strategies::{NamedStrategy, unnamed};
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{strategy_json, text};
 use crate::engine::query::time_clock;
-use crate::engine::session::play as engine;
-use crate::engine::session::play::{Done, Follower, Refused, Unadvised, player_name};
+use crate::engine::session::play::{
+    self as engine, Done, Follower, Refused, Unadvised, player_name,
+};
 use crate::game::strategy::attractor::Selection;
-use crate::python::{Answer, FailedError, Model, forced_rule, priority_rule, rejected};
 use crate::verify::{self, Effort};
 
 /// A strategy of one of the players.

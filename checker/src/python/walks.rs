@@ -4,11 +4,11 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
+use super::{FailedError, Model, StepEntry, rejected, step_entry};
 use crate::engine::format::{json, text};
 use crate::engine::session::walk::{Point, SIMULATED_TICKS_PER_UNIT};
 use crate::engine::{CodeEngine, LoadedModel};
 use crate::network::Failure;
-use crate::python::{FailedError, Model, StepEntry, rejected, step_entry};
 use crate::verify::timed::{Timed, least_multiple};
 
 /// A walk through a model.

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
+use super::checker::Checker;
+use super::codes;
+use super::expressions::entity_kind;
+use super::scope::Entity;
+use super::typed::{Expr, Kind, Parameter, Signature};
+use super::types::Type;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::exec::math::{self, MathCode};
 use crate::ir::{FunctionId, MathFunction, RegisterType};
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::expressions::entity_kind;
-use crate::semantics::scope::Entity;
-use crate::semantics::typed::{Expr, Kind, Parameter, Signature};
-use crate::semantics::types::Type;
 use crate::syntax::ast::{self, ExprKind};
 
 impl Checker<'_> {

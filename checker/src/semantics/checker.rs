@@ -4,18 +4,18 @@ use std::collections::HashSet;
 
 use rustc_hash::FxHashMap;
 
+use super::codes;
+use super::left_out::{LeftOut, declared_at};
+use super::lower::{Builder, Images};
+use super::scope::{Entity, Scope};
+use super::typed::{Expr, Kind, Local, LocalId, Place, Root};
+use super::types::{Size, Type};
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
 use crate::exec::{Context, EmittedAssignment, Executor, Interpreter, RunTimeError};
 use crate::ir::{
     Channel, Clock, Coordinate, Function, FunctionId, Instruction, Network, ProcessId,
     RunTimeErrorKind, SiteId, Variable,
 };
-use crate::semantics::codes;
-use crate::semantics::left_out::{LeftOut, declared_at};
-use crate::semantics::lower::{Builder, Images};
-use crate::semantics::scope::{Entity, Scope};
-use crate::semantics::typed::{Expr, Kind, Local, LocalId, Place, Root};
-use crate::semantics::types::{Size, Type};
 
 /// The place of the system section's scope: behind the prelude's and the global one.
 const SYSTEM_SCOPE: usize = 2;
@@ -81,7 +81,7 @@ pub(super) struct World {
     /// The scopes that queries see: prelude, globals, system.
     pub(super) query_scopes: Vec<Scope>,
     /// The processes by the name in the system line.
-    pub(super) processes: crate::semantics::instantiate::Processes,
+    pub(super) processes: super::instantiate::Processes,
 }
 
 impl<'a> Checker<'a> {
@@ -280,7 +280,7 @@ impl<'a> Checker<'a> {
         region.extend_from_slice(words);
         let base = Size {
             words: if meta {
-                crate::semantics::typed::META_WORDS + offset
+                super::typed::META_WORDS + offset
             } else {
                 offset
             },
@@ -294,7 +294,7 @@ impl<'a> Checker<'a> {
                 name: full_name.clone(),
                 owner,
                 offset: base.words,
-                shape: crate::semantics::layout::shape(ty),
+                shape: super::layout::shape(ty),
                 meta,
             });
         }

@@ -5,14 +5,14 @@
 //!
 //! Source: the classification of UPPAAL's type checker.
 
+use super::checker::Checker;
+use super::codes;
+use super::expressions::known_offset;
+use super::operators::{integer_operation, is_clock_term};
+use super::typed::{ClockRelation, ClockSum, Expr, Kind, Root};
+use super::types::{Class, Memory, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{CLOCK_LIMIT, ClockId, IntegerOperator, Relation};
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::expressions::known_offset;
-use crate::semantics::operators::{integer_operation, is_clock_term};
-use crate::semantics::typed::{ClockRelation, ClockSum, Expr, Kind, Root};
-use crate::semantics::types::{Class, Memory, Type};
 use crate::syntax::ast::BinaryOp;
 
 impl Checker<'_> {

@@ -3,13 +3,13 @@
 //! Most are folded while they are checked. What is left (calls of functions, parts of constant arrays) is lowered and run
 //! by the interpreter, so there is one meaning of code only.
 
+use super::checker::Checker;
+use super::codes;
+use super::typed::{Expr, Kind, Root};
+use super::types::Type;
 use crate::diagnostics::Span;
 use crate::exec::arithmetic;
 use crate::ir::RunTimeErrorKind;
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::typed::{Expr, Kind, Root};
-use crate::semantics::types::Type;
 
 impl Checker<'_> {
     /// Whether the value of an expression is known without a state.

@@ -2,17 +2,16 @@
 
 use std::sync::Arc;
 
+use super::checker::Checker;
+use super::clock_expressions::integral_double;
+use super::codes;
+use super::left_out::declared_at;
+use super::scope::{Carried, Entity};
+use super::typed::{Expr, Kind, Place, Root};
+use super::types::{self, DEFAULT_INT, Index, SIZE_LIMIT, Size, StructType, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::ir::{CLOCK_LIMIT, ScalarSet};
-use crate::semantics::checker::Checker;
-use crate::semantics::clock_expressions::integral_double;
-use crate::semantics::codes;
-use crate::semantics::left_out::declared_at;
-use crate::semantics::scope::{Carried, Entity};
-use crate::semantics::typed::{Expr, Kind, Place, Root};
-use crate::semantics::types;
-use crate::semantics::types::{DEFAULT_INT, Index, SIZE_LIMIT, Size, StructType, Type};
 use crate::syntax::ast::{self, Declaration, Dimension, Initialiser, Name, TypeExpr, TypeKind};
 
 /// The value that one part of a variable starts with.
@@ -385,7 +384,7 @@ impl Checker<'_> {
                     format!(
                         "'{}' is {}, not a type",
                         name.text,
-                        crate::semantics::expressions::entity_kind(&entity)
+                        super::expressions::entity_kind(&entity)
                     ),
                     "name types with typedef",
                 );
@@ -503,8 +502,7 @@ impl Checker<'_> {
             return Entity::Constant { value, free };
         }
         let world = &mut self.world;
-        let offset =
-            crate::semantics::lower::store_constant(&mut world.network, &mut world.images, words);
+        let offset = super::lower::store_constant(&mut world.network, &mut world.images, words);
         let place = Place {
             root: Root::Constants,
             base: Size {

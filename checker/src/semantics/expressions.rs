@@ -1,15 +1,13 @@
 //! From the expressions of the syntax tree to typed ones: names, parts, assignments, quantifiers.
 
+use super::checker::Checker;
+use super::codes;
+use super::operators::{as_truth, integer_operator, is_clock_term, to_double, truth_interval};
+use super::scope::Entity;
+use super::typed::{Expr, Kind, Place, Root};
+use super::types::{Class, Index, Memory, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::operators::{
-    as_truth, integer_operator, is_clock_term, to_double, truth_interval,
-};
-use crate::semantics::scope::Entity;
-use crate::semantics::typed::{Expr, Kind, Place, Root};
-use crate::semantics::types::{Class, Index, Memory, Size, Type};
 use crate::syntax::ast::{self, BinaryOp, ExprKind, Name, Quantifier, TypeExpr, UnaryOp};
 use std::ops::Range;
 
@@ -539,7 +537,7 @@ impl Checker<'_> {
         span: Span,
     ) -> Expr {
         let Some((range_type, range)) = self.iterated(ty) else {
-            self.scopes.push(crate::semantics::scope::Scope::default());
+            self.scopes.push(super::scope::Scope::default());
             self.declare(name, Entity::Broken);
             self.expression(body);
             self.scopes.pop();
@@ -561,7 +559,7 @@ impl Checker<'_> {
             mutable: false,
             declared: Span::default(),
         };
-        self.scopes.push(crate::semantics::scope::Scope::default());
+        self.scopes.push(super::scope::Scope::default());
         self.declare(
             name,
             Entity::Variable {
@@ -648,7 +646,7 @@ impl Checker<'_> {
         }
         let mut parts = Vec::new();
         for value in low..=high {
-            self.scopes.push(crate::semantics::scope::Scope::default());
+            self.scopes.push(super::scope::Scope::default());
             let value = Expr::int(value, ty.clone(), name.span);
             self.declare(name, Entity::Constant { value, free: false });
             parts.push(self.expression(body));

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use crate::diagnostics::{Diagnostic, Span};
-use crate::ir::FunctionId;
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::left_out::declared_at;
-use crate::semantics::scalars::is_order_irrelevant;
-use crate::semantics::scope::{Entity, Scope};
-use crate::semantics::typed::{
+use super::checker::Checker;
+use super::codes;
+use super::left_out::declared_at;
+use super::scalars::is_order_irrelevant;
+use super::scope::{Entity, Scope};
+use super::typed::{
     Effects, Expr, Kind, LocalId, Parameter, Place, Root, Signature, Statement, Unknown,
 };
-use crate::semantics::types::{Size, Type};
+use super::types::{Size, Type};
+use crate::diagnostics::{Diagnostic, Span};
+use crate::ir::FunctionId;
 use crate::syntax::ast::{self, Declaration, Name};
 
 /// The function of a declaration that could not be lowered; never called, because nothing is lowered after a mistake.
@@ -256,7 +256,7 @@ impl Checker<'_> {
         &mut self,
         variable: &ast::Variable,
         ty: Type,
-        parts: Vec<crate::semantics::declarations::InitialPart>,
+        parts: Vec<super::declarations::InitialPart>,
     ) -> Statement {
         // Without a value, a scalar is the first member; in a list of values, the first comes first.
         if parts.is_empty() {
@@ -494,7 +494,7 @@ impl Checker<'_> {
 }
 
 /// The assignment that gives a part of a local its initial value.
-fn initial_assignment(root: Root, part: crate::semantics::declarations::InitialPart) -> Expr {
+fn initial_assignment(root: Root, part: super::declarations::InitialPart) -> Expr {
     let place = Place {
         root,
         base: part.offset,

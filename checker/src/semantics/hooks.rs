@@ -6,15 +6,15 @@
 //!
 //! Source: UPPAAL's documentation, "Functions", section "Special Functions".
 
+use super::checker::Checker;
+use super::codes;
+use super::constants::reason;
+use super::scope::Entity;
+use super::typed::Signature;
+use super::types::Type;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::{EmittedAssignment, RunTimeError};
 use crate::ir::{CLOCK_LIMIT, FunctionId, RunTimeErrorKind};
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::constants::reason;
-use crate::semantics::scope::Entity;
-use crate::semantics::typed::Signature;
-use crate::semantics::types::Type;
 
 /// The hooks that are run, in order.
 const BEFORE_QUERIES: [&str; 2] = ["__ON_CONSTRUCT__", "__ON_BEGIN__"];

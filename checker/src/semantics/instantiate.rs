@@ -8,16 +8,16 @@ use std::collections::HashMap;
 
 use crate::cancellation;
 
+use super::assigned::assigned_names;
+use super::checker::Checker;
+use super::codes;
+use super::expressions::known_offset;
+use super::scope::{Entity, Scope};
+use super::typed::{Expr, Kind, Place, Root};
+use super::types::{DEFAULT_INT, Memory, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::ir::{Coordinate, ProcessId};
-use crate::semantics::assigned::assigned_names;
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::expressions::known_offset;
-use crate::semantics::scope::{Entity, Scope};
-use crate::semantics::typed::{Expr, Kind, Place, Root};
-use crate::semantics::types::{DEFAULT_INT, Memory, Size, Type};
 use crate::syntax::ast::{self, Document, Name, Parameter, SystemItem, UnsupportedPart};
 
 /// The most processes of a network.
@@ -195,7 +195,7 @@ impl Checker<'_> {
                     format!(
                         "'{}' is {}, not a template",
                         name.text,
-                        crate::semantics::expressions::entity_kind(&entity)
+                        super::expressions::entity_kind(&entity)
                     ),
                     "name a template or an instantiation",
                 );

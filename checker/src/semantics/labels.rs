@@ -1,16 +1,16 @@
 //! Guards, invariants, synchronisations and updates: checking, and lowering to what the network runs.
 
+use super::checker::Checker;
+use super::codes;
+use super::layout::merge_ranges;
+use super::lower::{bound_range, comparisons};
+use super::templates::conjuncts;
+use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId};
+use super::types::{Class, Type};
 use crate::ir::{
     self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, ClockRange,
     FixedConstraint, FunctionId, Guard, Update,
 };
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::layout::merge_ranges;
-use crate::semantics::lower::{bound_range, comparisons};
-use crate::semantics::templates::conjuncts;
-use crate::semantics::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId};
-use crate::semantics::types::{Class, Type};
 use crate::syntax::ast;
 
 /// A `select` binding: the local that stands for it, and its range.
@@ -153,8 +153,7 @@ impl Checker<'_> {
         let functions = self.world.network.functions.len();
         let mut builder = self.builder(&known);
         builder.select_parameters(locals);
-        let (first, count, index) =
-            builder.offset(&channel, crate::semantics::types::Memory::Channels);
+        let (first, count, index) = builder.offset(&channel, super::types::Memory::Channels);
         let index = index.map(|index| builder.offset_function(place.to_owned(), index));
         if index.is_none() {
             self.world.network.functions.truncate(functions);

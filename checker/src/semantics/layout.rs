@@ -4,9 +4,9 @@
 //! offsets of variables count from 0, those of `meta` variables from [`META_WORDS`], those of locations from
 //! [`LOCATION_WORDS`]; [`Relocation`] turns them into offsets of words.
 
+use super::typed::{LOCATION_WORDS, META_WORDS};
+use super::types::Type;
 use crate::ir::{Address, Base, Function, Instruction, Network, Shape, Update};
-use crate::semantics::typed::{LOCATION_WORDS, META_WORDS};
-use crate::semantics::types::Type;
 
 /// From provisional offsets to those of the final layout.
 #[derive(Clone, Copy, Debug, Default)]

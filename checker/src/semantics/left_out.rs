@@ -16,11 +16,11 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashSet;
 
+use super::checker::Checker;
+use super::codes;
+use super::typed::{Expr, Kind, Place};
+use super::types::{Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::typed::{Expr, Kind, Place};
-use crate::semantics::types::{Size, Type};
 
 /// How many times a model is checked at most: a longer chain of doubles, each of which takes the value of the next, is refused.
 pub(super) const MOST_ROUNDS: usize = 12;

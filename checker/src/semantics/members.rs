@@ -4,15 +4,15 @@
 //! index into them. Where members differ (a constant that hangs on the parameter), and for clocks, the quantifier that
 //! binds `i` is unrolled.
 
+use super::checker::Checker;
+use super::codes;
+use super::instantiate::Group;
+use super::operators::compare_integers;
+use super::scope::Entity;
+use super::typed::{Expr, Kind, LOCATION_WORDS, Place, Root};
+use super::types::{Size, Type};
 use crate::diagnostics::Span;
 use crate::ir::Relation;
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::instantiate::Group;
-use crate::semantics::operators::compare_integers;
-use crate::semantics::scope::Entity;
-use crate::semantics::typed::{Expr, Kind, LOCATION_WORDS, Place, Root};
-use crate::semantics::types::{Size, Type};
 use crate::syntax::ast::{self, ExprKind, Name};
 
 /// A process, or one of a set that the state chooses.
@@ -135,7 +135,7 @@ impl Checker<'_> {
             }
             let (low, high) = ty.bounds();
             let set = ty.scalar_set();
-            let index = crate::semantics::types::Index {
+            let index = super::types::Index {
                 first: low,
                 length: high.abs_diff(low) + 1,
                 set,

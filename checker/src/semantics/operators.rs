@@ -1,13 +1,13 @@
 //! Typing of operators on integers, truth values and doubles; folding of constants; intervals of results.
 
+use super::calls::folded_math;
+use super::checker::Checker;
+use super::codes;
+use super::typed::{Expr, Kind};
+use super::types::{Class, Type};
 use crate::diagnostics::Span;
 use crate::exec::arithmetic;
 use crate::ir::{DoubleOperator, IntegerOperator, MathFunction, Relation};
-use crate::semantics::calls::folded_math;
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::typed::{Expr, Kind};
-use crate::semantics::types::{Class, Type};
 use crate::syntax::ast::BinaryOp;
 
 impl Checker<'_> {

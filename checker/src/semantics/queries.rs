@@ -2,16 +2,16 @@
 //!
 //! A predicate is split only as far as clocks and `deadlock` reach; everything below is one function on the words.
 
+use super::checker::Checker;
+use super::codes;
+use super::labels::collapse;
+use super::typed::{ClockRelation, Expr, Kind, LOCATION_WORDS, Place, Root};
+use super::types::{Memory, Type};
 use crate::diagnostics::Span;
 use crate::ir::{
     self, ClockChoice, ClockId, ClockPredicate, ClockRange, FunctionId, LocationId, Measure,
     Objective, Predicate, ProcessId, QueryKind, Relation,
 };
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::labels::collapse;
-use crate::semantics::typed::{ClockRelation, Expr, Kind, LOCATION_WORDS, Place, Root};
-use crate::semantics::types::{Memory, Type};
 use crate::syntax::ast;
 
 impl Checker<'_> {
@@ -524,7 +524,7 @@ impl Checker<'_> {
     }
 
     fn truth_function(&mut self, expr: &Expr) -> Option<FunctionId> {
-        let truth = crate::semantics::operators::as_truth(expr.clone(), expr.span);
+        let truth = super::operators::as_truth(expr.clone(), expr.span);
         self.query_function(&truth)
     }
 }

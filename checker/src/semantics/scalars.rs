@@ -12,11 +12,11 @@
 //! Source: M. Hendriks, G. Behrmann, K. G. Larsen, P. Niebert, F. Vaandrager, "Adding Symmetry Reduction to UPPAAL", FORMATS 2003
 //! (which trusts loops; here they are looked at).
 
+use super::checker::Checker;
+use super::typed::{Expr, Kind, Local, LocalId, Place, Root, Statement};
+use super::types::{Memory, Size, Type};
 use crate::diagnostics::Span;
 use crate::ir::IntegerOperator;
-use crate::semantics::checker::Checker;
-use crate::semantics::typed::{Expr, Kind, Local, LocalId, Place, Root, Statement};
-use crate::semantics::types::{Memory, Size, Type};
 
 impl Checker<'_> {
     /// Notes that members of the set of a scalar type are told apart; nothing for other types.

@@ -8,10 +8,10 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
+use super::typed::{Expr, Place, Signature};
+use super::types::Type;
 use crate::diagnostics::Span;
 use crate::ir::FunctionId;
-use crate::semantics::typed::{Expr, Place, Signature};
-use crate::semantics::types::Type;
 
 /// What a name stands for.
 #[derive(Clone, Debug)]

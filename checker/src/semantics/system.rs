@@ -1,14 +1,14 @@
 //! A whole model: the order in which its parts are checked, what concerns all processes, and the finished network.
 
+use super::checker::Checker;
+use super::codes;
+use super::expressions::known_offset;
+use super::layout::Relocation;
+use super::scope::{Entity, Scope};
+use super::typed::{Expr, Root};
+use super::types::Memory;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{AssignedValue, Clock, ClockAtom, Features, Location, Network};
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::expressions::known_offset;
-use crate::semantics::layout::Relocation;
-use crate::semantics::scope::{Entity, Scope};
-use crate::semantics::typed::{Expr, Root};
-use crate::semantics::types::Memory;
 use crate::syntax::ast::{Declaration, Document, SystemItem, UnsupportedPart};
 
 impl Checker<'_> {
@@ -244,7 +244,7 @@ fn features(network: &Network) -> Features {
         stopwatches: locations().any(|location: &Location| !location.rates.is_empty()),
         strict_invariants: locations()
             .flat_map(|location| &location.invariant.atoms)
-            .any(crate::semantics::templates::is_strict_upper_bound),
+            .any(super::templates::is_strict_upper_bound),
         guarded_receivers: synchronises(|channel, send| channel.broadcast && !send),
         clock_guarded_urgent: synchronises(|channel, _| channel.urgent),
         clock_copies: updates.any(|update| {

@@ -2,14 +2,14 @@
 
 use rustc_hash::FxHashMap;
 
+use super::checker::Checker;
+use super::codes;
+use super::labels::Select;
+use super::scope::{Entity, Scope};
+use super::typed::{Expr, Kind, LocalId, Place, Root};
+use super::types::{Class, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationId, Urgency};
-use crate::semantics::checker::Checker;
-use crate::semantics::codes;
-use crate::semantics::labels::Select;
-use crate::semantics::scope::{Entity, Scope};
-use crate::semantics::typed::{Expr, Kind, LocalId, Place, Root};
-use crate::semantics::types::{Class, Size, Type};
 use crate::syntax::ast;
 
 /// The most branches that the select bindings of one leg may stand for.
@@ -409,7 +409,7 @@ impl Checker<'_> {
             return Vec::new();
         }
         let mut updates = Vec::new();
-        for values in crate::semantics::instantiate::combinations(&types) {
+        for values in super::instantiate::combinations(&types) {
             self.scopes.push(Scope::default());
             for ((name, ty), value) in ranges.iter().zip(values) {
                 let value = Expr::int(value, ty.clone(), name.span);

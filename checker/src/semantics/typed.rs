@@ -6,11 +6,11 @@
 //! * A place (something that may be assigned, referred to or indexed) is a [`Kind::Variable`] under [`Kind::Index`] and
 //!   [`Kind::Field`]; which memory it means follows from the type at its top.
 
+use super::types::{Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{
     ClockAtom, ClockRange, DoubleOperator, FunctionId, IntegerOperator, MathFunction, Relation,
 };
-use crate::semantics::types::{Size, Type};
 
 /// Index of a local of the function, guard or update that is being checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,13 +1,13 @@
 //! Declarations: types, variables, functions, priorities, hooks; what is recognised and not supported is recorded.
 
-use crate::diagnostics::Diagnostic;
-use crate::syntax::ast::{
+use super::ast::{
     Block, Declaration, Expr, Function, Initialiser, TypeExpr, Unsupported, UnsupportedPart,
     Variable,
 };
-use crate::syntax::codes;
-use crate::syntax::lexer::TokenKind;
-use crate::syntax::parser::{Dialect, Parser};
+use super::codes;
+use super::lexer::TokenKind;
+use super::parser::{Dialect, Parser};
+use crate::diagnostics::Diagnostic;
 
 /// Where a declaration stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,7 +150,7 @@ impl Parser<'_> {
             return None;
         }
         // Above the comparisons, because `<` separates the levels.
-        Some(self.expression_at(crate::syntax::expressions::level::POSTFIX))
+        Some(self.expression_at(super::expressions::level::POSTFIX))
     }
 
     /// `dynamic T(parameters);`

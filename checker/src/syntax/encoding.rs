@@ -3,8 +3,8 @@
 //! Known are UTF-8, UTF-16 in both byte orders, US-ASCII and Latin-1; a byte order mark wins over what the XML
 //! declaration says. Positions count characters, so they are right in every encoding.
 
+use super::codes;
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
-use crate::syntax::codes;
 
 /// Far beyond any model; a file of this size takes about 7 GB. Spans count in 32 bits.
 const MOST_BYTES: usize = 1 << 28;
@@ -68,7 +68,7 @@ pub(super) fn decode(
 }
 
 fn about_file(path: &str, code: Code, message: &str, sources: &mut SourceMap) -> Diagnostic {
-    let span: Span = crate::syntax::add_file(path, String::new(), sources);
+    let span: Span = super::add_file(path, String::new(), sources);
     let diagnostic = Diagnostic::new(code, span, message);
     match code {
         codes::EMPTY_FILE | codes::NOT_A_MODEL => diagnostic

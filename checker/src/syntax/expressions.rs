@@ -8,14 +8,14 @@
 //! order of evaluation stays the same. Other trees are refused beyond [`MAX_HEIGHT`] levels, so that every walk over a
 //! tree may recurse.
 
-use crate::diagnostics::{Diagnostic, Span};
-use crate::syntax::ast::{
+use super::ast::{
     BinaryOp, Expr, ExprKind, Name, Quantifier, UnaryOp, Unsupported, UnsupportedPart,
 };
-use crate::syntax::codes;
-use crate::syntax::keywords;
-use crate::syntax::lexer::TokenKind;
-use crate::syntax::parser::{Dialect, MAX_HEIGHT, Parser};
+use super::codes;
+use super::keywords;
+use super::lexer::TokenKind;
+use super::parser::{Dialect, MAX_HEIGHT, Parser};
+use crate::diagnostics::{Diagnostic, Span};
 
 /// Levels of precedence; an operator of a higher level binds tighter.
 pub(super) mod level {

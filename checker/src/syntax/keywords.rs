@@ -4,7 +4,7 @@
 //! Where we differ: names of built-in functions are not reserved, a declaration hides them (with a warning), because
 //! models older than UPPAAL 4.1.20 use them as names.
 
-use crate::syntax::parser::Dialect;
+use super::parser::Dialect;
 
 const OLD: u8 = 1;
 const NEW: u8 = 2;

@@ -9,8 +9,8 @@
 
 use crate::cancellation;
 
+use super::codes;
 use crate::diagnostics::{Diagnostic, SourceId, Span};
-use crate::syntax::codes;
 
 /// What bounds the memory for a text that is nothing but tokens: a tree takes up to 100 bytes for each.
 const MOST_TOKENS: usize = 20_000_000;
@@ -146,7 +146,7 @@ impl Lexer<'_> {
     }
 
     fn report(&mut self, diagnostic: Diagnostic) {
-        if self.diagnostics.len() < crate::syntax::MOST_MISTAKES {
+        if self.diagnostics.len() < super::MOST_MISTAKES {
             self.diagnostics.push(diagnostic);
         }
     }

@@ -8,11 +8,11 @@
 //! * Every loop consumes a token per turn, and recursion stops at [`MAX_NESTING`] levels, so any text ends in bounded
 //!   time and stack.
 
+use super::ast::{Expr, ExprKind, Name, Unsupported};
+use super::codes;
+use super::keywords;
+use super::lexer::{Token, TokenKind, lex};
 use crate::diagnostics::{Code, Diagnostic, SourceId, SourceMap, Span};
-use crate::syntax::ast::{Expr, ExprKind, Name, Unsupported};
-use crate::syntax::codes;
-use crate::syntax::keywords;
-use crate::syntax::lexer::{Token, TokenKind, lex};
 
 /// How deep brackets, blocks, types and prefix operators may be nested.
 pub(super) const MAX_NESTING: u32 = 256;
@@ -227,7 +227,7 @@ impl<'a> Parser<'a> {
         if self.gave_up {
             return;
         }
-        if self.diagnostics.len() <= crate::syntax::MOST_MISTAKES {
+        if self.diagnostics.len() <= super::MOST_MISTAKES {
             self.diagnostics.push(diagnostic);
         } else {
             self.give_up();

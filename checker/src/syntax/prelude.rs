@@ -1,8 +1,8 @@
 //! What every model can use without declaring it: ranges of machine integers and constants of mathematics.
 
+use super::ast::Declaration;
+use super::parser::{Dialect, Parser};
 use crate::diagnostics::{Source, SourceMap, Span};
-use crate::syntax::ast::Declaration;
-use crate::syntax::parser::{Dialect, Parser};
 
 /// The declarations that UPPAAL puts before every model. `UINT8_MAX` is 255; the reference manual's 256 is a slip.
 const PRELUDE: &str = "\
@@ -36,7 +36,7 @@ pub fn prelude(sources: &mut SourceMap) -> Vec<Declaration> {
     let span = Span {
         source,
         start: 0,
-        end: crate::syntax::lexer::to_u32(PRELUDE.len()),
+        end: super::lexer::to_u32(PRELUDE.len()),
     };
     let mut diagnostics = Vec::new();
     let mut parser = Parser::new(span, sources, Dialect::New, &mut diagnostics);

@@ -3,11 +3,9 @@
 //! Invariant: reading the text again gives the same tree, places aside. Two trees that differ in how long runs of `&&`
 //! and `||` are bracketed may give one text.
 
-use crate::syntax::ast::{
-    BinaryOp, Expr, ExprKind, Prefixes, Quantifier, TypeExpr, TypeKind, UnaryOp,
-};
-use crate::syntax::ast::{Dimension, StructField};
-use crate::syntax::expressions::{level, level_of};
+use super::ast::{BinaryOp, Expr, ExprKind, Prefixes, Quantifier, TypeExpr, TypeKind, UnaryOp};
+use super::ast::{Dimension, StructField};
+use super::expressions::{level, level_of};
 use std::fmt::Write;
 
 /// The text of an expression.

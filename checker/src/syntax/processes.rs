@@ -1,15 +1,15 @@
 //! The parts of textual models: process definitions, instantiations, the system line, and what may follow it.
 
-use crate::diagnostics::{Diagnostic, SourceMap, Span};
-use crate::syntax::ast::{
+use super::ast::{
     BinaryOp, Branchpoint, Declaration, Document, Edge, Expr, ExprKind, Location, Name, QueryText,
     Sync, System, SystemItem, Template, TypeExpr, UnsupportedPart,
 };
-use crate::syntax::codes;
-use crate::syntax::declarations::Scope;
-use crate::syntax::expressions::join_all;
-use crate::syntax::lexer::TokenKind;
-use crate::syntax::parser::{Dialect, Parser};
+use super::codes;
+use super::declarations::Scope;
+use super::expressions::join_all;
+use super::lexer::TokenKind;
+use super::parser::{Dialect, Parser};
+use crate::diagnostics::{Diagnostic, SourceMap, Span};
 use std::collections::HashMap;
 
 /// Which part of a model a text is.
@@ -183,7 +183,7 @@ impl Parser<'_> {
         self.expect(TokenKind::LeftBrace, "after `IO` and the process");
         while !self.at_end() && !self.at(TokenKind::RightBrace) {
             // Not a whole expression: `?` would begin a choice.
-            self.expression_at(crate::syntax::expressions::level::POSTFIX);
+            self.expression_at(super::expressions::level::POSTFIX);
             if !self.eat(TokenKind::Exclamation) {
                 self.eat(TokenKind::Question);
             }
@@ -581,7 +581,7 @@ pub(super) fn query_texts(spans: &[Span], sources: &SourceMap) -> Vec<QueryText>
         .iter()
         .map(|&span| QueryText {
             span,
-            text: crate::syntax::q_file::collapsed(sources.text(span)),
+            text: super::q_file::collapsed(sources.text(span)),
             comment: String::new(),
             expect: None,
         })

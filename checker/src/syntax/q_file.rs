@@ -4,10 +4,10 @@
 //! to the next one. `EXPECT:` on a line of its own belongs to the next query if the file's first one stands before the
 //! first query, and to the previous one otherwise, which is how verifyta reads it.
 
+use super::ast::{Expectation, QueryText};
+use super::codes;
+use super::lexer::to_u32;
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
-use crate::syntax::ast::{Expectation, QueryText};
-use crate::syntax::codes;
-use crate::syntax::lexer::to_u32;
 
 /// A piece of a `.q` file or of a formula.
 enum Piece<'a> {

@@ -1,11 +1,11 @@
 //! The query language: path formulas, extrema, games, strategies; statistical and learning queries by name only.
 
+use super::ast::{Control, Expr, ExprKind, Extremum, Name, Objective, Query, QueryKind};
+use super::codes;
+use super::expressions::{join_all, level};
+use super::lexer::TokenKind;
+use super::parser::{Dialect, Parser};
 use crate::diagnostics::{Diagnostic, Source, SourceMap, Span};
-use crate::syntax::ast::{Control, Expr, ExprKind, Extremum, Name, Objective, Query, QueryKind};
-use crate::syntax::codes;
-use crate::syntax::expressions::{join_all, level};
-use crate::syntax::lexer::TokenKind;
-use crate::syntax::parser::{Dialect, Parser};
 
 /// Parses the query formula that stands at `span`; there is no tree if anything was wrong.
 pub fn parse_query(span: Span, sources: &SourceMap) -> (Option<Query>, Vec<Diagnostic>) {
@@ -37,7 +37,7 @@ pub fn add_query_text(text: &str, sources: &mut SourceMap) -> Span {
     Span {
         source,
         start: 0,
-        end: crate::syntax::lexer::to_u32(text.len()),
+        end: super::lexer::to_u32(text.len()),
     }
 }
 
@@ -373,7 +373,7 @@ impl Parser<'_> {
             if self.eat(TokenKind::AlwaysFinally) {
                 let goal = self.expression();
                 self.closing(TokenKind::RightParenthesis, "after the goal");
-                let hold = join_all(crate::syntax::ast::BinaryOp::And, conjuncts)?;
+                let hold = join_all(super::ast::BinaryOp::And, conjuncts)?;
                 return Some(Objective::Buchi(hold, goal));
             }
             conjuncts.push(self.expression_at(level::AND + 1));

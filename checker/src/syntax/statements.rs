@@ -1,11 +1,11 @@
 //! Statements of functions.
 
+use super::ast::{Block, Expr, Statement};
+use super::codes;
+use super::declarations::Scope;
+use super::lexer::TokenKind;
+use super::parser::{Dialect, Parser};
 use crate::diagnostics::Diagnostic;
-use crate::syntax::ast::{Block, Expr, Statement};
-use crate::syntax::codes;
-use crate::syntax::declarations::Scope;
-use crate::syntax::lexer::TokenKind;
-use crate::syntax::parser::{Dialect, Parser};
 
 impl Parser<'_> {
     /// `{ declarations statements }`; the current token is the brace.

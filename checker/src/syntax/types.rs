@@ -1,10 +1,10 @@
 //! Types, declared names with dimensions, parameters.
 
+use super::ast::{Dimension, Name, Parameter, Prefixes, StructField, TypeExpr, TypeKind};
+use super::keywords;
+use super::lexer::TokenKind;
+use super::parser::{Dialect, Parser};
 use crate::diagnostics::Span;
-use crate::syntax::ast::{Dimension, Name, Parameter, Prefixes, StructField, TypeExpr, TypeKind};
-use crate::syntax::keywords;
-use crate::syntax::lexer::TokenKind;
-use crate::syntax::parser::{Dialect, Parser};
 
 impl Parser<'_> {
     /// Whether the current word begins a type that is no mere name.

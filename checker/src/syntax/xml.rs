@@ -5,16 +5,16 @@
 //!
 //! Source: the UPPAAL manual on file formats, and how utap reads what it leaves open.
 
+use super::ast::{Document, Expectation, Name, QueryText, Unsupported, UnsupportedPart};
+use super::codes;
+use super::keywords::is_reserved;
+use super::lexer::{end_of_word, lex, to_u32};
+use super::parser::{Dialect, Parser};
+use super::processes::{Part, query_texts};
+use super::q_file::{collapsed, expectation_in, trimmed};
+use super::xml_text::{XmlFile, end_of_tag};
+use super::xta::is_old_syntax;
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
-use crate::syntax::ast::{Document, Expectation, Name, QueryText, Unsupported, UnsupportedPart};
-use crate::syntax::codes;
-use crate::syntax::keywords::is_reserved;
-use crate::syntax::lexer::{end_of_word, lex, to_u32};
-use crate::syntax::parser::{Dialect, Parser};
-use crate::syntax::processes::{Part, query_texts};
-use crate::syntax::q_file::{collapsed, expectation_in, trimmed};
-use crate::syntax::xml_text::{XmlFile, end_of_tag};
-use crate::syntax::xta::is_old_syntax;
 use roxmltree::{Node, ParsingOptions};
 
 /// No model of 100 MB has as many nodes; it bounds the memory for files that are nothing but tags.

@@ -8,15 +8,13 @@
     reason = "the path of a method is not general over the lifetime of the parser"
 )]
 
+use super::ast::{Branchpoint, Edge, LabelKind, Location, Name, Point, Template, UnsupportedPart};
+use super::codes;
+use super::keywords::{is_built_in_function, is_reserved};
+use super::lexer::to_u32;
+use super::parser::Dialect;
+use super::xml::{Reader, child, is_element};
 use crate::diagnostics::{Diagnostic, Span};
-use crate::syntax::ast::{
-    Branchpoint, Edge, LabelKind, Location, Name, Point, Template, UnsupportedPart,
-};
-use crate::syntax::codes;
-use crate::syntax::keywords::{is_built_in_function, is_reserved};
-use crate::syntax::lexer::to_u32;
-use crate::syntax::parser::Dialect;
-use crate::syntax::xml::{Reader, child, is_element};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
 

@@ -1,8 +1,8 @@
 //! The text of XML elements with the way back to the file: entities, character references, CDATA and line ends make the
 //! text that is parsed differ from the bytes of the file.
 
+use super::lexer::to_u32;
 use crate::diagnostics::{Source, SourceId, SourceMap, Span};
-use crate::syntax::lexer::to_u32;
 use roxmltree::Node;
 use std::ops::Range;
 use std::sync::Arc;

@@ -1,12 +1,12 @@
 //! Textual models: XTA and the old TA syntax.
 
+use super::ast::Document;
+use super::codes;
+use super::keywords;
+use super::lexer::{Token, TokenKind, lex};
+use super::parser::{Dialect, Parser};
+use super::processes::{Part, query_texts};
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
-use crate::syntax::ast::Document;
-use crate::syntax::codes;
-use crate::syntax::keywords;
-use crate::syntax::lexer::{Token, TokenKind, lex};
-use crate::syntax::parser::{Dialect, Parser};
-use crate::syntax::processes::{Part, query_texts};
 
 /// How many tokens of a parameter list are looked at to tell the syntax.
 const LONGEST_PARAMETER_LIST: usize = 100;
@@ -18,7 +18,7 @@ pub(super) fn read(
     sources: &mut SourceMap,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Document {
-    let span = crate::syntax::add_file(path, text, sources);
+    let span = super::add_file(path, text, sources);
     let tokens = lex(&sources.get(span.source).text, span, &mut Vec::new());
     let text = &sources.get(span.source).text;
     let dialect = if is_old_syntax(text, &tokens) {

@@ -8,7 +8,7 @@
 //! * the predicate holds nowhere in it.
 //!
 //! Then no reachable state satisfies the predicate, whatever made the certificate: each point is checked exactly, by subtracting zones
-//! from zones ([`crate::verify::zone`]). That the zones are larger than what is reachable (extrapolation makes them so) does no harm as long as
+//! from zones ([`super::zone`]). That the zones are larger than what is reachable (extrapolation makes them so) does no harm as long as
 //! the four points hold.
 //!
 //! Where a clock stands still beside two that run, what a zone becomes in time is no zone. If the least zone around it lies in the
@@ -25,10 +25,10 @@ use std::collections::HashMap;
 use crate::exec::EmittedAssignment;
 use crate::ir::{ClockChoice, ClockId, FixedConstraint, Network, Predicate, Urgency};
 
-use crate::verify::code::{Candidate, Code, Combination};
-use crate::verify::concrete::{Error, Part};
-use crate::verify::strategy::Constraint;
-use crate::verify::zone::{Comparison, Zone, is_exact};
+use super::code::{Candidate, Code, Combination};
+use super::concrete::{Error, Part};
+use super::strategy::Constraint;
+use super::zone::{Comparison, Zone, is_exact};
 
 /// The states with some words.
 #[derive(Clone, Debug, PartialEq, Eq)]

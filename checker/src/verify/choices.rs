@@ -1,12 +1,12 @@
 //! What can happen next in a state with exact clock values, and when: for simulating runs.
 //!
-//! While time passes, what is possible changes only at the moments of [`crate::verify::moments`]; so a move is possible in whole windows
+//! While time passes, what is possible changes only at the moments of [`super::moments`]; so a move is possible in whole windows
 //! between them, which are found by looking once into each.
 
 use crate::ir::Network;
 
-use crate::verify::concrete::{Error, Part, Semantics, State};
-use crate::verify::moments::Moments;
+use super::concrete::{Error, Part, Semantics, State};
+use super::moments::Moments;
 
 /// A move and when it can happen.
 #[derive(Clone, Debug, PartialEq, Eq)]

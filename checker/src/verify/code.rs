@@ -1,7 +1,7 @@
 //! The code of a model on words: conditions, updates and the composition of edges into moves, from the definitions.
 //!
-//! What code says about clocks is handed on as constraints and assignments. [`crate::verify::concrete`] evaluates them on clock values,
-//! [`crate::verify::certificate`] on sets of values.
+//! What code says about clocks is handed on as constraints and assignments. [`super::concrete`] evaluates them on clock values,
+//! [`super::certificate`] on sets of values.
 //!
 //! The definitions (the documentation's pages on semantics, edges and locations):
 //! * one of the participants of a move leaves a committed location if some process is in one;
@@ -19,7 +19,7 @@ use crate::exec::{
 };
 use crate::ir::{ClockId, Edge, FixedConstraint, FunctionId, Guard, Network, Update, Urgency};
 
-use crate::verify::concrete::{Error, Part};
+use super::concrete::{Error, Part};
 
 /// What it takes to look at the edges of a process: see [`cancellation::work`].
 const UNITS_FOR_PROCESS: usize = 1 << 10;

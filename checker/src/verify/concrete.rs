@@ -3,7 +3,7 @@
 //! Clock values are integers: numbers of *ticks*, of which [`Semantics::ticks_per_unit`] make one unit of the model's time.
 //! Every rational valuation can be had by choosing it large enough.
 //!
-//! The definitions (the documentation's page on semantics; [`crate::verify::code`] has those about which edges go together):
+//! The definitions (the documentation's page on semantics; [`super::code`] has those about which edges go together):
 //! * a move is possible if the guards of all participants hold in the source state, the invariants hold after all updates, and
 //!   no move of a higher priority is possible;
 //! * time passes neither in urgent and committed locations nor while a synchronisation on an urgent channel is enabled.
@@ -17,7 +17,7 @@ use crate::ir::{
     ClockChoice, ClockId, Edge, FixedConstraint, FunctionId, Network, Predicate, Urgency,
 };
 
-use crate::verify::code::{Code, Combination};
+use super::code::{Code, Combination};
 
 /// Why a state could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,8 +10,8 @@ use std::collections::BTreeSet;
 
 use crate::ir::{AssignedValue, ClockAtom, ClockChoice, ClockRange, Network, Predicate};
 
-use crate::verify::concrete::{Error, State};
-use crate::verify::regions;
+use super::concrete::{Error, State};
+use super::regions;
 
 /// Values of an expression that are tried one by one; with more of them every integer counts as a constant.
 const MOST_VALUES: i64 = 4096;

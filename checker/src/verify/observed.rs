@@ -1,12 +1,12 @@
 //! Closing the loop of a strategy that goes by observations: the machine against every move of the environment.
 //!
-//! The play goes over pairs of a state of the machine and a region (see [`crate::verify::regions`]), whose constants include those of the
+//! The play goes over pairs of a state of the machine and a region (see [`super::regions`]), whose constants include those of the
 //! observations. As long as the observation stays the same, so does the state of the machine, and its action is proposed: where it
 //! is possible, it is taken or the environment moves; elsewhere the environment moves, or time passes to the next region. When the
 //! observation changes, the machine goes to the state that it has for the new one. It is right if
 //! * it has a state for every observation that is met before the goal, and what must be kept holds until then;
 //! * where time cannot pass and its action is not possible, the environment has to move, or, if the controller has only to keep
-//!   something, may stop: as for a strategy that waits there ([`crate::verify::strategy`]);
+//!   something, may stop: as for a strategy that waits there ([`super::strategy`]);
 //! * if the goal has to be reached, the graph up to the goals has no cycle, not even a region without end.
 //!
 //! What the machine says that it knows is not used.
@@ -17,11 +17,11 @@ use std::collections::HashMap;
 
 use crate::ir::{Network, Predicate};
 
-use crate::verify::concrete::{Error, Move, State};
-use crate::verify::effort::Effort;
-use crate::verify::regions::Regions;
-use crate::verify::rules::{Aim, Claim, Owner, Rest, Rules};
-use crate::verify::strategy::{Coverage, Defect, Outcome, Step, Violation};
+use super::concrete::{Error, Move, State};
+use super::effort::Effort;
+use super::regions::Regions;
+use super::rules::{Aim, Claim, Owner, Rest, Rules};
+use super::strategy::{Coverage, Defect, Outcome, Step, Violation};
 
 /// What the controller proposes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

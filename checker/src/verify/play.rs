@@ -2,16 +2,16 @@
 //!
 //! In a state with exact clock values both players lie in wait: the strategy acts at the first moment at which it does not decide to
 //! wait, its opponent at any moment before. At the same instant the environment is first. Where the strategy acts without a first
-//! moment, one is chosen for it. Moves, forced moves and ends of play are those of [`crate::verify::strategy`].
+//! moment, one is chosen for it. Moves, forced moves and ends of play are those of [`super::strategy`].
 
 use std::cmp::Ordering;
 
 use crate::ir::{Network, Predicate};
 
-use crate::verify::concrete::{Error, Part, Semantics, State};
-use crate::verify::moments::{Moments, Stretch};
-use crate::verify::rules::{Aim, Claim, Decisions, Owner, Rest, Rules, is_same_entry};
-use crate::verify::timed::Timed;
+use super::concrete::{Error, Part, Semantics, State};
+use super::moments::{Moments, Stretch};
+use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules, is_same_entry};
+use super::timed::Timed;
 
 /// What a strategy does in a state, as long as nothing else happens.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -256,7 +256,7 @@ struct View<'a> {
 /// A stretch of the wait with its state and moves.
 struct Passed {
     now: State,
-    moves: Vec<crate::verify::Move>,
+    moves: Vec<super::Move>,
     is_time_stopped: bool,
 }
 

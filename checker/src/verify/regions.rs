@@ -19,7 +19,7 @@
 
 use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Update};
 
-use crate::verify::concrete::{Error, State};
+use super::concrete::{Error, State};
 
 /// What keeps the set of representatives finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

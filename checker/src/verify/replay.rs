@@ -5,10 +5,10 @@
 //!   comparisons, so they hold before), no location is urgent, and no synchronisation on an urgent channel becomes
 //!   enabled before the end of the wait;
 //! * every move is one of the possible moves of the state, of the highest priority;
-//! * it ends as it says: in a loop, if the last state and the one that it leads back to lie in the same region ([`crate::verify::regions`]; with
+//! * it ends as it says: in a loop, if the last state and the one that it leads back to lie in the same region ([`super::regions`]; with
 //!   stopwatches if they have the same values as far as they matter), so that the same moves are possible again and again; waiting for ever; or without any move, now or after any wait.
 //!
-//! What must hold during a wait is looked at at all moments at which something may change ([`crate::verify::moments`]).
+//! What must hold during a wait is looked at at all moments at which something may change ([`super::moments`]).
 //!
 //! Cost: one look at each step; a region for each loop.
 
@@ -16,10 +16,9 @@ use std::collections::HashMap;
 
 use crate::ir::{ClockChoice, Measure, Network, Predicate};
 
-use crate::verify::concrete::{Error, Move, Part, Semantics, State};
-use crate::verify::moments;
-use crate::verify::moments::Moments;
-use crate::verify::regions::{Bounding, Regions};
+use super::concrete::{Error, Move, Part, Semantics, State};
+use super::moments::{self, Moments};
+use super::regions::{Bounding, Regions};
 
 /// A wait and the move after it.
 #[derive(Clone, Debug, PartialEq, Eq)]

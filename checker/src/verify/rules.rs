@@ -1,12 +1,12 @@
 //! What is claimed of a strategy, and the rules of the two sides: who may do what in a state, who must, and who has won.
 //!
-//! [`crate::verify::strategy`] and [`crate::verify::observed`] close their loops by them, [`crate::verify::play`] lets a person play by them.
+//! [`super::strategy`] and [`super::observed`] close their loops by them, [`super::play`] lets a person play by them.
 
 use std::collections::HashMap;
 
 use crate::ir::{Network, Predicate};
 
-use crate::verify::concrete::{Error, Move, Part, Semantics, State};
+use super::concrete::{Error, Move, Part, Semantics, State};
 
 /// `left - right < bound`, or `<=` if not strict; clocks by index, 0 for the reference clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

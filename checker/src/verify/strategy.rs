@@ -1,6 +1,6 @@
 //! Closing the loop: a strategy against every move of its opponent.
 //!
-//! The play goes over regions (see [`crate::verify::regions`]), whose constants include those of the strategy, so that each region has
+//! The play goes over regions (see [`super::regions`]), whose constants include those of the strategy, so that each region has
 //! one list of decisions. From a region in which the strategy waits, the opponent may make any of its moves, or time passes to the
 //! next region. Where the controller acts, the environment may still be first; where the environment acts, it is first. A strategy
 //! of the controller is right if
@@ -27,13 +27,13 @@ use std::collections::{HashMap, HashSet};
 
 use crate::ir::Network;
 
-use crate::verify::concrete::{Error, Move, State};
-use crate::verify::effort::{Effort, GivenUp};
-use crate::verify::regions::Regions;
-use crate::verify::rules::Rules;
-use crate::verify::timed::{Timed, least_multiple};
+use super::concrete::{Error, Move, State};
+use super::effort::{Effort, GivenUp};
+use super::regions::Regions;
+use super::rules::Rules;
+use super::timed::{Timed, least_multiple};
 
-pub use crate::verify::rules::{Aim, Claim, Constraint, Decision, Decisions, Forcing, Owner};
+pub use super::rules::{Aim, Claim, Constraint, Decision, Decisions, Forcing, Owner};
 
 /// What was looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! States together with the resolution of their clock values, so that every fraction of a unit can be waited.
 
-use crate::verify::concrete::State;
+use super::concrete::State;
 
 /// The finest resolution: constants of clocks stay far from the ends of the integers in it.
 pub const MOST_TICKS_PER_UNIT: i64 = 1 << 30;

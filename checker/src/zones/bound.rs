@@ -10,7 +10,7 @@
 //! Range: constants of a model lie within ±[`Bound::MAX_VALUE`]. Inside an operation on a zone, bounds along a path are added. Where
 //! single clocks are compared with constants, a path has two of the zone and two new ones at most; where clocks are compared with each
 //! other, it may pass all clocks. An `i32` has room for that as long as no bound of the zone is beyond [`Bound::most_in_zone`]. Extrapolated zones
-//! are within it; whoever lets bounds grow asks [`crate::zones::dbm::is_in_range`] once per step, and goes on otherwise or stops.
+//! are within it; whoever lets bounds grow asks [`super::dbm::is_in_range`] once per step, and goes on otherwise or stops.
 
 use std::fmt;
 use std::ops::Add;

@@ -1,6 +1,6 @@
 //! What moves clocks: delay and its past, reset, assignment, freeing, and the way back of an update.
 //!
-//! The contract is that of [`crate::zones::dbm`]: closed, consistent, positive zones in and out. Each function writes the
+//! The contract is that of [`super::dbm`]: closed, consistent, positive zones in and out. Each function writes the
 //! closed result directly; none needs to close again.
 //!
 //! *Stopped* clocks (stopwatches at rate 0) keep their value while the others run. The exact set after such a delay is
@@ -17,9 +17,9 @@
     reason = "the dimension is a constant at some calls"
 )]
 
-use crate::zones::dbm::{Constraint, constrain, is_empty, least_sum, set_empty, upper_bounds};
-use crate::zones::rows::{for_small_dimension, rows, rows_mut, with_row};
-use crate::zones::{Bound, ClockSet};
+use super::dbm::{Constraint, constrain, is_empty, least_sum, set_empty, upper_bounds};
+use super::rows::{for_small_dimension, rows, rows_mut, with_row};
+use super::{Bound, ClockSet};
 
 /// So few upper bounds are looked at one after the other for each clock, more as a row of bounds on all clocks.
 const FEW_BOUNDS: usize = 4;
@@ -168,7 +168,7 @@ pub struct Delays {
 }
 
 /// The delays that lead from the valuation into the zone while the clocks of `stopped` keep their values; none if no
-/// delay does. The valuation is given as in [`crate::zones::dbm::contains`].
+/// delay does. The valuation is given as in [`super::dbm::contains`].
 pub fn delays_into(
     zone: &[Bound],
     numerators: &[i64],
@@ -337,7 +337,7 @@ pub fn preimage(
         .iter()
         .rev()
         .all(|assignment| unassign(zone, dimension, assignment))
-        && crate::zones::dbm::constrain_all(zone, dimension, guard)
+        && super::dbm::constrain_all(zone, dimension, guard)
 }
 
 /// The preimage of one assignment: the values that the clock may have got, then any value that it had before.

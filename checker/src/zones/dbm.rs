@@ -28,8 +28,8 @@ use std::cmp::Ordering;
 
 use crate::cancellation;
 
-use crate::zones::rows::{for_small_dimension, relax_row, rows, rows_mut, with_row};
-use crate::zones::{Bound, ClockSet};
+use super::rows::{for_small_dimension, relax_row, rows, rows_mut, with_row};
+use super::{Bound, ClockSet};
 
 /// How two zones of the same dimension lie to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -17,7 +17,7 @@
 //!
 //! [`lu_plus`] is coarser still: an entry (i, j) is infinite, for i other than 0, already if `low(j) + (i, j) > L(i)`, that is, if
 //! with the least j there is a clock i above L; and where `low(j)` is `> U(j)`, strictly, that counts as above U. It forgets
-//! all entries on which the abstraction `aLU` does not depend (see [`crate::zones::simulation`]), and so it stays within `aLU`.
+//! all entries on which the abstraction `aLU` does not depend (see [`super::simulation`]), and so it stays within `aLU`.
 //!
 //! Source: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and Upper Bounds in Zone Based Abstractions of Timed
 //! Automata", TACAS 2004, definitions in section 4, closing after `Extra_LU+` (LU-Canonize) in section 5.
@@ -34,11 +34,10 @@
 
 use std::cmp::Ordering;
 
-use crate::zones::dbm;
-use crate::zones::dbm::Constraint;
-use crate::zones::federation::Federation;
-use crate::zones::rows::{for_small_dimension, relax_row, rows_mut};
-use crate::zones::{Bound, ClockSet};
+use super::dbm::{self, Constraint};
+use super::federation::Federation;
+use super::rows::{for_small_dimension, relax_row, rows_mut};
+use super::{Bound, ClockSet};
 
 /// The greatest constants that each clock is compared with, prepared for extrapolation.
 #[derive(Debug, PartialEq, Eq)]

@@ -17,12 +17,10 @@
 
 use crate::cancellation;
 
-use crate::zones::clocks;
-use crate::zones::clocks::Assignment;
-use crate::zones::dbm;
-use crate::zones::dbm::{Constraint, Relation};
-use crate::zones::rows::rows;
-use crate::zones::{Bound, ClockSet, Patience, Zone, minimal};
+use super::clocks::{self, Assignment};
+use super::dbm::{self, Constraint, Relation};
+use super::rows::rows;
+use super::{Bound, ClockSet, Patience, Zone, minimal};
 
 /// What it takes to find out that a zone is not in another, as a rule: see [`cancellation::work`].
 const UNITS_FOR_COMPARISON: usize = 16;

@@ -9,7 +9,7 @@
 //!
 //! Read backwards in time, each set cuts off a final part of the interval of delays that lead back to G, and of finitely many
 //! initial parts the shortest is contained in all. So for unions the result is the union over the zones of G of the
-//! intersection over all B and U, as for the safe predecessors in [`crate::zones::past`], whose mirror image this is.
+//! intersection over all B and U, as for the safe predecessors in [`super::past`], whose mirror image this is.
 //!
 //! A part of a barrier may be *open*: where it has no first moment (`x > 1` after `x <= 1`), there is no valuation at which time
 //! could stop at the latest, so time that comes from outside the barrier runs on inside the part. Where the part has a first
@@ -17,10 +17,10 @@
 //! (the valuations from which every short enough delay leads into P), time runs from `F ∩ P'` to the valuations of P strictly
 //! after it, and on as long as it stays in the part.
 //!
-//! Invariant: no clock is stopped. Cost: as [`crate::zones::past`].
+//! Invariant: no clock is stopped. Cost: as [`super::past`].
 
-use crate::zones::federation::Federation;
-use crate::zones::{Bound, ClockSet, Zone, clocks, dbm, instants, past};
+use super::federation::Federation;
+use super::{Bound, ClockSet, Zone, clocks, dbm, instants, past};
 
 /// Where time does not pass.
 #[derive(Clone, Debug)]

@@ -10,8 +10,8 @@
 
 use crate::cancellation;
 
-use crate::zones::federation::Federation;
-use crate::zones::{Bound, ClockSet, Patience, dbm};
+use super::federation::Federation;
+use super::{Bound, ClockSet, Patience, dbm};
 
 /// The valuations from which every small enough delay leads into the federation.
 #[must_use]

@@ -17,10 +17,9 @@
 
 use crate::cancellation;
 
-use crate::zones::dbm;
-use crate::zones::dbm::Constraint;
-use crate::zones::rows::{relax_row, rows, with_row};
-use crate::zones::{Bound, ClockSet};
+use super::dbm::{self, Constraint};
+use super::rows::{relax_row, rows, with_row};
+use super::{Bound, ClockSet};
 
 /// One constraint of a stored zone in eight bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

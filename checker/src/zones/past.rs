@@ -12,14 +12,14 @@
 //! Where we differ: instead of intersecting unions, which multiplies overlapping zones, we collect what each zone of B
 //! takes away, `(G↓ ∩ B↓) \ ((G ∩ B↓) \ B)↓`, and subtract that from `G↓` once.
 //!
-//! With stopped clocks the past of a zone is over-approximated (see [`crate::zones::clocks`]), so the result is an
+//! With stopped clocks the past of a zone is over-approximated (see [`super::clocks`]), so the result is an
 //! approximation in either direction and a verdict that rests on it is "maybe".
 //!
 //! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis of
 //! Timed Games", CONCUR 2005, section 4.
 
-use crate::zones::federation::Federation;
-use crate::zones::{Bound, ClockSet, Patience, clocks, dbm};
+use super::federation::Federation;
+use super::{Bound, ClockSet, Patience, clocks, dbm};
 
 /// Subtracting a zone can multiply the zones of the rest, reducing costs the square of their number: from about this
 /// many zones on, reducing first was faster on random federations.

@@ -9,7 +9,7 @@
     reason = "the dimension is a constant at some calls"
 )]
 
-use crate::zones::Bound;
+use super::Bound;
 
 /// Calls a function with the dimension as its last argument, which is a constant where it is small.
 ///

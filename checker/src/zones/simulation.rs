@@ -17,22 +17,22 @@
 //!   zones have the same `aLU` exactly if they have the same demands.
 //! * The zone *reduced* to those of its entries that are demands, infinite elsewhere and without a demand for (0, x) if x is certainly
 //!   above U, has these demands, and is determined by them. Unlike demands it does not show L, so that it is the same more often.
-//! * What [`crate::zones::extrapolate::lu_plus`] makes of Z has the demands of Z. It is the closure of the reduced zone, with `< -U(x)` for
+//! * What [`super::extrapolate::lu_plus`] makes of Z has the demands of Z. It is the closure of the reduced zone, with `< -U(x)` for
 //!   the entries (0, x) without a demand.
 //!
 //! Source: F. Herbreteau, B. Srivathsan, I. Walukiewicz, "Better abstractions for timed automata", Information and Computation
 //! 251, 2016 (LICS 2012). What follows is derived here.
 //!
-//! Cost: n^2 / 4 vector steps; for restoring as many as for [`crate::zones::extrapolate::lu_plus`].
+//! Cost: n^2 / 4 vector steps; for restoring as many as for [`super::extrapolate::lu_plus`].
 
 #![expect(
     clippy::inline_always,
     reason = "the dimension is a constant at some calls"
 )]
 
-use crate::zones::extrapolate::{Ceilings, close_again, forgotten_from};
-use crate::zones::rows::{for_small_dimension, rows, rows_mut};
-use crate::zones::{Bound, ClockSet};
+use super::extrapolate::{Ceilings, close_again, forgotten_from};
+use super::rows::{for_small_dimension, rows, rows_mut};
+use super::{Bound, ClockSet};
 
 /// No demand: every bound meets it, and what is less.
 pub const NO_DEMAND: Bound = Bound(i32::MIN / 2);
@@ -61,7 +61,7 @@ fn leave_demands(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
 }
 
 /// Writes the demands of a reduced zone; `limits` are those of its ceilings. A zone lies within `aLU` of another exactly if
-/// [`crate::zones::dbm::is_subset`] holds of its demands and the other, reduced or not, or the demands of the other.
+/// [`super::dbm::is_subset`] holds of its demands and the other, reduced or not, or the demands of the other.
 pub fn demands(reduced: &[Bound], dimension: usize, limits: &[Bound], target: &mut [Bound]) {
     for_small_dimension!(dimension, write_demands(reduced, limits, target));
 }
@@ -78,7 +78,7 @@ fn write_demands(reduced: &[Bound], limits: &[Bound], target: &mut [Bound], dime
     }
 }
 
-/// Replaces a reduced zone by what [`crate::zones::extrapolate::lu_plus`] makes of the zone.
+/// Replaces a reduced zone by what [`super::extrapolate::lu_plus`] makes of the zone.
 pub fn restore(reduced: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     for_small_dimension!(dimension, restore_and_close(reduced, ceilings));
 }

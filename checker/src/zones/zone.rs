@@ -1,11 +1,9 @@
-//! One zone that owns its matrix: the comfortable face of [`crate::zones::dbm`] and [`crate::zones::clocks`] for code that is not
+//! One zone that owns its matrix: the comfortable face of [`super::dbm`] and [`super::clocks`] for code that is not
 //! in the innermost loop.
 
-use crate::zones::clocks;
-use crate::zones::clocks::Assignment;
-use crate::zones::dbm;
-use crate::zones::dbm::{Constraint, Relation};
-use crate::zones::{Bound, ClockSet};
+use super::clocks::{self, Assignment};
+use super::dbm::{self, Constraint, Relation};
+use super::{Bound, ClockSet};
 
 /// A zone with its own storage; may be empty.
 ///

@@ -4,7 +4,7 @@
 
 use hashbrown::HashTable;
 
-use crate::zones::{Bound, dbm};
+use super::{Bound, dbm};
 
 /// The index of a stored zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -22,10 +22,8 @@ use crate::verify::replay::{self, Claim, End, Moment, Run, Shown, Step};
 use crate::verify::strategy::{Constraint, Outcome as StrategyOutcome};
 use crate::verify::{self, Effort, Part};
 
-use super::shown_states;
-use super::shown_states::Difference;
-use super::strategy_check;
-use super::strategy_check::{Asked, Played, Verification};
+use super::shown_states::{self, Difference};
+use super::strategy_check::{self, Asked, Played, Verification};
 use super::timed_run::{Missing, Proof};
 use crate::engine::format::text;
 use crate::engine::format::{json, machine_json, strategy_json};

@@ -8,15 +8,12 @@ use crate::analysis::Abstraction;
 use crate::ir::{Objective, Predicate, Query, QueryKind};
 use crate::network::{Extent, Failure, Part, Symbolic};
 use crate::search::reachability::goal::Goal;
-use crate::search::reachability::search;
-use crate::search::reachability::search::{Order, Trace};
+use crate::search::reachability::search::{self, Order, Trace};
 use crate::zones::Zone;
 
-use super::timed_run;
-use super::timed_run::{Kind, Shows, Witness};
+use super::timed_run::{self, Kind, Shows, Witness};
 use crate::engine::limits::{LimitWatch, Limits};
-use crate::engine::query::answer;
-use crate::engine::query::answer::{Answer, Subject, Verdict};
+use crate::engine::query::answer::{self, Answer, Subject, Verdict};
 use crate::engine::session::walk::{Point, successors_or_failure};
 use crate::engine::{LoadedModel, Options};
 

@@ -13,8 +13,7 @@ use crate::game::strategy::attractor::{Strategy, Under};
 use crate::ir::Query;
 
 use super::certificate::stop_text;
-use super::strategy_place;
-use super::strategy_place::Refusal;
+use super::strategy_place::{self, Refusal};
 use crate::engine::format::strategy_json;
 use crate::engine::query::answer::{Answer, Evidence, Verdict, new_answer};
 use crate::engine::{LoadedModel, Options, Rejection, codes};

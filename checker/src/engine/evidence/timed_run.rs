@@ -10,8 +10,9 @@ use crate::ir::{Measure, Network, Predicate};
 use crate::network::{Failure, Part, Symbolic};
 use crate::search::liveness::emptiness::Ending;
 use crate::search::reachability::search::Trace;
-use crate::search::timed_trace::schedule;
-use crate::search::timed_trace::schedule::{Closing, Finish, Schedule, Stays, Unscheduled, Wanted};
+use crate::search::timed_trace::schedule::{
+    self, Closing, Finish, Schedule, Stays, Unscheduled, Wanted,
+};
 use crate::verify::replay::{self, Claim, Coverage, End, Moment, Outcome, Run, Shown, Step};
 use crate::verify::{self, State, Violation};
 use crate::zones::dbm::Constraint;

@@ -12,8 +12,7 @@ use crate::verify::State;
 use crate::verify::choices::Choice;
 use crate::verify::replay::{End, Run};
 
-use super::text;
-use super::text::Value;
+use super::text::{self, Value};
 use crate::engine::evidence::timed_run::{Kind, Proof, Witness};
 use crate::engine::query::answer::Values;
 

@@ -14,11 +14,9 @@ use crate::network::Part;
 use crate::verify::observed as check;
 use crate::zones::{Federation, Zone};
 
-use super::strategy_json;
-use super::strategy_json::{At, Mismatch, Reader};
+use super::strategy_json::{self, At, Mismatch, Reader};
 use super::{json, text};
-use crate::engine::evidence::shown_states;
-use crate::engine::evidence::shown_states::Difference;
+use crate::engine::evidence::shown_states::{self, Difference};
 
 /// The name of the format.
 pub const FORMAT: &str = "ntagen-machine";

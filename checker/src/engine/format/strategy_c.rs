@@ -18,8 +18,7 @@ use crate::network::Part;
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, minimal};
 
-use super::decision_table;
-use super::decision_table::{Entry, Rule};
+use super::decision_table::{self, Entry, Rule};
 use super::{strategy_text, text};
 use crate::engine::query::time_clock;
 

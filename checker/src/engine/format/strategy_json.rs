@@ -13,8 +13,7 @@ use crate::game::Player;
 use crate::game::strategy::attractor::{
     Decision, Selection, Start, Strategy, StrategyState, Under, Way,
 };
-use crate::game::strategy::closed_loop;
-use crate::game::strategy::closed_loop::Joined;
+use crate::game::strategy::closed_loop::{self, Joined};
 use crate::ir::{EdgeId, Network, Shape};
 use crate::network::Part;
 use crate::network::discrete::selects::{select_count, select_values};
@@ -23,8 +22,7 @@ use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
 
 use super::json;
-use super::text;
-use super::text::Place;
+use super::text::{self, Place};
 use crate::engine::query::time_clock;
 
 /// The name of the format.

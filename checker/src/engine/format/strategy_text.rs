@@ -7,8 +7,7 @@ use crate::game::strategy::attractor::{Selection, Start, Strategy, Way};
 use crate::ir::Network;
 use crate::zones::{Federation, Zone};
 
-use super::decision_table;
-use super::decision_table::Rule;
+use super::decision_table::{self, Rule};
 use super::text;
 use crate::engine::query::time_clock;
 

@@ -29,8 +29,7 @@ use super::time_optimal::{Race, fastest};
 use super::{game, partial_observation};
 use crate::engine::evidence::certificate::{CLOCKS_GREW, Certificate};
 use crate::engine::evidence::strategy_check::Verification;
-use crate::engine::evidence::timed_run;
-use crate::engine::evidence::timed_run::{Kind, Missing, Proof, Shows, Takes, Witness};
+use crate::engine::evidence::timed_run::{self, Kind, Missing, Proof, Shows, Takes, Witness};
 use crate::engine::limits::LimitWatch;
 use crate::engine::{Options, PlansWanted};
 

@@ -4,14 +4,12 @@
 use crate::game::Player;
 use crate::game::backward::solver::{Solver, Win};
 use crate::game::objectives::cooperative::Winning;
-use crate::game::strategy::attractor;
-use crate::game::strategy::attractor::{Start, Strategy, Way};
+use crate::game::strategy::attractor::{self, Start, Strategy, Way};
 use crate::game::strategy::co_buchi;
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
 use crate::search::limits::{StopReason, Watch};
-use crate::search::reachability::search;
-use crate::search::reachability::search::{Outcome, Trace};
+use crate::search::reachability::search::{self, Outcome, Trace};
 use crate::search::timed_trace::schedule::Finish;
 use crate::verify::replay::{End, Run};
 use crate::zones::minimal;

@@ -7,11 +7,9 @@ use crate::cancellation;
 use crate::ir::{ClockAtom, Measure};
 use crate::network::symbolic::predicate;
 use crate::network::{Symbolic, Symmetry};
-use crate::search::optimum::extremum;
-use crate::search::optimum::extremum::{Extreme, Extremes, Question};
+use crate::search::optimum::extremum::{self, Extreme, Extremes, Question};
 use crate::search::optimum::value_goal::Taking;
-use crate::search::reachability::search;
-use crate::search::reachability::search::Outcome;
+use crate::search::reachability::search::{self, Outcome};
 use crate::verify::replay::Shown;
 
 use super::answer::{

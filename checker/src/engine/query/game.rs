@@ -9,8 +9,7 @@ use crate::game::backward::budget::Allowance;
 use crate::game::backward::solver::{Answer as GameAnswer, Extent, Solver, Win};
 use crate::game::forward::graph::{Graph, Objective as GameObjective};
 use crate::game::objectives::buchi;
-use crate::game::strategy::attractor;
-use crate::game::strategy::attractor::{Strategy, Under};
+use crate::game::strategy::attractor::{self, Strategy, Under};
 use crate::game::strategy::closed_loop::ClosedLoop;
 use crate::game::strategy::co_buchi;
 use crate::game::strategy::plans::{NoPlans, Plan, Plans};
@@ -28,8 +27,7 @@ use super::budgets::{
 };
 use super::cooperative;
 use crate::engine::evidence::certificate::stop_text;
-use crate::engine::evidence::strategy_check;
-use crate::engine::evidence::strategy_check::{Asked, Played, Verification};
+use crate::engine::evidence::strategy_check::{self, Asked, Played, Verification};
 use crate::engine::limits::{LimitWatch, cut_as_interrupted};
 use crate::engine::{MOST_THREADS, Options, PlansWanted};
 /// What is said of a game whose model has priorities.

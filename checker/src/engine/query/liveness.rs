@@ -6,14 +6,10 @@
 use crate::analysis::Abstraction;
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
-use crate::search::liveness::emptiness;
-use crate::search::liveness::emptiness::{Ending, Liveness};
-use crate::search::liveness::leads_to;
-use crate::search::liveness::leads_to::Unanswered;
-use crate::search::liveness::shortest_lasso;
-use crate::search::liveness::shortest_lasso::Wanted;
-use crate::search::reachability::search;
-use crate::search::reachability::search::{Outcome, Trace};
+use crate::search::liveness::emptiness::{self, Ending, Liveness};
+use crate::search::liveness::leads_to::{self, Unanswered};
+use crate::search::liveness::shortest_lasso::{self, Wanted};
+use crate::search::reachability::search::{self, Outcome, Trace};
 use crate::search::timed_trace::schedule::Stays;
 
 use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, negated, new_answer, symbolic};

@@ -16,11 +16,9 @@ use crate::verify::Effort;
 use crate::verify::observed::{self, MachineState};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
-use super::game;
-use super::game::{objective_atoms, zones_of};
+use super::game::{self, objective_atoms, zones_of};
 use crate::engine::evidence::certificate::{Checked, Unreadable};
-use crate::engine::evidence::strategy_check;
-use crate::engine::evidence::strategy_check::Verification;
+use crate::engine::evidence::strategy_check::{self, Verification};
 use crate::engine::format::machine_json;
 use crate::engine::limits::LimitWatch;
 use crate::engine::{Options, PlansWanted};

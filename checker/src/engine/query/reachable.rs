@@ -6,8 +6,7 @@ use crate::analysis::Abstraction;
 use crate::ir::Predicate;
 use crate::network::symbolic::predicate;
 use crate::network::{PartialOrder, Symbolic, Symmetry};
-use crate::search::reachability::search;
-use crate::search::reachability::search::{Outcome, Report, Trace};
+use crate::search::reachability::search::{self, Outcome, Report, Trace};
 
 use super::answer::Evidence;
 use super::answer::{

@@ -21,8 +21,7 @@ use crate::verify::strategy::{Outcome, Owner};
 use crate::verify::timed::{Timed, least_multiple};
 use crate::verify::{self, Effort, Part, Semantics};
 
-use crate::engine::evidence::strategy_check;
-use crate::engine::evidence::strategy_check::{Asked, Played};
+use crate::engine::evidence::strategy_check::{self, Asked, Played};
 use crate::engine::format::strategy_json::Mismatch;
 use crate::engine::format::{json, strategy_json};
 use crate::engine::query::time_clock;

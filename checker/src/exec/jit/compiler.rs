@@ -17,9 +17,9 @@ use cranelift_module::{FuncId, Module, default_libcall_names};
 use crate::exec::optimise::Optimiser;
 use crate::ir::{Function, FunctionId, Overflow, RegisterType};
 
-use crate::exec::jit::JitError;
-use crate::exec::jit::needs::{AllNeeds, callees};
-use crate::exec::jit::translate::{entry_signature, native_signature, translate, translate_entry};
+use super::JitError;
+use super::needs::{AllNeeds, callees};
+use super::translate::{entry_signature, native_signature, translate, translate_entry};
 
 /// A compiled function as it is called from outside.
 #[derive(Clone, Copy, Debug)]

@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
 use crate::ir::{Function, FunctionId, Overflow, SiteId};
 
-use crate::exec::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, validate};
+use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, validate};
 
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};

@@ -2,9 +2,7 @@
 
 use crate::ir::{Function, Register};
 
-use crate::exec::optimise::operands::{
-    each_use_mut, is_pure, target, target_mut, terminator_use_mut,
-};
+use super::operands::{each_use_mut, is_pure, target, target_mut, terminator_use_mut};
 
 /// Removes dead instructions, and numbers the remaining registers afresh.
 pub(super) fn remove_dead_code(function: &mut Function) {

@@ -4,11 +4,9 @@ use crate::ir::{
     Address, Base, Block, BlockId, Function, FunctionId, Instruction, Register, Terminator,
 };
 
-use crate::exec::optimise::graph::targets_mut;
-use crate::exec::optimise::operands::{
-    each_address_mut, each_use_mut, target_mut, terminator_use_mut,
-};
-use crate::exec::optimise::size_of;
+use super::graph::targets_mut;
+use super::operands::{each_address_mut, each_use_mut, target_mut, terminator_use_mut};
+use super::size_of;
 
 /// Larger frames are not taken over: every call would zero them word by word.
 const MAX_FRAME_WORDS: u32 = 16;

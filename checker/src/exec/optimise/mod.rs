@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 
 use crate::ir::{Block, Function, FunctionId, Instruction, Register};
 
-use crate::exec::rounds::count_rounds;
+use super::rounds::count_rounds;
 
 /// Callees of at most this size are inlined.
 const MAX_SIZE_TO_INLINE: usize = 60;

@@ -10,16 +10,14 @@ use rustc_hash::FxHashMap;
 use crate::exec::arithmetic;
 use crate::ir::{Block, BlockId, Function, Instruction, Register, Terminator};
 
-use crate::exec::optimise::graph::{
-    dominates, dominators, predecessors, successors_of, targets_mut,
-};
-use crate::exec::optimise::operands::target;
-use crate::exec::optimise::size_of_blocks;
+use super::graph::{dominates, dominators, predecessors, successors_of, targets_mut};
+use super::operands::target;
+use super::size_of_blocks;
 
 /// Loops of more rounds are left alone.
 const MAX_ROUNDS: usize = 64;
 
-/// Writes out one innermost loop of a [`crate::exec::optimise::graph::clean`] function, if there is one and the function stays below
+/// Writes out one innermost loop of a [`super::graph::clean`] function, if there is one and the function stays below
 /// `max_size`; says whether it did.
 pub(super) fn unroll_one(function: &mut Function, max_size: usize) -> bool {
     let predecessors = predecessors(function);

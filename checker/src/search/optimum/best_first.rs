@@ -24,8 +24,7 @@ use crate::search::limits::{
     Counters, StopReason, Watch, moves_between_looks, states_between_looks,
 };
 use crate::search::reachability::goal::{Goal, Target};
-use crate::search::reachability::retrace;
-use crate::search::reachability::retrace::Step;
+use crate::search::reachability::retrace::{self, Step};
 use crate::search::reachability::search::Trace;
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 

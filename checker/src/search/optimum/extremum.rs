@@ -24,8 +24,7 @@ use crate::zones::{Bound, Zone, clocks, dbm};
 
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::reachability::goal::{Goal, Look, SharedGoal, Target, Visited};
-use crate::search::reachability::search;
-use crate::search::reachability::search::{Manner, Trace};
+use crate::search::reachability::search::{self, Manner, Trace};
 
 /// A least or greatest value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

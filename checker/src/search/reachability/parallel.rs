@@ -27,14 +27,12 @@ use crate::cancellation;
 use crate::network::{Failure, Symbolic};
 use crate::zones::Bound;
 
-use super::expand;
-use super::expand::{Explorer, Scene, Visit};
+use super::expand::{self, Explorer, Scene, Visit};
 use super::goal::{Goal, Look, SharedGoal};
 use super::retrace;
 use super::search::{Outcome, Report, Trace};
 use super::shard::{Mail, Shard};
-use super::tree;
-use super::tree::Origin;
+use super::tree::{self, Origin};
 use crate::search::limits::{Counters, Unlimited, Watch, moves_between_looks};
 
 /// Moves of a worker between two looks at the time.

@@ -13,14 +13,11 @@ use std::collections::VecDeque;
 use crate::network::{Failure, Part, Symbolic};
 use crate::zones::{Bound, Zone};
 
-use super::expand;
-use super::expand::{Explorer, Scene, Sink, Visit};
+use super::expand::{self, Explorer, Scene, Sink, Visit};
 use super::goal::{Goal, Look, SharedGoal};
 use super::parallel;
-use super::retrace;
-use super::retrace::Step;
-use super::tree;
-use super::tree::{MOST_SHARDS, Origin, Tree};
+use super::retrace::{self, Step};
+use super::tree::{self, MOST_SHARDS, Origin, Tree};
 use crate::search::limits::{
     Counters, StopReason, Watch, moves_between_looks, states_between_looks,
 };

@@ -1,8 +1,8 @@
 //! Clock constraints and clock assignments.
 
+use super::super::typed::{ClockEffect, ClockRelation, ClockSet, Expr, Kind};
+use super::Builder;
 use crate::ir::{BlockId, ClockAtom, ClockId, ClockOperand, ClockRange, Instruction, Register};
-use crate::semantics::lower::Builder;
-use crate::semantics::typed::{ClockEffect, ClockRelation, ClockSet, Expr, Kind};
 use crate::syntax::ast::Quantifier;
 
 /// The reference clock as an operand.

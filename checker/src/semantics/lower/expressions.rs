@@ -1,17 +1,15 @@
 //! Values and conditions.
 
+use super::super::operators::integer_interval;
+use super::super::typed::{ClockEffect, ClockSet, Expr, Kind, LocalId, Parameter, Root, Signature};
+use super::super::types::{Index, Type};
+use super::places::Target;
+use super::{Builder, Home, at, register_type};
 use crate::diagnostics::Span;
 use crate::ir::{
     Address, Base, BlockId, ClockAtom, FunctionId, Instruction, IntegerOperator, Register,
     RegisterType, Relation, Terminator,
 };
-use crate::semantics::lower::places::Target;
-use crate::semantics::lower::{Builder, Home, at, register_type};
-use crate::semantics::operators::integer_interval;
-use crate::semantics::typed::{
-    ClockEffect, ClockSet, Expr, Kind, LocalId, Parameter, Root, Signature,
-};
-use crate::semantics::types::{Index, Type};
 use crate::syntax::ast::Quantifier;
 
 impl Builder<'_> {
@@ -691,7 +689,7 @@ impl Builder<'_> {
 
     /// Copies the words of a value into fresh memory of the frame.
     pub(super) fn default_words(&mut self, address: Address, words: &[i32]) {
-        let offset = crate::semantics::lower::store_constant(self.network, self.images, words);
+        let offset = super::store_constant(self.network, self.images, words);
         self.emit(Instruction::CopyWords {
             target: address,
             source: at(Base::Constants, offset),

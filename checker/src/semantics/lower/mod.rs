@@ -20,13 +20,13 @@ use std::collections::HashMap;
 
 use crate::cancellation;
 
+use super::typed::{Effects, Expr, Local, LocalId, Statement};
+use super::types::{Memory, Type};
 use crate::diagnostics::Span;
 use crate::ir::{
     Address, Base, Block, BlockId, Function, FunctionId, Instruction, IntegerOperator, Network,
     Register, RegisterType, Site, SiteId, Terminator,
 };
-use crate::semantics::typed::{Effects, Expr, Local, LocalId, Statement};
-use crate::semantics::types::{Memory, Type};
 
 /// Images of values in the constant memory that were stored before.
 pub(super) type Images = HashMap<Vec<i32>, u32>;
@@ -108,11 +108,7 @@ impl<'n> Builder<'n> {
     }
 
     /// Adds the parameters of a function of the model, whose first locals they are, and what it returns.
-    pub(super) fn signature(
-        &mut self,
-        parameters: &[crate::semantics::typed::Parameter],
-        result: &Type,
-    ) {
+    pub(super) fn signature(&mut self, parameters: &[super::typed::Parameter], result: &Type) {
         let mut copies = Vec::new();
         for (i, parameter) in parameters.iter().enumerate() {
             let local = LocalId(i as u32);

@@ -1,11 +1,11 @@
 //! Places: variables, their parts, and what is loaded from and stored to them.
 
+use super::super::typed::{ClockSet, Expr, Kind, LocalId, Place, Root};
+use super::super::types::{Memory, Type};
+use super::{Builder, Home, at, register_type};
 use crate::ir::{
     Address, Base, ClockId, ClockOperand, ClockRange, Instruction, Register, RegisterType,
 };
-use crate::semantics::lower::{Builder, Home, at, register_type};
-use crate::semantics::typed::{ClockSet, Expr, Kind, LocalId, Place, Root};
-use crate::semantics::types::{Memory, Type};
 
 /// Where a value can be stored.
 #[derive(Clone, Copy, Debug)]

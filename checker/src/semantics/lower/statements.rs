@@ -1,10 +1,10 @@
 //! Statements.
 
+use super::super::typed::{Expr, LocalId, Statement};
+use super::super::types::Type;
+use super::{Builder, Home, at, register_type};
 use crate::diagnostics::Span;
 use crate::ir::{Base, Instruction, RegisterType, RunTimeErrorKind, Terminator};
-use crate::semantics::lower::{Builder, Home, at, register_type};
-use crate::semantics::typed::{Expr, LocalId, Statement};
-use crate::semantics::types::Type;
 
 impl Builder<'_> {
     pub(super) fn statement(&mut self, statement: &Statement) {

@@ -11,7 +11,7 @@ use crate::ir::{
     RunTimeErrorKind, SiteId,
 };
 
-use crate::exec::jit::translate::Translator;
+use super::Translator;
 
 impl Translator<'_> {
     /// The instructions that compute a register from others and cannot fail.

@@ -9,7 +9,7 @@ use cranelift_codegen::ir::{Block as NativeBlock, InstBuilder, MemFlagsData, Val
 use crate::exec::jit::runtime::{self, NativeContext, failure_status};
 use crate::ir::{Instruction, Overflow, Register, RunTimeErrorKind, SiteId};
 
-use crate::exec::jit::translate::Translator;
+use super::Translator;
 
 impl Translator<'_> {
     /// The instructions that can fail and do nothing else.

@@ -9,7 +9,7 @@ use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value};
 use crate::exec::jit::runtime::{self, NativeContext};
 use crate::ir::{Address, Base, Instruction};
 
-use crate::exec::jit::translate::{INLINE_WORDS, MODEL_MEMORY, Translator};
+use super::{INLINE_WORDS, MODEL_MEMORY, Translator};
 
 impl Translator<'_> {
     /// The instructions that read and write memory.

@@ -2,7 +2,7 @@
 //!
 //! Invariants
 //! * A compiled function takes the [`runtime::NativeContext`], the state's words, its frame, and its own arguments in native types;
-//!   it returns the status (see [`crate::exec::jit::runtime`]) and, for a double or an address, the value beside it.
+//!   it returns the status (see [`super::runtime`]) and, for a double or an address, the value beside it.
 //! * A check that fails jumps to a cold block that returns the status of its kind and site; nothing is trapped by signals.
 //! * An address is a pointer. The frame of a callee begins where the frame of its caller ends.
 //!
@@ -26,7 +26,7 @@ use crate::ir::{
     RunTimeErrorKind, SiteId, Terminator,
 };
 
-use crate::exec::jit::runtime;
+use super::runtime;
 
 /// Up to so many words are copied, compared or zeroed in line.
 const INLINE_WORDS: u32 = 16;

@@ -5,8 +5,8 @@
 use crate::exec::arithmetic;
 use crate::ir::{Address, Base, Instruction, Register, RegisterType};
 
-use crate::exec::optimise::numbering::expressions::Literal;
-use crate::exec::optimise::numbering::{Numbering, Simplified};
+use super::expressions::Literal;
+use super::{Numbering, Simplified};
 
 /// So many words of memory are remembered.
 const MAX_KNOWN_WORDS: usize = 1024;

@@ -26,8 +26,8 @@ use crate::ir::{
     Terminator,
 };
 
-use crate::exec::optimise::graph::{dominators, predecessors, targets_mut};
-use crate::exec::optimise::operands::{
+use super::graph::{dominators, predecessors, targets_mut};
+use super::operands::{
     each_address_mut, each_clock_mut, each_use_mut, target, target_mut, terminator_use_mut,
 };
 
@@ -36,7 +36,7 @@ use memory::MAX_WORDS_TO_EXPAND;
 
 /// In larger functions nothing is handed on to blocks with several predecessors.
 const MAX_BLOCKS_TO_HAND_ON: usize = 500;
-/// Numbers the values of a [`crate::exec::optimise::graph::clean`] function over the given constant memory. Says whether branches fell
+/// Numbers the values of a [`super::graph::clean`] function over the given constant memory. Says whether branches fell
 /// away, so that cleaning up and numbering once more may find more.
 pub(super) fn number_values(function: &mut Function, constants: &[i32]) -> bool {
     let predecessors = predecessors(function);

@@ -4,8 +4,8 @@ use crate::exec::arithmetic;
 use crate::exec::math::{self, MathCode};
 use crate::ir::{Instruction, IntegerOperator, Register, Relation};
 
-use crate::exec::optimise::numbering::expressions::Literal;
-use crate::exec::optimise::numbering::{Numbering, Simplified};
+use super::expressions::Literal;
+use super::{Numbering, Simplified};
 
 impl Numbering<'_> {
     pub(super) fn simplify(&mut self, instruction: Instruction) -> Simplified {
