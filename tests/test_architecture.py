@@ -46,11 +46,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
     "drive": BASE | {"files", "needle", "nsl", "plan", "render", "checker"},
-    "campaign": BASE | {"needle", "nsl", "plan", "render", "checker", "drive"},
     "plot": BASE | {"files", "needle", "plan", "drive"},
     "cli": BASE
     | {"files", "needle", "nsl", "plan", "render", "loading", "explanations"}
-    | {"drive", "campaign", "plot"}
+    | {"drive", "plot"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "__main__": {"cli"},
 }
@@ -59,7 +58,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 The face of the engine is split by module; ``checker`` alone is what it shows to the other rooms.
 """
 
-NEEDLE = {"rules", "scene", "nsl", "render", "needle", "plan", "drive", "campaign", "plot"}
+NEEDLE = {"rules", "scene", "nsl", "render", "needle", "plan", "drive", "plot"}
 """The rooms that are about needles; the face of the engine serves any model."""
 
 SPLIT = {"checker"}

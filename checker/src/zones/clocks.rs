@@ -17,7 +17,7 @@
     reason = "the dimension is a constant at some calls"
 )]
 
-use super::dbm::{Constraint, constrain, is_empty, least_sum, set_empty, upper_bounds};
+use super::dbm::{Constraint, constrain, least_sum, upper_bounds};
 use super::rows::{for_small_dimension, rows, rows_mut, with_row};
 use super::{Bound, ClockSet};
 
@@ -151,78 +151,6 @@ pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
             let bound = &mut zone[left * dimension + right];
             *bound = (*bound + longest_delay).min(crossed);
         }
-    }
-}
-
-/// The delays that lead from one valuation into a zone: an interval, in fractions of the valuation's denominator.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Delays {
-    /// The infimum, at least 0.
-    pub least: i64,
-    /// Whether the infimum itself leads into the zone.
-    pub includes_least: bool,
-    /// The supremum; none if the delays are unbounded.
-    pub greatest: Option<i64>,
-    /// Whether the supremum itself leads into the zone.
-    pub includes_greatest: bool,
-}
-
-/// The delays that lead from the valuation into the zone while the clocks of `stopped` keep their values; none if no
-/// delay does. The valuation is given as in [`super::dbm::contains`].
-pub fn delays_into(
-    zone: &[Bound],
-    numerators: &[i64],
-    denominator: i64,
-    stopped: &ClockSet,
-) -> Option<Delays> {
-    let is_running = |clock: usize| clock != 0 && !stopped.contains(clock);
-    let mut delays = Delays {
-        least: 0,
-        includes_least: true,
-        greatest: None,
-        includes_greatest: false,
-    };
-    for (left, row) in rows(zone, numerators.len()).enumerate() {
-        for (right, bound) in row
-            .iter()
-            .enumerate()
-            .filter(|(_, bound)| bound.is_finite())
-        {
-            // The difference may still grow by this much.
-            let slack =
-                i64::from(bound.value()) * denominator - (numerators[left] - numerators[right]);
-            let is_weak = !bound.is_strict();
-            match (is_running(left), is_running(right)) {
-                (true, false) => delays.limit(slack, is_weak),
-                (false, true) => delays.postpone(-slack, is_weak),
-                _ if slack < 0 || slack == 0 && !is_weak => return None,
-                _ => {}
-            }
-        }
-    }
-    delays.is_possible().then_some(delays)
-}
-
-impl Delays {
-    fn limit(&mut self, delay: i64, is_included: bool) {
-        let is_tighter = self
-            .greatest
-            .is_none_or(|greatest| (delay, is_included) < (greatest, self.includes_greatest));
-        if is_tighter {
-            (self.greatest, self.includes_greatest) = (Some(delay), is_included);
-        }
-    }
-
-    fn postpone(&mut self, delay: i64, is_included: bool) {
-        if (delay, !is_included) > (self.least, !self.includes_least) {
-            (self.least, self.includes_least) = (delay, is_included);
-        }
-    }
-
-    fn is_possible(&self) -> bool {
-        let is_point = self.includes_least && self.includes_greatest;
-        self.greatest
-            .is_none_or(|greatest| self.least < greatest || self.least == greatest && is_point)
     }
 }
 
@@ -367,45 +295,4 @@ fn unassign(zone: &mut [Bound], dimension: usize, assignment: &Assignment) -> bo
         free_clock(zone, dimension, clock);
     }
     is_reachable
-}
-
-/// Writes the zone without the clocks outside `kept` into `target`, whose dimension is one more than their number.
-///
-/// The clocks keep their order; the reference clock is always kept.
-pub fn project(zone: &[Bound], dimension: usize, kept: &ClockSet, target: &mut [Bound]) {
-    let is_kept = |clock: usize| clock == 0 || kept.contains(clock);
-    let rows = zone
-        .chunks_exact(dimension)
-        .enumerate()
-        .filter(|(left, _)| is_kept(*left));
-    let entries = rows.flat_map(|(_, row)| row.iter().enumerate());
-    let kept_entries = entries.filter(|(right, _)| is_kept(*right));
-    for (bound, (_, kept_bound)) in target.iter_mut().zip(kept_entries) {
-        *bound = *kept_bound;
-    }
-}
-
-/// The inverse of [`project`]: writes a zone over the clocks of `kept` into `target` of the given dimension, where all
-/// other clocks may have any value from 0.
-pub fn embed(zone: &[Bound], kept: &ClockSet, target: &mut [Bound], dimension: usize) {
-    let mut bounds = zone.iter();
-    let is_kept = |clock: usize| clock == 0 || kept.contains(clock);
-    for (left, row) in target.chunks_exact_mut(dimension).enumerate() {
-        if !is_kept(left) {
-            row.fill(Bound::INFINITY);
-            row[left] = Bound::LE_ZERO;
-            continue;
-        }
-        for right in 0..dimension {
-            // A clock that may be 0 leaves the bound of the difference at the upper bound.
-            row[right] = if is_kept(right) {
-                bounds.next().copied().unwrap_or(row[0])
-            } else {
-                row[0]
-            };
-        }
-    }
-    if is_empty(zone) {
-        set_empty(target);
-    }
 }

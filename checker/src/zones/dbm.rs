@@ -28,7 +28,7 @@ use std::cmp::Ordering;
 
 use crate::cancellation;
 
-use super::rows::{for_small_dimension, relax_row, rows, rows_mut, with_row};
+use super::rows::{for_small_dimension, relax_row, rows_mut, with_row};
 use super::{Bound, ClockSet};
 
 /// How two zones of the same dimension lie to each other.
@@ -65,11 +65,6 @@ impl Constraint {
             bound: self.bound.negated(),
         }
     }
-}
-
-/// Makes the zone that contains only the valuation in which every clock is 0.
-pub fn set_zero(zone: &mut [Bound]) {
-    zone.fill(Bound::LE_ZERO);
 }
 
 /// Makes the zone of all valuations without negative clocks.
@@ -402,32 +397,6 @@ pub fn contains(zone: &[Bound], numerators: &[i64], denominator: i64) -> bool {
                     }
             })
         })
-}
-
-/// The valuation of the zone with the least clocks on a grid: numerators over the dimension as the denominator.
-///
-/// With `< c` tightened to `<= c - 1 / n` the zone still contains a valuation: a cycle has at most n strict bounds, and
-/// if it has one the others sum to at least 1. The negated lengths of the shortest paths from the reference clock then
-/// satisfy all bounds. Cost: n^3.
-pub fn least_point(zone: &[Bound], dimension: usize) -> Vec<i64> {
-    let unit = i64::try_from(dimension).expect("a dimension fits");
-    let length = |bound: Bound| i64::from(bound.value()) * unit - i64::from(bound.is_strict());
-    let mut point: Vec<i64> = zone[..dimension]
-        .iter()
-        .map(|bound| -length(*bound))
-        .collect();
-    for _ in 0..dimension {
-        for (left, row) in rows(zone, dimension).enumerate() {
-            for (right, bound) in row
-                .iter()
-                .enumerate()
-                .filter(|(_, bound)| bound.is_finite())
-            {
-                point[right] = point[right].max(point[left] - length(*bound));
-            }
-        }
-    }
-    point
 }
 
 /// The bounds of a clock in the zone: its negated lower bound (on `0 - x`) and its upper bound (on `x - 0`).

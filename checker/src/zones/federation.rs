@@ -387,11 +387,6 @@ impl Federation {
     }
 
     /// Makes the description shorter as [`Federation::reduce`] does, but leaves zones that only several others cover. Cheaper.
-    pub fn merge(&mut self) {
-        self.merge_within(&mut Patience::endless());
-    }
-
-    /// As [`Federation::merge`], with limited patience.
     pub fn merge_within(&mut self, patience: &mut Patience<'_>) {
         self.remove_included(patience);
         self.join_pairs(patience);

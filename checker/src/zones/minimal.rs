@@ -1,4 +1,4 @@
-//! Zones stored by their fewest constraints.
+//! Zones described by their fewest constraints.
 //!
 //! A closed matrix says most things twice. The minimal constraints are those that cannot be left out; closing them
 //! gives the matrix back. There are two sources of redundancy, and both have to be treated in the right order:
@@ -8,56 +8,18 @@
 //! * between these representatives there is no such cycle, so all constraints that are the sum of two others can be
 //!   left out at once, and the result does not depend on the order.
 //!
-//! `x >= 0` holds in every zone; neither it nor what follows from it is stored, so the universe is stored as nothing.
+//! `x >= 0` holds in every zone; neither it nor what follows from it is said, so nothing is said of the universe.
 //!
 //! Source: K. G. Larsen, F. Larsson, P. Pettersson, W. Yi, "Efficient Verification of Real-Time Systems: Compact Data
 //! Structure and State-Space Reduction", RTSS 1997, section 3.
 //!
-//! Cost: reduction O(n^3), inclusion linear in the number of constraints, unpacking that of closing.
+//! Cost: O(n^3).
 
 use crate::cancellation;
 
-use super::dbm::{self, Constraint};
+use super::dbm::Constraint;
 use super::rows::{relax_row, rows, with_row};
 use super::{Bound, ClockSet};
-
-/// One constraint of a stored zone in eight bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct StoredConstraint {
-    left: u16,
-    right: u16,
-    bound: Bound,
-}
-
-impl From<Constraint> for StoredConstraint {
-    /// Packs a constraint.
-    ///
-    /// # Panics
-    /// If a clock is beyond 2^16 - 1, which no model has.
-    fn from(constraint: Constraint) -> StoredConstraint {
-        let pack = |clock: usize| u16::try_from(clock).expect("a zone has fewer clocks");
-        StoredConstraint {
-            left: pack(constraint.left),
-            right: pack(constraint.right),
-            bound: constraint.bound,
-        }
-    }
-}
-
-impl From<StoredConstraint> for Constraint {
-    fn from(stored: StoredConstraint) -> Constraint {
-        Constraint {
-            left: stored.left.into(),
-            right: stored.right.into(),
-            bound: stored.bound,
-        }
-    }
-}
-
-/// Appends the minimal constraints of a zone that is not empty, row by row.
-pub fn append_minimal(zone: &[Bound], dimension: usize, target: &mut Vec<StoredConstraint>) {
-    for_each_minimal(zone, dimension, |constraint| target.push(constraint.into()));
-}
 
 /// Calls `visit` with the minimal constraints of a zone that is not empty, row by row.
 pub fn for_each_minimal(zone: &[Bound], dimension: usize, visit: impl FnMut(Constraint)) {
@@ -121,27 +83,6 @@ fn find_detours(
         );
         detours[via] = kept;
     }
-}
-
-/// Whether the zone is a subset of the stored one; the zone must not be empty.
-#[inline]
-pub fn is_subset_of_stored(zone: &[Bound], dimension: usize, stored: &[StoredConstraint]) -> bool {
-    stored.iter().all(|constraint| {
-        let entry = usize::from(constraint.left) * dimension + usize::from(constraint.right);
-        zone[entry] <= constraint.bound
-    })
-}
-
-/// Writes the stored zone as a closed matrix.
-pub fn unpack(stored: &[StoredConstraint], zone: &mut [Bound], dimension: usize) {
-    dbm::set_universe(zone, dimension);
-    let mut touched = ClockSet::EMPTY;
-    for constraint in stored.iter().copied().map(Constraint::from) {
-        zone[constraint.left * dimension + constraint.right] = constraint.bound;
-        touched.insert(constraint.left);
-        touched.insert(constraint.right);
-    }
-    dbm::close_touched(zone, dimension, &touched);
 }
 
 /// Whether two different clocks have a fixed distance in the zone.

@@ -65,14 +65,6 @@ pub fn predecessors_within(
     result
 }
 
-/// The safe predecessors in a state where no time passes: what is good and not bad.
-#[must_use]
-pub fn predecessors_without_delay(good: &Federation, bad: &Federation) -> Federation {
-    let mut result = good.clone();
-    result.subtract(bad);
-    result
-}
-
 /// A zone and its past.
 struct WithPast<'a> {
     zone: &'a [Bound],

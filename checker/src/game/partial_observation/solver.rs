@@ -134,11 +134,6 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// The number of knowledge sets.
-    pub fn knowledge_sets(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// Solves the game.
     pub fn solve(&mut self, watch: &mut dyn Watch) -> Result<Answer, Failure> {
         let Some(standing) = self.start()? else {
