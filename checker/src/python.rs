@@ -24,8 +24,7 @@ use crate::engine::format::{
 };
 use crate::engine::limits::Observer;
 use crate::engine::{
-    self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, PlansWanted, Rejection,
-    TraceWanted, Verdict,
+    self, CodeEngine, Limits, LoadedModel, MOST_THREADS, Options, Rejection, TraceWanted, Verdict,
 };
 use crate::game::{Forced, Nodes, Priorities};
 use crate::ir::Overflow;
@@ -400,11 +399,7 @@ impl Model {
                 timeout,
                 observer: Some(observer(progress)),
             },
-            plans: match max_plans {
-                None => PlansWanted::No,
-                Some(1) => PlansWanted::First,
-                Some(most) => PlansWanted::All(most),
-            },
+            plans: max_plans,
             strategy,
             verify,
             runs: trace,

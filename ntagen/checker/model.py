@@ -33,7 +33,7 @@ from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file
 
 SearchOrder = Literal["bfs", "dfs", "random"]
 CodeEngine = Literal["jit", "interpreter"]
-PlansWanted = Literal["none", "first", "all"]
+PlansWanted = Literal["none", "all"]
 OverflowRule = Literal["wrap", "error"]
 TraceWanted = Literal["any", "shortest", "fastest"]
 
@@ -227,8 +227,8 @@ class Model:
             memory_bytes: The search stops when its states take this much.
             timeout_s: The search stops after this time.
             plans: Which winning sequences to list.
-            max_plans: At most this many plans are listed; 1 is the quick search of
-                ``plans="first"``.
+            max_plans: At most this many plans are listed; a single one is found without looking
+                for the others.
             strategy: Whether the strategy of the player who wins is wanted.
             verify: Whether the strategy is to be checked against every move of the opponent.
             trace: Whether witnesses and counterexamples get exact times, which an independent
@@ -269,7 +269,7 @@ class Model:
             raise ValueError(f"{threads} threads: there must be at least one, or all")
         if max_plans < 1:
             raise ValueError("max_plans is the number of plans to list, at least 1")
-        wanted = {"none": None, "first": 1, "all": max_plans}[plans]
+        wanted = {"none": None, "all": max_plans}[plans]
         with rejecting():
             raw = self._raw.check(
                 query,

@@ -68,20 +68,6 @@ class _Threads(click.ParamType[int]):
         return int(text)
 
 
-class _PlanCount(click.ParamType[int]):
-    """A number of plans, at least 1; ``first`` is 1."""
-
-    name = "number of plans"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> int:
-        text = "1" if value == "first" else str(value)
-        if not text.isdecimal() or int(text) < 1:
-            self.fail(f"{value!r} is no {self.name}; write 1, 2, … or first", param, ctx)
-        return int(text)
-
-
 @dataclass(frozen=True, slots=True)
 class _Asked:
     """A query to be answered."""
@@ -197,11 +183,11 @@ class _Outputs:
 )
 @click.option(
     "--max-plans",
-    metavar="N|first",
-    type=_PlanCount(),
+    metavar="N",
+    type=click.IntRange(min=1),
     default=1_000_000,
     show_default=True,
-    help="List at most so many. 1 or `first` is any one, found without looking for the others.",
+    help="List at most N. 1 is any one, found without looking for the others.",
 )
 @click.option("--search", type=click.Choice(["bfs", "dfs", "random"]), default="bfs")
 @click.option(

@@ -66,18 +66,6 @@ pub enum CodeEngine {
     Interpreter,
 }
 
-/// Which plans are wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum PlansWanted {
-    /// None.
-    #[default]
-    No,
-    /// The first that is found.
-    First,
-    /// All, up to this number.
-    All(usize),
-}
-
 /// Which trace to a state is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum TraceWanted {
@@ -109,8 +97,8 @@ pub struct Options {
     pub code: CodeEngine,
     /// When to give up.
     pub limits: Limits,
-    /// Which plans are wanted.
-    pub plans: PlansWanted,
+    /// At most how many plans are wanted; a single one is found without looking for the others.
+    pub plans: Option<usize>,
     /// Whether a strategy is wanted.
     pub strategy: bool,
     /// Whether the strategy is to be checked in closed loop.
@@ -156,7 +144,7 @@ impl Default for Options {
             nodes: Nodes::default(),
             code: CodeEngine::default(),
             limits: Limits::default(),
-            plans: PlansWanted::default(),
+            plans: None,
             strategy: false,
             verify: false,
             runs: false,

@@ -164,13 +164,12 @@ def test_strategy_is_written_as_a_controller(
     assert "stopwatches" in err
 
 
-@pytest.mark.parametrize("most", ["1", "first"])
 def test_a_single_plan_is_found_without_the_others(
-    most: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = ("--query", "ReachFinalTR", "--plans", tmp_path / "plans.json", "--json")
     everything, _ = check_run(capsys, 0, PAPER, *options)
-    first, _ = check_run(capsys, 0, PAPER, *options, "--max-plans", most)
+    first, _ = check_run(capsys, 0, PAPER, *options, "--max-plans", 1)
     assert json.loads(first)["plans"] == 1
     assert json.loads(first)["stored"] * 10 < json.loads(everything)["stored"]
 
@@ -186,7 +185,7 @@ def test_a_single_plan_leaves_open_whether_there_are_more(
     assert json.loads(path.read_text())["complete"] is False
     for wrong in ("0", "last"):
         _, err = check_run(capsys, 2, gate, *query, "--max-plans", wrong)
-        assert "write 1, 2, … or first" in err
+        assert "--max-plans" in err
 
 
 def test_plans_of_an_environment_are_ranked_and_certified(

@@ -27,11 +27,11 @@ use super::liveness::{always, leads_to};
 use super::reachable::reachable;
 use super::time_optimal::{Race, fastest};
 use super::{game, partial_observation};
+use crate::engine::Options;
 use crate::engine::evidence::certificate::{CLOCKS_GREW, Certificate};
 use crate::engine::evidence::strategy_check::Verification;
 use crate::engine::evidence::timed_run::{self, Kind, Missing, Proof, Shows, Takes, Witness};
 use crate::engine::limits::LimitWatch;
-use crate::engine::{Options, PlansWanted};
 
 /// What a query came out as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,7 +184,7 @@ pub(in crate::engine) fn answer(subject: Subject<'_>, query: &Query, options: &O
         answer = new_answer(verdict, Evidence::default(), answer.counters);
         answer.message = Some(CLOCKS_GREW.to_owned());
     }
-    if options.plans != PlansWanted::No {
+    if options.plans.is_some() {
         game::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());
     }
     answer.seconds = start.elapsed().as_secs_f64();

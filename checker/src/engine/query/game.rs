@@ -29,7 +29,7 @@ use super::cooperative;
 use crate::engine::evidence::certificate::stop_text;
 use crate::engine::evidence::strategy_check::{self, Asked, Played, Verification};
 use crate::engine::limits::{LimitWatch, cut_as_interrupted};
-use crate::engine::{MOST_THREADS, Options, PlansWanted};
+use crate::engine::{MOST_THREADS, Options};
 /// What is said of a game whose model has priorities.
 pub(super) const IGNORED_PRIORITIES: &str =
     "games ignore the priorities of the model, unless they are told to keep them";
@@ -171,7 +171,7 @@ pub(super) fn can_be_discrete(network: &Network, is_cooperative: bool, options: 
     let has_priorities = network.features.priorities && options.priorities == Priorities::Kept;
     let is_urgent = network.features.clock_guarded_urgent;
     let hangs_on_more = network.features.stopwatches || has_priorities || is_urgent;
-    options.plans == PlansWanted::No && !is_cooperative && !hangs_on_more
+    options.plans.is_none() && !is_cooperative && !hangs_on_more
 }
 
 /// The clock comparisons of an objective.
@@ -224,7 +224,7 @@ fn played(
     // A strategy says what to do in states with all their values, and plans have such states.
     let forgets = options.live_variables
         && !is_strategy_wanted
-        && options.plans == PlansWanted::No
+        && options.plans.is_none()
         && within.is_none();
     if forgets {
         let read = [goal, keep].into_iter().flatten();
@@ -248,7 +248,7 @@ fn played(
     if nodes == Nodes::Automatic {
         solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD);
     }
-    let is_planned = options.plans != PlansWanted::No
+    let is_planned = options.plans.is_some()
         && matches!(objective, Objective::Reach(_) | Objective::Until(..))
         && !is_cooperative
         && within.is_none();
@@ -256,7 +256,7 @@ fn played(
         solver.graph.leave_out_chains();
     }
     let extent = match options.plans {
-        PlansWanted::All(_) if is_planned => Extent::Everything,
+        Some(most) if most > 1 && is_planned => Extent::Everything,
         // A strategy that keeps out of what was not explored would not be the most permissive one.
         _ if is_strategy_wanted && seeker == Player::Environment => Extent::Permissive,
         _ => Extent::Verdict,
@@ -399,13 +399,12 @@ fn add_plans(
     watch: &mut dyn Watch,
 ) {
     let most = match options.plans {
-        PlansWanted::No => return,
+        None => return,
         _ if answer.verdict == Verdict::NotSatisfied => {
             answer.evidence.plans = Some(Vec::new());
             return;
         }
-        PlansWanted::First => 1,
-        PlansWanted::All(most) => most,
+        Some(most) => most,
     };
     match plans(solver, most) {
         Ok(Ok((plans, end))) => {

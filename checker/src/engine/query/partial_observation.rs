@@ -17,11 +17,11 @@ use crate::verify::observed::{self, MachineState};
 
 use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
 use super::game::{self, objective_atoms, zones_of};
+use crate::engine::Options;
 use crate::engine::evidence::certificate::{Checked, Unreadable};
 use crate::engine::evidence::strategy_check::{self, Verification};
 use crate::engine::format::machine_json;
 use crate::engine::limits::LimitWatch;
-use crate::engine::{Options, PlansWanted};
 
 /// Answers a game query with observations.
 pub(super) fn game(
@@ -72,7 +72,7 @@ pub(super) fn game(
     if ignores_priorities {
         answer.message = Some(game::IGNORED_PRIORITIES.to_owned());
     }
-    if options.plans != PlansWanted::No {
+    if options.plans.is_some() {
         let message = "a game with observations gives no plans: its strategy is a machine that goes by what it sees";
         answer.message = Some(message.to_owned());
     }
