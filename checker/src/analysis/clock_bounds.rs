@@ -14,7 +14,7 @@
 //!
 //! Invariant: an assignment counts as a reset only if it is certain (among [`crate::ir::Update::fixed`]).
 
-use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, ClockRange, Edge, Network, Process};
+use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Process};
 use crate::zones::extrapolate::{Ceiling, Ceilings};
 use crate::zones::{Bound, Federation, extrapolate};
 
@@ -183,7 +183,8 @@ impl ClockBounds {
             abstraction,
             differences,
             greatest: summary.greatest,
-            has_differences: network.features.diagonals || atoms.iter().any(is_difference),
+            has_differences: network.features.diagonals
+                || atoms.iter().any(ClockAtom::is_difference),
             has_opposed_clocks: opposed,
         }
     }
@@ -350,7 +351,7 @@ fn propagate(edge: &Edge, step: Step, partners: Option<&Partners>, table: &mut T
 /// `left - right ≺ b` is an upper bound b on left, and a lower bound -b on right. A difference of two clocks bounds both, and once
 /// one of them is set to at most `reset`, it compares the other with a constant that lies so much further out.
 fn add_atom(bounds: &mut [(i32, i32)], atom: &ClockAtom, reset: i32) {
-    let is_difference = is_difference(atom);
+    let is_difference = atom.is_difference();
     let reset = if is_difference { reset } else { 0 };
     for clock in range(atom.left.first.0, atom.left.count) {
         let bound = atom.high.saturating_add(reset);
@@ -367,12 +368,6 @@ fn add_atom(bounds: &mut [(i32, i32)], atom: &ClockAtom, reset: i32) {
             bounds[clock].1 = bounds[clock].1.max(bound);
         }
     }
-}
-
-/// Whether a comparison concerns two clocks.
-pub fn is_difference(atom: &ClockAtom) -> bool {
-    let is_clock = |range: ClockRange| range.first.0 != 0 || range.count > 1;
-    is_clock(atom.left) && is_clock(atom.right)
 }
 
 fn range(first: u32, count: u32) -> impl Iterator<Item = usize> {

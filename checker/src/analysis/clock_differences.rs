@@ -17,8 +17,6 @@ use crate::ir::{AssignedValue, ClockAtom, ClockRange, Edge, Network, Process, Up
 use crate::zones::Bound;
 use crate::zones::dbm::Constraint;
 
-use super::clock_bounds::is_difference;
-
 /// Comparisons of a network, at most.
 const MOST_DIFFERENCES: usize = 256;
 
@@ -153,7 +151,7 @@ pub fn greatest_reset(network: &Network) -> i32 {
 
 /// Adds the comparisons that an atom stands for, if it is one of two clocks; `None` if there are too many.
 fn collect(atom: &ClockAtom, into: &mut BTreeSet<Difference>) -> Option<()> {
-    if !is_difference(atom) {
+    if !atom.is_difference() {
         return Some(());
     }
     let values = i64::from(atom.high) - i64::from(atom.low) + 1;

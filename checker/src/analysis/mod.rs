@@ -1,6 +1,7 @@
 //! What is true of a network before any search: which clock bounds matter where, which variables are live, which processes depend on
 //! each other, which comparisons can hold.
 
+mod cells;
 pub mod clock_bounds;
 pub mod clock_differences;
 pub(crate) mod dependence;

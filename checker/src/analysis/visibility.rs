@@ -2,7 +2,7 @@
 
 use crate::ir::{ClockChoice, FunctionId, LocationId, Network, Predicate, ProcessId};
 
-use super::dependence::{CellNumbers, Cells};
+use super::cells::{CellNumbers, Cells};
 
 /// What decides a predicate.
 ///

@@ -312,6 +312,14 @@ pub struct ClockAtom {
     pub strict: bool,
 }
 
+impl ClockAtom {
+    /// Whether the comparison concerns two clocks.
+    pub fn is_difference(&self) -> bool {
+        let is_clock = |range: ClockRange| range.first.0 != 0 || range.count > 1;
+        is_clock(self.left) && is_clock(self.right)
+    }
+}
+
 /// Consecutive clocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClockRange {

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::analysis::clock_bounds::is_difference;
 use crate::analysis::{Abstraction, ClockBounds, LiveVariables};
 use crate::cancellation;
 use crate::exec::Executor;
@@ -368,7 +367,7 @@ pub(super) fn negated(answer: Answer) -> Answer {
 
 /// Whether the network or a query compares two clocks.
 pub(in crate::engine) fn has_differences(network: &Network, atoms: &[ClockAtom]) -> bool {
-    network.features.diagonals || atoms.iter().any(is_difference)
+    network.features.diagonals || atoms.iter().any(ClockAtom::is_difference)
 }
 
 /// Zones for searches, with an abstraction that is sound for the network and these predicates, and keeps what further
