@@ -8,7 +8,7 @@
 
 use crate::ir::{Measure, Network, Predicate};
 use crate::network::{Failure, Part, Symbolic};
-use crate::search::liveness::emptiness::Ending;
+use crate::search::liveness::ending::RunEnding;
 use crate::search::reachability::search::Trace;
 use crate::search::timed_trace::schedule::{
     self, Closing, Finish, Schedule, Stays, Unscheduled, Wanted,
@@ -31,7 +31,7 @@ pub struct Witness {
     /// The symbolic run.
     pub trace: Trace,
     /// Why it never ends, if it does not.
-    pub ending: Option<Ending>,
+    pub ending: Option<RunEnding>,
     /// The move that fails in the last state, if it leads to a failure that is in one.
     pub failing: Option<Vec<Part>>,
     /// Whether it shows what the query asks about, a value, or only the way to a failure.
@@ -53,7 +53,7 @@ pub enum Kind {
 
 impl Witness {
     /// A symbolic run without anything.
-    pub fn new(trace: Trace, ending: Option<Ending>, kind: Kind) -> Witness {
+    pub fn new(trace: Trace, ending: Option<RunEnding>, kind: Kind) -> Witness {
         Witness {
             title: None,
             trace,
@@ -132,18 +132,18 @@ pub fn prove(
     symbolic: &mut Symbolic<'_>,
     network: &Network,
     trace: &Trace,
-    (ending, shows): (Option<Ending>, Shows<'_>),
+    (ending, shows): (Option<RunEnding>, Shows<'_>),
     is_doubtful: bool,
 ) -> Proof {
     let result = match (shows, ending) {
-        (Shows::Stays(stays), Some(Ending::Loop(start))) if network.features.stopwatches => {
+        (Shows::Stays(stays), Some(RunEnding::Loop(start))) if network.features.stopwatches => {
             closed(symbolic, network, trace, start, stays)
         }
-        (Shows::Stays(stays), Some(Ending::Loop(start))) => {
+        (Shows::Stays(stays), Some(RunEnding::Loop(start))) => {
             looped(symbolic, network, trace, start, stays)
         }
         (Shows::Stays(stays), ending) => {
-            let finish = if ending == Some(Ending::Waits) {
+            let finish = if ending == Some(RunEnding::Waits) {
                 Finish::Waits
             } else {
                 Finish::Stuck

@@ -6,7 +6,7 @@ use crate::cancellation;
 use crate::game::strategy::plans::Plan;
 use crate::ir::Network;
 use crate::network::Part;
-use crate::search::liveness::emptiness::Ending;
+use crate::search::liveness::ending::RunEnding;
 use crate::search::optimum::extremum::{Extreme, Extremes};
 use crate::verify::State;
 use crate::verify::choices::Choice;
@@ -153,9 +153,9 @@ fn witness(network: &Network, witness: &Witness) -> Json {
     }
     if let Some(ending) = witness.ending {
         json["ending"] = match ending {
-            Ending::Loop(start) => json!({ "kind": "loop", "loop": start }),
-            Ending::Waits => json!({ "kind": "waits" }),
-            Ending::Stuck => json!({ "kind": "stuck" }),
+            RunEnding::Loop(start) => json!({ "kind": "loop", "loop": start }),
+            RunEnding::Waits => json!({ "kind": "waits" }),
+            RunEnding::Stuck => json!({ "kind": "stuck" }),
         };
     }
     if let Some(Proof::Replayed(exact, states, _)) = &witness.run {

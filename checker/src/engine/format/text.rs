@@ -9,7 +9,7 @@ use crate::engine::evidence::timed_run::{Missing, Proof, Witness};
 use crate::ir::{Branch, Edge, EdgeLabels, Network, RunTimeErrorKind, Shape};
 use crate::network::discrete::selects::{select_count, select_values};
 use crate::network::{Failure, Part};
-use crate::search::liveness::emptiness::Ending;
+use crate::search::liveness::ending::RunEnding;
 use crate::search::reachability::search::Trace;
 use crate::verify::replay::{Defect, End, Run};
 use crate::verify::{self, State};
@@ -295,13 +295,13 @@ pub fn failing_text(network: &Network, parts: &[Part]) -> String {
 }
 
 /// Why a run never ends, as a line below its trace.
-pub fn ending_text(ending: Ending) -> String {
+pub fn ending_text(ending: RunEnding) -> String {
     match ending {
-        Ending::Loop(start) => {
+        RunEnding::Loop(start) => {
             format!("\nThe last state leads back to state {start} (the first is 0).\n")
         }
-        Ending::Waits => "\nTime passes for ever in the last state.\n".to_owned(),
-        Ending::Stuck => "\nNothing is possible any more in the last state.\n".to_owned(),
+        RunEnding::Waits => "\nTime passes for ever in the last state.\n".to_owned(),
+        RunEnding::Stuck => "\nNothing is possible any more in the last state.\n".to_owned(),
     }
 }
 

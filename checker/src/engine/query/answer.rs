@@ -15,7 +15,7 @@ use crate::ir::{ClockAtom, FunctionId, Network, Predicate, Query, QueryKind, Sit
 use crate::network::symbolic::predicate;
 use crate::network::{Failure, Restriction, Stepper, Symbolic, Symmetry};
 use crate::search::limits::{Counters, StopReason};
-use crate::search::liveness::emptiness::Ending;
+use crate::search::liveness::ending::RunEnding;
 use crate::search::optimum::extremum::{Extremes, Question};
 use crate::search::reachability::search::Trace;
 use crate::verify::strategy::Outcome as StrategyCheck;
@@ -488,7 +488,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
     pub(super) fn add(
         &mut self,
         trace: Trace,
-        ending: Option<Ending>,
+        ending: Option<RunEnding>,
         shows: Shows<'_>,
     ) -> Verdict {
         let kind = match shows {
@@ -503,7 +503,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
             Shows::Reaches(predicate, _) | Shows::Takes(Takes { predicate, .. }) => {
                 predicate::has_deadlock(predicate)
             }
-            Shows::Stays(_) => ending == Some(Ending::Stuck),
+            Shows::Stays(_) => ending == Some(RunEnding::Stuck),
             Shows::Possible => false,
         };
         let is_comparable = !(self.is_restricted && is_dead || self.symbolic.ignores_priorities());

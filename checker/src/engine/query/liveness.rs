@@ -6,7 +6,8 @@
 use crate::analysis::Abstraction;
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
-use crate::search::liveness::emptiness::{self, Ending, Liveness};
+use crate::search::liveness::emptiness::{self, Liveness};
+use crate::search::liveness::ending::RunEnding;
 use crate::search::liveness::leads_to::{self, Unanswered};
 use crate::search::liveness::shortest_lasso::{self, Wanted};
 use crate::search::reachability::search::{self, Outcome, Trace};
@@ -125,7 +126,7 @@ pub(super) fn leads_to<'a>(
 }
 
 /// A trace, how it ends, and the state in which it begins to stay.
-type Endless = (Trace, Ending, usize);
+type Endless = (Trace, RunEnding, usize);
 
 /// The best trace, or any one with a message that says why.
 fn chosen(

@@ -10,14 +10,14 @@ use crate::zones::dbm::{self, Constraint};
 use crate::zones::future::{self, Barriers};
 use crate::zones::{Bound, ClockSet, Federation, Zone};
 
-use super::emptiness::Ending;
+use super::ending::RunEnding;
 
 /// The part of a state that a run inside the predicate can reach.
 pub(super) struct Inside {
     /// Its zones before extrapolation; those in which a run can end, if one can.
     pub(super) zones: Vec<Zone>,
     /// Whether a run can end in it.
-    pub(super) ending: Option<Ending>,
+    pub(super) ending: Option<RunEnding>,
     /// Whether a doubt was counted as a run.
     pub(super) is_coarse: bool,
 }
@@ -189,16 +189,16 @@ impl Passage {
         symbolic: &mut Symbolic<'_>,
         words: &mut [i32],
         inside: &Federation,
-    ) -> Result<Option<(Ending, Federation)>, Failure> {
+    ) -> Result<Option<(RunEnding, Federation)>, Failure> {
         if inside.is_empty() {
             return Ok(None);
         }
         let waiting = self.waiting(inside);
         if !waiting.is_empty() {
-            return Ok(Some((Ending::Waits, waiting)));
+            return Ok(Some((RunEnding::Waits, waiting)));
         }
         let stuck = self.stuck(symbolic, words, inside)?;
-        Ok((!stuck.is_empty()).then_some((Ending::Stuck, stuck)))
+        Ok((!stuck.is_empty()).then_some((RunEnding::Stuck, stuck)))
     }
 
     /// The valuations of the part that is reached from which time can pass without limit.

@@ -25,6 +25,7 @@ use crate::zones::dbm;
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 
 use super::delay_inside::Inside;
+use super::ending::RunEnding;
 use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
 use crate::search::reachability::search::Trace;
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
@@ -35,35 +36,13 @@ const LOOK_EVERY: u64 = 256;
 /// No node.
 const NONE: u32 = u32::MAX;
 
-/// Why a run inside a predicate never leaves it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
-    /// Its last state leads back to the state with this index by the last move.
-    Loop(usize),
-    /// Time passes for ever in its last state.
-    Waits,
-    /// No move is possible any more, and time cannot take it out of the predicate.
-    Stuck,
-}
-
-impl Ending {
-    /// The same for a trace with so many more states before it.
-    #[must_use]
-    pub fn moved(self, before: usize) -> Ending {
-        match self {
-            Ending::Loop(start) => Ending::Loop(start + before),
-            other => other,
-        }
-    }
-}
-
 /// A run inside a predicate that never leaves it.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Its states and moves; the zones are those of the search.
     pub trace: Trace,
     /// Why it never leaves.
-    pub ending: Ending,
+    pub ending: RunEnding,
 }
 
 /// What a search found.
@@ -223,7 +202,7 @@ impl<'p> Liveness<'p> {
     }
 
     /// Goes one node down, to the next move, or one node up.
-    fn step(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<Ending>, Failure> {
+    fn step(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<RunEnding>, Failure> {
         let Some(frame) = self.frames.last_mut() else {
             return Ok(None);
         };
@@ -241,7 +220,7 @@ impl<'p> Liveness<'p> {
     }
 
     /// Takes the next move of the node on top: fills its pending nodes.
-    fn take_next(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<Ending>, Failure> {
+    fn take_next(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<RunEnding>, Failure> {
         let mut frame = self.frames.pop().expect("there is a node on top");
         let result = self.take(symbolic, &mut frame);
         self.frames.push(frame);
@@ -252,7 +231,7 @@ impl<'p> Liveness<'p> {
         &mut self,
         symbolic: &mut Symbolic<'_>,
         frame: &mut Frame,
-    ) -> Result<Option<Ending>, Failure> {
+    ) -> Result<Option<RunEnding>, Failure> {
         let one = frame.moves.get(frame.next_move);
         frame.next_move += 1;
         if !symbolic.is_enabled(one, frame.zone.bounds())? {
@@ -286,7 +265,7 @@ impl<'p> Liveness<'p> {
         symbolic: &mut Symbolic<'_>,
         words: &[i32],
         zone: Zone,
-    ) -> Result<Option<Ending>, Failure> {
+    ) -> Result<Option<RunEnding>, Failure> {
         let (discrete, is_new) = self.store.intern(words);
         if is_new {
             self.heads.push(NONE);
@@ -309,7 +288,7 @@ impl<'p> Liveness<'p> {
                     .last_mut()
                     .expect("the move was taken from a node");
                 top.pending = vec![zone];
-                return Ok(Some(Ending::Loop(depth as usize)));
+                return Ok(Some(RunEnding::Loop(depth as usize)));
             }
             node = next;
         }
@@ -402,7 +381,7 @@ impl<'p> Liveness<'p> {
     }
 
     /// The run on the stack, with the state in which it ends.
-    fn found(&self, ending: Ending) -> Run {
+    fn found(&self, ending: RunEnding) -> Run {
         let mut trace = self.stack_trace();
         if let Some(top) = self.frames.last() {
             trace.moves.push(top.parts.clone());

@@ -2,5 +2,6 @@
 
 pub(super) mod delay_inside;
 pub mod emptiness;
+pub mod ending;
 pub mod leads_to;
 pub mod shortest_lasso;

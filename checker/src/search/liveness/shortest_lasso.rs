@@ -20,7 +20,8 @@ use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Zone};
 
 use super::delay_inside::Inside;
-use super::emptiness::{Ending, Run, push_state};
+use super::emptiness::{Run, push_state};
+use super::ending::RunEnding;
 use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
 use crate::search::reachability::search::Trace;
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
@@ -78,7 +79,7 @@ struct Node {
 /// A way to stay.
 enum Stay {
     /// Without a move, in these zones of a state.
-    Ends(Ending, Origin, Vec<i32>, Vec<Zone>),
+    Ends(RunEnding, Origin, Vec<i32>, Vec<Zone>),
     /// In a loop from a node: its moves with the nodes that they lead to.
     Loops(usize, Vec<(usize, Vec<Part>)>),
 }
@@ -452,7 +453,7 @@ impl<'s, 'a> Search<'s, 'a> {
                     trace.moves.push(parts);
                     self.push_node(node, &mut trace);
                 }
-                let ending = Ending::Loop(start);
+                let ending = RunEnding::Loop(start);
                 (Run { trace, ending }, opening)
             }
         }

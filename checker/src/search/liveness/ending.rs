@@ -1,0 +1,23 @@
+//! How a run ends that never leaves a predicate.
+
+/// Why a run inside a predicate never leaves it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunEnding {
+    /// Its last state leads back to the state with this index by the last move.
+    Loop(usize),
+    /// Time passes for ever in its last state.
+    Waits,
+    /// No move is possible any more, and time cannot take it out of the predicate.
+    Stuck,
+}
+
+impl RunEnding {
+    /// The same for a trace with so many more states before it.
+    #[must_use]
+    pub fn moved(self, before: usize) -> RunEnding {
+        match self {
+            RunEnding::Loop(start) => RunEnding::Loop(start + before),
+            other => other,
+        }
+    }
+}
