@@ -170,7 +170,6 @@ impl ClockBounds {
                     .map(|table| summary.of(table, is_maximum)),
             );
         }
-        let opposed = summary.has_opposed_clocks;
         let everywhere = to_ceilings(&summary.bounds(everywhere, is_maximum));
         let classes = ceilings.iter().zip(&tracked).enumerate();
         let classes =
@@ -185,7 +184,7 @@ impl ClockBounds {
             greatest: summary.greatest,
             has_differences: network.features.diagonals
                 || atoms.iter().any(ClockAtom::is_difference),
-            has_opposed_clocks: opposed,
+            has_opposed_clocks: summary.has_opposed_clocks,
         }
     }
 

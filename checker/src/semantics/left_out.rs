@@ -19,7 +19,7 @@ use rustc_hash::FxHashSet;
 use super::checker::Checker;
 use super::codes;
 use super::typed::{Expr, Kind, Place};
-use super::types::{Size, Type};
+use super::types::Type;
 use crate::diagnostics::{Diagnostic, Span};
 
 /// How many times a model is checked at most: a longer chain of doubles, each of which takes the value of the next, is refused.
@@ -94,20 +94,16 @@ impl Checker<'_> {
 
     /// Whether the variable that a place is part of is left out.
     pub(super) fn is_left_out(&self, place: &Expr) -> bool {
-        !self.left_out.fixed.is_empty()
-            && place
-                .variable()
-                .is_some_and(|root| self.left_out.fixed.contains_key(&root.declared))
+        let root = place.variable();
+        root.is_some_and(|root| self.cause_of(root.declared).is_some())
     }
 
     /// A variable that is used: unknown, if it holds doubles and is left out.
     pub(super) fn unless_left_out(&mut self, expr: Expr) -> Expr {
-        if !self.is_left_out(&expr) || expr.ty.size().clocks > 0 {
-            return expr;
-        }
-        let declared = expr.variable().map(|place| place.declared);
-        let declared = declared.unwrap_or_default();
-        let Some(cause) = self.cause_of(declared) else {
+        let cause = expr
+            .variable()
+            .and_then(|place| Some((place.declared, self.cause_of(place.declared)?)));
+        let Some((declared, cause)) = cause.filter(|_| expr.ty.size().clocks == 0) else {
             return expr;
         };
         let name = self.sources.text(declared);
@@ -222,8 +218,7 @@ impl Checker<'_> {
 
 /// Where the clocks of the conditions in an expression were declared.
 fn visit_clocks(expr: &Expr, found: &mut Vec<Span>) {
-    if expr.ty.size() != Size::default()
-        && expr.ty.size().clocks > 0
+    if expr.ty.size().clocks > 0
         && let Some(place) = expr.variable()
     {
         found.push(place.declared);
