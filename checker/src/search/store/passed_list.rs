@@ -17,7 +17,8 @@ use crate::zones::Bound;
 use crate::zones::zone_table::ZoneId;
 
 use super::discrete_states::{DiscreteId, StateStore};
-use super::packed_zones::{Kept, PackedZones, Signature};
+use super::packed_zones::{Kept, PackedZones};
+use super::signature::Signature;
 use super::zone_lists::{Entry, Lists};
 
 /// A stored state with its number.

@@ -12,7 +12,7 @@
 use crate::zones::zone_table::ZoneId;
 
 use super::discrete_states::DiscreteId;
-use super::packed_zones::Signature;
+use super::signature::Signature;
 
 /// A zone in the list of a discrete state.
 #[derive(Clone, Copy, Debug)]

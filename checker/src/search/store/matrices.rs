@@ -1,0 +1,74 @@
+//! Packed matrices side by side, in blocks that are never moved.
+
+use crate::cancellation;
+
+/// Bytes of matrices in one block, at least; a block holds a power of two of matrices.
+const BLOCK_BYTES: usize = 1 << 16;
+
+/// Packed matrices of one size, by number from 0, in blocks that are never moved.
+#[derive(Debug)]
+pub(super) struct Matrices {
+    size: usize,
+    /// Matrices in a block, as a power of two.
+    block_bits: u32,
+    pub(super) blocks: Vec<Vec<u8>>,
+    count: u32,
+}
+
+impl Matrices {
+    pub(super) fn new(size: usize) -> Matrices {
+        Matrices {
+            size,
+            block_bits: (BLOCK_BYTES / size).max(1).ilog2(),
+            blocks: Vec::new(),
+            count: 0,
+        }
+    }
+
+    #[inline]
+    pub(super) fn get(&self, id: u32) -> &[u8] {
+        let (block, first) = self.place(id);
+        &self.blocks[block][first..first + self.size]
+    }
+
+    pub(super) fn get_mut(&mut self, id: u32) -> &mut [u8] {
+        let (block, first) = self.place(id);
+        &mut self.blocks[block][first..first + self.size]
+    }
+
+    /// The block of a matrix, and where it begins there.
+    #[inline]
+    fn place(&self, id: u32) -> (usize, usize) {
+        let within = id as usize & ((1 << self.block_bits) - 1);
+        (id as usize >> self.block_bits, within * self.size)
+    }
+
+    pub(super) fn push(&mut self, matrix: &[u8]) -> u32 {
+        let id = self.count;
+        self.count += 1;
+        if id as usize >> self.block_bits == self.blocks.len() {
+            self.blocks
+                .push(Vec::with_capacity(self.size << self.block_bits));
+        }
+        let block = self.blocks.last_mut();
+        block
+            .expect("a block was just made if there was none")
+            .extend_from_slice(matrix);
+        id
+    }
+
+    /// Gives entries twice as many bytes, block by block, so that the old and the new ones never stand side by side.
+    pub(super) fn widen(&mut self, widened: impl Fn(&[u8], &mut Vec<u8>)) {
+        cancellation::ask_for(self.bytes());
+        self.size *= 2;
+        for block in &mut self.blocks {
+            let mut wide = Vec::with_capacity(self.size << self.block_bits);
+            widened(block, &mut wide);
+            *block = wide;
+        }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.blocks.len() * (self.size << self.block_bits)
+    }
+}
