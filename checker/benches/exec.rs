@@ -1,5 +1,6 @@
-//! How fast is compiled code? A step and a roll of the needle, from the text of the generated model through the front end, against
-//! the same arithmetic written by hand in C (`exec.c`, compiled with `cc -O2`).
+//! How fast is compiled code? A step and a roll of the needle, from the text of the generated model
+//! through the front end, against the same arithmetic written by hand in C (`exec.c`, compiled with
+//! `cc -O2`).
 //!
 //! Prints nanoseconds a call and the ratio to C; fails if the two reach different states.
 
@@ -23,9 +24,11 @@ use needle::{load, needle_model};
 use support::Scratch;
 
 const ROUNDS: u32 = 2_000;
-/// The fastest of so many repetitions counts; C and compiled code take turns, so that both see the same load.
+/// The fastest of so many repetitions counts; C and compiled code take turns, so that both see the
+/// same load.
 const REPETITIONS: u32 = 40;
-/// What the C program calls `dt`, `velocity` and `radius`; constants in the model, and so no part of its state.
+/// What the C program calls `dt`, `velocity` and `radius`; constants in the model, and so no part
+/// of its state.
 const CONSTANTS: [i32; 3] = [2, 1_000, 30_000];
 /// The variables of the model that the C program knows, in its order.
 const VARIABLES: [&str; 8] = [

@@ -1,10 +1,10 @@
-//! How long does loading take? The generated model of the needle, with compiling its code, against the time that an enumerator
-//! written by hand in C for this one model needs for the whole problem (`tests/benchmarks/needle.c`); and a large model against
-//! reading its XML alone.
+//! How long does loading take? The generated model of the needle, with compiling its code, against
+//! the time that an enumerator written by hand in C for this one model needs for the whole problem
+//! (`tests/benchmarks/needle.c`); and a large model against reading its XML alone.
 //!
-//! Code is compiled when it has become hot. So there are two figures: loading until a query can start, which is what a user
-//! waits for, and loading with all guards, invariants and updates compiled at once, and all that they call, which is more than
-//! a run ever does.
+//! Code is compiled when it has become hot. So there are two figures: loading until a query can
+//! start, which is what a user waits for, and loading with all guards, invariants and updates
+//! compiled at once, and all that they call, which is more than a run ever does.
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints")]
 
@@ -24,7 +24,8 @@ use checker::ir::{FunctionId, Instruction, Network};
 use needle::{load, needle_model};
 use support::Scratch;
 
-/// The least of so many repetitions counts; what is compared takes turns, so that both see the same load.
+/// The least of so many repetitions counts; what is compared takes turns, so that both see the same
+/// load.
 const REPETITIONS: usize = 15;
 const LARGE_BYTES: usize = 1 << 20;
 
@@ -126,7 +127,8 @@ fn c_seconds(program: &Path) -> Result<f64, Box<dyn Error>> {
         .parse()?)
 }
 
-/// A model of about a megabyte: templates with declarations, functions, invariants and all kinds of labels, each used once.
+/// A model of about a megabyte: templates with declarations, functions, invariants and all kinds of
+/// labels, each used once.
 fn large_model() -> String {
     const LOCATIONS: usize = 40;
     let mut text = String::from(

@@ -1,10 +1,12 @@
 //! How long does one zone operation take, and one full successor?
 //!
-//! `cargo bench --no-default-features --bench zones` prints nanoseconds per operation, copying the source zone included,
-//! over zones that a random walk of successors reaches. With the folders of the sources of UDBM and of `UUtils`, on which it
-//! rests, in `NTAGEN_UDBM` and `NTAGEN_UUTILS`, the same operations on the same zones are timed in its C code (`udbm.c`), in
-//! turns with ours, and the ratio stands beside each figure. Without them the figures in brackets are those published for
-//! another machine, an order of magnitude. The least of several rounds is printed, so a busy machine disturbs little.
+//! `cargo bench --no-default-features --bench zones` prints nanoseconds per operation, copying the
+//! source zone included, over zones that a random walk of successors reaches. With the folders of
+//! the sources of UDBM and of `UUtils`, on which it rests, in `NTAGEN_UDBM` and `NTAGEN_UUTILS`,
+//! the same operations on the same zones are timed in its C code (`udbm.c`), in turns with ours,
+//! and the ratio stands beside each figure. Without them the figures in brackets are those
+//! published for another machine, an order of magnitude. The least of several rounds is printed, so
+//! a busy machine disturbs little.
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints its table")]
 
@@ -38,7 +40,8 @@ const TURNS: usize = 4;
 /// The greatest constant of a guard or invariant.
 const GREATEST: u32 = 20;
 
-/// One step of a clock automaton: wait for a guard from below, reset a clock, delay within an invariant.
+/// One step of a clock automaton: wait for a guard from below, reset a clock, delay within an
+/// invariant.
 struct Step {
     guarded: usize,
     at_least: Bound,
@@ -146,7 +149,8 @@ impl Bench {
         }
     }
 
-    /// Nanoseconds that `operation` takes on a copy of each zone; it returns something that depends on its result.
+    /// Nanoseconds that `operation` takes on a copy of each zone; it returns something that depends
+    /// on its result.
     fn measure(&self, operation: impl Fn(&mut [Bound], usize) -> bool) -> f64 {
         let mut scratch = vec![Bound::LE_ZERO; self.dimension * self.dimension];
         let mut round = || {
@@ -200,7 +204,8 @@ impl Bench {
         }
     }
 
-    /// The zones of the cases after delay and invariant, where extrapolation happens: before, little would be forgotten.
+    /// The zones of the cases after delay and invariant, where extrapolation happens: before,
+    /// little would be forgotten.
     fn delayed(&self) -> Vec<Vec<Bound>> {
         let without = |case: &Case| {
             let mut zone = case.zone.clone();
@@ -297,7 +302,8 @@ fn compile_udbm(scratch: &Scratch) -> Result<Option<PathBuf>, Box<dyn Error>> {
         option.push(folder);
         option
     };
-    // The sources of UDBM leave out a header that they need; what is not used needs nothing of `UUtils` but headers.
+    // The sources of UDBM leave out a header that they need; what is not used needs nothing of
+    // `UUtils` but headers.
     let mut arguments: Vec<OsString> = [
         "-O3",
         "-march=native",
@@ -323,7 +329,8 @@ fn compile_udbm(scratch: &Scratch) -> Result<Option<PathBuf>, Box<dyn Error>> {
     scratch.compile("benches/udbm.c", &arguments).map(Some)
 }
 
-/// The operations with the published figures in nanoseconds, where there are any: those that `udbm.c` times, in its order.
+/// The operations with the published figures in nanoseconds, where there are any: those that
+/// `udbm.c` times, in its order.
 const TABLE: [(&str, [u32; 5]); 12] = [
     ("copy", [4, 5, 9, 17, 27]),
     ("close", [75, 262, 561, 1_017, 3_106]),

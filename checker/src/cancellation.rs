@@ -1,29 +1,34 @@
 //! How work that takes too long, or too much memory, is ended from inside the operation at hand.
 //!
-//! Whoever starts work says what to look at ([`within`]): a clock, an account of memory, a user who interrupts. Operations that can take
-//! long say what they have done ([`work`]) and what they are about to allocate ([`ask_for`]), and now and then that is looked at. When
-//! it is time to end, the thread unwinds to whoever started the work, which gets [`Cut`]: nothing that is half done is ever seen, and
-//! what it took is given back on the way. Where code that cannot unwind runs, it asks ([`is_due`]) and ends by an error of its own.
+//! Whoever starts work says what to look at ([`within`]): a clock, an account of memory, a user who
+//! interrupts. Operations that can take long say what they have done ([`work`]) and what they are
+//! about to allocate ([`ask_for`]), and now and then that is looked at. When it is time to end, the
+//! thread unwinds to whoever started the work, which gets [`Cut`]: nothing that is half done is
+//! ever seen, and what it took is given back on the way. Where code that cannot unwind runs, it
+//! asks ([`is_due`]) and ends by an error of its own.
 //!
-//! What is looked at belongs to a thread; who starts another one hands it on ([`current`], [`looking_at`]). Where nothing is to be
-//! looked at, work runs to its end.
+//! What is looked at belongs to a thread; who starts another one hands it on ([`current`],
+//! [`looking_at`]). Where nothing is to be looked at, work runs to its end.
 //!
-//! Unwinding is how the incremental computations of rust-analyzer are cancelled, too (`Cancelled` of the library salsa): the alternative,
-//! an error in the type of every operation on sets, would be as long as the operations themselves.
+//! Unwinding is how the incremental computations of rust-analyzer are cancelled, too (`Cancelled`
+//! of the library salsa): the alternative, an error in the type of every operation on sets, would
+//! be as long as the operations themselves.
 
 use std::cell::{Cell, RefCell};
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
 use std::thread;
 
-/// Returns whether to end; is told how many bytes are about to be allocated beside what the account says.
+/// Returns whether to end; is told how many bytes are about to be allocated beside what the account
+/// says.
 pub type Look = Arc<dyn Fn(u64) -> bool + Send + Sync>;
 
 /// Work was cut off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut;
 
-/// Units of work between two looks: bounds that are read or written, of which a core does about a thousand million a second.
+/// Units of work between two looks: bounds that are read or written, of which a core does about a
+/// thousand million a second.
 const BETWEEN_LOOKS: i64 = 1 << 21;
 
 thread_local! {
@@ -65,7 +70,8 @@ pub fn within<R>(look: Look, run: impl FnOnce() -> R) -> Result<R, Cut> {
     unless_cut(|| looking_at(Some(look), run))
 }
 
-/// Does work that looks at what is looked at anyway, but does not take what was done before along when it is cut off.
+/// Does work that looks at what is looked at anyway, but does not take what was done before along
+/// when it is cut off.
 ///
 /// # Errors
 /// The work was cut off.

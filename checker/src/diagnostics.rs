@@ -1,13 +1,16 @@
 //! Diagnostics: what is wrong with an input, where, why, and what to do about it.
 //!
 //! Invariants:
-//! * Every piece of text that is parsed is a [`Source`] of its own: a whole `.xta` or `.q` file, or one `<declaration>`
-//!   or `<label>` of an XML file. A [`Span`] counts bytes of the *decoded* text of its source.
-//! * A source knows how its bytes map back to the file (entities such as `&lt;` make the two differ), so a diagnostic can
-//!   always be given as file, line and column, and in words ("template Gate, edge Free → Occ, guard").
-//! * Diagnostics are values. They are collected, sorted by position and reported together; nothing here prints.
-//! * Rendered text has no control character but line feeds and tabs, and nothing that turns the direction of writing, whatever stands in
-//!   a file: a terminal would obey it.
+//! * Every piece of text that is parsed is a [`Source`] of its own: a whole `.xta` or `.q` file, or
+//!   one `<declaration>` or `<label>` of an XML file. A [`Span`] counts bytes of the *decoded* text
+//!   of its source.
+//! * A source knows how its bytes map back to the file (entities such as `&lt;` make the two
+//!   differ), so a diagnostic can always be given as file, line and column, and in words ("template
+//!   Gate, edge Free → Occ, guard").
+//! * Diagnostics are values. They are collected, sorted by position and reported together; nothing
+//!   here prints.
+//! * Rendered text has no control character but line feeds and tabs, and nothing that turns the
+//!   direction of writing, whatever stands in a file: a terminal would obey it.
 
 use std::fmt;
 use std::ops::Range;
@@ -48,18 +51,20 @@ impl Span {
 pub struct Source {
     /// The file as the user named it; empty for text given directly (a query on the command line).
     pub path: Arc<str>,
-    /// The place in words, for example `template Gate, edge Free → Occ, guard`; empty for a whole file.
+    /// The place in words, for example `template Gate, edge Free → Occ, guard`; empty for a whole
+    /// file.
     pub place: String,
     /// The decoded text that spans count in.
     pub text: String,
     /// The byte of the file that the text begins at.
     pub file_start: u32,
-    /// Pairs (byte of `text`, byte of the file), ascending, where the two do not advance together; between two entries,
-    /// and before the first, they do.
+    /// Pairs (byte of `text`, byte of the file), ascending, where the two do not advance together;
+    /// between two entries, and before the first, they do.
     pub offsets: Vec<(u32, u32)>,
     /// The file's byte offsets at which lines start. Empty: the text is the file.
     pub line_starts: Arc<[u32]>,
-    /// Which of the `line_starts` belong to the lines from that which the text begins in to the one that it ends in.
+    /// Which of the `line_starts` belong to the lines from that which the text begins in to the one
+    /// that it ends in.
     pub lines: Range<u32>,
 }
 
@@ -198,8 +203,8 @@ pub struct Code {
     pub name: &'static str,
 }
 
-/// Defines the codes of a layer: a constant each, all of them as `ALL`, and their pages as `PAGES`. The page of a code is
-/// `pages/CODE.md`; without one the crate does not compile.
+/// Defines the codes of a layer: a constant each, all of them as `ALL`, and their pages as `PAGES`.
+/// The page of a code is `pages/CODE.md`; without one the crate does not compile.
 macro_rules! codes {
     ($($(#[$doc:meta])* $constant:ident = $code:literal $name:literal;)*) => {
         $($(#[$doc])* pub const $constant: $crate::diagnostics::Code =
@@ -256,7 +261,8 @@ impl Diagnostic {
         self.code.severity() == Severity::Error
     }
 
-    /// The diagnostic as text: a header line with file, line and column, the source line with a caret, notes and help.
+    /// The diagnostic as text: a header line with file, line and column, the source line with a
+    /// caret, notes and help.
     pub fn render(&self, sources: &SourceMap) -> String {
         let rendered = Rendered {
             diagnostic: self,
@@ -266,7 +272,8 @@ impl Diagnostic {
     }
 }
 
-/// The text with a visible character for each that a terminal would obey, so that columns stay where they are.
+/// The text with a visible character for each that a terminal would obey, so that columns stay
+/// where they are.
 pub fn visible(text: &str) -> String {
     text.chars().map(visible_char).collect()
 }

@@ -1,4 +1,5 @@
-//! An engine for UPPAAL timed automata and timed games: loads a model, checks queries, synthesises strategies.
+//! An engine for UPPAAL timed automata and timed games: loads a model, checks queries, synthesises
+//! strategies.
 //!
 //! The modules stand in reading order; each may use the ones above it and none below
 //! (`checker/ARCHITECTURE.md` says what each must not know, and a test enforces it).

@@ -1,7 +1,7 @@
 //! The Python module `ntagen._checker`: conversions only.
 //!
-//! A model is behind a lock, so that Python threads may share it; the interpreter is released while the engine works, and
-//! signals (Ctrl-C) are looked for now and then.
+//! A model is behind a lock, so that Python threads may share it; the interpreter is released while
+//! the engine works, and signals (Ctrl-C) are looked for now and then.
 
 mod play;
 mod walks;
@@ -174,17 +174,19 @@ impl Model {
     }
 }
 
-/// An edge as it stands in the model: process, source, targets of the branches, select names, synchronisation, whether
-/// controllable.
+/// An edge as it stands in the model: process, source, targets of the branches, select names,
+/// synchronisation, whether controllable.
 type EdgeEntry = (String, String, Vec<String>, Vec<String>, String, bool);
 
 /// A step of a plan: for each edge that is taken, process, edge, branch and select values.
 type StepEntry = Vec<(u32, u32, u32, Vec<i32>)>;
 
-/// A row of a matrix of bounds: of each the value and whether it is strict, `None` for one that is infinite.
+/// A row of a matrix of bounds: of each the value and whether it is strict, `None` for one that is
+/// infinite.
 type BoundRow = Vec<Option<(i32, bool)>>;
 
-/// A reached state: locations and variables as JSON, the constraints, the matrix, and the state and move that led to it.
+/// A reached state: locations and variables as JSON, the constraints, the matrix, and the state and
+/// move that led to it.
 type ReachedEntry = (
     String,
     Vec<String>,
@@ -279,7 +281,8 @@ impl Model {
         })
     }
 
-    /// The reachable symbolic states, and "states", "memory" or "time" if a limit stopped the search.
+    /// The reachable symbolic states, and "states", "memory" or "time" if a limit stopped the
+    /// search.
     #[pyo3(signature = (engine, *, states, memory_bytes, timeout_s))]
     fn states(
         slf: &Bound<'_, Self>,
@@ -327,8 +330,8 @@ impl Model {
         Ok(json_list(model_json::queries(&queries)))
     }
 
-    /// Checks a file with a certificate, a trace or a strategy: whether it holds (`None` if the check does not cover it), and what was
-    /// looked at.
+    /// Checks a file with a certificate, a trace or a strategy: whether it holds (`None` if the
+    /// check does not cover it), and what was looked at.
     fn verify(
         slf: &Bound<'_, Self>,
         path: &str,
@@ -592,13 +595,15 @@ impl Answer {
         until_signal(py, || self.certificate_text_or_none())
     }
 
-    /// Whether the strategy and the traces passed their checks; `None` if none was made or one came to no end.
+    /// Whether the strategy and the traces passed their checks; `None` if none was made or one came
+    /// to no end.
     #[getter]
     fn verified(&self) -> Option<bool> {
         self.inner.evidence.is_verified()
     }
 
-    /// What the checks of strategy and traces covered, or what is wrong, line by line; empty without a check.
+    /// What the checks of strategy and traces covered, or what is wrong, line by line; empty
+    /// without a check.
     fn verification(&self) -> Vec<String> {
         let evidence = &self.inner.evidence;
         let runs = evidence.witnesses.iter().filter_map(|one| one.run.as_ref());
@@ -618,13 +623,15 @@ impl Answer {
         until_signal(py, || self.strategy_json_or_none())
     }
 
-    /// The strategy, or the machine of a game with observations, as a controller in C; `None` without any.
+    /// The strategy, or the machine of a game with observations, as a controller in C; `None`
+    /// without any.
     fn controller_c(&self, py: Python<'_>) -> PyResult<Option<String>> {
         let text = until_signal(py, || self.controller_c_or_reason())?;
         text.map_err(|reason| RejectedError::new_err((vec![format!("error: {reason}")],)))
     }
 
-    /// The strategy as text in TIGA's form, or the machine of a game with observations; `None` without any.
+    /// The strategy as text in TIGA's form, or the machine of a game with observations; `None`
+    /// without any.
     fn strategy_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
         until_signal(py, || self.strategy_text_or_none())
     }
@@ -730,7 +737,8 @@ fn load(py: Python<'_>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Model
     })
 }
 
-/// Of every code: the code, its name, its severity ("error" or "warning"), and its page in Markdown.
+/// Of every code: the code, its name, its severity ("error" or "warning"), and its page in
+/// Markdown.
 #[pyfunction]
 fn explanations() -> Vec<(&'static str, &'static str, &'static str, &'static str)> {
     let explanations = explain::explanations().map(|(code, page)| {

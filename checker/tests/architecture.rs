@@ -148,3 +148,19 @@ fn nothing_prints_or_exits() {
         }
     }
 }
+
+#[test]
+fn comments_keep_to_100_columns() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut paths = Vec::new();
+    for folder in ["src", "tests", "benches"] {
+        sources(&root.join(folder), &mut paths);
+    }
+    for path in paths {
+        let text = fs::read_to_string(&path).expect("the sources are text");
+        for (line, words) in text.lines().enumerate() {
+            let is_long = words.trim_start().starts_with("//") && words.chars().count() > 100;
+            assert!(!is_long, "{}:{} is long", path.display(), line + 1);
+        }
+    }
+}

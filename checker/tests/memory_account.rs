@@ -1,7 +1,8 @@
-//! The bytes that a game says it takes are those that it takes, and the limit of memory holds where there are many clocks.
+//! The bytes that a game says it takes are those that it takes, and the limit of memory holds where
+//! there are many clocks.
 //!
-//! An allocator counts what lives. What it takes is compared with the account of the answer, by which the limit of memory goes, and with
-//! the limit.
+//! An allocator counts what lives. What it takes is compared with the account of the answer, by
+//! which the limit of memory goes, and with the limit.
 
 #![expect(unsafe_code, reason = "an allocator is not safe to write")]
 
@@ -15,8 +16,8 @@ use checker::zones::federation::block_bytes;
 #[path = "common/games.rs"]
 mod games;
 
-/// Plates that come on a belt, an arm that takes each to a press that is ready when it likes; a plate that waits too long falls.
-/// `arrow` says who lets plates come: `->` or `-u->`.
+/// Plates that come on a belt, an arm that takes each to a press that is ready when it likes; a
+/// plate that waits too long falls. `arrow` says who lets plates come: `->` or `-u->`.
 fn cell(count: usize, arrow: &str) -> String {
     format!(
         "const int N = {count};
@@ -81,7 +82,8 @@ fn measured(text: &str, query: &str, options: &Options) -> (usize, Answer) {
     (PEAK.load(Ordering::Relaxed) - before, answer)
 }
 
-/// Vectors of some length have room that takes no memory before it is written to, and is not in the account: in small games up to so much.
+/// Vectors of some length have room that takes no memory before it is written to, and is not in the
+/// account: in small games up to so much.
 const LEAST_PERCENT: u64 = 70;
 
 /// One test, since all of them would share the counts.
@@ -120,7 +122,8 @@ fn account_is_what_games_take() {
     }
 }
 
-/// Jobs with a clock each that pass through committed locations; the environment begins them where `arrow` is `-u->`.
+/// Jobs with a clock each that pass through committed locations; the environment begins them where
+/// `arrow` is `-u->`.
 fn jobs(count: usize, arrow: &str) -> String {
     format!(
         "process Job(const int[1,{count}] id) {{
@@ -136,7 +139,8 @@ system Job;
     )
 }
 
-/// What is allocated may come to so much of a limit: vectors that grow have room to spare, which takes no memory before it is written to.
+/// What is allocated may come to so much of a limit: vectors that grow have room to spare, which
+/// takes no memory before it is written to.
 const MOST_PERCENT: u64 = 220;
 
 fn limit_holds_where_there_are_many_clocks() {
@@ -178,7 +182,8 @@ fn bounds_of_clocks_take_no_table_of_all() {
     };
     let clocks = 1000;
     let (taken, _) = measured(&jobs(clocks, "->"), "E<> false", &options);
-    // A table of the bounds of all clocks in all locations of all processes has three times eight bytes for each pair of clocks.
+    // A table of the bounds of all clocks in all locations of all processes has three times eight
+    // bytes for each pair of clocks.
     let zones = taken / (4 * clocks * clocks);
     assert!(zones <= 6, "as much as {zones} zones is taken");
 }

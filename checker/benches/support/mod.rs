@@ -15,7 +15,8 @@ impl Scratch {
         Ok(Scratch(folder))
     }
 
-    /// Compiles a C program of this repository by `cc -O2`, and what more is given: options, which win, and other sources.
+    /// Compiles a C program of this repository by `cc -O2`, and what more is given: options, which
+    /// win, and other sources.
     pub(crate) fn compile(
         &self,
         source: &str,

@@ -1,4 +1,5 @@
-//! Sets of cells: what guards, updates and predicates may depend on. A *cell* is a word, a clock, or whether some location is committed.
+//! Sets of cells: what guards, updates and predicates may depend on. A *cell* is a word, a clock,
+//! or whether some location is committed.
 
 use crate::ir::{ClockRange, FunctionId, LocationId, Network};
 

@@ -1,18 +1,21 @@
 //! Clock bounds for extrapolation: the constants that matter to each clock, location by location.
 //!
-//! For a process in location l and a clock x, `lower` is the greatest c of a comparison `x > c` or `x >= c`, and `upper` of a
-//! comparison `x < c` or `x <= c`, that some path from l may evaluate before x is assigned; an edge whose guard is known never
-//! to hold is on no path. Bounds of a state are the
-//! greatest over its processes. A clock without bounds is *inactive*: its value no longer matters.
+//! For a process in location l and a clock x, `lower` is the greatest c of a comparison `x > c` or
+//! `x >= c`, and `upper` of a comparison `x < c` or `x <= c`, that some path from l may evaluate
+//! before x is assigned; an edge whose guard is known never to hold is on no path. Bounds of a
+//! state are the greatest over its processes. A clock without bounds is *inactive*: its value no
+//! longer matters.
 //!
-//! Source: G. Behrmann, P. Bouyer, E. Fleury, K. G. Larsen, "Static guard analysis in timed automata verification", TACAS 2003
-//! (the fixpoint over locations), and G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and upper bounds in
-//! zone-based abstractions of timed automata", STTT 8, 2006 (lower and upper bounds apart).
-//! Where we differ: locations are taken apart by the values of variables on which comparisons hang ([`super::location_splitting`]), and
-//! what all partners of a synchronisation reset counts as reset ([`super::joint_resets`]); with assignments from clock to clock the
-//! bounds do not depend on locations.
+//! Source: G. Behrmann, P. Bouyer, E. Fleury, K. G. Larsen, "Static guard analysis in timed
+//! automata verification", TACAS 2003 (the fixpoint over locations), and G. Behrmann, P. Bouyer, K.
+//! G. Larsen, R. Pelánek, "Lower and upper bounds in zone-based abstractions of timed automata",
+//! STTT 8, 2006 (lower and upper bounds apart). Where we differ: locations are taken apart by the
+//! values of variables on which comparisons hang ([`super::location_splitting`]), and what all
+//! partners of a synchronisation reset counts as reset ([`super::joint_resets`]); with assignments
+//! from clock to clock the bounds do not depend on locations.
 //!
-//! Invariant: an assignment counts as a reset only if it is certain (among [`crate::ir::Update::fixed`]).
+//! Invariant: an assignment counts as a reset only if it is certain (among
+//! [`crate::ir::Update::fixed`]).
 
 use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Process};
 use crate::zones::extrapolate::{Ceiling, Ceilings};
@@ -36,7 +39,8 @@ pub enum Abstraction {
     Maximum,
     /// Extra-LU+: keeps what reachability of locations needs.
     LowerUpper,
-    /// Extra-M on the parts of a zone on either side of every comparison of two clocks: see [`ClockBounds::split`].
+    /// Extra-M on the parts of a zone on either side of every comparison of two clocks: see
+    /// [`ClockBounds::split`].
     Differences,
 }
 
@@ -154,7 +158,8 @@ impl ClockBounds {
             if network.features.clock_copies {
                 tables.push(table);
             } else {
-                // One process at a time: tables have a place for every clock, and processes bounds on few.
+                // One process at a time: tables have a place for every clock, and processes bounds
+                // on few.
                 ceilings.push(summary.of(table, is_maximum));
             }
         }
@@ -203,7 +208,8 @@ impl ClockBounds {
         self.abstraction == Abstraction::Differences
     }
 
-    /// Cuts a zone along the comparisons of two clocks that matter in the state, and adds the extrapolated parts to `target`.
+    /// Cuts a zone along the comparisons of two clocks that matter in the state, and adds the
+    /// extrapolated parts to `target`.
     pub fn split(
         &self,
         words: &[i32],
@@ -227,7 +233,9 @@ impl ClockBounds {
         }
     }
 
-    /// Adds numbers which decide what [`Symbolic::extrapolate`](crate::network::Symbolic::extrapolate) makes of the zones of a state.
+    /// Adds numbers which decide what
+    /// [`Symbolic::extrapolate`](crate::network::Symbolic::extrapolate) makes of the zones of a
+    /// state.
     pub(crate) fn classes_into(&self, words: &[i32], numbers: &mut Vec<u32>) {
         if self.simulates() {
             for one in &self.classes {
@@ -256,7 +264,8 @@ impl ClockBounds {
         }
     }
 
-    /// Whether what simulates a valuation (see [`crate::zones::simulation`]) can do all that matters of what it can do.
+    /// Whether what simulates a valuation (see [`crate::zones::simulation`]) can do all that
+    /// matters of what it can do.
     pub fn simulates(&self) -> bool {
         matches!(
             self.abstraction,
@@ -264,9 +273,11 @@ impl ClockBounds {
         )
     }
 
-    /// Whether it pays to compare zones by simulation and not by inclusion: where a process compares one clock from below and another
-    /// one from above. How the two differ is what simulation tells apart less finely; measured, it saves up to nine tenths of the
-    /// states of such models and none of those in which processes have one clock each, for some twentieth of the time.
+    /// Whether it pays to compare zones by simulation and not by inclusion: where a process
+    /// compares one clock from below and another one from above. How the two differ is what
+    /// simulation tells apart less finely; measured, it saves up to nine tenths of the states of
+    /// such models and none of those in which processes have one clock each, for some twentieth of
+    /// the time.
     pub fn compares_by_simulation(&self) -> bool {
         self.simulates() && self.has_opposed_clocks
     }
@@ -297,8 +308,9 @@ fn to_ceilings(bounds: &[(i32, i32)]) -> Ceilings {
     Ceilings::lower_upper(&lower, &upper)
 }
 
-/// The least bounds of the nodes of a process that satisfy: those of a node cover its invariant and the guards of its edges,
-/// and those of every target for the clocks that are not certainly reset on the way.
+/// The least bounds of the nodes of a process that satisfy: those of a node cover its invariant and
+/// the guards of its edges, and those of every target for the clocks that are not certainly reset
+/// on the way.
 fn fixpoint(
     process: &Process,
     valuations: &Valuations,
@@ -347,8 +359,9 @@ fn propagate(edge: &Edge, step: Step, partners: Option<&Partners>, table: &mut T
     changed
 }
 
-/// `left - right ≺ b` is an upper bound b on left, and a lower bound -b on right. A difference of two clocks bounds both, and once
-/// one of them is set to at most `reset`, it compares the other with a constant that lies so much further out.
+/// `left - right ≺ b` is an upper bound b on left, and a lower bound -b on right. A difference of
+/// two clocks bounds both, and once one of them is set to at most `reset`, it compares the other
+/// with a constant that lies so much further out.
 fn add_atom(bounds: &mut [(i32, i32)], atom: &ClockAtom, reset: i32) {
     let is_difference = atom.is_difference();
     let reset = if is_difference { reset } else { 0 };
@@ -393,8 +406,9 @@ fn spread_over_copies(network: &Network, tables: &mut [Table], everywhere: &mut 
         std::iter::once(&edge.update).chain(edge.branches.iter().map(|branch| &branch.update))
     });
     let copies: Vec<_> = updates.flat_map(|update| &update.assignments).collect();
-    // As many rounds as there are clocks reach the end of every chain of copies. Bounds that still grow then do so for ever
-    // (a cycle of copies that adds a negative number): they become the greatest bound that zones can hold.
+    // As many rounds as there are clocks reach the end of every chain of copies. Bounds that still
+    // grow then do so for ever (a cycle of copies that adds a negative number): they become the
+    // greatest bound that zones can hold.
     let mut step: fn(&mut [(i32, i32)], &ClockAssignment) -> bool = spread;
     let mut round = 0;
     loop {

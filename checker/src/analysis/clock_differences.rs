@@ -1,15 +1,17 @@
-//! The comparisons of two clocks, location by location: along them zones are cut before extrapolation.
+//! The comparisons of two clocks, location by location: along them zones are cut before
+//! extrapolation.
 //!
-//! A comparison `x - y ≺ c` of a guard or invariant matters in a location if some path from there may evaluate it before x or y
-//! is certainly set to a constant; after that it compares one clock with a constant, which the ceilings cover
-//! ([`super::clock_bounds`]). A comparison of a query matters everywhere. With assignments from clock to clock a comparison of the target
-//! is one of the source, and all matter everywhere.
+//! A comparison `x - y ≺ c` of a guard or invariant matters in a location if some path from there
+//! may evaluate it before x or y is certainly set to a constant; after that it compares one clock
+//! with a constant, which the ceilings cover ([`super::clock_bounds`]). A comparison of a query
+//! matters everywhere. With assignments from clock to clock a comparison of the target is one of
+//! the source, and all matter everywhere.
 //!
-//! A bound that the words decide stands for every value that it may take. Where that makes more comparisons than
-//! `MOST_DIFFERENCES`, there is no such abstraction, and exploring may not end.
+//! A bound that the words decide stands for every value that it may take. Where that makes more
+//! comparisons than `MOST_DIFFERENCES`, there is no such abstraction, and exploring may not end.
 //!
-//! Source: J. Bengtsson, W. Yi, "On Clock Difference Constraints and Termination in Reachability Analysis of Timed Automata",
-//! ICFEM 2003.
+//! Source: J. Bengtsson, W. Yi, "On Clock Difference Constraints and Termination in Reachability
+//! Analysis of Timed Automata", ICFEM 2003.
 
 use std::collections::BTreeSet;
 
@@ -69,7 +71,8 @@ impl Differences {
         all.into_iter().map(constraint).collect()
     }
 
-    /// With `x := y + k` each comparison of x becomes one of y, everywhere; `None` if that does not end soon.
+    /// With `x := y + k` each comparison of x becomes one of y, everywhere; `None` if that does not
+    /// end soon.
     fn spread_over_copies(&mut self, network: &Network) -> Option<()> {
         let all = std::mem::take(&mut self.locations);
         self.everywhere.extend(all.into_iter().flatten().flatten());
@@ -108,7 +111,8 @@ fn clocks(range: ClockRange) -> impl Iterator<Item = usize> {
     (range.first.0..range.first.0 + range.count).map(|clock| clock as usize)
 }
 
-/// Adds what a comparison says of the source if a clock of the range was set to it plus the increment.
+/// Adds what a comparison says of the source if a clock of the range was set to it plus the
+/// increment.
 fn substitute(
     (left, right, bound): Difference,
     (target, source, increment): (ClockRange, usize, i32),
@@ -149,7 +153,8 @@ pub fn greatest_reset(network: &Network) -> i32 {
     constants.chain(initial).max().unwrap_or(0).max(0)
 }
 
-/// Adds the comparisons that an atom stands for, if it is one of two clocks; `None` if there are too many.
+/// Adds the comparisons that an atom stands for, if it is one of two clocks; `None` if there are
+/// too many.
 fn collect(atom: &ClockAtom, into: &mut BTreeSet<Difference>) -> Option<()> {
     if !atom.is_difference() {
         return Some(());
@@ -186,8 +191,8 @@ fn canonical(left: usize, right: usize, bound: Bound) -> Difference {
     }
 }
 
-/// Those of each location of a process: of its invariant and the guards of its edges, and those of every target that survive
-/// the edge.
+/// Those of each location of a process: of its invariant and the guards of its edges, and those of
+/// every target that survive the edge.
 fn fixpoint(process: &Process) -> Option<Vec<BTreeSet<Difference>>> {
     let mut table = vec![BTreeSet::new(); process.locations.len()];
     for (location, found) in process.locations.iter().zip(&mut table) {

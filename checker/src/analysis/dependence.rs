@@ -1,14 +1,18 @@
-//! What the edges of a network read and write, whom they may synchronise with, and so which processes may get in each other's way.
+//! What the edges of a network read and write, whom they may synchronise with, and so which
+//! processes may get in each other's way.
 //!
-//! The footprint of an edge has the cells ([`super::cells`]) that decide
-//! whether its moves are possible and what they do (those that its guard, channel and updates read, and the invariants of the
-//! locations that it leaves and enters), and the cells that they change. Footprints are never too small, and may be too large.
+//! The footprint of an edge has the cells ([`super::cells`]) that decide whether its moves are
+//! possible and what they do (those that its guard, channel and updates read, and the invariants of
+//! the locations that it leaves and enters), and the cells that they change. Footprints are never
+//! too small, and may be too large.
 //!
-//! Two footprints of each location count: *now*, of the edges that leave it, and *future*, of all edges that the process may
-//! take from there on while time stands still. While a process stays in a committed location, a move needs another committed
-//! process, so that processes elsewhere take no internal edges; this makes two of each ([`Still`]).
+//! Two footprints of each location count: *now*, of the edges that leave it, and *future*, of all
+//! edges that the process may take from there on while time stands still. While a process stays in
+//! a committed location, a move needs another committed process, so that processes elsewhere take
+//! no internal edges; this makes two of each ([`Still`]).
 //!
-//! An edge that needs more of a clock than any assignment gives it *sleeps* where the clock is lower: only time could wake it.
+//! An edge that needs more of a clock than any assignment gives it *sleeps* where the clock is
+//! lower: only time could wake it.
 
 use crate::ir::{AssignedValue, ClockRange, Edge, LocationId, Network, ProcessId, Urgency};
 
@@ -39,7 +43,8 @@ struct Offer {
 }
 
 impl Offer {
-    /// Whether one may synchronise with the other, where a move must leave a committed location if `still` says so.
+    /// Whether one may synchronise with the other, where a move must leave a committed location if
+    /// `still` says so.
     fn fits(self, other: Offer, still: Still) -> bool {
         self.sends != other.sends
             && self.first < other.first + other.count
@@ -51,7 +56,8 @@ impl Offer {
     }
 }
 
-/// A constraint that an assignment never makes true: the edge that needs it sleeps while it does not hold.
+/// A constraint that an assignment never makes true: the edge that needs it sleeps while it does
+/// not hold.
 pub(crate) type Sleeper = Constraint;
 
 /// What some edges of one process do.
@@ -60,7 +66,8 @@ pub(crate) struct Footprint {
     reads: Cells,
     writes: Cells,
     offers: Vec<Offer>,
-    /// Constraints that keep edges asleep as long as they do not hold: one for each edge that may sleep.
+    /// Constraints that keep edges asleep as long as they do not hold: one for each edge that may
+    /// sleep.
     pub(crate) sleepers: Vec<Sleeper>,
     /// Whether one of them may make what is watched come true,
     pub(crate) may_fulfil: bool,
@@ -139,8 +146,8 @@ pub(crate) struct Footprints {
 }
 
 impl Footprints {
-    /// That of the edges that leave a location, and of what the process hears once it has taken one: a broadcast that left it behind
-    /// would take it along then.
+    /// That of the edges that leave a location, and of what the process hears once it has taken
+    /// one: a broadcast that left it behind would take it along then.
     pub(crate) fn now(
         &mut self,
         ground: Ground<'_>,

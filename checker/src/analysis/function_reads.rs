@@ -5,7 +5,8 @@ use std::ops::Range;
 use crate::exec::target;
 use crate::ir::{Address, Base, Function, FunctionId, Instruction, Network, Register};
 
-/// The words that functions may read, calls included, ascending; `None` if that is not known, or they are more than `most`.
+/// The words that functions may read, calls included, ascending; `None` if that is not known, or
+/// they are more than `most`.
 pub(crate) fn read_words(
     network: &Network,
     functions: impl IntoIterator<Item = FunctionId>,
@@ -53,8 +54,8 @@ fn add(code: &Function, address: Address, count: u32, most: usize, words: &mut V
     is_known
 }
 
-/// The words of the state that an access to so many words may touch; `None` if that is not known, or its place is one of more
-/// than `most`.
+/// The words of the state that an access to so many words may touch; `None` if that is not known,
+/// or its place is one of more than `most`.
 pub(super) fn state_words(
     code: &Function,
     address: Address,

@@ -1,7 +1,8 @@
 //! Which clocks a synchronisation certainly resets, whoever the partner is.
 //!
-//! An edge that synchronises is taken together with another one: a sender on a channel that is no broadcast with one receiver, a
-//! receiver with the sender. What all edges that can stand on the other side reset is reset with it.
+//! An edge that synchronises is taken together with another one: a sender on a channel that is no
+//! broadcast with one receiver, a receiver with the sender. What all edges that can stand on the
+//! other side reset is reset with it.
 
 use crate::ir::{Branch, Edge, Network, Update};
 

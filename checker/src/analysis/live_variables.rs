@@ -1,13 +1,15 @@
 //! Live variables: those whose values may still be read.
 //!
-//! A variable is live in a location of a process if the process may read it on some way from there before it has surely written
-//! it. Where it is live in no process, its value makes no difference: what is possible in one of two states that differ only in
-//! such values is possible in the other, and leads to states that differ only in such values again. So a search may set them all to
-//! what they are in the initial state ([`LiveVariables::forget`]), and finds the states together that differ in nothing else.
+//! A variable is live in a location of a process if the process may read it on some way from there
+//! before it has surely written it. Where it is live in no process, its value makes no difference:
+//! what is possible in one of two states that differ only in such values is possible in the other,
+//! and leads to states that differ only in such values again. So a search may set them all to what
+//! they are in the initial state ([`LiveVariables::forget`]), and finds the states together that
+//! differ in nothing else.
 //!
-//! A variable is written on an edge also where whoever takes part in its synchronisation surely writes it: the sender before the
-//! receivers read, the one receiver after the sender. What a query reads is live everywhere, and so is what is read around every
-//! transition.
+//! A variable is written on an edge also where whoever takes part in its synchronisation surely
+//! writes it: the sender before the receivers read, the one receiver after the sender. What a query
+//! reads is live everywhere, and so is what is read around every transition.
 
 use crate::ir::{Edge, FunctionId, Network, Process, Shape};
 
@@ -18,7 +20,8 @@ use super::read_before_write::{Exposure, Exposures, WordSet};
 const MOST_WORDS_OF_VARIABLE: u32 = 64;
 /// At most so many words are looked at.
 const MOST_WORDS: usize = 4096;
-/// Nothing is found out where it takes more bits than this: one for each word and function or location.
+/// Nothing is found out where it takes more bits than this: one for each word and function or
+/// location.
 const MOST_BITS: usize = 1 << 28;
 
 /// Which variables are live where, of those that are not so everywhere.
@@ -39,8 +42,8 @@ struct Reader {
 }
 
 impl LiveVariables {
-    /// Those of a network if `functions` are what a query reads words by, and scalars keep their values if `keeps_scalars`.
-    /// `None` if no variable is ever dead.
+    /// Those of a network if `functions` are what a query reads words by, and scalars keep their
+    /// values if `keeps_scalars`. `None` if no variable is ever dead.
     pub fn new(
         network: &Network,
         functions: impl IntoIterator<Item = FunctionId>,
@@ -120,7 +123,8 @@ fn bits_of(live: &WordSet, numbers: &[usize]) -> Vec<u64> {
     chunks.collect()
 }
 
-/// The words that are worth looking at, ascending: they are written, and nothing reads them in every state.
+/// The words that are worth looking at, ascending: they are written, and nothing reads them in
+/// every state.
 fn looked_at(
     network: &Network,
     functions: impl IntoIterator<Item = FunctionId>,

@@ -1,15 +1,18 @@
-//! What a process can do in a location, told apart by the values of a few variables that only it writes.
+//! What a process can do in a location, told apart by the values of a few variables that only it
+//! writes.
 //!
-//! A comparison of clocks often hangs on a flag that a process keeps: `running && x <= 5`. While the flag is not set the
-//! comparison does not matter, and it is set where the clock is. So locations are taken apart by the values of such variables:
-//! a *node* is a location with values of the tracked variables. Guards and updates are run by the interpreter for all values of what
-//! they read, as long as these are few; where they are not, everything counts as possible.
+//! A comparison of clocks often hangs on a flag that a process keeps: `running && x <= 5`. While
+//! the flag is not set the comparison does not matter, and it is set where the clock is. So
+//! locations are taken apart by the values of such variables: a *node* is a location with values of
+//! the tracked variables. Guards and updates are run by the interpreter for all values of what they
+//! read, as long as these are few; where they are not, everything counts as possible.
 //!
 //! Invariants
-//! * Only words that nobody else writes and that are no `meta` are tracked: who takes no part in a transition stays in its node,
-//!   and states with different nodes are different.
-//! * Every transition of the network in which the process takes an edge leads from a node to another one along a [`Step`], and
-//!   the comparisons in the guards that it evaluates are among the [`Node::atoms`].
+//! * Only words that nobody else writes and that are no `meta` are tracked: who takes no part in a
+//!   transition stays in its node, and states with different nodes are different.
+//! * Every transition of the network in which the process takes an edge leads from a node to
+//!   another one along a [`Step`], and the comparisons in the guards that it evaluates are among
+//!   the [`Node::atoms`].
 
 use rustc_hash::FxHashMap;
 
@@ -146,8 +149,8 @@ pub(super) struct Step {
     pub(super) branch: usize,
 }
 
-/// The nodes of a process. The number of a node is that of its location plus, for every tracked word, its value above the
-/// least one times the stride.
+/// The nodes of a process. The number of a node is that of its location plus, for every tracked
+/// word, its value above the least one times the stride.
 #[derive(Debug, Default)]
 pub(super) struct Valuations {
     pub(super) tracked: Vec<Tracked>,
@@ -241,7 +244,8 @@ impl<'a> Analysis<'a> {
         tracked
     }
 
-    /// The values of a word of a variable that is no `meta`, if they are integers, and who writes it.
+    /// The values of a word of a variable that is no `meta`, if they are integers, and who writes
+    /// it.
     fn range_of(&mut self, word: u32) -> Option<(Ranged, Writer)> {
         let network = self.network;
         let behind = variable_behind(network, word);
@@ -302,7 +306,8 @@ impl<'a> Analysis<'a> {
         valuations.steps.extend(steps);
     }
 
-    /// Whether the guard of an edge can hold where the tracked words have these values, and what it compares.
+    /// Whether the guard of an edge can hold where the tracked words have these values, and what it
+    /// compares.
     fn guard(&mut self, edge: &Edge, tracked: &[Ranged], values: &[i32]) -> Answer {
         let guard = &edge.guard;
         let everything = Answer {
@@ -323,7 +328,8 @@ impl<'a> Analysis<'a> {
             atoms: Vec::new(),
         };
         let finished = self.run_all(edge, &[function], &free, (tracked, values), |run| {
-            // Who evaluates a guard that fails with an error goes no further, but first looks at what it compared.
+            // Who evaluates a guard that fails with an error goes no further, but first looks at
+            // what it compared.
             if run.result != Ok(0) {
                 answer.can_hold |= run.result.is_ok();
                 add_atoms(guard, run.constraints, &mut answer.atoms);
@@ -362,8 +368,8 @@ impl<'a> Analysis<'a> {
         }
     }
 
-    /// The words that functions read but for the tracked ones, with their values, and whether they read tracked ones; `None` if
-    /// that is not known.
+    /// The words that functions read but for the tracked ones, with their values, and whether they
+    /// read tracked ones; `None` if that is not known.
     fn free_words(
         &mut self,
         functions: &[FunctionId],
@@ -377,8 +383,8 @@ impl<'a> Analysis<'a> {
         Some((free?, words.iter().any(is_tracked)))
     }
 
-    /// Runs functions one after the other for all values of the free words and of the edge's `select`; false if these are too
-    /// many, or a run too long.
+    /// Runs functions one after the other for all values of the free words and of the edge's
+    /// `select`; false if these are too many, or a run too long.
     fn run_all(
         &mut self,
         edge: &Edge,

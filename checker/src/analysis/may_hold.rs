@@ -1,8 +1,8 @@
 //! Whether a predicate can hold where nothing is known of a state but the location of one process.
 //!
-//! Code is run with unknown values: where one decides how it goes on, both ways are looked at. What frames and references hold
-//! counts as unknown. The answer errs towards "it can": a way that ends in a run-time error, and whatever takes too many steps, counts
-//! as holding.
+//! Code is run with unknown values: where one decides how it goes on, both ways are looked at. What
+//! frames and references hold counts as unknown. The answer errs towards "it can": a way that ends
+//! in a run-time error, and whatever takes too many steps, counts as holding.
 
 use crate::exec::{arithmetic, target};
 use crate::ir::{
@@ -66,7 +66,8 @@ impl<'a> Possibility<'a> {
         }
     }
 
-    /// Whether the predicate can have the truth value in a state in which the process is in the location.
+    /// Whether the predicate can have the truth value in a state in which the process is in the
+    /// location.
     pub fn can_be(
         &mut self,
         truth: bool,

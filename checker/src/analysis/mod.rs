@@ -1,5 +1,5 @@
-//! What is true of a network before any search: which clock bounds matter where, which variables are live, which processes depend on
-//! each other, which comparisons can hold.
+//! What is true of a network before any search: which clock bounds matter where, which variables
+//! are live, which processes depend on each other, which comparisons can hold.
 
 mod cells;
 pub mod clock_bounds;

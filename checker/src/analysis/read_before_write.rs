@@ -1,7 +1,9 @@
-//! Which variables a function may read before it has surely written them, and which it surely writes.
+//! Which variables a function may read before it has surely written them, and which it surely
+//! writes.
 //!
-//! Only some words of the state are looked at, and each has a number. A word counts as written after an instruction that writes
-//! just it on all ways that lead there; a write whose place is computed proves nothing, and a read whose place is not known reads all.
+//! Only some words of the state are looked at, and each has a number. A word counts as written
+//! after an instruction that writes just it on all ways that lead there; a write whose place is
+//! computed proves nothing, and a read whose place is not known reads all.
 //!
 //! Cost: the instructions of the functions, a few times, and two bits for each function and word.
 

@@ -1,4 +1,5 @@
-//! What a predicate watches: which steps of the network may make it come true, and which may make it false again.
+//! What a predicate watches: which steps of the network may make it come true, and which may make
+//! it false again.
 
 use crate::ir::{ClockChoice, FunctionId, LocationId, Network, Predicate, ProcessId};
 
@@ -6,8 +7,8 @@ use super::cells::{CellNumbers, Cells};
 
 /// What decides a predicate.
 ///
-/// Where `deadlock` is needed for it, nothing is watched: in a deadlock no move is possible, so that whatever remains possible keeps
-/// the predicate from coming true.
+/// Where `deadlock` is needed for it, nothing is watched: in a deadlock no move is possible, so
+/// that whatever remains possible keeps the predicate from coming true.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Watched {
     /// What its code reads and the clocks that it compares.

@@ -1,9 +1,10 @@
 //! Which edges may be taken again and again while time stands still.
 //!
-//! In a run without end in which no time passes, consider the edges that are taken infinitely often. Those of each process lie on cycles of
-//! such edges; a synchronisation among them has a partner among them; and an edge that sleeps where a clock is low ([`super::dependence`]) is
-//! not among them if each of its cycles sets that clock, for nothing could raise it again. What breaks one of these rules does not
-//! recur, and then neither does what relied on it.
+//! In a run without end in which no time passes, consider the edges that are taken infinitely
+//! often. Those of each process lie on cycles of such edges; a synchronisation among them has a
+//! partner among them; and an edge that sleeps where a clock is low ([`super::dependence`]) is not
+//! among them if each of its cycles sets that clock, for nothing could raise it again. What breaks
+//! one of these rules does not recur, and then neither does what relied on it.
 
 use crate::ir::{Edge, LocationId, Network, Process};
 
@@ -34,8 +35,8 @@ impl Who {
     }
 }
 
-/// By process and edge: whether it may be taken infinitely often while time stands still. `greatest`: the values that clocks are
-/// set to, at most.
+/// By process and edge: whether it may be taken infinitely often while time stands still.
+/// `greatest`: the values that clocks are set to, at most.
 pub(crate) fn recurrent_edges(network: &Network, greatest: &[i32]) -> Vec<Vec<bool>> {
     let processes = network.processes.iter();
     let mut recurrent: Vec<Vec<bool>> = processes
@@ -96,7 +97,8 @@ fn partners(network: &Network, recurrent: &[Vec<bool>]) -> (Vec<Who>, Vec<Who>) 
     (senders, receivers)
 }
 
-/// Whether the edge lies on a cycle of recurrent edges, none of which sets a clock that lets it sleep.
+/// Whether the edge lies on a cycle of recurrent edges, none of which sets a clock that lets it
+/// sleep.
 fn is_on_cycle(process: &Process, edge: usize, recurrent: &[bool], greatest: &[i32]) -> bool {
     let own = &process.edges[edge];
     let clock = sleeper(own, greatest).map(|one| one.right);

@@ -178,7 +178,8 @@ impl LimitWatch {
     }
 }
 
-/// Does work that may be cut off in the middle of an operation without what was found before: then it fails as interrupted.
+/// Does work that may be cut off in the middle of an operation without what was found before: then
+/// it fails as interrupted.
 ///
 /// # Errors
 /// The work fails, or was cut off.

@@ -1,7 +1,7 @@
 //! The face of the engine: load a model, ask it queries, get answers.
 //!
-//! Everything here is a value: diagnostics, answers, traces, strategies, plans. Nothing prints, and the only clock that is read
-//! is the one for the time limit and the measured seconds.
+//! Everything here is a value: diagnostics, answers, traces, strategies, plans. Nothing prints, and
+//! the only clock that is read is the one for the time limit and the measured seconds.
 
 pub mod evidence;
 pub mod format;
@@ -84,8 +84,9 @@ pub enum TraceWanted {
 pub struct Options {
     /// In which order states are explored.
     pub order: Order,
-    /// How many threads share the work, from 1 to [`MOST_THREADS`]. More than one share searches for a reachable state and for values,
-    /// breadth first, and compute what is won in games; other searches take one.
+    /// How many threads share the work, from 1 to [`MOST_THREADS`]. More than one share searches
+    /// for a reachable state and for values, breadth first, and compute what is won in games; other
+    /// searches take one.
     pub threads: usize,
     /// The rule for forced moves of the environment.
     pub forced: Forced,
@@ -115,12 +116,14 @@ pub struct Options {
     pub certificate: bool,
     /// What happens where results of integer arithmetic do not fit into 32 bits.
     pub overflow: Overflow,
-    /// Whether a search may take states that differ only in which member of a scalar set is which for the same.
+    /// Whether a search may take states that differ only in which member of a scalar set is which
+    /// for the same.
     pub symmetry: bool,
-    /// Whether a search for a state need not take independent moves in every order where time stands still.
+    /// Whether a search for a state need not take independent moves in every order where time
+    /// stands still.
     pub partial_order: bool,
-    /// Whether a search for states or values, and a game of which only the winner is asked, may take states for the same that differ only
-    /// in variables that are not live.
+    /// Whether a search for states or values, and a game of which only the winner is asked, may
+    /// take states for the same that differ only in variables that are not live.
     pub live_variables: bool,
 }
 
@@ -421,7 +424,8 @@ impl LoadedModel {
         })
     }
 
-    /// Compiles a query, whose code becomes part of the network: the query, and its warnings as text.
+    /// Compiles a query, whose code becomes part of the network: the query, and its warnings as
+    /// text.
     pub fn compile(&mut self, span: Span) -> Result<(crate::ir::Query, Vec<String>), Rejection> {
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
         if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
@@ -435,7 +439,8 @@ impl LoadedModel {
         Err(Rejection::new(diagnostics, &self.sources))
     }
 
-    /// Says what happens where results of integer arithmetic do not fit into 32 bits; a query has an option of its own.
+    /// Says what happens where results of integer arithmetic do not fit into 32 bits; a query has
+    /// an option of its own.
     pub fn set_overflow(&mut self, overflow: Overflow) {
         self.model.network.overflow = overflow;
     }
@@ -449,7 +454,8 @@ impl LoadedModel {
         is_error.then_some(Failure::RunTime(RunTimeError { kind, site }))
     }
 
-    /// Where the answer to a query first wrapped round, in the order of the model, or a constant did.
+    /// Where the answer to a query first wrapped round, in the order of the model, or a constant
+    /// did.
     fn first_wrap(&self) -> Option<SiteId> {
         let in_constants = self.network().wrapped_constant;
         let noted = self.executor().wraps().first();

@@ -1,12 +1,13 @@
-//! What the operators mean, on plain values: the one definition that interpretation, constant folding and the tests of
-//! compiled code go back to.
+//! What the operators mean, on plain values: the one definition that interpretation, constant
+//! folding and the tests of compiled code go back to.
 //!
-//! Invariant: nothing here panics or wraps silently: whether a result wrapped round is said with it, and whatever has no result is
-//! a [`RunTimeErrorKind`].
+//! Invariant: nothing here panics or wraps silently: whether a result wrapped round is said with
+//! it, and whatever has no result is a [`RunTimeErrorKind`].
 
 use crate::ir::{DoubleOperator, IntegerOperator, Relation, RunTimeErrorKind};
 
-/// The result of integer arithmetic, and whether it wrapped round: the true result is another one modulo 2^32.
+/// The result of integer arithmetic, and whether it wrapped round: the true result is another one
+/// modulo 2^32.
 pub(crate) type Wrapping = (i32, bool);
 
 /// `left operator right`, or why there is no such integer.
@@ -35,7 +36,8 @@ pub(crate) fn integer(
     })
 }
 
-/// `left operator right` if there is such an integer and it did not wrap round: what may be computed beforehand.
+/// `left operator right` if there is such an integer and it did not wrap round: what may be
+/// computed beforehand.
 pub(crate) fn fitting(operator: IntegerOperator, left: i32, right: i32) -> Option<i32> {
     match integer(operator, left, right) {
         Ok((value, false)) => Some(value),
@@ -86,7 +88,8 @@ pub(crate) fn doubles_relate(relation: Relation, left: f64, right: f64) -> bool 
     }
 }
 
-/// `left operator right` on doubles. The sign and payload of a NaN are of no meaning, see [`canonical`].
+/// `left operator right` on doubles. The sign and payload of a NaN are of no meaning, see
+/// [`canonical`].
 pub(crate) fn double(operator: DoubleOperator, left: f64, right: f64) -> f64 {
     match operator {
         DoubleOperator::Add => left + right,
@@ -109,8 +112,8 @@ pub(crate) fn truncate(value: f64) -> Result<i32, RunTimeErrorKind> {
     }
 }
 
-/// The value, with one NaN for all: the IEEE leaves sign and payload of a NaN open, processors and compilers differ in
-/// them, and they must not leak into states.
+/// The value, with one NaN for all: the IEEE leaves sign and payload of a NaN open, processors and
+/// compilers differ in them, and they must not leak into states.
 pub(crate) fn canonical(value: f64) -> f64 {
     if value.is_nan() { f64::NAN } else { value }
 }
@@ -128,8 +131,8 @@ pub(crate) fn double_of_words(low: i32, high: i32) -> f64 {
 
 /// `(index - first) * stride` if the index lies inside.
 ///
-/// The subtraction wraps: integers modulo 2^32 are told apart by 32 bits, so exactly the `length` valid indices have an
-/// unsigned difference below `length`.
+/// The subtraction wraps: integers modulo 2^32 are told apart by 32 bits, so exactly the `length`
+/// valid indices have an unsigned difference below `length`.
 pub(crate) fn scale_index(
     index: i32,
     first: i32,

@@ -1,9 +1,10 @@
 //! The interpreter: what code means, written to be read. Compiled code is compared with it.
 //!
-//! Every thread has one [`Machine`] whose stacks are kept between calls, so that a call allocates nothing once they have
-//! grown. A register is 64 bits wide and holds an integer (its low half), the bits of a double, or the address of a word as
-//! space and offset. Calls within the model push an [`Activation`] and do not recurse in Rust, so that long chains of
-//! functions need no native stack.
+//! Every thread has one [`Machine`] whose stacks are kept between calls, so that a call allocates
+//! nothing once they have grown. A register is 64 bits wide and holds an integer (its low half),
+//! the bits of a double, or the address of a word as space and offset. Calls within the model push
+//! an [`Activation`] and do not recurse in Rust, so that long chains of functions need no native
+//! stack.
 //!
 //! Cost: some nanoseconds an instruction.
 
@@ -48,7 +49,8 @@ impl Interpreter {
         self
     }
 
-    /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
+    /// Takes over what was appended since: both arguments are the whole of it, and begin with what
+    /// was given before.
     pub fn extend(&mut self, functions: &[Function], constants: &[i32]) {
         let known = self.functions.len();
         self.functions.extend_from_slice(&functions[known..]);
@@ -57,7 +59,8 @@ impl Interpreter {
         self.constants.extend_from_slice(constants);
     }
 
-    /// Calls a function that may take this number of rounds instead of [`ROUND_LIMIT`]; returns also how many it took.
+    /// Calls a function that may take this number of rounds instead of [`ROUND_LIMIT`]; returns
+    /// also how many it took.
     pub fn call_within(
         &self,
         round_limit: u64,
@@ -290,7 +293,8 @@ impl<'run> Run<'run, '_> {
         callee
     }
 
-    /// Gives up the room of a function and hands its result to the caller, which is returned if there is one.
+    /// Gives up the room of a function and hands its result to the caller, which is returned if
+    /// there is one.
     fn leave(&mut self, active: Activation, result: u64) -> Option<Activation> {
         self.machine.registers.truncate(active.registers);
         self.machine.frames.truncate(active.frame);

@@ -1,11 +1,13 @@
-//! The functions of the mathematical library, for interpretation, constant folding and compiled code alike.
+//! The functions of the mathematical library, for interpretation, constant folding and compiled
+//! code alike.
 //!
-//! All three call the very same machine code: mostly the platform's C library itself, whose results may differ in the last
-//! bit from those of other libraries, so that no two engines may use different ones. Rust's standard library has no `erf`,
-//! `logb` or `ldexp`, and its `asinh` is its own; hence the declarations at the end.
+//! All three call the very same machine code: mostly the platform's C library itself, whose results
+//! may differ in the last bit from those of other libraries, so that no two engines may use
+//! different ones. Rust's standard library has no `erf`, `logb` or `ldexp`, and its `asinh` is its
+//! own; hence the declarations at the end.
 //!
-//! Two functions see the sign of a NaN, which IEEE arithmetic leaves open: `signbit` and the second argument of `copysign`.
-//! Here every NaN counts as positive there.
+//! Two functions see the sign of a NaN, which IEEE arithmetic leaves open: `signbit` and the second
+//! argument of `copysign`. Here every NaN counts as positive there.
 
 use crate::ir::{MathFunction, RunTimeErrorKind};
 
@@ -123,8 +125,8 @@ extern "C" fn copysign(magnitude: f64, sign: f64) -> f64 {
     magnitude.copysign(canonical(sign))
 }
 
-/// Distances of points are sums of squares. That of a whole number is exact as a product, and what is exact the library gives too,
-/// but takes ten times as long for it.
+/// Distances of points are sums of squares. That of a whole number is exact as a product, and what
+/// is exact the library gives too, but takes ten times as long for it.
 extern "C" fn pow(base: f64, exponent: f64) -> f64 {
     if exponent - 2.0 == 0.0 && base.abs() <= WHOLE_ROOT {
         // Asking for the part behind the point would be a call of the library again.
@@ -156,8 +158,8 @@ extern "C" fn sign_bit(value: f64) -> i32 {
     canonical(value).is_sign_negative().into()
 }
 
-/// The C library. Its functions take and give plain numbers and touch no memory of the caller (but for `errno`, and
-/// `signgam` of `lgamma`, which nobody here reads), so that calling them is safe.
+/// The C library. Its functions take and give plain numbers and touch no memory of the caller (but
+/// for `errno`, and `signgam` of `lgamma`, which nobody here reads), so that calling them is safe.
 #[expect(
     unsafe_code,
     reason = "declaring functions of the C library is the only way to call them"

@@ -1,7 +1,8 @@
-//! Running code: the interpreter is the reference, compiled code is fast, and both answer to one trait.
+//! Running code: the interpreter is the reference, compiled code is fast, and both answer to one
+//! trait.
 //!
-//! Neither knows the solver, zones or queries. Clock constraints and assignments that code emits are collected in the
-//! context for whoever called.
+//! Neither knows the solver, zones or queries. Clock constraints and assignments that code emits
+//! are collected in the context for whoever called.
 
 pub(crate) mod arithmetic;
 pub(crate) mod math;
@@ -82,8 +83,9 @@ pub struct RunTimeError {
 
 /// Something that runs functions.
 ///
-/// `function` must be one of the functions that the executor was made from; its parameters must all be integers, as many
-/// as `arguments`, and its result an integer or nothing. Every other use of functions is between functions.
+/// `function` must be one of the functions that the executor was made from; its parameters must all
+/// be integers, as many as `arguments`, and its result an integer or nothing. Every other use of
+/// functions is between functions.
 pub trait Executor: Send + Sync {
     /// Runs a function and returns its result; 0 for a function that returns nothing.
     fn call(
@@ -97,6 +99,6 @@ pub trait Executor: Send + Sync {
     fn wraps(&self) -> &Wraps;
 }
 
-/// Rounds of loops between two looks whether to end ([`crate::cancellation::is_due`]); a call that is ended so fails with
-/// [`crate::ir::RunTimeErrorKind::Interrupted`].
+/// Rounds of loops between two looks whether to end ([`crate::cancellation::is_due`]); a call that
+/// is ended so fails with [`crate::ir::RunTimeErrorKind::Interrupted`].
 const ROUNDS_BETWEEN_LOOKS: u64 = 1 << 16;

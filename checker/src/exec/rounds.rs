@@ -1,8 +1,9 @@
 //! Makes sure that every run ends: counts rounds of loops, and calls of functions that call others.
 //!
-//! Invariant: after [`count_rounds`] every cycle of blocks contains a [`Instruction::CountRound`], and so does the first
-//! block of every function that calls another, for a few dozen functions that call each other twice run as long as any
-//! loop. All engines run the counted code, so that they stop at the same round.
+//! Invariant: after [`count_rounds`] every cycle of blocks contains a [`Instruction::CountRound`],
+//! and so does the first block of every function that calls another, for a few dozen functions that
+//! call each other twice run as long as any loop. All engines run the counted code, so that they
+//! stop at the same round.
 
 use crate::ir::{BlockId, Function, Instruction, SiteId, Terminator};
 
@@ -39,7 +40,8 @@ fn count_at(function: &mut Function, block: usize, site: SiteId) {
         .insert(0, Instruction::CountRound { site });
 }
 
-/// Where the edges end that close a cycle without a count, in a depth-first walk over blocks without a count.
+/// Where the edges end that close a cycle without a count, in a depth-first walk over blocks
+/// without a count.
 fn uncounted_cycle_heads(function: &Function) -> Vec<usize> {
     #[derive(Clone, Copy, PartialEq)]
     enum Visit {
@@ -90,7 +92,8 @@ pub(crate) fn successors(terminator: Terminator) -> impl Iterator<Item = BlockId
     first.into_iter().chain(second)
 }
 
-/// The first site at or after a block, else the first of the function; blocks stand in the order of the text.
+/// The first site at or after a block, else the first of the function; blocks stand in the order of
+/// the text.
 fn nearest_site(function: &Function, block: usize) -> SiteId {
     let (before, after) = function.blocks.split_at(block);
     after

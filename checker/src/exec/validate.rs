@@ -1,13 +1,17 @@
-//! Checks code before machine code is made of it: the compiler trusts what the interpreter would stumble over.
+//! Checks code before machine code is made of it: the compiler trusts what the interpreter would
+//! stumble over.
 //!
 //! A program that passes has
 //! * registers that exist and are of the types that each instruction wants, parameters first;
-//! * jumps to blocks that exist, and calls of functions that exist, with arguments of the right number and types;
+//! * jumps to blocks that exist, and calls of functions that exist, with arguments of the right
+//!   number and types;
 //! * no function that calls itself, directly or indirectly;
-//! * accesses to the frame and the constants that stay inside, whatever the indices; and it says how long the state must be.
+//! * accesses to the frame and the constants that stay inside, whatever the indices; and it says
+//!   how long the state must be.
 //!
-//! Indices are bounded by the instructions that make them ([`Instruction::ScaleIndex`] checks them when it runs). Not checked are
-//! accesses through addresses that are handed over as arguments: the caller's place is checked, not its length.
+//! Indices are bounded by the instructions that make them ([`Instruction::ScaleIndex`] checks them
+//! when it runs). Not checked are accesses through addresses that are handed over as arguments: the
+//! caller's place is checked, not its length.
 //!
 //! Cost: linear; a small part of what translating takes.
 
@@ -42,7 +46,8 @@ impl fmt::Display for Flaw {
     }
 }
 
-/// Checks the functions from `first` on, which may call earlier ones; returns how many words of state they reach.
+/// Checks the functions from `first` on, which may call earlier ones; returns how many words of
+/// state they reach.
 pub fn validate(functions: &[Function], first: usize, constants: usize) -> Result<usize, Flaw> {
     let mut state_words = 0;
     for (index, function) in functions.iter().enumerate().skip(first) {
@@ -351,7 +356,8 @@ fn index_limits(function: &Function) -> Vec<Option<u64>> {
     let mut limits = vec![Some(0_u64); function.registers.len()];
     let parameters = (function.parameters as usize).min(limits.len());
     limits[..parameters].fill(None);
-    // Sums are of indices that stand before them, as a rule: two passes suffice. What still grows has no limit.
+    // Sums are of indices that stand before them, as a rule: two passes suffice. What still grows
+    // has no limit.
     let mut passes = 0;
     while raise_limits(function, &mut limits, passes > 2) {
         passes += 1;
@@ -359,7 +365,8 @@ fn index_limits(function: &Function) -> Vec<Option<u64>> {
     limits
 }
 
-/// Raises the limits to what the instructions write; whether any rose. `give_up`: what rises has no limit.
+/// Raises the limits to what the instructions write; whether any rose. `give_up`: what rises has no
+/// limit.
 fn raise_limits(function: &Function, limits: &mut [Option<u64>], give_up: bool) -> bool {
     let mut has_risen = false;
     for instruction in function.blocks.iter().flat_map(|block| &block.instructions) {

@@ -1,7 +1,7 @@
 //! Where the result of integer arithmetic did not fit into 32 bits, and wrapped round.
 //!
-//! Of all such places the first one in the order of sites is kept, which depends neither on the engine nor on the order in which several
-//! threads run.
+//! Of all such places the first one in the order of sites is kept, which depends neither on the
+//! engine nor on the order in which several threads run.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -28,7 +28,8 @@ impl Wraps {
 
     /// Notes that a result wrapped here.
     pub fn note(&self, SiteId(site): SiteId) {
-        // Most results that wrap do so at a place that is known: this spares other threads the writing.
+        // Most results that wrap do so at a place that is known: this spares other threads the
+        // writing.
         if site < self.0.load(Ordering::Relaxed) {
             self.0.fetch_min(site, Ordering::Relaxed);
         }

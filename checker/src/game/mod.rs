@@ -1,8 +1,8 @@
 //! Timed games: on-the-fly solving, strategies and plans.
 //!
-//! The controller owns a move if all participating edges are controllable; all other moves are the environment's. The
-//! environment is faster: where both can move at the same instant, it may. It also picks the leg behind a branch point, whoever owns the
-//! edge that leads there.
+//! The controller owns a move if all participating edges are controllable; all other moves are the
+//! environment's. The environment is faster: where both can move at the same instant, it may. It
+//! also picks the leg behind a branch point, whoever owns the edge that leads there.
 
 pub mod backward;
 pub mod exploration;
@@ -42,17 +42,19 @@ pub enum Priorities {
     /// TIGA's rule: they do not, neither in games nor under the strategies that come from them.
     #[default]
     Ignored,
-    /// A move is possible only where none of a higher level is, whoever owns either, as in all other queries.
+    /// A move is possible only where none of a higher level is, whoever owns either, as in all
+    /// other queries.
     Kept,
 }
 
-/// What happens at a point where time cannot pass and the environment has a move. Where it need not move it may decline, and then play
-/// stops unless the controller moves: that loses a goal that must be reached; where something has only to be kept, the controller
-/// must take a move if it has one, and has lost if each of them loses.
+/// What happens at a point where time cannot pass and the environment has a move. Where it need not
+/// move it may decline, and then play stops unless the controller moves: that loses a goal that
+/// must be reached; where something has only to be kept, the controller must take a move if it has
+/// one, and has lost if each of them loses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Forced {
-    /// TIGA's rule: the environment must move if the component whose invariant (or urgent location) stops time has no
-    /// controllable move there.
+    /// TIGA's rule: the environment must move if the component whose invariant (or urgent location)
+    /// stops time has no controllable move there.
     #[default]
     Tiga,
     /// The environment must move if no controllable move of the whole network is possible there.
@@ -64,7 +66,8 @@ pub enum Forced {
 /// What the nodes of a game graph are. The answer is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Nodes {
-    /// Symbolic states first; discrete states if there turn out to be many symbolic ones for each, and if that is possible.
+    /// Symbolic states first; discrete states if there turn out to be many symbolic ones for each,
+    /// and if that is possible.
     #[default]
     Automatic,
     /// Symbolic states: what is reached, and no more.

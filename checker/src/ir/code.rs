@@ -1,17 +1,21 @@
 //! Code: functions over virtual registers, in basic blocks.
 //!
 //! Invariants:
-//! * Registers are typed and may be written more than once; every register is written before it is read.
-//! * Arithmetic on integers is 32-bit: where a result does not fit, [`Overflow`] says whether it wraps round, and is noted with the
-//!   instruction's [`SiteId`], or is an error.
-//! * An error (a division by zero, a negative or too large shift, an index or a value out of range) ends the call with a
-//!   [`RunTimeErrorKind`] at the instruction's [`SiteId`], and the state's words are then of no further use.
-//! * Floating-point arithmetic is IEEE double precision in the order written; mathematical functions are those of the
-//!   platform's C library, in the interpreter and in compiled code alike, so that the two agree bit for bit.
+//! * Registers are typed and may be written more than once; every register is written before it is
+//!   read.
+//! * Arithmetic on integers is 32-bit: where a result does not fit, [`Overflow`] says whether it
+//!   wraps round, and is noted with the instruction's [`SiteId`], or is an error.
+//! * An error (a division by zero, a negative or too large shift, an index or a value out of range)
+//!   ends the call with a [`RunTimeErrorKind`] at the instruction's [`SiteId`], and the state's
+//!   words are then of no further use.
+//! * Floating-point arithmetic is IEEE double precision in the order written; mathematical
+//!   functions are those of the platform's C library, in the interpreter and in compiled code
+//!   alike, so that the two agree bit for bit.
 //! * Functions never call themselves, directly or indirectly.
 
-/// The greatest absolute value of a clock bound and of a value that a clock is set to; beyond it is a
-/// [`RunTimeErrorKind::ClockValue`]. The limit of zones, whose operations add several bounds before they check.
+/// The greatest absolute value of a clock bound and of a value that a clock is set to; beyond it is
+/// a [`RunTimeErrorKind::ClockValue`]. The limit of zones, whose operations add several bounds
+/// before they check.
 pub const CLOCK_LIMIT: i32 = (1 << 27) - 1;
 
 /// Index of a function in [`super::Network::functions`].
@@ -117,7 +121,8 @@ pub enum Base {
 /// A clock: `first + index`. The index was checked before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClockOperand {
-    /// The first clock; 0 where the register holds the clock itself (a clock parameter of a function).
+    /// The first clock; 0 where the register holds the clock itself (a clock parameter of a
+    /// function).
     pub first: super::ClockId,
     /// A computed offset.
     pub index: Option<Register>,
@@ -172,7 +177,8 @@ pub enum Instruction {
         source: Register,
         site: SiteId,
     },
-    /// A function of the mathematical library. `arguments` and `target` have the types that [`MathFunction`] says.
+    /// A function of the mathematical library. `arguments` and `target` have the types that
+    /// [`MathFunction`] says.
     Math {
         function: MathFunction,
         target: Register,
@@ -185,7 +191,8 @@ pub enum Instruction {
     LoadDouble { target: Register, address: Address },
     /// Writes an integer.
     StoreInteger { address: Address, source: Register },
-    /// Writes a double into two words. Every NaN is written as the same one, so that equal states have equal words.
+    /// Writes a double into two words. Every NaN is written as the same one, so that equal states
+    /// have equal words.
     StoreDouble { address: Address, source: Register },
     /// Copies words; the two ranges are the same or disjoint.
     CopyWords {
@@ -224,9 +231,10 @@ pub enum Instruction {
         left: Register,
         right: Register,
     },
-    /// One more round of a loop; an error of kind [`RunTimeErrorKind::StepLimit`] if the rounds of the whole call from
-    /// outside exceed the limit. Engines put one into every cycle that has none, at the first site that they find there;
-    /// the front end may put one at the head of a loop to name a better site.
+    /// One more round of a loop; an error of kind [`RunTimeErrorKind::StepLimit`] if the rounds of
+    /// the whole call from outside exceed the limit. Engines put one into every cycle that has
+    /// none, at the first site that they find there; the front end may put one at the head of a
+    /// loop to name a better site.
     CountRound { site: SiteId },
     /// Calls a function.
     Call {
@@ -273,13 +281,15 @@ pub enum IntegerOperator {
     Subtract,
     /// Product; may wrap round.
     Multiply,
-    /// Quotient, truncated towards zero; division by zero is an error, and `-2^31 / -1` wraps round to `-2^31`.
+    /// Quotient, truncated towards zero; division by zero is an error, and `-2^31 / -1` wraps round
+    /// to `-2^31`.
     Divide,
     /// Remainder with the dividend's sign; division by zero is an error, `-2^31 % -1` is 0.
     Remainder,
     /// Power; may wrap round; a negative exponent is an error; `0 ** 0` is 1.
     Power,
-    /// Shift left by 0 to 31 bits; bits are lost without a word, as in C; other distances, of which C says nothing, are errors.
+    /// Shift left by 0 to 31 bits; bits are lost without a word, as in C; other distances, of which
+    /// C says nothing, are errors.
     ShiftLeft,
     /// Arithmetic shift right by 0 to 31 bits; other distances are errors.
     ShiftRight,
@@ -321,7 +331,8 @@ pub enum Relation {
     NotEqual,
 }
 
-/// Functions of the mathematical library, with the meaning that C gives them (`Log` is base 10, `Ln` is natural).
+/// Functions of the mathematical library, with the meaning that C gives them (`Log` is base 10,
+/// `Ln` is natural).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "the names are those of the language")]
 pub enum MathFunction {

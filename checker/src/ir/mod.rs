@@ -1,20 +1,21 @@
 //! The typed program and the flat network: what the engine runs.
 //!
-//! This is the hand-over point between the front end and everything below it. After it nobody looks at source text: names
-//! and spans are kept only to name things to the user.
+//! This is the hand-over point between the front end and everything below it. After it nobody looks
+//! at source text: names and spans are kept only to name things to the user.
 //!
 //! Memory
-//! * The discrete state is one array of 32-bit *words*: first the location index of each process, then the variables in
-//!   order of declaration, then the `meta` variables. Two states are equal if their first [`Layout::identity_words`] words
-//!   are; `meta` words are carried along and not compared.
-//! * Integers, truth values and scalars take one word; a `double` takes two (its bits, low word first); arrays and structs
-//!   are the concatenation of their parts in declaration order.
-//! * Constants that must be addressed (constant arrays and structs) lie in [`Network::constants`]; scalar constants are
-//!   folded into the code. Local arrays and structs of functions lie in a frame of [`Function::frame_words`] words, zeroed
-//!   on entry.
+//! * The discrete state is one array of 32-bit *words*: first the location index of each process,
+//!   then the variables in order of declaration, then the `meta` variables. Two states are equal if
+//!   their first [`Layout::identity_words`] words are; `meta` words are carried along and not
+//!   compared.
+//! * Integers, truth values and scalars take one word; a `double` takes two (its bits, low word
+//!   first); arrays and structs are the concatenation of their parts in declaration order.
+//! * Constants that must be addressed (constant arrays and structs) lie in [`Network::constants`];
+//!   scalar constants are folded into the code. Local arrays and structs of functions lie in a
+//!   frame of [`Function::frame_words`] words, zeroed on entry.
 //!
-//! Clocks are no part of the words. Clock 0 is the reference clock (always 0); the model's clocks count from 1, arrays of
-//! clocks flattened. Channels are flattened likewise and count from 0.
+//! Clocks are no part of the words. Clock 0 is the reference clock (always 0); the model's clocks
+//! count from 1, arrays of clocks flattened. Channels are flattened likewise and count from 0.
 
 mod accesses;
 mod code;
@@ -93,13 +94,15 @@ impl Network {
     }
 }
 
-/// A scalar set: numbers that are only compared for equality and used as indices, so that they can be exchanged.
+/// A scalar set: numbers that are only compared for equality and used as indices, so that they can
+/// be exchanged.
 #[derive(Clone, Debug)]
 pub struct ScalarSet {
     /// How many members it has.
     pub size: u32,
-    /// What tells its members apart nevertheless, so that exchanging them would change what the network does; `None` if
-    /// nothing does but, possibly, the order in which broadcast receivers run their updates.
+    /// What tells its members apart nevertheless, so that exchanging them would change what the
+    /// network does; `None` if nothing does but, possibly, the order in which broadcast receivers
+    /// run their updates.
     pub told_apart_by: Option<Span>,
 }
 
@@ -155,8 +158,8 @@ pub struct Location {
     pub urgency: Urgency,
     /// Its invariant.
     pub invariant: Guard,
-    /// Clocks whose rate the invariant sets (`x' == e`; quantifiers unrolled), with the function that gives the rate
-    /// (0 or 1).
+    /// Clocks whose rate the invariant sets (`x' == e`; quantifiers unrolled), with the function
+    /// that gives the rate (0 or 1).
     pub rates: Vec<(ClockId, FunctionId)>,
     /// The edges that leave it.
     pub edges: Vec<EdgeId>,
@@ -171,8 +174,8 @@ pub struct Location {
 pub struct Edge {
     /// The location it leaves.
     pub source: LocationId,
-    /// The ranges of the `select` bindings; each combination is an instance of the edge. The values are the arguments of
-    /// all functions of the edge, in this order.
+    /// The ranges of the `select` bindings; each combination is an instance of the edge. The values
+    /// are the arguments of all functions of the edge, in this order.
     pub select: Vec<Select>,
     /// Its guard.
     pub guard: Guard,
@@ -246,7 +249,8 @@ pub struct Channel {
     pub broadcast: bool,
     /// No time passes while a synchronisation on it is enabled.
     pub urgent: bool,
-    /// Its level in `chan priority`; greater is more urgent. Internal edges have [`Features::default_priority`].
+    /// Its level in `chan priority`; greater is more urgent. Internal edges have
+    /// [`Features::default_priority`].
     pub priority: u32,
 }
 
@@ -263,12 +267,12 @@ pub struct Clock {
     pub coordinates: Vec<Coordinate>,
 }
 
-/// A condition on words and clocks: a guard or an invariant. It holds if `function` returns 1, and then on the clock
-/// values that satisfy `fixed` and all constraints that the function emitted.
+/// A condition on words and clocks: a guard or an invariant. It holds if `function` returns 1, and
+/// then on the clock values that satisfy `fixed` and all constraints that the function emitted.
 #[derive(Clone, Debug, Default)]
 pub struct Guard {
-    /// Decides the part on the words and emits clock constraints ([`Instruction::Constrain`]); `None` is true.
-    /// Its parameters are the edge's select values; it returns an integer.
+    /// Decides the part on the words and emits clock constraints ([`Instruction::Constrain`]);
+    /// `None` is true. Its parameters are the edge's select values; it returns an integer.
     pub function: Option<FunctionId>,
     /// Clock constraints with constant bounds that hold whatever the words say.
     pub fixed: Vec<FixedConstraint>,
@@ -297,10 +301,12 @@ pub struct FixedConstraint {
     pub strict: bool,
 }
 
-/// A comparison `left - right ≺ bound` as static analysis sees it: which clocks it may concern, and how large the bound may be.
+/// A comparison `left - right ≺ bound` as static analysis sees it: which clocks it may concern, and
+/// how large the bound may be.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClockAtom {
-    /// The clocks that may stand at the left (one, or all of an array indexed at run time), the reference clock included.
+    /// The clocks that may stand at the left (one, or all of an array indexed at run time), the
+    /// reference clock included.
     pub left: ClockRange,
     /// The same at the right.
     pub right: ClockRange,
@@ -332,15 +338,18 @@ pub struct ClockRange {
 /// What happens to words and clocks. First `function` runs; then the clocks of `fixed` are set.
 #[derive(Clone, Debug, Default)]
 pub struct Update {
-    /// Changes words and emits clock assignments ([`Instruction::SetClock`], [`Instruction::CopyClock`]); `None` changes nothing.
+    /// Changes words and emits clock assignments ([`Instruction::SetClock`],
+    /// [`Instruction::CopyClock`]); `None` changes nothing.
     pub function: Option<FunctionId>,
-    /// Clocks that are set to constants. Used only where the order against `function` does not matter.
+    /// Clocks that are set to constants. Used only where the order against `function` does not
+    /// matter.
     pub fixed: Vec<(ClockId, i32)>,
     /// Whether `function` may emit clock assignments.
     pub emits: bool,
     /// All assignments to clocks in it, fixed ones included: for static analysis.
     pub assignments: Vec<ClockAssignment>,
-    /// The words that `function` may write, as ascending disjoint ranges (first, count); for static analysis.
+    /// The words that `function` may write, as ascending disjoint ranges (first, count); for static
+    /// analysis.
     pub writes: Vec<(u32, u32)>,
 }
 
@@ -566,7 +575,8 @@ pub enum Objective {
     Buchi(Predicate, Predicate),
 }
 
-/// A state predicate of a query. Quantifiers whose body mentions clocks, and process sets, are unrolled.
+/// A state predicate of a query. Quantifiers whose body mentions clocks, and process sets, are
+/// unrolled.
 #[derive(Clone, Debug)]
 pub enum Predicate {
     /// A condition on the words alone: a function without parameters that returns 0 or 1.
@@ -599,7 +609,8 @@ impl Predicate {
     }
 }
 
-/// `left - right ≺ bound` in a query, for a relation ≺ out of `<` and `<=` (the others are written with `Not` and `And`).
+/// `left - right ≺ bound` in a query, for a relation ≺ out of `<` and `<=` (the others are written
+/// with `Not` and `And`).
 #[derive(Clone, Debug)]
 pub struct ClockPredicate {
     /// The left clock.

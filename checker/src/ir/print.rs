@@ -1,7 +1,7 @@
 //! Code as text, for people who look for a fault and for tests that show what they ran.
 //!
-//! One line an instruction, the target first: `r7 = r3 + r5  @12`, where `@12` is the site that errors are reported at.
-//! Words in memory are written `state[4 + r2]`.
+//! One line an instruction, the target first: `r7 = r3 + r5  @12`, where `@12` is the site that
+//! errors are reported at. Words in memory are written `state[4 + r2]`.
 
 use std::fmt::{Display, Formatter, Result};
 

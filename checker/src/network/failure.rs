@@ -23,7 +23,8 @@ pub enum Failure {
     Moves(usize),
     /// The initial state breaks an invariant.
     InitialInvariant,
-    /// None of the model: a call of its code, or the enumeration of moves, was ended ([`crate::cancellation`]).
+    /// None of the model: a call of its code, or the enumeration of moves, was ended
+    /// ([`crate::cancellation`]).
     Interrupted,
 }
 

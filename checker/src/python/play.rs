@@ -167,7 +167,8 @@ impl Strategy {
         })
     }
 
-    /// Checks it in closed loop: whether its owner wins (`None` if the check does not cover it), and what was looked at.
+    /// Checks it in closed loop: whether its owner wins (`None` if the check does not cover it),
+    /// and what was looked at.
     fn verify(
         &self,
         py: Python<'_>,
@@ -267,8 +268,8 @@ impl Play {
         })
     }
 
-    /// Lets a fraction of the unit pass, and then a move be made: the reply of the opponent with an index, or what a permissive
-    /// strategy allows, or none.
+    /// Lets a fraction of the unit pass, and then a move be made: the reply of the opponent with an
+    /// index, or what a permissive strategy allows, or none.
     #[pyo3(signature = (numerator, denominator, *, reply, allowed))]
     #[pyo3(name = "pass_time")]
     fn pass(

@@ -49,8 +49,9 @@ pub trait Watch {
     fn look(&mut self, counters: &Counters) -> Option<StopReason>;
 }
 
-/// States that a search may explore between two looks, of as many at most, at zones of this dimension: what a state takes grows with the
-/// third power of it, and what its successors take with that, too, where clocks have a process each.
+/// States that a search may explore between two looks, of as many at most, at zones of this
+/// dimension: what a state takes grows with the third power of it, and what its successors take
+/// with that, too, where clocks have a process each.
 pub(crate) fn states_between_looks(most: u64, dimension: usize) -> u64 {
     (UNITS_BETWEEN_LOOKS / (dimension as u64).pow(3)).clamp(1, most)
 }

@@ -1,7 +1,8 @@
-//! Which parameters by value a template assigns to: they are variables of the process; all others are constants.
+//! Which parameters by value a template assigns to: they are variables of the process; all others
+//! are constants.
 //!
-//! Found on the syntax tree, because it decides what the names mean while the template is checked. A function that
-//! declares the name itself is left out.
+//! Found on the syntax tree, because it decides what the names mean while the template is checked.
+//! A function that declares the name itself is left out.
 
 use std::collections::HashSet;
 

@@ -114,7 +114,8 @@ impl Checker<'_> {
         );
     }
 
-    /// An argument by reference. What refers to a variable that is left out must be left out itself, and the other way round.
+    /// An argument by reference. What refers to a variable that is left out must be left out
+    /// itself, and the other way round.
     fn reference_left_out(&mut self, argument: Expr, parameter: &Parameter) -> Expr {
         self.refers_to(&argument);
         let is_left_out = self.cause_of(parameter.declared).cloned();

@@ -41,7 +41,8 @@ pub(super) struct Checker<'a> {
     has_errors: bool,
     /// The locals of the function, guard or update that is being checked.
     pub(super) locals: Vec<Local>,
-    /// The values that only statistical queries know, as long as it is open whether anything depends on them: what is to be said if so.
+    /// The values that only statistical queries know, as long as it is open whether anything
+    /// depends on them: what is to be said if so.
     pub(super) unknowns: Vec<Diagnostic>,
     /// The variables that are left out because only statistical queries know their values.
     pub(super) left_out: LeftOut,
@@ -55,7 +56,8 @@ pub(super) struct Checker<'a> {
     pub(super) system_is_open: bool,
     /// Whether the declarations of the system section are out of sight.
     pub(super) hides_system: bool,
-    /// Set when a quantifier can only be checked value by value, because the members of a process set differ.
+    /// Set when a quantifier can only be checked value by value, because the members of a process
+    /// set differ.
     pub(super) needs_unrolling: bool,
     /// Whether a query is checked.
     pub(super) is_query: bool,
@@ -141,7 +143,8 @@ impl<'a> Checker<'a> {
         self.report(Diagnostic::new(code, span, message).help(help));
     }
 
-    /// A value that only statistical queries know; what is said of it is reported if anything depends on it.
+    /// A value that only statistical queries know; what is said of it is reported if anything
+    /// depends on it.
     pub(super) fn unknown(&mut self, diagnostic: Diagnostic, from: Expr, ty: Type) -> Expr {
         let span = diagnostic.span;
         self.unknowns.push(diagnostic);
@@ -200,7 +203,8 @@ impl<'a> Checker<'a> {
             .map(|(_, name)| name.to_owned())
     }
 
-    /// Declares a name in the innermost scope. The system section may not declare what the global declarations do.
+    /// Declares a name in the innermost scope. The system section may not declare what the global
+    /// declarations do.
     pub(super) fn declare(&mut self, name: &crate::syntax::ast::Name, entity: Entity) {
         let innermost = self.scopes.len() - 1;
         let outermost = innermost - usize::from(self.system_is_open && innermost == SYSTEM_SCOPE);
@@ -381,7 +385,8 @@ impl<'a> Checker<'a> {
         );
     }
 
-    /// Runs a function on the words of a state, and gives them back; what it assigns to clocks is appended.
+    /// Runs a function on the words of a state, and gives them back; what it assigns to clocks is
+    /// appended.
     pub(super) fn run_on(
         &mut self,
         function: FunctionId,

@@ -1,7 +1,9 @@
-//! Expressions on clocks: sums, comparisons, rates, assignments; and which class a condition on clocks is of.
+//! Expressions on clocks: sums, comparisons, rates, assignments; and which class a condition on
+//! clocks is of.
 //!
-//! `x < c`, `x <= c`, `x > c`, `x >= c` and the same for differences can stand anywhere; equalities in guards and queries;
-//! inequalities, negations and disjunctions of such conditions in queries only. That keeps guards and invariants convex.
+//! `x < c`, `x <= c`, `x > c`, `x >= c` and the same for differences can stand anywhere; equalities
+//! in guards and queries; inequalities, negations and disjunctions of such conditions in queries
+//! only. That keeps guards and invariants convex.
 //!
 //! Source: the classification of UPPAAL's type checker.
 
@@ -50,7 +52,8 @@ impl Checker<'_> {
         self.binary(operator, left, right, span)
     }
 
-    /// A clock as a number; anything else as it is. Whether that can be is decided where it is used.
+    /// A clock as a number; anything else as it is. Whether that can be is decided where it is
+    /// used.
     pub(super) fn clock_value(&mut self, expr: Expr) -> Expr {
         if !is_clock_term(&expr) {
             return expr;
@@ -168,7 +171,8 @@ impl Checker<'_> {
         }
     }
 
-    /// `clock' == rate`; `before` is how many values of clocks were used before the two were checked.
+    /// `clock' == rate`; `before` is how many values of clocks were used before the two were
+    /// checked.
     pub(super) fn rate(&mut self, clock: Expr, rate: Expr, before: usize, span: Span) -> Expr {
         if clock.is_error() || rate.is_error() {
             return Expr::error(span);
@@ -219,7 +223,8 @@ impl Checker<'_> {
         Expr::new(kind, Type::Constraint(Class::InvariantWithRate), span)
     }
 
-    /// `clock := value`; `before` is how many values of clocks were used before the two were checked.
+    /// `clock := value`; `before` is how many values of clocks were used before the two were
+    /// checked.
     pub(super) fn assign_clock(
         &mut self,
         target: Expr,

@@ -173,7 +173,8 @@ codes! {
     ARRAY_EMPTY = "W0207" "array-empty";
     /// Arithmetic of constants beyond 32 bits.
     CONSTANT_WRAPS = "W0212" "constant-wraps";
-    /// A double that takes values of clocks or random numbers, which symbolic and game queries do not see.
+    /// A double that takes values of clocks or random numbers, which symbolic and game queries do
+    /// not see.
     DOUBLE_IGNORED = "W0213" "double-ignored";
     /// A clock with rates or values of its own, which symbolic and game queries do not see.
     CLOCK_IGNORED = "W0214" "clock-ignored";

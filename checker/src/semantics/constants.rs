@@ -1,7 +1,8 @@
-//! Values that must be known when the model is loaded: bounds, sizes, initialisers, arguments of templates.
+//! Values that must be known when the model is loaded: bounds, sizes, initialisers, arguments of
+//! templates.
 //!
-//! Most are folded while they are checked. What is left (calls of functions, parts of constant arrays) is lowered and run
-//! by the interpreter, so there is one meaning of code only.
+//! Most are folded while they are checked. What is left (calls of functions, parts of constant
+//! arrays) is lowered and run by the interpreter, so there is one meaning of code only.
 
 use super::checker::Checker;
 use super::codes;
@@ -41,8 +42,8 @@ impl Checker<'_> {
         )
     }
 
-    /// The words of an expression that must be known now, converted to `ty`; `None` if that was reported, or if it hangs on
-    /// a value that no instance gives.
+    /// The words of an expression that must be known now, converted to `ty`; `None` if that was
+    /// reported, or if it hangs on a value that no instance gives.
     pub(super) fn known_words(&mut self, expr: &Expr, ty: &Type, what: &str) -> Option<Vec<i32>> {
         if expr.is_error() || ty.is_error() {
             return None;
@@ -126,8 +127,9 @@ impl Checker<'_> {
             .map(|words| words[0])
     }
 
-    /// The bound of a range. As in C, and as UPPAAL does, the arithmetic of bounds wraps round where 32 bits are exceeded:
-    /// `-(1<<31)` and `(1<<31)-1` are common ways to write the limits of integers.
+    /// The bound of a range. As in C, and as UPPAAL does, the arithmetic of bounds wraps round
+    /// where 32 bits are exceeded: `-(1<<31)` and `(1<<31)-1` are common ways to write the limits
+    /// of integers.
     pub(super) fn known_bound(&mut self, expr: &Expr) -> Option<i32> {
         wrapping_value(expr).or_else(|| self.known_int(expr, "the bound of a range"))
     }

@@ -25,7 +25,8 @@ pub(super) struct InitialPart {
 }
 
 impl Checker<'_> {
-    /// Checks declarations outside functions. `before_update`, `after_update` and `chan priority` are left to the caller.
+    /// Checks declarations outside functions. `before_update`, `after_update` and `chan priority`
+    /// are left to the caller.
     pub(super) fn declarations(&mut self, declarations: &[Declaration]) {
         for declaration in declarations {
             match declaration {
@@ -306,7 +307,8 @@ impl Checker<'_> {
         let (Some(low), Some(high)) = (self.known_bound(&low), self.known_bound(&high)) else {
             return Type::Error;
         };
-        // As long as there is exactly nothing in between, it is the range of a number that happens to be zero.
+        // As long as there is exactly nothing in between, it is the range of a number that happens
+        // to be zero.
         if low > high && i64::from(low) != i64::from(high) + 1 {
             self.error(
                 codes::RANGE_EMPTY,
@@ -397,7 +399,8 @@ impl Checker<'_> {
         }
     }
 
-    /// The type and the least and greatest value that a `select`, a quantifier or a range-for runs over.
+    /// The type and the least and greatest value that a `select`, a quantifier or a range-for runs
+    /// over.
     pub(super) fn iterated(&mut self, ty: &TypeExpr) -> Option<(Type, (i32, i32))> {
         let resolved = self.type_of(ty);
         // `const int` is the type of every integer, which has no bounds.

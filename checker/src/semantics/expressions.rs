@@ -236,8 +236,8 @@ impl Checker<'_> {
         }
     }
 
-    /// The value of a scalar in the constant memory at a known place; at one of several places, the interval of their
-    /// values; anything else as it is.
+    /// The value of a scalar in the constant memory at a known place; at one of several places, the
+    /// interval of their values; anything else as it is.
     fn folded(&self, expr: Expr) -> Expr {
         let Some(place) = expr.variable() else {
             return expr;
@@ -268,7 +268,8 @@ impl Checker<'_> {
     }
 
     fn unary(&mut self, operator: UnaryOp, inner: &ast::Expr, span: Span) -> Expr {
-        // The least integer can only be written as the negation of a literal that is too large by one.
+        // The least integer can only be written as the negation of a literal that is too large by
+        // one.
         if operator == UnaryOp::Minus
             && matches!(inner.kind, ExprKind::Int(value) if value == -i64::from(i32::MIN))
         {
@@ -382,7 +383,8 @@ impl Checker<'_> {
         true
     }
 
-    /// `target = value`; `of_target` is where among the unknown values those stand that the target hangs on.
+    /// `target = value`; `of_target` is where among the unknown values those stand that the target
+    /// hangs on.
     fn assignment(
         &mut self,
         target: Expr,
@@ -423,8 +425,8 @@ impl Checker<'_> {
         Expr::new(Kind::Assign(Box::new(target), Box::new(value)), ty, span)
     }
 
-    /// An assignment to a variable that is left out: it remains where its own value is used, which is unknown, and what the
-    /// value does beside it.
+    /// An assignment to a variable that is left out: it remains where its own value is used, which
+    /// is unknown, and what the value does beside it.
     fn assignment_left_out(
         &mut self,
         (target, place): (Expr, &Expr),
@@ -619,7 +621,8 @@ impl Checker<'_> {
         })
     }
 
-    /// Whether a quantifier cannot be a loop: its body sets rates, or holds clock conditions of a query.
+    /// Whether a quantifier cannot be a loop: its body sets rates, or holds clock conditions of a
+    /// query.
     fn must_unroll(&self, body: &Expr) -> bool {
         let mentions_rate = |e: &Expr| matches!(e.kind, Kind::Rate { .. });
         (self.is_query && body.mentions_clocks()) || body.any(&mentions_rate)
@@ -711,7 +714,8 @@ fn joined(left: &Type, right: &Type) -> Type {
     }
 }
 
-/// Where in the constant memory a place may lie, wherever its indices are inside; `None` if these are too many.
+/// Where in the constant memory a place may lie, wherever its indices are inside; `None` if these
+/// are too many.
 fn possible_offsets(expr: &Expr) -> Option<Vec<u32>> {
     match &expr.kind {
         Kind::Variable(place) => Some(vec![place.base.of(Memory::Words)]),

@@ -15,7 +15,8 @@ use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::FunctionId;
 use crate::syntax::ast::{self, Declaration, Name};
 
-/// The function of a declaration that could not be lowered; never called, because nothing is lowered after a mistake.
+/// The function of a declaration that could not be lowered; never called, because nothing is
+/// lowered after a mistake.
 const NO_FUNCTION: FunctionId = FunctionId(u32::MAX);
 
 impl Checker<'_> {
@@ -258,7 +259,8 @@ impl Checker<'_> {
         ty: Type,
         parts: Vec<super::declarations::InitialPart>,
     ) -> Statement {
-        // Without a value, a scalar is the first member; in a list of values, the first comes first.
+        // Without a value, a scalar is the first member; in a list of values, the first comes
+        // first.
         if parts.is_empty() {
             self.tell_scalars_apart(&ty, variable.name.span);
         } else {
@@ -410,7 +412,8 @@ impl Checker<'_> {
 
     /// Warns of an expression whose value is dropped and that changes nothing.
     fn warn_without_effect(&mut self, expr: &Expr) {
-        // A call of a function without effect is common in libraries of models; a dropped comparison is a typing mistake.
+        // A call of a function without effect is common in libraries of models; a dropped
+        // comparison is a typing mistake.
         let is_silent = expr.is_error() || expr.ty == Type::Void || expr.has_effect();
         if !is_silent && !matches!(expr.kind, Kind::Call { .. } | Kind::Assign(..)) {
             self.report(

@@ -1,8 +1,9 @@
-//! Functions that UPPAAL calls by their names: `__ON_CONSTRUCT__` once the model is built, `__ON_BEGIN__` before a query is
-//! answered, `__ON_END__` and `__ON_DESTRUCT__` after it.
+//! Functions that UPPAAL calls by their names: `__ON_CONSTRUCT__` once the model is built,
+//! `__ON_BEGIN__` before a query is answered, `__ON_END__` and `__ON_DESTRUCT__` after it.
 //!
-//! Every query starts from the initial state, so that the first two are run once, in this order, when the model is loaded: what they leave in
-//! variables and clocks is the initial state. What the other two do comes after all that a query sees; they are only checked.
+//! Every query starts from the initial state, so that the first two are run once, in this order,
+//! when the model is loaded: what they leave in variables and clocks is the initial state. What the
+//! other two do comes after all that a query sees; they are only checked.
 //!
 //! Source: UPPAAL's documentation, "Functions", section "Special Functions".
 

@@ -1,8 +1,8 @@
 //! The system section: instantiations, process sets, and the processes of the network.
 //!
-//! A name in the system line that has parameters left stands for a set of processes, one for each combination of their
-//! values, the first parameter changing slowest. Arguments by value are constants; arguments by reference stand for the
-//! very variable, clock or channel.
+//! A name in the system line that has parameters left stands for a set of processes, one for each
+//! combination of their values, the first parameter changing slowest. Arguments by value are
+//! constants; arguments by reference stand for the very variable, clock or channel.
 
 use std::collections::HashMap;
 
@@ -72,7 +72,8 @@ impl Checker<'_> {
                     self.declarations(std::slice::from_ref(declaration));
                 }
                 SystemItem::Instantiation { name, .. } => {
-                    // Without its template it is broken: it must not mean a template that is named like it later on.
+                    // Without its template it is broken: it must not mean a template that is named
+                    // like it later on.
                     let entity = match self.check_instantiation(document, i) {
                         Some(_) => Entity::Instantiation(i),
                         None if self.is_of_chart(document, i) => Entity::Chart,
@@ -137,7 +138,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Checks an instantiation without knowing the values of its parameters; returns what it instantiates.
+    /// Checks an instantiation without knowing the values of its parameters; returns what it
+    /// instantiates.
     fn check_instantiation(&mut self, document: &Document, item: usize) -> Option<Target> {
         let SystemItem::Instantiation {
             parameters,
@@ -316,7 +318,8 @@ impl Checker<'_> {
         Some(types)
     }
 
-    /// The type of a formal parameter, seen from where it is declared; earlier parameters may stand in it.
+    /// The type of a formal parameter, seen from where it is declared; earlier parameters may stand
+    /// in it.
     fn formal_type(&mut self, formal: &Parameter, target: Target, earlier: &mut Scope) -> Type {
         let hidden = std::mem::replace(
             &mut self.hides_system,
@@ -541,7 +544,8 @@ impl Checker<'_> {
         );
     }
 
-    /// Reports unsupported constructs that the processes of the system use, and warns of the others.
+    /// Reports unsupported constructs that the processes of the system use, and warns of the
+    /// others.
     fn unsupported_parts(&mut self, document: &Document, used: &[bool]) {
         for construct in &document.unsupported {
             let name = match &construct.part {

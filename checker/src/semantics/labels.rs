@@ -1,4 +1,5 @@
-//! Guards, invariants, synchronisations and updates: checking, and lowering to what the network runs.
+//! Guards, invariants, synchronisations and updates: checking, and lowering to what the network
+//! runs.
 
 use super::checker::Checker;
 use super::codes;

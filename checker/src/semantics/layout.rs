@@ -1,8 +1,9 @@
 //! The final layout of the state: locations, variables, `meta` variables.
 //!
-//! How many processes there are is known only at the end, when the global functions have long been lowered. Until then the
-//! offsets of variables count from 0, those of `meta` variables from [`META_WORDS`], those of locations from
-//! [`LOCATION_WORDS`]; [`Relocation`] turns them into offsets of words.
+//! How many processes there are is known only at the end, when the global functions have long been
+//! lowered. Until then the offsets of variables count from 0, those of `meta` variables from
+//! [`META_WORDS`], those of locations from [`LOCATION_WORDS`]; [`Relocation`] turns them into
+//! offsets of words.
 
 use super::typed::{LOCATION_WORDS, META_WORDS};
 use super::types::Type;

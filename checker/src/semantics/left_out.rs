@@ -1,16 +1,21 @@
-//! What symbolic and game queries cannot know, and what they see without: doubles that take the values of clocks or of
-//! random numbers, and clocks with rates of their own.
+//! What symbolic and game queries cannot know, and what they see without: doubles that take the
+//! values of clocks or of random numbers, and clocks with rates of their own.
 //!
-//! A model is first checked as if it had none. Where a double takes a value that is not known, or a clock a rate or a value
-//! that ordinary clocks cannot have, that is an error, and the variable a candidate. The model is then checked again without
-//! the candidates, like hybrid clocks: what is assigned to them is not computed, and what is read from them is unknown, so that
-//! the other variables that take such a value become candidates in turn. That ends when nothing is wrong any more (then all that
-//! is left out decides nothing), or when there is no new candidate (then what is wrong is said).
+//! A model is first checked as if it had none. Where a double takes a value that is not known, or a
+//! clock a rate or a value that ordinary clocks cannot have, that is an error, and the variable a
+//! candidate. The model is then checked again without the candidates, like hybrid clocks: what is
+//! assigned to them is not computed, and what is read from them is unknown, so that the other
+//! variables that take such a value become candidates in turn. That ends when nothing is wrong any
+//! more (then all that is left out decides nothing), or when there is no new candidate (then what
+//! is wrong is said).
 //!
 //! Invariants:
-//! * What is left out is fixed before a model is checked: nothing reads a variable as known whose changes are dropped elsewhere.
-//! * A clock that a guard or an invariant compares, or that a function takes by reference, is never left out.
-//! * Variables are left out as a whole, in all processes, and only if they hold nothing but doubles, or clocks.
+//! * What is left out is fixed before a model is checked: nothing reads a variable as known whose
+//!   changes are dropped elsewhere.
+//! * A clock that a guard or an invariant compares, or that a function takes by reference, is never
+//!   left out.
+//! * Variables are left out as a whole, in all processes, and only if they hold nothing but
+//!   doubles, or clocks.
 
 use std::collections::BTreeMap;
 
@@ -22,10 +27,12 @@ use super::typed::{Expr, Kind, Place};
 use super::types::Type;
 use crate::diagnostics::{Diagnostic, Span};
 
-/// How many times a model is checked at most: a longer chain of doubles, each of which takes the value of the next, is refused.
+/// How many times a model is checked at most: a longer chain of doubles, each of which takes the
+/// value of the next, is refused.
 pub(super) const MOST_ROUNDS: usize = 12;
 
-/// Variables by the place of their declaration, each with the reason why ordinary variables could not do.
+/// Variables by the place of their declaration, each with the reason why ordinary variables could
+/// not do.
 pub(super) type Causes = BTreeMap<Span, Diagnostic>;
 
 /// What is known of variables that are, or could be, left out.
@@ -119,8 +126,8 @@ impl Checker<'_> {
         self.unknown(diagnostic, expr, ty)
     }
 
-    /// The place that is meant by the expression checked last, where a part of it or a reference to it is taken: also if it is
-    /// left out.
+    /// The place that is meant by the expression checked last, where a part of it or a reference to
+    /// it is taken: also if it is left out.
     pub(super) fn place_left_out(&mut self, expr: Expr) -> Expr {
         match expr.kind {
             Kind::Unknown(inner) if self.is_left_out(&inner) && inner.ty == expr.ty => {
@@ -155,7 +162,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Notes that a variable takes a value that may be unknown; what is said of values since `before` is why.
+    /// Notes that a variable takes a value that may be unknown; what is said of values since
+    /// `before` is why.
     pub(super) fn takes_unknown(&mut self, declared: Span, value: &Expr, before: usize) {
         if value.is_unknown()
             && let Some(cause) = self.unknowns.get(before).cloned()

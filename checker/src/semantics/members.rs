@@ -1,8 +1,8 @@
 //! Processes in queries: `P.location`, `P.l`, `P.x`, `P(1).x`, `P(i).l`.
 //!
-//! The members of a process set come from one template and lie one behind the other, so `P(i).x` with a computed `i` is an
-//! index into them. Where members differ (a constant that hangs on the parameter), and for clocks, the quantifier that
-//! binds `i` is unrolled.
+//! The members of a process set come from one template and lie one behind the other, so `P(i).x`
+//! with a computed `i` is an index into them. Where members differ (a constant that hangs on the
+//! parameter), and for clocks, the quantifier that binds `i` is unrolled.
 
 use super::checker::Checker;
 use super::codes;

@@ -1,19 +1,24 @@
-//! From syntax trees to the network: names, types, constants, every static rule of the language, and lowering to code.
+//! From syntax trees to the network: names, types, constants, every static rule of the language,
+//! and lowering to code.
 //!
-//! The way: declarations are checked in order, functions are lowered as soon as they are checked, so that constants can be
-//! computed with them; then the system section is instantiated, and every template is checked and lowered once for each of
-//! its processes, with its parameters known. Templates that no process uses are checked with unknown parameters.
+//! The way: declarations are checked in order, functions are lowered as soon as they are checked,
+//! so that constants can be computed with them; then the system section is instantiated, and every
+//! template is checked and lowered once for each of its processes, with its parameters known.
+//! Templates that no process uses are checked with unknown parameters.
 //!
 //! Invariants:
 //! * All mistakes are reported in one run; what hangs on a mistake is silent.
 //! * Nothing is lowered after a mistake, so lowering never fails.
-//! * The scopes of a model outlive its check: queries are compiled against them, and only append to the network.
+//! * The scopes of a model outlive its check: queries are compiled against them, and only append to
+//!   the network.
 //!
-//! Source: UPPAAL's language reference, and the rules of its official parser where that is silent. Where we differ:
+//! Source: UPPAAL's language reference, and the rules of its official parser where that is silent.
+//! Where we differ:
 //! * Names that UPPAAL predeclares may be declared again by a model.
 //! * Parameters of templates by value are constants, unless the template assigns to them.
 //! * Mutable doubles are part of the state, with a warning.
-//! * Clocks with rates other than 0 and 1 are left out, with a warning, if no condition depends on them; UPPAAL refuses the queries.
+//! * Clocks with rates other than 0 and 1 are left out, with a warning, if no condition depends on
+//!   them; UPPAAL refuses the queries.
 //!
 //! Cost: linear in the trees, times the number of processes of a template.
 
@@ -116,8 +121,8 @@ pub fn analyse(
 }
 
 impl Model {
-    /// Checks and lowers a query; its functions and sites are appended to the network. `strategies` are the names of the
-    /// strategies that exist so far.
+    /// Checks and lowers a query; its functions and sites are appended to the network. `strategies`
+    /// are the names of the strategies that exist so far.
     pub fn compile_query(
         &mut self,
         query: &ast::Query,

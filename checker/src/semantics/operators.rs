@@ -1,4 +1,5 @@
-//! Typing of operators on integers, truth values and doubles; folding of constants; intervals of results.
+//! Typing of operators on integers, truth values and doubles; folding of constants; intervals of
+//! results.
 
 use super::calls::folded_math;
 use super::checker::Checker;
@@ -316,8 +317,8 @@ fn compare_doubles(relation: Relation, left: Expr, right: Expr, span: Span) -> E
     Expr::new(kind, Type::Bool, span)
 }
 
-/// The values of an operation whose operands have values in these intervals, where it has one. Results that may not fit into 32 bits may
-/// wrap round to any value.
+/// The values of an operation whose operands have values in these intervals, where it has one.
+/// Results that may not fit into 32 bits may wrap round to any value.
 pub(super) fn integer_interval(
     operator: IntegerOperator,
     (a, b): (i32, i32),
@@ -366,7 +367,8 @@ pub(super) fn integer_interval(
     }
 }
 
-/// The values of a quotient: a positive constant divisor keeps the order, any other can only change the sign.
+/// The values of a quotient: a positive constant divisor keeps the order, any other can only change
+/// the sign.
 fn divided((a, b): (i32, i32), (c, d): (i32, i32), magnitude: i32) -> (i32, i32) {
     if c > 0 && c == d {
         return (a / c, b / c);

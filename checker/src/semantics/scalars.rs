@@ -1,16 +1,17 @@
 //! What tells the members of a scalar set apart.
 //!
-//! The language lets scalars only be compared for equality, assigned and used as indices, so that exchanging two members
-//! everywhere turns what a network can do into what it can do. Four things break this, and are noted of a set where they stand:
-//! code that runs through the members in their order and for which the order matters, constants that differ from member to
-//! member, values that nothing chose (the first member, for a scalar of a function without a value), and places where
+//! The language lets scalars only be compared for equality, assigned and used as indices, so that
+//! exchanging two members everywhere turns what a network can do into what it can do. Four things
+//! break this, and are noted of a set where they stand: code that runs through the members in their
+//! order and for which the order matters, constants that differ from member to member, values that
+//! nothing chose (the first member, for a scalar of a function without a value), and places where
 //! members are numbered.
 //!
-//! Invariant: what is noted here is conservative. A loop counts as one for which the order does not matter only if it is of
-//! the simple kinds of [`is_order_irrelevant`].
+//! Invariant: what is noted here is conservative. A loop counts as one for which the order does not
+//! matter only if it is of the simple kinds of [`is_order_irrelevant`].
 //!
-//! Source: M. Hendriks, G. Behrmann, K. G. Larsen, P. Niebert, F. Vaandrager, "Adding Symmetry Reduction to UPPAAL", FORMATS 2003
-//! (which trusts loops; here they are looked at).
+//! Source: M. Hendriks, G. Behrmann, K. G. Larsen, P. Niebert, F. Vaandrager, "Adding Symmetry
+//! Reduction to UPPAAL", FORMATS 2003 (which trusts loops; here they are looked at).
 
 use super::checker::Checker;
 use super::typed::{Expr, Kind, Local, LocalId, Place, Root, Statement};
@@ -135,15 +136,17 @@ impl Touched {
 struct Body {
     local: LocalId,
     writes: Vec<(Touched, Write)>,
-    /// The variables that are read, and how far apart the parts are of which the loop variable chooses one.
+    /// The variables that are read, and how far apart the parts are of which the loop variable
+    /// chooses one.
     reads: Vec<(Touched, Option<(u32, u32)>)>,
     /// The values that end the loop.
     returns: Vec<i32>,
     is_simple: bool,
 }
 
-/// Whether running through the values of `local` in another order does the same: each round touches only its own parts of what
-/// is written, or gathers into variables in a way that does not hang on the order, or only looks for a reason to return.
+/// Whether running through the values of `local` in another order does the same: each round touches
+/// only its own parts of what is written, or gathers into variables in a way that does not hang on
+/// the order, or only looks for a reason to return.
 pub(super) fn is_order_irrelevant(body: &Statement, local: LocalId, locals: &[Local]) -> bool {
     let mut parts = Body {
         local,
@@ -259,7 +262,8 @@ impl Body {
         }
     }
 
-    /// A write to a part of a variable; `common` says what it is if the loop variable does not choose the part.
+    /// A write to a part of a variable; `common` says what it is if the loop variable does not
+    /// choose the part.
     fn write(&mut self, target: &Expr, common: Option<Write>) {
         let own = self.own_stride(target);
         let write = own.map(Write::Own).or(common);

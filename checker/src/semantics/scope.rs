@@ -1,8 +1,9 @@
 //! Names and what they stand for.
 //!
-//! One namespace per scope, names of locations included; an inner scope hides an outer one. The scopes of a template are
-//! the prelude, the global declarations and its own; the declarations of the system section are seen by the system line and
-//! by queries only. The prelude is a scope of its own, so a model may declare its names again.
+//! One namespace per scope, names of locations included; an inner scope hides an outer one. The
+//! scopes of a template are the prelude, the global declarations and its own; the declarations of
+//! the system section are seen by the system line and by queries only. The prelude is a scope of
+//! its own, so a model may declare its names again.
 
 use std::sync::Arc;
 

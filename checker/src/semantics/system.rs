@@ -1,4 +1,5 @@
-//! A whole model: the order in which its parts are checked, what concerns all processes, and the finished network.
+//! A whole model: the order in which its parts are checked, what concerns all processes, and the
+//! finished network.
 
 use super::checker::Checker;
 use super::codes;

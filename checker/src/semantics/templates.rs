@@ -26,7 +26,8 @@ enum Node {
 }
 
 impl Checker<'_> {
-    /// Checks a template whose parameters are declared in the innermost scope, and makes a process of it.
+    /// Checks a template whose parameters are declared in the innermost scope, and makes a process
+    /// of it.
     pub(super) fn template(&mut self, template: &ast::Template, priority: u32) -> ir::Process {
         self.declarations(&template.declarations);
         for (i, location) in template.locations.iter().enumerate() {
@@ -422,7 +423,8 @@ impl Checker<'_> {
     }
 
     fn leg_update(&mut self, leg: &ast::Edge, parameters: usize, place: &str) -> ir::Update {
-        // The functions of a leg take the values of the entry's select bindings too, but its expressions do not see them.
+        // The functions of a leg take the values of the entry's select bindings too, but its
+        // expressions do not see them.
         self.locals.clear();
         let unseen: Vec<LocalId> = (0..parameters)
             .map(|_| self.new_local(Type::ANY_INT))

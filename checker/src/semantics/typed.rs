@@ -1,10 +1,12 @@
 //! The typed tree: what checking makes of the syntax tree, and lowering turns into code.
 //!
 //! Invariants:
-//! * Names are resolved, types are known, conversions are explicit, constant integer and double operations are folded.
-//! * An expression that a mistake was reported about is [`Kind::Error`]; it spreads silently and is never lowered.
-//! * A place (something that may be assigned, referred to or indexed) is a [`Kind::Variable`] under [`Kind::Index`] and
-//!   [`Kind::Field`]; which memory it means follows from the type at its top.
+//! * Names are resolved, types are known, conversions are explicit, constant integer and double
+//!   operations are folded.
+//! * An expression that a mistake was reported about is [`Kind::Error`]; it spreads silently and is
+//!   never lowered.
+//! * A place (something that may be assigned, referred to or indexed) is a [`Kind::Variable`] under
+//!   [`Kind::Index`] and [`Kind::Field`]; which memory it means follows from the type at its top.
 
 use super::types::{Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
@@ -36,11 +38,13 @@ pub(super) struct Place {
     pub(super) base: Size,
     /// Whether it may be assigned.
     pub(super) mutable: bool,
-    /// Where a variable was declared that could be left out (see `left_out`); nowhere for all others.
+    /// Where a variable was declared that could be left out (see `left_out`); nowhere for all
+    /// others.
     pub(super) declared: Span,
 }
 
-/// Offsets of words below this are variables; from it on, `meta` variables, until the layout is final.
+/// Offsets of words below this are variables; from it on, `meta` variables, until the layout is
+/// final.
 pub(super) const META_WORDS: u32 = 1 << 29;
 /// Offsets of words from this on are locations of processes, until the layout is final.
 pub(super) const LOCATION_WORDS: u32 = 1 << 30;
@@ -83,8 +87,8 @@ pub(super) enum Kind {
     Field { record: Box<Expr>, offset: Size },
     /// An integer as a double.
     ToDouble(Box<Expr>),
-    /// A value that only statistical queries know, and what it comes from; it stands only where nothing depends on it, and is never
-    /// lowered.
+    /// A value that only statistical queries know, and what it comes from; it stands only where
+    /// nothing depends on it, and is never lowered.
     Unknown(Box<Expr>),
     /// A double truncated to an integer.
     ToInteger(Box<Expr>),
@@ -184,7 +188,8 @@ pub(super) struct Signature {
     pub(super) result: Type,
     /// What it does to the state.
     pub(super) effects: Effects,
-    /// Set if its result hangs on values that only statistical queries know. Then it is not lowered.
+    /// Set if its result hangs on values that only statistical queries know. Then it is not
+    /// lowered.
     pub(super) unknown: Option<Unknown>,
 }
 
@@ -286,7 +291,8 @@ pub(super) struct Local {
     pub(super) ty: Type,
     /// Whether it must lie in memory because something refers to it.
     pub(super) addressed: bool,
-    /// Whether it is a parameter by reference: another name for something that other names may mean as well.
+    /// Whether it is a parameter by reference: another name for something that other names may mean
+    /// as well.
     pub(super) reference: bool,
 }
 
@@ -486,7 +492,8 @@ impl Expr {
         })
     }
 
-    /// Whether it stands for a variable whose values are left out; a place in itself, it is not among [`Expr::is_place`].
+    /// Whether it stands for a variable whose values are left out; a place in itself, it is not
+    /// among [`Expr::is_place`].
     fn is_left_out(&self) -> bool {
         matches!(&self.kind, Kind::Unknown(_))
     }

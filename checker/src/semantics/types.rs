@@ -1,13 +1,15 @@
 //! Types: what values there are, how much room they take, and which may stand for which.
 //!
-//! All bounds and sizes are known numbers: a template is checked once for each of its instances, with its parameters
-//! known. [`Type::Error`] stands for a type that could not be found out; nothing is reported about it again.
+//! All bounds and sizes are known numbers: a template is checked once for each of its instances,
+//! with its parameters known. [`Type::Error`] stands for a type that could not be found out;
+//! nothing is reported about it again.
 //!
-//! A value may take room in three memories at once (a struct may hold integers, clocks and channels), so a [`Size`] and a
-//! place count in all three.
+//! A value may take room in three memories at once (a struct may hold integers, clocks and
+//! channels), so a [`Size`] and a place count in all three.
 //!
-//! Source: UPPAAL's documentation on types, and the official parser's rules of equivalence (types of equal structure are
-//! the same, ranges must have equal bounds, every `scalar[n]` is a set of its own).
+//! Source: UPPAAL's documentation on types, and the official parser's rules of equivalence (types
+//! of equal structure are the same, ranges must have equal bounds, every `scalar[n]` is a set of
+//! its own).
 
 use std::fmt;
 use std::sync::Arc;
@@ -15,7 +17,8 @@ use std::sync::Arc;
 /// The bounds of `int` without a range.
 pub(super) const DEFAULT_INT: (i32, i32) = (-32768, 32767);
 
-/// The most words, clocks or channels that a declaration may take, and the most words of all declarations together.
+/// The most words, clocks or channels that a declaration may take, and the most words of all
+/// declarations together.
 pub(super) const SIZE_LIMIT: u64 = 1 << 24;
 
 /// The most channels of a model: each has a name of its own.
@@ -49,7 +52,8 @@ pub(super) enum Type {
     Array(Arc<ArrayType>),
     /// A struct.
     Struct(Arc<StructType>),
-    /// The difference of two clocks, or a clock and an integer; only while an expression is checked.
+    /// The difference of two clocks, or a clock and an integer; only while an expression is
+    /// checked.
     ClockTerm,
     /// A condition on clocks.
     Constraint(Class),
@@ -374,7 +378,8 @@ impl Type {
         }
     }
 
-    /// Whether every value of the other type, read word by word, is one of this type: ranges may be wider here.
+    /// Whether every value of the other type, read word by word, is one of this type: ranges may be
+    /// wider here.
     pub(super) fn holds(&self, other: &Type) -> bool {
         match (self, other) {
             (Type::Array(a), Type::Array(b)) => a.index == b.index && a.part.holds(&b.part),

@@ -1,8 +1,10 @@
-//! The syntax tree of UPPAAL models and queries: what was written, with its place, and nothing of what it means.
+//! The syntax tree of UPPAAL models and queries: what was written, with its place, and nothing of
+//! what it means.
 //!
 //! Invariants:
 //! * Names are text; nothing is resolved, no type is known, no constant is folded.
-//! * Every node carries the span that it was read from; a node made up by the reader has the span of its cause.
+//! * Every node carries the span that it was read from; a node made up by the reader has the span
+//!   of its cause.
 //! * The three readers (XML, XTA, old TA syntax) produce the same tree.
 
 use crate::diagnostics::Span;
@@ -23,11 +25,13 @@ pub struct Document {
     pub declarations: Vec<Declaration>,
     /// The templates, in file order.
     pub templates: Vec<Template>,
-    /// What stands in `<instantiation>` and `<system>`: declarations, instantiations, the system line.
+    /// What stands in `<instantiation>` and `<system>`: declarations, instantiations, the system
+    /// line.
     pub system: System,
     /// The queries of the file, in order; empty and comment-only formulas are left out.
     pub queries: Vec<QueryText>,
-    /// Constructs that were read and are not supported: LSC templates, dynamic templates, external functions.
+    /// Constructs that were read and are not supported: LSC templates, dynamic templates, external
+    /// functions.
     pub unsupported: Vec<Unsupported>,
 }
 
@@ -156,7 +160,8 @@ pub struct StructField {
 /// One `[…]` after a declared name.
 #[derive(Clone, Debug)]
 pub enum Dimension {
-    /// `[expression]`: a size. A bare type name also parses as this; the semantics tells them apart.
+    /// `[expression]`: a size. A bare type name also parses as this; the semantics tells them
+    /// apart.
     Size(Expr),
     /// `[int[0,3]]`, `[scalar[2]]`: an index type.
     Type(TypeExpr),
@@ -532,7 +537,8 @@ pub struct Sync {
 pub struct System {
     /// Declarations, in order with the instantiations.
     pub items: Vec<SystemItem>,
-    /// The `system` line: the processes of each priority level, lowest first (one level without `<`).
+    /// The `system` line: the processes of each priority level, lowest first (one level without
+    /// `<`).
     pub processes: Vec<Vec<Name>>,
     /// `progress { … }`: read, type-checked, not used.
     pub progress: Vec<Expr>,
@@ -605,7 +611,8 @@ pub enum QueryKind {
         /// The file.
         file: String,
     },
-    /// A query that was recognised and is not supported; the name says which kind (statistical, learning, cost, …).
+    /// A query that was recognised and is not supported; the name says which kind (statistical,
+    /// learning, cost, …).
     Unsupported(Name),
 }
 
@@ -623,7 +630,8 @@ pub enum Extremum {
 pub struct Control {
     /// What the controller is to enforce.
     pub objective: Objective,
-    /// `E<> control: …`: whether it can be enforced from some state that is reachable with the environment's help.
+    /// `E<> control: …`: whether it can be enforced from some state that is reachable with the
+    /// environment's help.
     pub cooperative: bool,
     /// `control_t*(u, g)`: the bounds, each optional; `None` for plain `control`.
     pub time_optimal: Option<(Option<Expr>, Option<Expr>)>,

@@ -1,4 +1,5 @@
-//! Declarations: types, variables, functions, priorities, hooks; what is recognised and not supported is recorded.
+//! Declarations: types, variables, functions, priorities, hooks; what is recognised and not
+//! supported is recorded.
 
 use super::ast::{
     Block, Declaration, Expr, Function, Initialiser, TypeExpr, Unsupported, UnsupportedPart,
@@ -21,7 +22,8 @@ pub(super) enum Scope {
 }
 
 impl Parser<'_> {
-    /// The declarations of a template, to the end of the text or a word that begins the next part of a process.
+    /// The declarations of a template, to the end of the text or a word that begins the next part
+    /// of a process.
     pub(super) fn local_declarations(&mut self) -> Vec<Declaration> {
         let mut declarations = Vec::new();
         while !self.at_end() && !self.at(TokenKind::RightBrace) && !self.at_process_part() {

@@ -1,7 +1,7 @@
 //! From bytes to text: byte order marks, declared encodings, and the refusal of what is no text.
 //!
-//! Known are UTF-8, UTF-16 in both byte orders, US-ASCII and Latin-1; a byte order mark wins over what the XML
-//! declaration says. Positions count characters, so they are right in every encoding.
+//! Known are UTF-8, UTF-16 in both byte orders, US-ASCII and Latin-1; a byte order mark wins over
+//! what the XML declaration says. Positions count characters, so they are right in every encoding.
 
 use super::codes;
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};

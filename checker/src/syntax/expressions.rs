@@ -1,12 +1,12 @@
 //! Expressions: operator precedence, prefix and postfix forms, quantifiers.
 //!
-//! Precedence, loosest first: assignment and `?:` (from the right); `|| or xor imply` (one level, from the left);
-//! `&& and`; `|`; `^`; `&`; `== !=`; `< <= >= >`; `<? >?`; `<< >>`; `+ -`; `* / %`; `**`; prefix; postfix.
-//! The body of a quantifier extends as far to the right as it can.
+//! Precedence, loosest first: assignment and `?:` (from the right); `|| or xor imply` (one level,
+//! from the left); `&& and`; `|`; `^`; `&`; `== !=`; `< <= >= >`; `<? >?`; `<< >>`; `+ -`; `* / %`;
+//! `**`; prefix; postfix. The body of a quantifier extends as far to the right as it can.
 //!
-//! Long runs of one of `&&` and `||` become a balanced tree: generated models join thousands of operands, and the
-//! order of evaluation stays the same. Other trees are refused beyond [`MAX_HEIGHT`] levels, so that every walk over a
-//! tree may recurse.
+//! Long runs of one of `&&` and `||` become a balanced tree: generated models join thousands of
+//! operands, and the order of evaluation stays the same. Other trees are refused beyond
+//! [`MAX_HEIGHT`] levels, so that every walk over a tree may recurse.
 
 use super::ast::{
     BinaryOp, Expr, ExprKind, Name, Quantifier, UnaryOp, Unsupported, UnsupportedPart,
@@ -109,7 +109,8 @@ impl Parser<'_> {
         left
     }
 
-    /// The node from `start` to here, one level above the last expression and another of the given height.
+    /// The node from `start` to here, one level above the last expression and another of the given
+    /// height.
     fn node(&mut self, start: Span, kind: ExprKind, other_height: u32) -> Expr {
         self.height = self.height.max(other_height) + 1;
         let span = self.since(start);

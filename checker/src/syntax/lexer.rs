@@ -1,9 +1,12 @@
 //! From text to tokens.
 //!
 //! Invariants:
-//! * The tokens lie in the text in order and do not overlap; the last one is [`TokenKind::End`], empty, at the end.
-//! * Words are not told apart here: a keyword of a model may be a name in a query, so the parser decides.
-//! * The longest token wins, as in UPPAAL: `E<>` and `A[]` are one token only without a blank inside.
+//! * The tokens lie in the text in order and do not overlap; the last one is [`TokenKind::End`],
+//!   empty, at the end.
+//! * Words are not told apart here: a keyword of a model may be a name in a query, so the parser
+//!   decides.
+//! * The longest token wins, as in UPPAAL: `E<>` and `A[]` are one token only without a blank
+//!   inside.
 //!
 //! Cost: linear in the text.
 
@@ -12,7 +15,8 @@ use crate::cancellation;
 use super::codes;
 use crate::diagnostics::{Diagnostic, SourceId, Span};
 
-/// What bounds the memory for a text that is nothing but tokens: a tree takes up to 100 bytes for each.
+/// What bounds the memory for a text that is nothing but tokens: a tree takes up to 100 bytes for
+/// each.
 const MOST_TOKENS: usize = 20_000_000;
 
 /// A token and its bytes.

@@ -1,11 +1,14 @@
 //! From text to syntax trees: lexer, parser, and the readers of the file formats.
 //!
-//! Parsing never fails and never panics: it returns a tree and a list of diagnostics. It knows no types and resolves no
-//! names; the locations that an edge refers to are text like everything else.
+//! Parsing never fails and never panics: it returns a tree and a list of diagnostics. It knows no
+//! types and resolves no names; the locations that an edge refers to are text like everything else.
 //!
-//! Source: the UPPAAL language reference, and the behaviour of utap where the reference is silent. Where we differ:
-//! * Names of built-in functions may be declared (warning); words of the query language may name locations (warning).
-//! * The order of the parts of a textual process and of an XML template is free; `for` may leave parts out.
+//! Source: the UPPAAL language reference, and the behaviour of utap where the reference is silent.
+//! Where we differ:
+//! * Names of built-in functions may be declared (warning); words of the query language may name
+//!   locations (warning).
+//! * The order of the parts of a textual process and of an XML template is free; `for` may leave
+//!   parts out.
 //! * Comments in a label do not cut it off; a label that holds only comments counts as absent.
 //! * The old syntax is recognised by constructs that only it has; no switch is needed.
 //!
@@ -65,8 +68,8 @@ pub struct Parsed {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Reads a model. The format is found from the content: XML begins with `<`; everything else is a textual model, in
-/// the old syntax if it uses what only that one has.
+/// Reads a model. The format is found from the content: XML begins with `<`; everything else is a
+/// textual model, in the old syntax if it uses what only that one has.
 pub fn read_model(path: &str, bytes: &[u8], sources: &mut SourceMap) -> Parsed {
     let mut diagnostics = Vec::new();
     let document = match encoding::decode_model(path, bytes, sources, &mut diagnostics) {

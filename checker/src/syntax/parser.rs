@@ -3,10 +3,11 @@
 //! The grammar stands in the modules below this one, one function per production, named like it.
 //!
 //! Invariants:
-//! * A parse function always returns a node; what it could not read was reported and is an error node or left out.
+//! * A parse function always returns a node; what it could not read was reported and is an error
+//!   node or left out.
 //! * One token is blamed at most once, so one mistake gives one diagnostic.
-//! * Every loop consumes a token per turn, and recursion stops at [`MAX_NESTING`] levels, so any text ends in bounded
-//!   time and stack.
+//! * Every loop consumes a token per turn, and recursion stops at [`MAX_NESTING`] levels, so any
+//!   text ends in bounded time and stack.
 
 use super::ast::{Expr, ExprKind, Name, Unsupported};
 use super::codes;
@@ -245,7 +246,8 @@ impl<'a> Parser<'a> {
         self.gave_up = true;
     }
 
-    /// Reports nothing about the current token: the text was skipped up to here because of an earlier mistake.
+    /// Reports nothing about the current token: the text was skipped up to here because of an
+    /// earlier mistake.
     pub(super) fn stay_quiet(&mut self) {
         self.blamed = Some(self.position);
     }
@@ -270,7 +272,8 @@ impl<'a> Parser<'a> {
         self.expected_at(self.here(), what);
     }
 
-    /// Reports that a closing symbol was left out: behind the previous token if the next one is on another line.
+    /// Reports that a closing symbol was left out: behind the previous token if the next one is on
+    /// another line.
     pub(super) fn missing(&mut self, what: &str) {
         let here = self.here();
         let behind = self.behind_previous();
@@ -318,7 +321,8 @@ impl<'a> Parser<'a> {
             .help(format!("write `{new}`; only the old syntax knows `{old}`"))
     }
 
-    /// Consumes a token of this kind or reports; `context` says where it was expected ("after the declaration").
+    /// Consumes a token of this kind or reports; `context` says where it was expected ("after the
+    /// declaration").
     pub(super) fn expect(&mut self, kind: TokenKind, context: &str) -> bool {
         let found = self.eat(kind);
         if !found {
@@ -361,7 +365,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Whether the current word begins a construct of its own, so that it is more likely that a name was left out.
+    /// Whether the current word begins a construct of its own, so that it is more likely that a
+    /// name was left out.
     fn is_structural_word(&self) -> bool {
         let next = self.peek(1).kind;
         match self.word() {
@@ -386,7 +391,8 @@ impl<'a> Parser<'a> {
         name
     }
 
-    /// Runs `read` one level deeper; at the limit it reports, skips the rest of the text and returns `None`.
+    /// Runs `read` one level deeper; at the limit it reports, skips the rest of the text and
+    /// returns `None`.
     pub(super) fn nested<T>(&mut self, read: impl FnOnce(&mut Self) -> T) -> Option<T> {
         if self.nesting >= MAX_NESTING {
             let message = format!("nested deeper than {MAX_NESTING} levels");
@@ -420,7 +426,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Skips to the next of `stops` at this level of brackets, or to a closing bracket of an outer level.
+    /// Skips to the next of `stops` at this level of brackets, or to a closing bracket of an outer
+    /// level.
     pub(super) fn skip_to(&mut self, stops: &[TokenKind]) {
         let mut depth = 0_u32;
         while !self.at_end() {
@@ -444,8 +451,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// After a mistake in a declaration or statement: on to the next `;`, the end of the block, or a word that begins
-    /// a declaration.
+    /// After a mistake in a declaration or statement: on to the next `;`, the end of the block, or
+    /// a word that begins a declaration.
     pub(super) fn recover(&mut self) {
         let mut depth = 0_u32;
         while !self.at_end() {

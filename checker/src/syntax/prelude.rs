@@ -1,10 +1,12 @@
-//! What every model can use without declaring it: ranges of machine integers and constants of mathematics.
+//! What every model can use without declaring it: ranges of machine integers and constants of
+//! mathematics.
 
 use super::ast::Declaration;
 use super::parser::{Dialect, Parser};
 use crate::diagnostics::{Source, SourceMap, Span};
 
-/// The declarations that UPPAAL puts before every model. `UINT8_MAX` is 255; the reference manual's 256 is a slip.
+/// The declarations that UPPAAL puts before every model. `UINT8_MAX` is 255; the reference manual's
+/// 256 is a slip.
 const PRELUDE: &str = "\
 const int INT8_MIN = -128, INT8_MAX = 127, UINT8_MAX = 255;
 const int INT16_MIN = -32768, INT16_MAX = 32767, UINT16_MAX = 65535;

@@ -1,7 +1,7 @@
 //! Expressions and types back as text, with no more parentheses than needed.
 //!
-//! Invariant: reading the text again gives the same tree, places aside. Two trees that differ in how long runs of `&&`
-//! and `||` are bracketed may give one text.
+//! Invariant: reading the text again gives the same tree, places aside. Two trees that differ in
+//! how long runs of `&&` and `||` are bracketed may give one text.
 
 use super::ast::{BinaryOp, Expr, ExprKind, Prefixes, Quantifier, TypeExpr, TypeKind, UnaryOp};
 use super::ast::{Dimension, StructField};

@@ -1,4 +1,5 @@
-//! The parts of textual models: process definitions, instantiations, the system line, and what may follow it.
+//! The parts of textual models: process definitions, instantiations, the system line, and what may
+//! follow it.
 
 use super::ast::{
     BinaryOp, Branchpoint, Declaration, Document, Edge, Expr, ExprKind, Location, Name, QueryText,
@@ -75,7 +76,8 @@ impl Parser<'_> {
     fn declaration_of(&mut self, part: Part, document: &mut Document) {
         let mut declarations = Vec::new();
         self.declaration(Scope::Global, &mut declarations);
-        // In a textual model, declarations are global as long as a process may follow that uses them.
+        // In a textual model, declarations are global as long as a process may follow that uses
+        // them.
         let is_global = match part {
             Part::Declarations => true,
             Part::Whole => document.system.items.is_empty(),
@@ -163,8 +165,8 @@ impl Parser<'_> {
         self.closing(TokenKind::RightBrace, "after the progress measures");
     }
 
-    /// `IO P(1) { a!, b? }`: which channels are a process's outputs and inputs. Only Ecdar's queries look at it, so the tree does not
-    /// keep it.
+    /// `IO P(1) { a!, b? }`: which channels are a process's outputs and inputs. Only Ecdar's
+    /// queries look at it, so the tree does not keep it.
     fn interface(&mut self) {
         let start = self.here();
         self.bump();

@@ -1,4 +1,5 @@
-//! The query language: path formulas, extrema, games, strategies; statistical and learning queries by name only.
+//! The query language: path formulas, extrema, games, strategies; statistical and learning queries
+//! by name only.
 
 use super::ast::{Control, Expr, ExprKind, Extremum, Name, Objective, Query, QueryKind};
 use super::codes;
@@ -166,7 +167,8 @@ impl Parser<'_> {
         })
     }
 
-    /// `E[<=10](max: x)`, and not an array named `E`: a bound stands in the brackets, and `(name:` follows them.
+    /// `E[<=10](max: x)`, and not an array named `E`: a bound stands in the brackets, and `(name:`
+    /// follows them.
     fn at_expected_value(&self) -> bool {
         let mut depth = 0_u32;
         for distance in 1.. {

@@ -186,8 +186,9 @@ impl Parser<'_> {
     }
 }
 
-/// A loop whose first and last part may be lists. The tree has one expression in each place, so the others become
-/// statements before the loop and at the end of its body; there is no `continue` that could tell the difference.
+/// A loop whose first and last part may be lists. The tree has one expression in each place, so the
+/// others become statements before the loop and at the end of its body; there is no `continue` that
+/// could tell the difference.
 fn for_loop(
     mut init: Vec<Expr>,
     condition: Option<Expr>,

@@ -1,7 +1,9 @@
-//! XML models, of every DTD version: the DTD itself is never fetched and its version does not matter.
+//! XML models, of every DTD version: the DTD itself is never fetched and its version does not
+//! matter.
 //!
-//! Every text that is parsed becomes a source with its place in words. Unknown elements, attributes and kinds of labels
-//! are skipped, an empty label is an absent one, and the order of elements is free.
+//! Every text that is parsed becomes a source with its place in words. Unknown elements, attributes
+//! and kinds of labels are skipped, an empty label is an absent one, and the order of elements is
+//! free.
 //!
 //! Source: the UPPAAL manual on file formats, and how utap reads what it leaves open.
 
@@ -62,7 +64,8 @@ pub(super) fn read(
     }
 }
 
-/// roxmltree bounds the nesting of entities (10) and their references in one expansion (255), not their sum.
+/// roxmltree bounds the nesting of entities (10) and their references in one expansion (255), not
+/// their sum.
 fn expands_too_much(text: &str) -> bool {
     let declared = text.find("<!ENTITY").map(|start| {
         let end = text.rfind("]>").unwrap_or(text.len());
@@ -188,7 +191,8 @@ impl Reader<'_, '_> {
         }
     }
 
-    /// Reads an element of the system section, if it is one; returns whether it holds the system line.
+    /// Reads an element of the system section, if it is one; returns whether it holds the system
+    /// line.
     fn system_section(&mut self, node: Node) -> bool {
         match node.tag_name().name() {
             "instantiation" => self.part(node, Part::Instantiations, "instantiations"),

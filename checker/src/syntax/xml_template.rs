@@ -1,7 +1,7 @@
 //! Templates of XML models: locations, branch points, edges and their labels.
 //!
-//! A transition is controllable if its attribute is absent or exactly `true`; every other value makes it the
-//! environment's, as in utap.
+//! A transition is controllable if its attribute is absent or exactly `true`; every other value
+//! makes it the environment's, as in utap.
 
 #![expect(
     clippy::redundant_closure_for_method_calls,

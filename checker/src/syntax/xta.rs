@@ -66,8 +66,9 @@ fn looks_like_a_model(text: &str, tokens: &[Token]) -> bool {
         })
 }
 
-/// Whether a text holds what only the old syntax has: constants without a type or a `=`, processes without a list of
-/// parameters, and `;` between parameters. A word that only the new syntax has decides otherwise: then it is a slip.
+/// Whether a text holds what only the old syntax has: constants without a type or a `=`, processes
+/// without a list of parameters, and `;` between parameters. A word that only the new syntax has
+/// decides otherwise: then it is a slip.
 pub(super) fn is_old_syntax(text: &str, tokens: &[Token]) -> bool {
     let is_new = tokens.iter().any(|&token| {
         matches!(

@@ -2,21 +2,24 @@
 //!
 //! A certificate is a list of words with zones. It is right if
 //! * the initial state is in it;
-//! * no time takes a state of it out of it: what each zone becomes within the invariants, up to where an urgent synchronisation stops
-//!   time, lies in the zones of the same words;
-//! * no move does: where a move is possible in a zone, what it becomes lies in the zones of the words after it;
+//! * no time takes a state of it out of it: what each zone becomes within the invariants, up to
+//!   where an urgent synchronisation stops time, lies in the zones of the same words;
+//! * no move does: where a move is possible in a zone, what it becomes lies in the zones of the
+//!   words after it;
 //! * the predicate holds nowhere in it.
 //!
-//! Then no reachable state satisfies the predicate, whatever made the certificate: each point is checked exactly, by subtracting zones
-//! from zones ([`super::zone`]). That the zones are larger than what is reachable (extrapolation makes them so) does no harm as long as
-//! the four points hold.
+//! Then no reachable state satisfies the predicate, whatever made the certificate: each point is
+//! checked exactly, by subtracting zones from zones ([`super::zone`]). That the zones are larger
+//! than what is reachable (extrapolation makes them so) does no harm as long as the four points
+//! hold.
 //!
-//! Where a clock stands still beside two that run, what a zone becomes in time is no zone. If the least zone around it lies in the
-//! zones of the same words, all is well; if not, that shows nothing, and the check has no result. So it has for deadlocks
-//! there, unless a move is possible at once.
+//! Where a clock stands still beside two that run, what a zone becomes in time is no zone. If the
+//! least zone around it lies in the zones of the same words, all is well; if not, that shows
+//! nothing, and the check has no result. So it has for deadlocks there, unless a move is possible
+//! at once.
 //!
-//! Words are all words, `meta` variables included, whether or not a search takes states that differ in them alone for the same. So what
-//! holds does so whichever of them are kept.
+//! Words are all words, `meta` variables included, whether or not a search takes states that differ
+//! in them alone for the same. So what holds does so whichever of them are kept.
 //!
 //! Cost: for each zone and move, one zone minus all those of the words after it.
 
@@ -76,7 +79,8 @@ pub enum Outcome {
     Violated(Defect, Vec<i32>),
 }
 
-/// Checks that the certificate shows that no reachable state satisfies the predicate. The network must hold its code.
+/// Checks that the certificate shows that no reachable state satisfies the predicate. The network
+/// must hold its code.
 pub fn verify(network: &Network, states: &[States], avoided: &Predicate) -> Result<Outcome, Error> {
     if network.features.stopwatches && network.features.clock_guarded_urgent {
         let what = "stopwatches beside clock guards on urgent channels";
@@ -143,7 +147,8 @@ struct Possible {
     level: (u32, u32),
     target: Vec<i32>,
     assignments: Vec<EmittedAssignment>,
-    /// Where its guards hold, nobody abstains who may not, and the invariants of the target hold after it.
+    /// Where its guards hold, nobody abstains who may not, and the invariants of the target hold
+    /// after it.
     enabled: Vec<Zone>,
 }
 
@@ -260,8 +265,8 @@ impl Check<'_> {
         Ok(None)
     }
 
-    /// The combinations of edges that are possible somewhere in a zone as far as words and guards decide, and where an urgent one
-    /// stops time.
+    /// The combinations of edges that are possible somewhere in a zone as far as words and guards
+    /// decide, and where an urgent one stops time.
     fn combinations(
         &self,
         candidates: &[Vec<Candidate>],
@@ -471,8 +476,9 @@ fn guarded(guard: &[FixedConstraint], excluded: &[Vec<FixedConstraint>], zone: &
     parts
 }
 
-/// What a zone becomes while time passes, up to the barriers: each stops time, so a wait ends before it begins or in its first
-/// moment, or starts after its end, or runs beside it. Clocks that stand still are not expected beside barriers.
+/// What a zone becomes while time passes, up to the barriers: each stops time, so a wait ends
+/// before it begins or in its first moment, or starts after its end, or runs beside it. Clocks that
+/// stand still are not expected beside barriers.
 fn futures(zone: &Zone, stopped: &[bool], barriers: &[Zone]) -> Vec<Zone> {
     // Where a wait may start, and what holds at its end.
     let mut waits: Vec<(Zone, Vec<Comparison>)> = vec![(zone.clone(), Vec::new())];

@@ -1,7 +1,7 @@
 //! What can happen next in a state with exact clock values, and when: for simulating runs.
 //!
-//! While time passes, what is possible changes only at the moments of [`super::moments`]; so a move is possible in whole windows
-//! between them, which are found by looking once into each.
+//! While time passes, what is possible changes only at the moments of [`super::moments`]; so a move
+//! is possible in whole windows between them, which are found by looking once into each.
 
 use crate::ir::Network;
 
@@ -13,7 +13,8 @@ use super::moments::Moments;
 pub struct Choice {
     /// Its participants, the sender first.
     pub parts: Vec<Part>,
-    /// The waits after which it is possible, as ascending windows of ticks from first to last; without a last one for ever.
+    /// The waits after which it is possible, as ascending windows of ticks from first to last;
+    /// without a last one for ever.
     pub windows: Vec<(i64, Option<i64>)>,
 }
 
@@ -38,7 +39,8 @@ impl<'a> Choices<'a> {
         Ok(halved(self.semantics.initial()?))
     }
 
-    /// What can happen in a state, in the order of the first moments; and how long time can pass, `None` for ever.
+    /// What can happen in a state, in the order of the first moments; and how long time can pass,
+    /// `None` for ever.
     pub fn of(&self, state: &State) -> Result<(Vec<Choice>, Option<i64>), Error> {
         let state = doubled(state);
         let is_stopped = self.semantics.stopped(&state)?;

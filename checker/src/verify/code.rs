@@ -1,12 +1,13 @@
-//! The code of a model on words: conditions, updates and the composition of edges into moves, from the definitions.
+//! The code of a model on words: conditions, updates and the composition of edges into moves, from
+//! the definitions.
 //!
-//! What code says about clocks is handed on as constraints and assignments. [`super::concrete`] evaluates them on clock values,
-//! [`super::certificate`] on sets of values.
+//! What code says about clocks is handed on as constraints and assignments. [`super::concrete`]
+//! evaluates them on clock values, [`super::certificate`] on sets of values.
 //!
 //! The definitions (the documentation's pages on semantics, edges and locations):
 //! * one of the participants of a move leaves a committed location if some process is in one;
-//! * a binary synchronisation takes two processes, sender and receiver; a broadcast takes the sender and, of every other process
-//!   with an enabled receiving edge, exactly one such edge;
+//! * a binary synchronisation takes two processes, sender and receiver; a broadcast takes the
+//!   sender and, of every other process with an enabled receiving edge, exactly one such edge;
 //! * updates run sender first, then receivers in the order of the processes.
 //!
 //! Cost: written to be read; every call allocates.
@@ -159,7 +160,8 @@ impl<'a> Code<'a> {
         Ok(Some(constraints))
     }
 
-    /// The edges of a process whose guards hold as far as words decide, and whose clock constraints are accepted.
+    /// The edges of a process whose guards hold as far as words decide, and whose clock constraints
+    /// are accepted.
     pub(super) fn candidates(
         &self,
         process: usize,
@@ -200,8 +202,8 @@ impl<'a> Code<'a> {
         Ok(found)
     }
 
-    /// All combinations of candidates, given by process, that make a move. Those of a broadcast are put
-    /// together receiver by receiver, and given up where `is_possible` says no.
+    /// All combinations of candidates, given by process, that make a move. Those of a broadcast are
+    /// put together receiver by receiver, and given up where `is_possible` says no.
     pub(super) fn combinations(
         &self,
         candidates: &[Vec<Candidate>],

@@ -1,14 +1,17 @@
 //! States with exact clock values, and their moves, from the definitions.
 //!
-//! Clock values are integers: numbers of *ticks*, of which [`Semantics::ticks_per_unit`] make one unit of the model's time.
-//! Every rational valuation can be had by choosing it large enough.
+//! Clock values are integers: numbers of *ticks*, of which [`Semantics::ticks_per_unit`] make one
+//! unit of the model's time. Every rational valuation can be had by choosing it large enough.
 //!
-//! The definitions (the documentation's page on semantics; [`super::code`] has those about which edges go together):
-//! * a move is possible if the guards of all participants hold in the source state, the invariants hold after all updates, and
-//!   no move of a higher priority is possible;
-//! * time passes neither in urgent and committed locations nor while a synchronisation on an urgent channel is enabled.
+//! The definitions (the documentation's page on semantics; [`super::code`] has those about which
+//! edges go together):
+//! * a move is possible if the guards of all participants hold in the source state, the invariants
+//!   hold after all updates, and no move of a higher priority is possible;
+//! * time passes neither in urgent and committed locations nor while a synchronisation on an urgent
+//!   channel is enabled.
 //!
-//! [`Semantics::moves`] and [`Semantics::take`] ignore priorities, [`Semantics::successors`] does not.
+//! [`Semantics::moves`] and [`Semantics::take`] ignore priorities, [`Semantics::successors`] does
+//! not.
 //!
 //! Cost: written to be read; every state allocates.
 
@@ -163,7 +166,8 @@ impl<'a> Semantics<'a> {
         Ok(later)
     }
 
-    /// All moves whose guards hold; whether the invariants of their targets do is not looked at, nor are priorities.
+    /// All moves whose guards hold; whether the invariants of their targets do is not looked at,
+    /// nor are priorities.
     pub fn moves(&self, state: &State) -> Result<Vec<Move>, Error> {
         let found = self.combinations(state)?;
         Ok(found.into_iter().map(|one| self.to_move(one)).collect())
@@ -196,8 +200,8 @@ impl<'a> Semantics<'a> {
         }
     }
 
-    /// The possible moves with the states that they lead to: those whose targets satisfy the invariants, of the highest priority
-    /// among these.
+    /// The possible moves with the states that they lead to: those whose targets satisfy the
+    /// invariants, of the highest priority among these.
     pub fn successors(&self, state: &State) -> Result<Vec<(Move, State)>, Error> {
         let mut found = Vec::new();
         for one in self.moves(state)? {
@@ -254,7 +258,8 @@ impl<'a> Semantics<'a> {
         self.holds_where(predicate, state, &deadlock)
     }
 
-    /// Whether a predicate of a query holds; `deadlock` says whether the predicate of this name does.
+    /// Whether a predicate of a query holds; `deadlock` says whether the predicate of this name
+    /// does.
     pub(super) fn holds_where(
         &self,
         predicate: &Predicate,

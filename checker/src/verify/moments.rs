@@ -1,10 +1,11 @@
 //! The moments of a wait at which something may change.
 //!
-//! While time passes, a comparison of a running clock with a constant changes its truth only where the clock meets the constant,
-//! and one of two running clocks never does. So what holds at the moments where some clock meets some constant of the
-//! model or the query, at one moment between each two of them, and at one after the last, holds at all moments. Among
-//! the constants are those that a clock meets only through the update of a move: with `x = y + k` a comparison of x with c is
-//! one of y with c - k; with `y = r` one of x - y with c is one of x with c + r.
+//! While time passes, a comparison of a running clock with a constant changes its truth only where
+//! the clock meets the constant, and one of two running clocks never does. So what holds at the
+//! moments where some clock meets some constant of the model or the query, at one moment between
+//! each two of them, and at one after the last, holds at all moments. Among the constants are those
+//! that a clock meets only through the update of a move: with `x = y + k` a comparison of x with c
+//! is one of y with c - k; with `y = r` one of x - y with c is one of x with c + r.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +14,8 @@ use crate::ir::{AssignedValue, ClockAtom, ClockChoice, ClockRange, Network, Pred
 use super::concrete::{Error, State};
 use super::regions;
 
-/// Values of an expression that are tried one by one; with more of them every integer counts as a constant.
+/// Values of an expression that are tried one by one; with more of them every integer counts as a
+/// constant.
 const MOST_VALUES: i64 = 4096;
 
 /// Moments of one wait that are looked at, at most.
@@ -66,7 +68,8 @@ impl Moments {
         }
     }
 
-    /// Those of a network and of the comparisons of predicates; an error if a comparison has too many possible bounds.
+    /// Those of a network and of the comparisons of predicates; an error if a comparison has too
+    /// many possible bounds.
     pub(super) fn new(network: &Network, predicates: &[&Predicate]) -> Result<Moments, Error> {
         let mut atoms = Vec::new();
         for predicate in predicates {
@@ -110,7 +113,8 @@ impl Moments {
         })
     }
 
-    /// The stretches of a wait from a state, however long. Clock values must be even numbers of ticks; so are the ends then.
+    /// The stretches of a wait from a state, however long. Clock values must be even numbers of
+    /// ticks; so are the ends then.
     pub(super) fn stretches(
         &self,
         state: &State,
@@ -139,8 +143,9 @@ impl Moments {
         Ok(stretches.collect())
     }
 
-    /// The waits from a state to look at: 0, those at which something may change, one between each two, and the last. Without a
-    /// limit the last is one after which nothing changes. All in ticks; values and the limit must be even numbers of ticks.
+    /// The waits from a state to look at: 0, those at which something may change, one between each
+    /// two, and the last. Without a limit the last is one after which nothing changes. All in
+    /// ticks; values and the limit must be even numbers of ticks.
     pub(super) fn of(
         &self,
         state: &State,
@@ -206,7 +211,8 @@ fn collect(predicate: &Predicate, atoms: &mut Vec<ClockAtom>) {
     }
 }
 
-/// The greatest constant, in absolute value, that predicates compare clocks with, and whether they compare two clocks.
+/// The greatest constant, in absolute value, that predicates compare clocks with, and whether they
+/// compare two clocks.
 pub(super) fn constants(predicates: &[&Predicate]) -> (i64, bool) {
     let mut atoms = Vec::new();
     for predicate in predicates {
@@ -219,7 +225,8 @@ pub(super) fn constants(predicates: &[&Predicate]) -> (i64, bool) {
     (greatest.unwrap_or(0), has_differences)
 }
 
-/// Whether a predicate compares clocks or mentions `deadlock`: whether it may change while time passes.
+/// Whether a predicate compares clocks or mentions `deadlock`: whether it may change while time
+/// passes.
 pub(super) fn depends_on_time(predicate: &Predicate) -> bool {
     match predicate {
         Predicate::Clock(_) | Predicate::Deadlock => true,

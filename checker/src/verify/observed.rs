@@ -1,13 +1,18 @@
-//! Closing the loop of a strategy that goes by observations: the machine against every move of the environment.
+//! Closing the loop of a strategy that goes by observations: the machine against every move of the
+//! environment.
 //!
-//! The play goes over pairs of a state of the machine and a region (see [`super::regions`]), whose constants include those of the
-//! observations. As long as the observation stays the same, so does the state of the machine, and its action is proposed: where it
-//! is possible, it is taken or the environment moves; elsewhere the environment moves, or time passes to the next region. When the
+//! The play goes over pairs of a state of the machine and a region (see [`super::regions`]), whose
+//! constants include those of the observations. As long as the observation stays the same, so does
+//! the state of the machine, and its action is proposed: where it is possible, it is taken or the
+//! environment moves; elsewhere the environment moves, or time passes to the next region. When the
 //! observation changes, the machine goes to the state that it has for the new one. It is right if
-//! * it has a state for every observation that is met before the goal, and what must be kept holds until then;
-//! * where time cannot pass and its action is not possible, the environment has to move, or, if the controller has only to keep
-//!   something, may stop: as for a strategy that waits there ([`super::strategy`]);
-//! * if the goal has to be reached, the graph up to the goals has no cycle, not even a region without end.
+//! * it has a state for every observation that is met before the goal, and what must be kept holds
+//!   until then;
+//! * where time cannot pass and its action is not possible, the environment has to move, or, if the
+//!   controller has only to keep something, may stop: as for a strategy that waits there
+//!   ([`super::strategy`]);
+//! * if the goal has to be reached, the graph up to the goals has no cycle, not even a region
+//!   without end.
 //!
 //! What the machine says that it knows is not used.
 //!
@@ -50,8 +55,8 @@ pub struct MachineState {
     pub next: Vec<(Vec<bool>, usize)>,
 }
 
-/// Checks a machine of the controller, who sees `observations`, with this effort: pairs of a state of it and a region count. The
-/// constants of the observations must be among those of the claim.
+/// Checks a machine of the controller, who sees `observations`, with this effort: pairs of a state
+/// of it and a region count. The constants of the observations must be among those of the claim.
 pub fn verify(
     network: &Network,
     machine: &[MachineState],
@@ -74,7 +79,8 @@ pub fn verify(
 /// Where play stands: the state of the machine, and the region.
 type Place = (usize, State);
 
-/// A step with where it leads to; the number is missing where the machine has no state for what is observed there.
+/// A step with where it leads to; the number is missing where the machine has no state for what is
+/// observed there.
 type Successor = (Step, Option<usize>, State);
 
 /// A place on the path, with its successors that are still to be looked at.

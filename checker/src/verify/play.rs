@@ -1,8 +1,10 @@
-//! Playing against a strategy: what it does next, what its opponent can do until then, and who has won.
+//! Playing against a strategy: what it does next, what its opponent can do until then, and who has
+//! won.
 //!
-//! In a state with exact clock values both players lie in wait: the strategy acts at the first moment at which it does not decide to
-//! wait, its opponent at any moment before. At the same instant the environment is first. Where the strategy acts without a first
-//! moment, one is chosen for it. Moves, forced moves and ends of play are those of [`super::strategy`].
+//! In a state with exact clock values both players lie in wait: the strategy acts at the first
+//! moment at which it does not decide to wait, its opponent at any moment before. At the same
+//! instant the environment is first. Where the strategy acts without a first moment, one is chosen
+//! for it. Moves, forced moves and ends of play are those of [`super::strategy`].
 
 use std::cmp::Ordering;
 
@@ -25,7 +27,8 @@ pub struct Advice {
 /// How long a strategy waits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Waiting {
-    /// The half ticks after which it no longer waits, or the first moment that was chosen for it; `None` if it waits for ever.
+    /// The half ticks after which it no longer waits, or the first moment that was chosen for it;
+    /// `None` if it waits for ever.
     pub half_ticks: Option<i64>,
     /// The decisions that apply then, by index.
     pub then: Vec<usize>,
@@ -86,8 +89,8 @@ pub fn advice(
     Ok(advice)
 }
 
-/// The first moment of a stretch; of one without, the half tick after its beginning, which lies in each such stretch of the wait
-/// however finely it is cut.
+/// The first moment of a stretch; of one without, the half tick after its beginning, which lies in
+/// each such stretch of the wait however finely it is cut.
 fn soon(stretch: &Stretch) -> i64 {
     stretch.first + i64::from(stretch.is_open())
 }
@@ -187,7 +190,8 @@ pub enum Next {
     Acts {
         /// What it says.
         action: Vec<Part>,
-        /// The moves that this may be: several if the opponent picks among branches. These are replies too then.
+        /// The moves that this may be: several if the opponent picks among branches. These are
+        /// replies too then.
         legs: Vec<Vec<Part>>,
     },
     /// Play is over, and this player has won.
@@ -215,7 +219,8 @@ pub struct Situation {
     pub is_goal: bool,
 }
 
-/// What can happen in a state if the owner of the claim follows the strategy. The network must hold the code of the claim.
+/// What can happen in a state if the owner of the claim follows the strategy. The network must hold
+/// the code of the claim.
 pub fn look(
     network: &Network,
     strategy: &[Decisions],
@@ -305,7 +310,8 @@ impl View<'_> {
         Ok(())
     }
 
-    /// Whether something happens in a stretch at the latest; notes what, and what is possible before.
+    /// Whether something happens in a stretch at the latest; notes what, and what is possible
+    /// before.
     fn ends(&mut self, stretch: &Stretch, here: &Passed) -> Result<bool, Error> {
         let mut window = Window::of(stretch);
         self.situation.waits.last = window.last;
@@ -417,7 +423,8 @@ fn add(replies: &mut Vec<Timing>, parts: &[Part], window: Window) {
     }
 }
 
-/// The state after a wait in half ticks, and then a move if one is given; `None` if its target breaks an invariant.
+/// The state after a wait in half ticks, and then a move if one is given; `None` if its target
+/// breaks an invariant.
 pub fn after(
     network: &Network,
     timed: &Timed,

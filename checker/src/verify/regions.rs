@@ -1,21 +1,26 @@
 //! Regions: a finite set of valuations that stands for all.
 //!
-//! Two valuations are equivalent if the same moves are possible now and after every delay (with suitable other delays). With
-//! constraints on integer constants, what matters of a valuation is the integer parts of the clocks and the order of their
-//! fractional parts, and whether they are 0. So each region has a representative on a grid of `1 / (2 (n + 1))` for n clocks:
-//! the k-th smallest of the different fractional parts other than 0 becomes `2 k` ticks, and the odd ticks are where they go
-//! while those clocks that were integers are on their way. A plain grid without this renaming would be wrong for strict
-//! constraints, however fine: a run may need fractional parts that grow for ever below another one.
+//! Two valuations are equivalent if the same moves are possible now and after every delay (with
+//! suitable other delays). With constraints on integer constants, what matters of a valuation is
+//! the integer parts of the clocks and the order of their fractional parts, and whether they are 0.
+//! So each region has a representative on a grid of `1 / (2 (n + 1))` for n clocks: the k-th
+//! smallest of the different fractional parts other than 0 becomes `2 k` ticks, and the odd ticks
+//! are where they go while those clocks that were integers are on their way. A plain grid without
+//! this renaming would be wrong for strict constraints, however fine: a run may need fractional
+//! parts that grow for ever below another one.
 //!
 //! Two things make the set finite:
-//! * [`Bounding::Values`], without comparisons of clock differences: a clock above the greatest constant K stays just above it.
-//! * [`Bounding::Gaps`], with them: where the sorted values have a gap of more than `K + R` (R: the greatest value that a
-//!   clock is set to), the gap is shortened by whole units. Differences that are changed are above K before and after,
-//!   and stay so when a clock is set.
-//! * [`Bounding::Nothing`]: the set may be infinite; needed where copies with an increment meet comparisons of differences.
+//! * [`Bounding::Values`], without comparisons of clock differences: a clock above the greatest
+//!   constant K stays just above it.
+//! * [`Bounding::Gaps`], with them: where the sorted values have a gap of more than `K + R` (R: the
+//!   greatest value that a clock is set to), the gap is shortened by whole units. Differences that
+//!   are changed are above K before and after, and stay so when a clock is set.
+//! * [`Bounding::Nothing`]: the set may be infinite; needed where copies with an increment meet
+//!   comparisons of differences.
 //!
-//! Source: R. Alur, D. Dill, "A theory of timed automata", TCS 126, 1994, section 4; P. Bouyer, C. Dufourd, E. Fleury, A. Petit,
-//! "Updatable timed automata", TCS 321, 2004 (differences and copies).
+//! Source: R. Alur, D. Dill, "A theory of timed automata", TCS 126, 1994, section 4; P. Bouyer, C.
+//! Dufourd, E. Fleury, A. Petit, "Updatable timed automata", TCS 321, 2004 (differences and
+//! copies).
 
 use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Update};
 
@@ -47,8 +52,8 @@ impl Regions {
         2 * network.clocks.len().max(1) as i64
     }
 
-    /// The regions that tell apart what the network tells apart, and comparisons of a clock with constants up to `constant`, or of
-    /// two clocks if `has_differences`.
+    /// The regions that tell apart what the network tells apart, and comparisons of a clock with
+    /// constants up to `constant`, or of two clocks if `has_differences`.
     pub fn new(network: &Network, constant: i64, has_differences: bool) -> Result<Regions, Error> {
         if network.features.stopwatches {
             return Err(Error::Unsupported("stopwatches"));
@@ -56,8 +61,9 @@ impl Regions {
         Ok(Regions::with_bounding(network, constant, has_differences))
     }
 
-    /// Sets that stand for all with stopwatches too, of which there may be infinitely many: clocks have the same values, or both are above
-    /// the greatest constant if no two are compared. So they do after the same delays, and if they stand still.
+    /// Sets that stand for all with stopwatches too, of which there may be infinitely many: clocks
+    /// have the same values, or both are above the greatest constant if no two are compared. So
+    /// they do after the same delays, and if they stand still.
     pub fn of_values(network: &Network, constant: i64, has_differences: bool) -> Regions {
         let regions = Regions::with_bounding(network, constant, has_differences);
         Regions {
@@ -91,7 +97,8 @@ impl Regions {
         }
     }
 
-    /// The same regions for another number of ticks in a unit, which must be more than twice the number of clocks.
+    /// The same regions for another number of ticks in a unit, which must be more than twice the
+    /// number of clocks.
     #[must_use]
     pub fn with_ticks_per_unit(self, ticks_per_unit: i64) -> Regions {
         Regions {
@@ -142,7 +149,8 @@ impl Regions {
         let Some(&greatest) = fractions.iter().max() else {
             return false;
         };
-        // From integers into the open; or on until the clock with the greatest fractional part is an integer.
+        // From integers into the open; or on until the clock with the greatest fractional part is
+        // an integer.
         let ticks = if fractions.contains(&0) {
             1
         } else {
@@ -157,7 +165,8 @@ impl Regions {
         true
     }
 
-    /// Whether the next region, unlike this one, lasts: some clock leaves an integer, and time passes within the next region.
+    /// Whether the next region, unlike this one, lasts: some clock leaves an integer, and time
+    /// passes within the next region.
     pub fn opens(&self, clocks: &[i64]) -> bool {
         let is_integer = |clock: &i64| *clock % self.ticks_per_unit == 0;
         let mut running = clocks[1..].iter().filter(|&&clock| self.is_running(clock));
@@ -177,7 +186,8 @@ impl Regions {
     }
 }
 
-/// Shortens gaps between the sorted values that are longer than `longest` by whole units to at most one unit more.
+/// Shortens gaps between the sorted values that are longer than `longest` by whole units to at most
+/// one unit more.
 fn shorten_gaps(clocks: &mut [i64], longest: i64, unit: i64) {
     let mut order: Vec<usize> = (0..clocks.len()).collect();
     order.sort_by_key(|&clock| clocks[clock]);
@@ -222,7 +232,8 @@ pub(super) fn assignments(network: &Network) -> impl Iterator<Item = &ClockAssig
     updates.flat_map(|update| &update.assignments)
 }
 
-/// The greatest value that a clock is set to, at the start included, and whether some copy adds or takes away something.
+/// The greatest value that a clock is set to, at the start included, and whether some copy adds or
+/// takes away something.
 fn assigned(network: &Network) -> (i64, bool, bool) {
     let initial = network.initial_clocks.iter().max();
     let mut result = (initial.map_or(0, |&value| i64::from(value)), false, false);

@@ -1,14 +1,17 @@
 //! Replaying a run: exact waits and moves, step by step, and what is claimed about it.
 //!
 //! A run is right if
-//! * time may pass in every state for as long as the run waits in it: the invariants hold at its end (they are conjunctions of
-//!   comparisons, so they hold before), no location is urgent, and no synchronisation on an urgent channel becomes
-//!   enabled before the end of the wait;
+//! * time may pass in every state for as long as the run waits in it: the invariants hold at its
+//!   end (they are conjunctions of comparisons, so they hold before), no location is urgent, and no
+//!   synchronisation on an urgent channel becomes enabled before the end of the wait;
 //! * every move is one of the possible moves of the state, of the highest priority;
-//! * it ends as it says: in a loop, if the last state and the one that it leads back to lie in the same region ([`super::regions`]; with
-//!   stopwatches if they have the same values as far as they matter), so that the same moves are possible again and again; waiting for ever; or without any move, now or after any wait.
+//! * it ends as it says: in a loop, if the last state and the one that it leads back to lie in the
+//!   same region ([`super::regions`]; with stopwatches if they have the same values as far as they
+//!   matter), so that the same moves are possible again and again; waiting for ever; or without any
+//!   move, now or after any wait.
 //!
-//! What must hold during a wait is looked at at all moments at which something may change ([`super::moments`]).
+//! What must hold during a wait is looked at at all moments at which something may change
+//! ([`super::moments`]).
 //!
 //! Cost: one look at each step; a region for each loop.
 
@@ -34,7 +37,8 @@ pub struct Step {
 pub enum End {
     /// In its last state, after waiting so many ticks.
     After(i64),
-    /// Its last state is one of the same region as the state with this index (the first is 0), on entry of both.
+    /// Its last state is one of the same region as the state with this index (the first is 0), on
+    /// entry of both.
     Loop(usize),
     /// After so many ticks in its last state time goes on for ever.
     Waits(i64),
@@ -102,7 +106,8 @@ pub struct Coverage {
 /// What is wrong with a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Defect {
-    /// A wait is negative, or the end or the moment from which something holds is not part of the run.
+    /// A wait is negative, or the end or the moment from which something holds is not part of the
+    /// run.
     Malformed,
     /// Time cannot pass here, or not so long.
     NoTime,
@@ -136,7 +141,8 @@ pub struct Violation {
 /// How a replay ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The run is right. The states on entry, in ticks of the run; and, if it waits in the last, the one after the wait.
+    /// The run is right. The states on entry, in ticks of the run; and, if it waits in the last,
+    /// the one after the wait.
     Replayed(Vec<State>, Coverage),
     /// It is not.
     Violated(Violation),
@@ -263,7 +269,8 @@ impl Replay<'_> {
         self.semantics.after(state, 2 * wait)
     }
 
-    /// Whether time may pass in the state with this index so long, or for ever, and what must hold does meanwhile.
+    /// Whether time may pass in the state with this index so long, or for ever, and what must hold
+    /// does meanwhile.
     fn wait(&mut self, index: usize, wait: Option<i64>, claim: &Claim<'_>) -> Checked {
         if wait.is_some_and(|wait| wait < 0) {
             return Ok(Err(Defect::Malformed));
@@ -373,7 +380,8 @@ impl Replay<'_> {
             if !self.semantics.invariants_hold(&now)? {
                 break;
             }
-            // Between two changes: no moment of this kind is the first, so time stops before all of them.
+            // Between two changes: no moment of this kind is the first, so time stops before all of
+            // them.
             if index % 2 == 1 && self.is_time_stopped(&now)? {
                 break;
             }
@@ -437,7 +445,8 @@ impl Replay<'_> {
         })
     }
 
-    /// Whether the last state leads back to the one with this index, and the loop lies where something must stay.
+    /// Whether the last state leads back to the one with this index, and the loop lies where
+    /// something must stay.
     fn looped(&mut self, start: usize, claim: &Claim<'_>, predicates: &[&Predicate]) -> Checked {
         let last = self.states.len() - 1;
         let head = Moment {
@@ -483,8 +492,9 @@ pub fn indifferent_above(network: &Network, predicates: &[&Predicate]) -> Option
     }
 }
 
-/// The indices of two states that lie in the same region, a first one and one after it; `None` if all regions differ. The predicates are
-/// told apart by the regions too. With stopwatches regions are single values.
+/// The indices of two states that lie in the same region, a first one and one after it; `None` if
+/// all regions differ. The predicates are told apart by the regions too. With stopwatches regions
+/// are single values.
 pub fn repeated(
     network: &Network,
     states: &[&State],

@@ -1,6 +1,8 @@
-//! What is claimed of a strategy, and the rules of the two sides: who may do what in a state, who must, and who has won.
+//! What is claimed of a strategy, and the rules of the two sides: who may do what in a state, who
+//! must, and who has won.
 //!
-//! [`super::strategy`] and [`super::observed`] close their loops by them, [`super::play`] lets a person play by them.
+//! [`super::strategy`] and [`super::observed`] close their loops by them, [`super::play`] lets a
+//! person play by them.
 
 use std::collections::HashMap;
 
@@ -23,8 +25,8 @@ pub struct Constraint {
 pub struct Decision {
     /// Where it applies: in one of these conjunctions.
     pub zones: Vec<Vec<Constraint>>,
-    /// The move to take; `None` is to wait. Of one of the controller only the edges and their `select` values count: the environment picks
-    /// the branches.
+    /// The move to take; `None` is to wait. Of one of the controller only the edges and their
+    /// `select` values count: the environment picks the branches.
     pub action: Option<Vec<Part>>,
 }
 
@@ -40,7 +42,8 @@ impl Decision {
     }
 }
 
-/// Whether two moves take the same edges with the same `select` values, so that they differ in branches only.
+/// Whether two moves take the same edges with the same `select` values, so that they differ in
+/// branches only.
 pub(super) fn is_same_entry(one: &[Part], other: &[Part]) -> bool {
     let is_same = |(one, other): (&Part, &Part)| {
         (one.process, one.edge, one.select) == (other.process, other.edge, other.select)
@@ -48,20 +51,23 @@ pub(super) fn is_same_entry(one: &[Part], other: &[Part]) -> bool {
     one.len() == other.len() && one.iter().zip(other).all(is_same)
 }
 
-/// The decisions of the states with some words, in order: the first whose zones contain the clock values applies.
+/// The decisions of the states with some words, in order: the first whose zones contain the clock
+/// values applies.
 #[derive(Clone, Debug)]
 pub struct Decisions {
     /// The words.
     pub words: Vec<i32>,
     /// The decisions.
     pub decisions: Vec<Decision>,
-    /// The moves of the controller whose branches the environment picks, if the strategy is its: of those with the same edges and `select`
-    /// values the first that applies. Without one it picks any.
+    /// The moves of the controller whose branches the environment picks, if the strategy is its: of
+    /// those with the same edges and `select` values the first that applies. Without one it picks
+    /// any.
     pub legs: Vec<Decision>,
 }
 
 impl Decisions {
-    /// The decisions that apply at clock values in ticks, by index; only the first of them unless the strategy is permissive.
+    /// The decisions that apply at clock values in ticks, by index; only the first of them unless
+    /// the strategy is permissive.
     pub(super) fn indices_at(
         &self,
         clocks: &[i64],
@@ -78,8 +84,8 @@ impl Decisions {
 /// When the environment must move at a point where time cannot pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Forcing {
-    /// If something stops time to which the controller has no move: a process by its location or invariant, or the network
-    /// by an urgent channel.
+    /// If something stops time to which the controller has no move: a process by its location or
+    /// invariant, or the network by an urgent channel.
     Component,
     /// If the controller has no move at all.
     Network,
@@ -107,7 +113,8 @@ pub enum Aim {
     Recur,
 }
 
-/// What is claimed: that the owner of the strategy wins, by getting the controller to its aim, or by keeping it from it.
+/// What is claimed: that the owner of the strategy wins, by getting the controller to its aim, or
+/// by keeping it from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Claim<'a> {
     /// Who plays by the strategy.
@@ -116,14 +123,15 @@ pub struct Claim<'a> {
     pub is_permissive: bool,
     /// What the controller is asked for.
     pub aim: Aim,
-    /// Where play ends, for the controller, unless the goal is to recur; `None` without such an end.
+    /// Where play ends, for the controller, unless the goal is to recur; `None` without such an
+    /// end.
     pub goal: Option<&'a Predicate>,
     /// What holds until then.
     pub keep: Option<&'a Predicate>,
     /// When the environment must move.
     pub forcing: Forcing,
-    /// What the controller is allowed, by a strategy of its, and whether that allows every decision that applies; `None` is everything.
-    /// Where it decides nothing, everything is allowed.
+    /// What the controller is allowed, by a strategy of its, and whether that allows every decision
+    /// that applies; `None` is everything. Where it decides nothing, everything is allowed.
     pub under: Option<(&'a [Decisions], bool)>,
     /// Whether priorities count.
     pub has_priorities: bool,
@@ -134,7 +142,8 @@ pub struct Claim<'a> {
 }
 
 impl Claim<'_> {
-    /// Whether plays that go on for ever, without the goal if that is to recur, are lost for the owner.
+    /// Whether plays that go on for ever, without the goal if that is to recur, are lost for the
+    /// owner.
     pub(super) fn must_end(&self) -> bool {
         (self.owner == Owner::Controller) == (self.aim != Aim::Keep)
     }
@@ -196,7 +205,8 @@ impl<'a> Rules<'a> {
         }
     }
 
-    /// The moves whose targets satisfy the invariants, with these; if priorities count, those of the highest among them.
+    /// The moves whose targets satisfy the invariants, with these; if priorities count, those of
+    /// the highest among them.
     pub(super) fn possible<'m>(
         &self,
         state: &State,
@@ -255,8 +265,8 @@ impl<'a> Rules<'a> {
         one.controllable == (self.claim.owner == Owner::Controller)
     }
 
-    /// The possible moves that an action of the owner stands for: of the controller's all with the same edges, since the environment picks
-    /// the branches.
+    /// The possible moves that an action of the owner stands for: of the controller's all with the
+    /// same edges, since the environment picks the branches.
     pub(super) fn meant<'m, 'p>(
         &self,
         action: &[Part],
@@ -270,8 +280,8 @@ impl<'a> Rules<'a> {
         own.filter(|(one, _)| is_meant(one)).collect()
     }
 
-    /// The possible moves of the opponent, where the owner picks their branches those that it picks; `None` if it picks one that is
-    /// not possible.
+    /// The possible moves of the opponent, where the owner picks their branches those that it
+    /// picks; `None` if it picks one that is not possible.
     pub(super) fn others<'m, 'p>(
         &self,
         state: &State,
@@ -322,8 +332,8 @@ impl<'a> Rules<'a> {
         })
     }
 
-    /// What becomes of play in a state in which time cannot pass if nobody wants to move. `later` is the state a little later,
-    /// `moves` are those whose guards hold.
+    /// What becomes of play in a state in which time cannot pass if nobody wants to move. `later`
+    /// is the state a little later, `moves` are those whose guards hold.
     pub(super) fn rest(
         &self,
         state: &State,

@@ -1,25 +1,30 @@
 //! Closing the loop: a strategy against every move of its opponent.
 //!
-//! The play goes over regions (see [`super::regions`]), whose constants include those of the strategy, so that each region has
-//! one list of decisions. From a region in which the strategy waits, the opponent may make any of its moves, or time passes to the
-//! next region. Where the controller acts, the environment may still be first; where the environment acts, it is first. A strategy
-//! of the controller is right if
+//! The play goes over regions (see [`super::regions`]), whose constants include those of the
+//! strategy, so that each region has one list of decisions. From a region in which the strategy
+//! waits, the opponent may make any of its moves, or time passes to the next region. Where the
+//! controller acts, the environment may still be first; where the environment acts, it is first. A
+//! strategy of the controller is right if
 //! * every region that is met before the goal satisfies what must be kept and has a decision;
-//! * every action is one of the moves of the state, is the controller's, and its target satisfies the invariants; whichever branches of
-//!   its edges the environment picks, play goes on right;
-//! * where it waits and time cannot pass, the environment has a move and must take it (see [`Forcing`]); if it has only to keep
-//!   something, play may also stop there, if the controller has no move;
-//! * if it has to reach the goal, no play goes on for ever without: the graph up to the goals has no cycle, not even a region
-//!   without end; if the goal is to recur, the same from each goal on.
+//! * every action is one of the moves of the state, is the controller's, and its target satisfies
+//!   the invariants; whichever branches of its edges the environment picks, play goes on right;
+//! * where it waits and time cannot pass, the environment has a move and must take it (see
+//!   [`Forcing`]); if it has only to keep something, play may also stop there, if the controller
+//!   has no move;
+//! * if it has to reach the goal, no play goes on for ever without: the graph up to the goals has
+//!   no cycle, not even a region without end; if the goal is to recur, the same from each goal on.
 //!
-//! One of the environment, which may say which branches of the controller's edges it picks, is right if no play meets the goal before what must be kept is broken, every decision is there and
+//! One of the environment, which may say which branches of the controller's edges it picks, is
+//! right if no play meets the goal before what must be kept is broken, every decision is there and
 //! possible, and
 //! * against a controller that has to reach the goal, it never waits where it must move;
 //! * against one that has to keep something, every play ends in a region in which that is broken;
-//! * against one whose goal is to recur, no cycle of the graph has a goal in it, and no play stops at one.
+//! * against one whose goal is to recur, no cycle of the graph has a goal in it, and no play stops
+//!   at one.
 //!
-//! If the game is played under a strategy of the controller ([`Claim::under`]), the controller has no moves but those that this allows, and
-//! where it does not allow waiting no time passes: the controller must move, and has lost if it cannot.
+//! If the game is played under a strategy of the controller ([`Claim::under`]), the controller has
+//! no moves but those that this allows, and where it does not allow waiting no time passes: the
+//! controller must move, and has lost if it cannot.
 //!
 //! Cost: one look at each region and move of the closed loop; memory for each region.
 
@@ -59,7 +64,8 @@ pub enum Defect {
     Broken,
     /// The goal holds, against the environment.
     GoalReached,
-    /// The strategy waits where time cannot pass, although play may stop there, lost, or it must move itself.
+    /// The strategy waits where time cannot pass, although play may stop there, lost, or it must
+    /// move itself.
     Stuck,
     /// The play goes on for ever without what the owner wants.
     Endless,
@@ -280,9 +286,10 @@ impl Play<'_> {
         }
     }
 
-    /// Looks for a way back from the last region of the path to itself or one before it, if it is a goal that the environment
-    /// is to keep from recurring. All regions behind it were looked at. Source: C. Courcoubetis, M. Vardi, P. Wolper,
-    /// M. Yannakakis, "Memory-Efficient Algorithms for the Verification of Temporal Properties", FMSD 1, 1992 (nested search).
+    /// Looks for a way back from the last region of the path to itself or one before it, if it is a
+    /// goal that the environment is to keep from recurring. All regions behind it were looked at.
+    /// Source: C. Courcoubetis, M. Vardi, P. Wolper, M. Yannakakis, "Memory-Efficient Algorithms
+    /// for the Verification of Temporal Properties", FMSD 1, 1992 (nested search).
     fn leave(&mut self) -> Result<Option<Outcome>, Error> {
         let claim = self.rules.claim;
         if claim.aim != Aim::Recur || claim.owner == Owner::Controller {
@@ -353,7 +360,8 @@ impl Play<'_> {
         Ok(Outcome::Violated(Box::new(violation), self.coverage))
     }
 
-    /// A run of the closed loop from its start to a region that it reaches; the last state is left out.
+    /// A run of the closed loop from its start to a region that it reaches; the last state is left
+    /// out.
     fn way_to(&mut self, end: &State) -> Result<(Vec<State>, Vec<Step>), Error> {
         let start = self.start.clone();
         let mut origins: HashMap<State, Option<(State, Step)>> = HashMap::new();
@@ -380,7 +388,8 @@ impl Play<'_> {
         Ok((states, steps))
     }
 
-    /// Puts a new region on the path, with its successors in the closed loop; what is wrong with it.
+    /// Puts a new region on the path, with its successors in the closed loop; what is wrong with
+    /// it.
     fn enter(&mut self, state: &State) -> Result<Option<Defect>, Error> {
         self.coverage.regions += 1;
         self.seen.insert(state.clone(), Mark::Open);
@@ -473,8 +482,8 @@ impl Play<'_> {
         Ok(can_pass.then_some(later))
     }
 
-    /// Whether an urgent synchronisation is possible at all moments that follow a region: there is no first one to which time
-    /// could pass.
+    /// Whether an urgent synchronisation is possible at all moments that follow a region: there is
+    /// no first one to which time could pass.
     fn is_stopped_at_once(&self, state: &State, later: &State) -> Result<bool, Error> {
         let semantics = &self.rules.semantics;
         Ok(semantics.network().features.clock_guarded_urgent

@@ -1,4 +1,5 @@
-//! States together with the resolution of their clock values, so that every fraction of a unit can be waited.
+//! States together with the resolution of their clock values, so that every fraction of a unit can
+//! be waited.
 
 use super::concrete::State;
 
@@ -15,7 +16,8 @@ pub struct Timed {
 }
 
 impl Timed {
-    /// The same at the coarsest resolution that is a multiple of this one; `None` if there is none below the finest.
+    /// The same at the coarsest resolution that is a multiple of this one; `None` if there is none
+    /// below the finest.
     #[must_use]
     pub fn at_multiple_of(&self, ticks_per_unit: i64) -> Option<Timed> {
         let clocks = self.state.clocks.iter();

@@ -1,7 +1,8 @@
 //! Convex sets of clock values, for checking certificates: plain and slow on purpose.
 //!
-//! A zone is a matrix of bounds on all differences. It shares nothing with the zones of the engine. After every change it is closed by
-//! shortest paths: over the one bound that became tighter, or over all.
+//! A zone is a matrix of bounds on all differences. It shares nothing with the zones of the engine.
+//! After every change it is closed by shortest paths: over the one bound that became tighter, or
+//! over all.
 //!
 //! Invariant: the matrix is closed, or the zone is empty and marked so.
 
@@ -91,8 +92,8 @@ impl From<&FixedConstraint> for Comparison {
     }
 }
 
-/// Whether what a zone becomes while time passes is a zone when the clocks of `stopped` keep their values: if none does, or if only
-/// one runs.
+/// Whether what a zone becomes while time passes is a zone when the clocks of `stopped` keep their
+/// values: if none does, or if only one runs.
 pub(super) fn is_exact(stopped: &[bool]) -> bool {
     let running = stopped.iter().skip(1).filter(|&&is_stopped| !is_stopped);
     !stopped.contains(&true) || running.count() <= 1
@@ -149,7 +150,8 @@ impl Zone {
         self.is_empty |= (0..self.clocks).any(|clock| self.get(clock, clock) < ZERO);
     }
 
-    /// Tightens every bound by the least sum that goes through one bound that was made tighter in a closed zone.
+    /// Tightens every bound by the least sum that goes through one bound that was made tighter in a
+    /// closed zone.
     fn close_over(&mut self, one: Comparison) {
         for left in 0..self.clocks {
             let to = sum(self.get(left, one.left), self.get(one.left, one.right));
@@ -242,8 +244,8 @@ impl Zone {
             .all(|part| part.is_covered(others))
     }
 
-    /// What it becomes while time passes and the clocks of `stopped` keep their values; where [`is_exact`] says so, and else the
-    /// least zone around it.
+    /// What it becomes while time passes and the clocks of `stopped` keep their values; where
+    /// [`is_exact`] says so, and else the least zone around it.
     pub(super) fn future(&self, stopped: &[bool]) -> Zone {
         let mut later = self.clone();
         for clock in (1..self.clocks).filter(|&clock| !stopped[clock]) {
@@ -256,7 +258,8 @@ impl Zone {
         later
     }
 
-    /// What becomes it while time passes and the clocks of `stopped` keep their values; where [`is_exact`] says so.
+    /// What becomes it while time passes and the clocks of `stopped` keep their values; where
+    /// [`is_exact`] says so.
     pub(super) fn past(&self, stopped: &[bool]) -> Zone {
         let mut before = self.clone();
         for clock in (1..self.clocks).filter(|&clock| !stopped[clock]) {

@@ -1,16 +1,20 @@
 //! One bound on a difference of two clocks: `< c`, `<= c`, or none.
 //!
-//! Encoding: `2 * c + 1` for `<= c`, `2 * c` for `< c`, `i32::MAX` for none. The order of the encodings is the order of
-//! tightness: `< c` is below `<= c`, both are below every bound with a greater constant, and all are below infinity.
+//! Encoding: `2 * c + 1` for `<= c`, `2 * c` for `< c`, `i32::MAX` for none. The order of the
+//! encodings is the order of tightness: `< c` is below `<= c`, both are below every bound with a
+//! greater constant, and all are below infinity.
 //!
-//! The sum of two bounds (the bound on `x - z` that follows from those on `x - y` and `y - z`) adds the constants and is
-//! weak only if both are. In the encoding, for a fixed first bound `a`,
-//! `a + b = (a & !1) + (b & (a | !1))`: the rest of a row costs one `and` and one `add` per entry and no branch.
+//! The sum of two bounds (the bound on `x - z` that follows from those on `x - y` and `y - z`) adds
+//! the constants and is weak only if both are. In the encoding, for a fixed first bound `a`, `a + b
+//! = (a & !1) + (b & (a | !1))`: the rest of a row costs one `and` and one `add` per entry and no
+//! branch.
 //!
-//! Range: constants of a model lie within ±[`Bound::MAX_VALUE`]. Inside an operation on a zone, bounds along a path are added. Where
-//! single clocks are compared with constants, a path has two of the zone and two new ones at most; where clocks are compared with each
-//! other, it may pass all clocks. An `i32` has room for that as long as no bound of the zone is beyond [`Bound::most_in_zone`]. Extrapolated zones
-//! are within it; whoever lets bounds grow asks [`super::dbm::is_in_range`] once per step, and goes on otherwise or stops.
+//! Range: constants of a model lie within ±[`Bound::MAX_VALUE`]. Inside an operation on a zone,
+//! bounds along a path are added. Where single clocks are compared with constants, a path has two
+//! of the zone and two new ones at most; where clocks are compared with each other, it may pass all
+//! clocks. An `i32` has room for that as long as no bound of the zone is beyond
+//! [`Bound::most_in_zone`]. Extrapolated zones are within it; whoever lets bounds grow asks
+//! [`super::dbm::is_in_range`] once per step, and goes on otherwise or stops.
 
 use std::fmt;
 use std::ops::Add;
@@ -30,8 +34,9 @@ impl Bound {
     /// The greatest constant, and the negative of the least one, that a model may write.
     pub const MAX_VALUE: i32 = (1 << 27) - 1;
 
-    /// The greatest constant, and the negative of the least one, that a zone of this dimension may have for no sum to leave the range of the
-    /// encoding. `has_differences` says whether clocks are compared with each other.
+    /// The greatest constant, and the negative of the least one, that a zone of this dimension may
+    /// have for no sum to leave the range of the encoding. `has_differences` says whether clocks
+    /// are compared with each other.
     pub const fn most_in_zone(dimension: usize, has_differences: bool) -> i32 {
         const MOST: usize = 2 * (Bound::MAX_VALUE as usize + 1);
         let shared = (1 << 30) / (dimension + 1);
@@ -89,7 +94,8 @@ impl Bound {
         self.0 != i32::MAX
     }
 
-    /// The bound of the complement, read from the other clock: `x - y <= c` fails where `y - x < -c` holds.
+    /// The bound of the complement, read from the other clock: `x - y <= c` fails where `y - x <
+    /// -c` holds.
     ///
     /// Infinity has no complement; the result for it is meaningless.
     #[must_use]
@@ -118,7 +124,8 @@ impl Bound {
         }
     }
 
-    /// The sum of two bounds that are infinite or far from the ends of their range: as `+`, and without a branch.
+    /// The sum of two bounds that are infinite or far from the ends of their range: as `+`, and
+    /// without a branch.
     #[inline]
     pub(super) const fn plus(self, other: Bound) -> Bound {
         let sum = (self.0 & !1).wrapping_add(other.0 & (self.0 | !1));
@@ -145,7 +152,8 @@ impl Bound {
     }
 }
 
-/// The bound on `x - z` that follows from one on `x - y` and one on `y - z`; infinite if one of them is.
+/// The bound on `x - z` that follows from one on `x - y` and one on `y - z`; infinite if one of
+/// them is.
 impl Add for Bound {
     type Output = Bound;
 

@@ -1,5 +1,5 @@
-//! A set of clocks as a bit set: the first 256 in machine words of its own, so that operations on zones of few clocks need no
-//! allocation, those beyond in a list.
+//! A set of clocks as a bit set: the first 256 in machine words of its own, so that operations on
+//! zones of few clocks need no allocation, those beyond in a list.
 
 /// How many machine words lie in the set itself.
 const INLINE_WORDS: usize = 4;
@@ -137,7 +137,8 @@ impl<'s> IntoIterator for &'s ClockSet {
 /// The clocks of a set in ascending order.
 #[derive(Clone, Debug)]
 pub struct Clocks<'s> {
-    /// What is left of each inline word, and of the first four after those that are used up; the words before `index` are used up.
+    /// What is left of each inline word, and of the first four after those that are used up; the
+    /// words before `index` are used up.
     words: [u64; INLINE_WORDS],
     more: &'s [u64],
     index: usize,

@@ -1,16 +1,19 @@
-//! What moves clocks: delay and its past, reset, assignment, freeing, and the way back of an update.
+//! What moves clocks: delay and its past, reset, assignment, freeing, and the way back of an
+//! update.
 //!
-//! The contract is that of [`super::dbm`]: closed, consistent, positive zones in and out. Each function writes the
-//! closed result directly; none needs to close again.
+//! The contract is that of [`super::dbm`]: closed, consistent, positive zones in and out. Each
+//! function writes the closed result directly; none needs to close again.
 //!
-//! *Stopped* clocks (stopwatches at rate 0) keep their value while the others run. The exact set after such a delay is
-//! in general not a zone; the functions with stopped clocks return the least zone that contains it, which UPPAAL does
-//! as well (its answers become "maybe"). Without stopped clocks they are exact.
+//! *Stopped* clocks (stopwatches at rate 0) keep their value while the others run. The exact set
+//! after such a delay is in general not a zone; the functions with stopped clocks return the least
+//! zone that contains it, which UPPAAL does as well (its answers become "maybe"). Without stopped
+//! clocks they are exact.
 //!
-//! Source: Bengtsson and Yi 2004, section 4.2, algorithms `up`, `down`, `free`, `reset`, `copy`, `shift`; the
-//! stopped variants are derived here.
+//! Source: Bengtsson and Yi 2004, section 4.2, algorithms `up`, `down`, `free`, `reset`, `copy`,
+//! `shift`; the stopped variants are derived here.
 //!
-//! Cost: O(n) for delay, freeing and resetting; O(n^2) for the past and for assignments that drop valuations.
+//! Cost: O(n) for delay, freeing and resetting; O(n^2) for the past and for assignments that drop
+//! valuations.
 
 #![expect(
     clippy::inline_always,
@@ -21,7 +24,8 @@ use super::dbm::{Constraint, constrain, least_sum, upper_bounds};
 use super::rows::{for_small_dimension, rows, rows_mut, with_row};
 use super::{Bound, ClockSet};
 
-/// So few upper bounds are looked at one after the other for each clock, more as a row of bounds on all clocks.
+/// So few upper bounds are looked at one after the other for each clock, more as a row of bounds on
+/// all clocks.
 const FEW_BOUNDS: usize = 4;
 
 /// One step of an update of clocks; a list of them is carried out in order.
@@ -34,7 +38,8 @@ pub enum Assignment {
         /// Its new value.
         value: i32,
     },
-    /// `x_clock := x_source + increment`; the magnitude of the increment must be at most [`Bound::MAX_VALUE`].
+    /// `x_clock := x_source + increment`; the magnitude of the increment must be at most
+    /// [`Bound::MAX_VALUE`].
     Copy {
         /// The clock that is set.
         clock: usize,
@@ -60,8 +65,9 @@ pub fn up(zone: &mut [Bound], dimension: usize) {
 
 /// Lets time pass as long as the constraints hold, all of which the zone must satisfy.
 ///
-/// Only upper bounds end a delay, and of the closed future within them only upper bounds are new: the least that a bound of
-/// another clock and the difference to it allow. Differences were possible before and stay so. Cost: O(n) for each upper bound.
+/// Only upper bounds end a delay, and of the closed future within them only upper bounds are new:
+/// the least that a bound of another clock and the difference to it allow. Differences were
+/// possible before and stay so. Cost: O(n) for each upper bound.
 pub fn up_within(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) {
     let is_upper = |one: &&Constraint| one.right == 0 && one.left != 0;
     let count = constraints.iter().filter(is_upper).count();
@@ -89,9 +95,9 @@ fn delay_below(zone: &mut [Bound], upper_bounds: &[Bound], dimension: usize) {
 
 /// The least zone around the future of the zone when the clocks of `stopped` do not move.
 ///
-/// Differences between two running or two stopped clocks stay, a running clock loses its bound from above against
-/// every stopped one and the reference, and the opposite bounds are reached without delay. If all clocks are stopped,
-/// nothing changes.
+/// Differences between two running or two stopped clocks stay, a running clock loses its bound from
+/// above against every stopped one and the reference, and the opposite bounds are reached without
+/// delay. If all clocks are stopped, nothing changes.
 pub fn up_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
     let running = |clock: &usize| !stopped.contains(*clock);
     for left in (1..dimension).filter(running) {
@@ -106,7 +112,8 @@ pub fn up_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
 
 /// Lets time run backwards: the zone becomes its past, the valuations that reach it by some delay.
 ///
-/// A lower bound of a clock is lost except for what keeps the other clocks from becoming negative first.
+/// A lower bound of a clock is lost except for what keeps the other clocks from becoming negative
+/// first.
 pub fn down(zone: &mut [Bound], dimension: usize) {
     for_small_dimension!(dimension, lower_to_columns(zone));
 }
@@ -126,11 +133,11 @@ fn lower_to_columns(zone: &mut [Bound], dimension: usize) {
 
 /// The least zone around the past of the zone when the clocks of `stopped` do not move.
 ///
-/// Only bounds `x_s - x_r` between a stopped clock or the reference `s` and a running clock `r` change. A delay `d` is
-/// limited by every running clock, so it behaves like a clock with `d - x_q <= 0` for all running `q`: let
-/// `delay(y) = min over q of (q, y)` be its closed bounds. The greatest `x_s - x_r + d` over the zone is a flow from
-/// `{s, d}` to `{r, 0}` along closed entries, hence the lesser of the two pairings
-/// `(s, r) + delay(0)` and `(s, 0) + delay(r)`.
+/// Only bounds `x_s - x_r` between a stopped clock or the reference `s` and a running clock `r`
+/// change. A delay `d` is limited by every running clock, so it behaves like a clock with `d - x_q
+/// <= 0` for all running `q`: let `delay(y) = min over q of (q, y)` be its closed bounds. The
+/// greatest `x_s - x_r + d` over the zone is a flow from `{s, d}` to `{r, 0}` along closed entries,
+/// hence the lesser of the two pairings `(s, r) + delay(0)` and `(s, 0) + delay(r)`.
 pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
     if stopped.is_empty() {
         return down(zone, dimension);
@@ -184,10 +191,11 @@ pub fn reset(zone: &mut [Bound], dimension: usize, clock: usize, value: i32) {
     zone[start + clock] = Bound::LE_ZERO;
 }
 
-/// Sets a clock to the value of another (or its own) plus an increment; returns whether something is left.
+/// Sets a clock to the value of another (or its own) plus an increment; returns whether something
+/// is left.
 ///
-/// Valuations that would make the clock negative are dropped: a caller to whom that is a mistake looks at the lower
-/// bound of `source` before.
+/// Valuations that would make the clock negative are dropped: a caller to whom that is a mistake
+/// looks at the lower bound of `source` before.
 pub fn assign_clock(
     zone: &mut [Bound],
     dimension: usize,
@@ -215,7 +223,8 @@ pub fn assign_clock(
     true
 }
 
-/// Adds an increment to a clock; returns whether something is left. Drops valuations as [`assign_clock`] does.
+/// Adds an increment to a clock; returns whether something is left. Drops valuations as
+/// [`assign_clock`] does.
 pub fn shift(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32) -> bool {
     if !keep_from(zone, dimension, clock, increment) {
         return false;
@@ -230,7 +239,8 @@ pub fn shift(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32)
     true
 }
 
-/// Drops the valuations in which `clock + increment` is negative; returns whether something is left.
+/// Drops the valuations in which `clock + increment` is negative; returns whether something is
+/// left.
 fn keep_from(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32) -> bool {
     increment >= 0 || constrain(zone, dimension, 0, clock, Bound(2 * increment + 1))
 }
@@ -253,8 +263,8 @@ pub fn assign(zone: &mut [Bound], dimension: usize, assignments: &[Assignment]) 
     })
 }
 
-/// Replaces the zone by the valuations that satisfy the guard and are carried into the zone by the assignments;
-/// returns whether there are any.
+/// Replaces the zone by the valuations that satisfy the guard and are carried into the zone by the
+/// assignments; returns whether there are any.
 pub fn preimage(
     zone: &mut [Bound],
     dimension: usize,
@@ -268,7 +278,8 @@ pub fn preimage(
         && super::dbm::constrain_all(zone, dimension, guard)
 }
 
-/// The preimage of one assignment: the values that the clock may have got, then any value that it had before.
+/// The preimage of one assignment: the values that the clock may have got, then any value that it
+/// had before.
 fn unassign(zone: &mut [Bound], dimension: usize, assignment: &Assignment) -> bool {
     let (clock, source, increment) = match *assignment {
         Assignment::Free { clock } => {

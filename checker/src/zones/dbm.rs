@@ -1,23 +1,25 @@
 //! Zones as difference bound matrices on slices.
 //!
-//! A zone of dimension n is a slice of n * n bounds, row by row: entry (i, j) at `i * n + j` bounds `x_i - x_j`, so row
-//! 0 holds the negated lower bounds and column 0 the upper bounds. The terms used in every contract:
+//! A zone of dimension n is a slice of n * n bounds, row by row: entry (i, j) at `i * n + j` bounds
+//! `x_i - x_j`, so row 0 holds the negated lower bounds and column 0 the upper bounds. The terms
+//! used in every contract:
 //!
 //! * *consistent*: no cycle of bounds sums to less than `<= 0`, so the zone contains a valuation;
-//! * *closed*: no entry is greater than the sum along a path, so every entry is the least upper bound of its difference;
-//!   the diagonal is `<= 0`. A closed matrix is unique for its set;
+//! * *closed*: no entry is greater than the sum along a path, so every entry is the least upper
+//!   bound of its difference; the diagonal is `<= 0`. A closed matrix is unique for its set;
 //! * *positive*: row 0 is at most `<= 0`, so no clock is negative;
 //! * *empty*: entry (0, 0) is below `<= 0`, and no other entry means anything.
 //!
-//! Every public function takes zones that are closed, consistent and positive, and leaves them so, unless it says
-//! otherwise. A function that may empty a zone returns whether the zone still contains a valuation; an empty zone must
-//! not be used any further except with [`is_empty`]. Indices must be below the dimension, and slices must have the
-//! right length: both are contracts, checked by the bounds of the slices only.
+//! Every public function takes zones that are closed, consistent and positive, and leaves them so,
+//! unless it says otherwise. A function that may empty a zone returns whether the zone still
+//! contains a valuation; an empty zone must not be used any further except with [`is_empty`].
+//! Indices must be below the dimension, and slices must have the right length: both are contracts,
+//! checked by the bounds of the slices only.
 //!
 //! Source: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4.
 //!
-//! Cost: closing takes n^3 / 4 vector steps, one constraint n^2 / 4, all others at most that; only [`least_point`]
-//! allocates.
+//! Cost: closing takes n^3 / 4 vector steps, one constraint n^2 / 4, all others at most that; only
+//! [`least_point`] allocates.
 
 #![expect(
     clippy::inline_always,
@@ -85,16 +87,19 @@ pub fn is_empty(zone: &[Bound]) -> bool {
     zone[0] < Bound::LE_ZERO
 }
 
-/// Whether the constant of every bound is at most this great, signs aside; see [`Bound::most_in_zone`].
+/// Whether the constant of every bound is at most this great, signs aside; see
+/// [`Bound::most_in_zone`].
 ///
-/// Bounds can only become greater than the constants of a model by growing over many steps without extrapolation.
+/// Bounds can only become greater than the constants of a model by growing over many steps without
+/// extrapolation.
 pub fn is_in_range(zone: &[Bound], most: i32) -> bool {
     let (least, most) = (-2 * most, 2 * most + 1);
     zone.iter()
         .all(|bound| bound.is_infinite() || (least..=most).contains(&bound.0))
 }
 
-/// Closes any matrix with a diagonal of `<= 0` (Floyd–Warshall); returns whether it is consistent, else marks it empty.
+/// Closes any matrix with a diagonal of `<= 0` (Floyd–Warshall); returns whether it is consistent,
+/// else marks it empty.
 ///
 /// The matrix need not be closed or consistent before. Positive if row 0 was at most `<= 0`.
 pub fn close(zone: &mut [Bound], dimension: usize) -> bool {
@@ -110,8 +115,8 @@ fn close_all(zone: &mut [Bound], dimension: usize) -> bool {
 ///
 /// Both clocks of every tightened entry must be in the set. Returns whether the zone is consistent.
 ///
-/// Sound because in a closed matrix two old entries in a row are never better than one: a path needs to visit only ends
-/// of new entries on its way.
+/// Sound because in a closed matrix two old entries in a row are never better than one: a path
+/// needs to visit only ends of new entries on its way.
 pub fn close_touched(zone: &mut [Bound], dimension: usize, touched: &ClockSet) -> bool {
     touched
         .iter()
@@ -151,10 +156,11 @@ fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
     is_consistent
 }
 
-/// Intersects the zone with `x_left - x_right` bounded by `bound`; returns whether something is left.
+/// Intersects the zone with `x_left - x_right` bounded by `bound`; returns whether something is
+/// left.
 ///
-/// Every tightened path uses the new bound once, so one pass over the rows closes the zone again; a row whose bound
-/// against `x_right` does not improve is passed over whole.
+/// Every tightened path uses the new bound once, so one pass over the rows closes the zone again; a
+/// row whose bound against `x_right` does not improve is passed over whole.
 pub fn constrain(
     zone: &mut [Bound],
     dimension: usize,
@@ -215,10 +221,12 @@ fn constrain_by(zone: &mut [Bound], dimension: usize, constraint: &Constraint) -
     constrain(zone, dimension, left, right, bound)
 }
 
-/// Intersects the zone with all upper bounds among the constraints at once; returns whether something is left.
+/// Intersects the zone with all upper bounds among the constraints at once; returns whether
+/// something is left.
 ///
-/// All the new bounds lead to the reference clock, so a path that uses two of them passes it twice and is no shorter than
-/// without what lies between. Each row is closed again by its new upper bound and the lower bounds.
+/// All the new bounds lead to the reference clock, so a path that uses two of them passes it twice
+/// and is no shorter than without what lies between. Each row is closed again by its new upper
+/// bound and the lower bounds.
 fn constrain_above(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) -> bool {
     with_row(dimension, |row| {
         let upper_bounds = upper_bounds(constraints, row);
@@ -243,7 +251,8 @@ fn tighten_above(zone: &mut [Bound], upper_bounds: &[Bound], dimension: usize) -
     true
 }
 
-/// Lowers the entries of `bounds`, by clock, to the upper bounds among some constraints; that of the reference clock stays.
+/// Lowers the entries of `bounds`, by clock, to the upper bounds among some constraints; that of
+/// the reference clock stays.
 pub(super) fn upper_bounds<'b>(constraints: &[Constraint], bounds: &'b mut [Bound]) -> &'b [Bound] {
     for constraint in constraints {
         if constraint.right == 0 && constraint.left != 0 {
@@ -254,8 +263,8 @@ pub(super) fn upper_bounds<'b>(constraints: &[Constraint], bounds: &'b mut [Boun
     bounds
 }
 
-/// The least upper bound on the clock of a row that follows from the differences in it to the clocks with upper bounds, its
-/// own among them: its bound against itself is `<= 0`.
+/// The least upper bound on the clock of a row that follows from the differences in it to the
+/// clocks with upper bounds, its own among them: its bound against itself is `<= 0`.
 #[inline(always)]
 pub(super) fn least_sum(row: &[Bound], upper_bounds: &[Bound]) -> Bound {
     let length = row.len().min(upper_bounds.len());
@@ -380,7 +389,8 @@ pub fn relation(zone: &[Bound], other: &[Bound]) -> Relation {
     }
 }
 
-/// Whether the zone contains the valuation in which clock i has the value `numerators[i] / denominator`.
+/// Whether the zone contains the valuation in which clock i has the value `numerators[i] /
+/// denominator`.
 ///
 /// `numerators[0]` must be 0 and the denominator positive.
 pub fn contains(zone: &[Bound], numerators: &[i64], denominator: i64) -> bool {
@@ -399,13 +409,14 @@ pub fn contains(zone: &[Bound], numerators: &[i64], denominator: i64) -> bool {
         })
 }
 
-/// The bounds of a clock in the zone: its negated lower bound (on `0 - x`) and its upper bound (on `x - 0`).
+/// The bounds of a clock in the zone: its negated lower bound (on `0 - x`) and its upper bound (on
+/// `x - 0`).
 pub fn clock_bounds(zone: &[Bound], dimension: usize, clock: usize) -> (Bound, Bound) {
     (zone[clock], zone[clock * dimension])
 }
 
-/// Whether the delay from some valuation of the zone within it is limited: some clock other than those stopped has an
-/// upper bound.
+/// Whether the delay from some valuation of the zone within it is limited: some clock other than
+/// those stopped has an upper bound.
 pub fn is_delay_bounded(zone: &[Bound], dimension: usize, stopped: &ClockSet) -> bool {
     let upper_bounds = zone
         .chunks_exact(dimension)
@@ -419,7 +430,8 @@ pub fn is_delay_bounded(zone: &[Bound], dimension: usize, stopped: &ClockSet) ->
 
 /// A hash of the zone that depends on nothing but its bounds, so it is the same in every run.
 ///
-/// Two lanes take two bounds each on either side of a multiplication, whose halves are folded into one word.
+/// Two lanes take two bounds each on either side of a multiplication, whose halves are folded into
+/// one word.
 pub fn hash(zone: &[Bound]) -> u64 {
     const MULTIPLIERS: [u64; 2] = [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03]; // Odd, bits evenly mixed.
     let word = |low: Bound, high: Bound| {

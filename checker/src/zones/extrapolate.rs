@@ -1,29 +1,34 @@
 //! Abstractions that make the zone graph finite by forgetting what no guard can tell apart.
 //!
-//! For each clock let L be the greatest constant that its guards and invariants compare from below (`x > c`, `x >= c`),
-//! U from above, M the greater of both; minus infinity where there is none. A closed zone with entries (i, j) and lower
-//! bounds `low(i)` (the negated entry (0, i)) is replaced by the closure of this matrix, old entries elsewhere:
+//! For each clock let L be the greatest constant that its guards and invariants compare from below
+//! (`x > c`, `x >= c`), U from above, M the greater of both; minus infinity where there is none. A
+//! closed zone with entries (i, j) and lower bounds `low(i)` (the negated entry (0, i)) is replaced
+//! by the closure of this matrix, old entries elsewhere:
 //!
 //! * `Extra_M`: infinite if `(i, j) > M(i)`; `< -M(j)` if `-(i, j) > M(j)`;
 //! * `Extra_LU`: infinite if `(i, j) > L(i)`; `< -U(j)` if `-(i, j) > U(j)`;
-//! * `Extra_M+`: infinite if `(i, j) > M(i)`, or `low(i) > M(i)`, or `low(j) > M(j)` and i is not 0; `< -M(j)` in row 0
-//!   if `low(j) > M(j)`;
-//! * `Extra_LU+`: infinite if `(i, j) > L(i)`, or `low(i) > L(i)`, or `low(j) > U(j)` and i is not 0; `< -U(j)` in row
-//!   0 if `low(j) > U(j)`.
+//! * `Extra_M+`: infinite if `(i, j) > M(i)`, or `low(i) > M(i)`, or `low(j) > M(j)` and i is not
+//!   0; `< -M(j)` in row 0 if `low(j) > M(j)`;
+//! * `Extra_LU+`: infinite if `(i, j) > L(i)`, or `low(i) > L(i)`, or `low(j) > U(j)` and i is not
+//!   0; `< -U(j)` in row 0 if `low(j) > U(j)`.
 //!
-//! Zones stay positive: row 0 never exceeds `<= 0`. The diagonal stays. All four are sound and complete for reachability
-//! in automata that compare single clocks with constants; the later ones are coarser. None is sound where guards
-//! compare two clocks; [`split_by_differences`] is the variant for those.
+//! Zones stay positive: row 0 never exceeds `<= 0`. The diagonal stays. All four are sound and
+//! complete for reachability in automata that compare single clocks with constants; the later ones
+//! are coarser. None is sound where guards compare two clocks; [`split_by_differences`] is the
+//! variant for those.
 //!
-//! [`lu_plus`] is coarser still: an entry (i, j) is infinite, for i other than 0, already if `low(j) + (i, j) > L(i)`, that is, if
-//! with the least j there is a clock i above L; and where `low(j)` is `> U(j)`, strictly, that counts as above U. It forgets
-//! all entries on which the abstraction `aLU` does not depend (see [`super::simulation`]), and so it stays within `aLU`.
+//! [`lu_plus`] is coarser still: an entry (i, j) is infinite, for i other than 0, already if
+//! `low(j) + (i, j) > L(i)`, that is, if with the least j there is a clock i above L; and where
+//! `low(j)` is `> U(j)`, strictly, that counts as above U. It forgets all entries on which the
+//! abstraction `aLU` does not depend (see [`super::simulation`]), and so it stays within `aLU`.
 //!
-//! Source: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and Upper Bounds in Zone Based Abstractions of Timed
-//! Automata", TACAS 2004, definitions in section 4, closing after `Extra_LU+` (LU-Canonize) in section 5.
+//! Source: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and Upper Bounds in Zone Based
+//! Abstractions of Timed Automata", TACAS 2004, definitions in section 4, closing after `Extra_LU+`
+//! (LU-Canonize) in section 5.
 //!
-//! Where we differ: closing passes over all rows in which nothing was forgotten. The new matrix lies above the old one,
-//! which was closed, so an entry that was kept cannot become tighter. This holds for all four.
+//! Where we differ: closing passes over all rows in which nothing was forgotten. The new matrix
+//! lies above the old one, which was closed, so an entry that was kept cannot become tighter. This
+//! holds for all four.
 //!
 //! Cost: O(n^2) to forget, then n^2 / 4 vector steps for each row that lost something.
 
@@ -42,9 +47,11 @@ use super::{Bound, ClockSet};
 /// The greatest constants that each clock is compared with, prepared for extrapolation.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Ceilings {
-    /// `<= L` of each clock: greater entries of its row are forgotten. Below every bound if there is no L.
+    /// `<= L` of each clock: greater entries of its row are forgotten. Below every bound if there
+    /// is no L.
     rows: Box<[Bound]>,
-    /// `< -U` of each clock: lesser entries of its column are forgotten. Above every bound if there is no U.
+    /// `< -U` of each clock: lesser entries of its column are forgotten. Above every bound if there
+    /// is no U.
     columns: Box<[Bound]>,
 }
 
@@ -82,9 +89,11 @@ impl Ceilings {
         ceilings
     }
 
-    /// The ceilings of the clocks 0..n from the greatest constants of comparisons from below and from above.
+    /// The ceilings of the clocks 0..n from the greatest constants of comparisons from below and
+    /// from above.
     ///
-    /// `None` stands for a clock without such comparisons. The entries of the reference clock are not looked at.
+    /// `None` stands for a clock without such comparisons. The entries of the reference clock are
+    /// not looked at.
     pub fn lower_upper(lower: &[Option<i32>], upper: &[Option<i32>]) -> Ceilings {
         let mut ceilings = Ceilings::none(lower.len());
         for (clock, (lower, upper)) in lower.iter().zip(upper).enumerate().skip(1) {
@@ -108,8 +117,8 @@ impl Ceilings {
 
     /// Takes a comparison of the clock from below, `x > constant` or `x >= constant`, into account.
     ///
-    /// A negative constant changes nothing, since clocks are not negative; one beyond [`Bound::MAX_VALUE`] counts as
-    /// that.
+    /// A negative constant changes nothing, since clocks are not negative; one beyond
+    /// [`Bound::MAX_VALUE`] counts as that.
     pub fn admit_lower(&mut self, clock: usize, constant: i32) {
         if constant >= 0 {
             let row = Bound(2 * constant.min(Bound::MAX_VALUE) + 1);
@@ -117,8 +126,8 @@ impl Ceilings {
         }
     }
 
-    /// Takes a comparison of the clock from above, `x < constant` or `x <= constant`, into account; as
-    /// [`Ceilings::admit_lower`].
+    /// Takes a comparison of the clock from above, `x < constant` or `x <= constant`, into account;
+    /// as [`Ceilings::admit_lower`].
     pub fn admit_upper(&mut self, clock: usize, constant: i32) {
         if constant >= 0 {
             let column = Bound(-2 * constant.min(Bound::MAX_VALUE));
@@ -210,18 +219,21 @@ impl Ceilings {
     }
 }
 
-/// The least even bound on `y - x` that lets y be above L where x is least, from `<= L(y)` and the entry (0, x).
+/// The least even bound on `y - x` that lets y be above L where x is least, from `<= L(y)` and the
+/// entry (0, x).
 #[inline]
 pub(super) fn forgotten_from(limit: Bound, lower: Bound) -> Bound {
     Bound((limit.0 + lower.0) & !1)
 }
 
-/// Extrapolates further than `Extra_LU+`, within `aLU`; than `Extra_M+` if the ceilings are [`Ceilings::maximal`].
+/// Extrapolates further than `Extra_LU+`, within `aLU`; than `Extra_M+` if the ceilings are
+/// [`Ceilings::maximal`].
 ///
-/// The forgetting leaves only these ways from one clock to another: through clocks that are neither certainly above L
-/// (their rows are infinite) nor certainly above U (only the reference clock still bounds them), and through the
-/// reference clock. Row 0 is final after forgetting, since the way over a clock above U was not better before its bound
-/// became weaker. So paths need to be admitted through those clocks and, last, through the reference clock.
+/// The forgetting leaves only these ways from one clock to another: through clocks that are neither
+/// certainly above L (their rows are infinite) nor certainly above U (only the reference clock
+/// still bounds them), and through the reference clock. Row 0 is final after forgetting, since the
+/// way over a clock above U was not better before its bound became weaker. So paths need to be
+/// admitted through those clocks and, last, through the reference clock.
 pub fn lu_plus(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     for_small_dimension!(dimension, forget_and_close(zone, ceilings));
 }
@@ -232,8 +244,8 @@ fn forget_and_close(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
     close_again(zone, dimension, &weakened, &between);
 }
 
-/// Closes a matrix in which nothing is left that [`lu_plus`] forgets, given the clocks whose rows lost a bound, and those that
-/// are neither certainly above L nor certainly above U.
+/// Closes a matrix in which nothing is left that [`lu_plus`] forgets, given the clocks whose rows
+/// lost a bound, and those that are neither certainly above L nor certainly above U.
 #[inline(always)]
 pub(super) fn close_again(
     zone: &mut [Bound],
@@ -250,8 +262,8 @@ pub(super) fn close_again(
     relax_rows(zone, dimension, weakened, 0);
 }
 
-/// Writes the matrix of `Extra_LU+`, not closed; returns the clocks whose rows lost a bound that closing may restore,
-/// and the clocks that are neither certainly above L nor certainly above U.
+/// Writes the matrix of `Extra_LU+`, not closed; returns the clocks whose rows lost a bound that
+/// closing may restore, and the clocks that are neither certainly above L nor certainly above U.
 #[inline(always)]
 fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (ClockSet, ClockSet) {
     let (lower_bounds, rows) = zone.split_at_mut(dimension);
@@ -282,8 +294,8 @@ fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (Cl
     (weakened, between)
 }
 
-/// Makes the entries of a row infinite that exceed `limit` or whose clock is certainly above its U; returns whether
-/// that weakened one.
+/// Makes the entries of a row infinite that exceed `limit` or whose clock is certainly above its U;
+/// returns whether that weakened one.
 #[inline(always)]
 fn forget_in_row(
     row: &mut [Bound],
@@ -352,13 +364,15 @@ pub fn lu(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     }
 }
 
-/// Adds to `target` the zone cut along the given differences, each part extrapolated by `Extra_M` and kept on its sides.
+/// Adds to `target` the zone cut along the given differences, each part extrapolated by `Extra_M`
+/// and kept on its sides.
 ///
-/// For automata whose guards or invariants compare two clocks: `differences` are these comparisons. Every part lies
-/// wholly inside or outside each of them and stays there, so the parts can tell apart what the guards can.
+/// For automata whose guards or invariants compare two clocks: `differences` are these comparisons.
+/// Every part lies wholly inside or outside each of them and stays there, so the parts can tell
+/// apart what the guards can.
 ///
-/// Source: J. Bengtsson, W. Yi, "On Clock Difference Constraints and Termination in Reachability Analysis of Timed
-/// Automata", ICFEM 2003, section 4. Cost: up to 2^m parts for m differences.
+/// Source: J. Bengtsson, W. Yi, "On Clock Difference Constraints and Termination in Reachability
+/// Analysis of Timed Automata", ICFEM 2003, section 4. Cost: up to 2^m parts for m differences.
 pub fn split_by_differences(
     zone: &[Bound],
     dimension: usize,

@@ -1,19 +1,20 @@
 //! Finite unions of zones.
 //!
-//! A federation keeps closed, consistent, positive zones of one dimension one after the other in a flat buffer. It may
-//! describe the same set in many ways; [`Federation::add`] and [`Federation::reduce`] keep the description short, and
-//! every answer about the set is exact.
+//! A federation keeps closed, consistent, positive zones of one dimension one after the other in a
+//! flat buffer. It may describe the same set in many ways; [`Federation::add`] and
+//! [`Federation::reduce`] keep the description short, and every answer about the set is exact.
 //!
-//! Subtraction is what all exactness rests on: `Z \ B` is cut out along the minimal constraints of `B`. For each of them,
-//! the part of the rest that violates it is a zone of the result, and the rest is intersected with it. The results are
-//! disjoint. Constraints that the rest satisfies anyway cut nothing and are passed over; among the others the one that
-//! the rest exceeds most goes first, so the first parts are large and the later cuts have little left to split.
+//! Subtraction is what all exactness rests on: `Z \ B` is cut out along the minimal constraints of
+//! `B`. For each of them, the part of the rest that violates it is a zone of the result, and the
+//! rest is intersected with it. The results are disjoint. Constraints that the rest satisfies
+//! anyway cut nothing and are passed over; among the others the one that the rest exceeds most goes
+//! first, so the first parts are large and the later cuts have little left to split.
 //!
-//! Source: A. David, J. Håkansson, K. G. Larsen, P. Pettersson, "Model Checking Timed Automata with Priorities Using DBM
-//! Subtraction", FORMATS 2006, sections 3 and 4.
+//! Source: A. David, J. Håkansson, K. G. Larsen, P. Pettersson, "Model Checking Timed Automata with
+//! Priorities Using DBM Subtraction", FORMATS 2006, sections 3 and 4.
 //!
-//! Cost: one zone minus another makes at most as many zones as the other has minimal constraints; the difference of
-//! federations is exponential in the worst case, and reduced after each step.
+//! Cost: one zone minus another makes at most as many zones as the other has minimal constraints;
+//! the difference of federations is exponential in the worst case, and reduced after each step.
 
 use crate::cancellation;
 
@@ -101,7 +102,8 @@ impl Federation {
         self.bounds.extend_from_slice(zone);
     }
 
-    /// Adds a zone, which may be empty, unless one zone contains it; removes the zones that it contains.
+    /// Adds a zone, which may be empty, unless one zone contains it; removes the zones that it
+    /// contains.
     ///
     /// Returns whether the zone was not contained in a single zone.
     pub fn add(&mut self, zone: &[Bound]) -> bool {
@@ -114,7 +116,8 @@ impl Federation {
         true
     }
 
-    /// Adds all zones of another federation as [`Federation::add`] does; returns whether one was new.
+    /// Adds all zones of another federation as [`Federation::add`] does; returns whether one was
+    /// new.
     pub fn unite(&mut self, other: &Federation) -> bool {
         other
             .zones()
@@ -181,7 +184,8 @@ impl Federation {
 
     /// Removes the valuations of a zone.
     ///
-    /// A zone that is cut had no other one within it, so only its parts are looked for in the others.
+    /// A zone that is cut had no other one within it, so only its parts are looked for in the
+    /// others.
     pub fn subtract_zone(&mut self, zone: &[Bound]) {
         let dimension = self.dimension;
         let is_apart = |minuend: &[Bound]| dbm::are_apart(minuend, zone, dimension);
@@ -214,8 +218,8 @@ impl Federation {
         }
     }
 
-    /// Removes the valuations that satisfy all constraints: [`Federation::subtract_zone`] of their zone, without making it where each
-    /// constraint bounds one clock.
+    /// Removes the valuations that satisfy all constraints: [`Federation::subtract_zone`] of their
+    /// zone, without making it where each constraint bounds one clock.
     pub fn subtract_conjunction(&mut self, constraints: &[Constraint]) {
         if constraints
             .iter()
@@ -333,7 +337,8 @@ impl Federation {
         })
     }
 
-    /// Lets any time pass while the clocks of `stopped` keep their values; see [`clocks::up_stopped`].
+    /// Lets any time pass while the clocks of `stopped` keep their values; see
+    /// [`clocks::up_stopped`].
     pub fn up(&mut self, stopped: &ClockSet) {
         let dimension = self.dimension;
         self.update(|zone| {
@@ -342,7 +347,8 @@ impl Federation {
         });
     }
 
-    /// Lets time run backwards while the clocks of `stopped` keep their values; see [`clocks::down_stopped`].
+    /// Lets time run backwards while the clocks of `stopped` keep their values; see
+    /// [`clocks::down_stopped`].
     pub fn down(&mut self, stopped: &ClockSet) {
         let dimension = self.dimension;
         self.update(|zone| {
@@ -357,7 +363,8 @@ impl Federation {
         self.update(|zone| clocks::assign(zone, dimension, assignments));
     }
 
-    /// Replaces the federation by its preimage under a guard and assignments; see [`clocks::preimage`].
+    /// Replaces the federation by its preimage under a guard and assignments; see
+    /// [`clocks::preimage`].
     pub fn preimage(&mut self, guard: &[Constraint], assignments: &[Assignment]) {
         let dimension = self.dimension;
         self.update(|zone| clocks::preimage(zone, dimension, guard, assignments));
@@ -374,8 +381,8 @@ impl Federation {
         }
     }
 
-    /// Makes the description shorter: joins pairs of zones whose union is a zone, and removes zones that the rest
-    /// covers. The set stays the same.
+    /// Makes the description shorter: joins pairs of zones whose union is a zone, and removes zones
+    /// that the rest covers. The set stays the same.
     pub fn reduce(&mut self) {
         self.reduce_within(&mut Patience::endless());
     }
@@ -386,13 +393,15 @@ impl Federation {
         self.remove_covered(patience);
     }
 
-    /// Makes the description shorter as [`Federation::reduce`] does, but leaves zones that only several others cover. Cheaper.
+    /// Makes the description shorter as [`Federation::reduce`] does, but leaves zones that only
+    /// several others cover. Cheaper.
     pub fn merge_within(&mut self, patience: &mut Patience<'_>) {
         self.remove_included(patience);
         self.join_pairs(patience);
     }
 
-    /// Replaces pairs of zones by their hull where that adds no valuation, until there is no such pair.
+    /// Replaces pairs of zones by their hull where that adds no valuation, until there is no such
+    /// pair.
     ///
     /// Zones enter one by one; one that joins with another enters again as their hull.
     fn join_pairs(&mut self, patience: &mut Patience<'_>) {
@@ -445,10 +454,12 @@ impl Federation {
         hull
     }
 
-    /// Adds the faces of `zone` in which an upper bound of an invariant is reached, so that time cannot pass.
+    /// Adds the faces of `zone` in which an upper bound of an invariant is reached, so that time
+    /// cannot pass.
     ///
-    /// A strict bound is never reached and has no face; neither has the bound of a clock in `stopped`. Constraints
-    /// other than upper bounds of a clock do not stop time and are passed over.
+    /// A strict bound is never reached and has no face; neither has the bound of a clock in
+    /// `stopped`. Constraints other than upper bounds of a clock do not stop time and are passed
+    /// over.
     pub fn add_upper_faces(
         &mut self,
         zone: &[Bound],
@@ -508,8 +519,8 @@ impl Federation {
     }
 }
 
-/// Makes room for so many more bounds; asks before, where that takes much memory. Long lists grow by a quarter, so that they do not come
-/// to a limit of memory with half of it free.
+/// Makes room for so many more bounds; asks before, where that takes much memory. Long lists grow
+/// by a quarter, so that they do not come to a limit of memory with half of it free.
 #[inline]
 fn make_room(bounds: &mut Vec<Bound>, more: usize) {
     if bounds.capacity() - bounds.len() < more {
@@ -524,7 +535,8 @@ fn make_room(bounds: &mut Vec<Bound>, more: usize) {
     }
 }
 
-/// What a block of so many bytes takes of the heap: allocators keep its size in front of it, and common ones give multiples of 16.
+/// What a block of so many bytes takes of the heap: allocators keep its size in front of it, and
+/// common ones give multiples of 16.
 pub fn block_bytes(bytes: usize) -> usize {
     if bytes == 0 {
         return 0;
@@ -550,7 +562,8 @@ impl<'a> Subtrahend<'a> {
         }
     }
 
-    /// Gives the parts of `minuend` outside the zone to `visit` until that returns false; returns whether it never did.
+    /// Gives the parts of `minuend` outside the zone to `visit` until that returns false; returns
+    /// whether it never did.
     fn subtract_from(&self, minuend: &[Bound], visit: &mut impl FnMut(&[Bound]) -> bool) -> bool {
         let dimension = self.dimension;
         if dbm::are_apart(minuend, self.zone, dimension) {
@@ -632,8 +645,9 @@ fn is_covered(
 
 /// Writes the hull of two zones; returns whether it contains nothing but them.
 ///
-/// A valuation of the hull outside of both exceeds some bound of each. Such a pair of bounds leaves valuations of the hull, which
-/// is closed as a hull of closed zones, unless the cycle through both negated bounds is negative.
+/// A valuation of the hull outside of both exceeds some bound of each. Such a pair of bounds leaves
+/// valuations of the hull, which is closed as a hull of closed zones, unless the cycle through both
+/// negated bounds is negative.
 fn join(hull: &mut [Bound], zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
     if has_gap(zone, other, dimension) {
         return false;
@@ -666,7 +680,8 @@ fn exceeded(
         .map(move |(index, _)| (index / dimension, index % dimension))
 }
 
-/// Whether there is room between two zones: some difference has values that lie beyond the one and before the other.
+/// Whether there is room between two zones: some difference has values that lie beyond the one and
+/// before the other.
 fn has_gap(zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
     let lies_apart =
         |bound: &Bound, opposite: Bound| bound.is_finite() && opposite < bound.negated();

@@ -1,10 +1,13 @@
-//! The instants just before and just after a set: what a delay of any small length enters, or has left.
+//! The instants just before and just after a set: what a delay of any small length enters, or has
+//! left.
 //!
-//! `before(Z)` holds the valuations v with `v + d` in Z for all small enough delays d > 0; `after(Z)` those with `v - d` in Z. Of
-//! finitely many zones each contains either all small enough delays or none, so for a union both are the union of those of its
-//! zones. A zone is the conjunction of the bounds of its closed matrix, and for each bound alone the answer is read off: the
-//! differences of two clocks stay; just before `x < c` and `x <= c` it is `x < c`, just before `x > c` and `x >= c` it is `x >= c`;
-//! just after, the other way round. A stopped clock is as the reference clock: what runs is compared with it.
+//! `before(Z)` holds the valuations v with `v + d` in Z for all small enough delays d > 0;
+//! `after(Z)` those with `v - d` in Z. Of finitely many zones each contains either all small enough
+//! delays or none, so for a union both are the union of those of its zones. A zone is the
+//! conjunction of the bounds of its closed matrix, and for each bound alone the answer is read off:
+//! the differences of two clocks stay; just before `x < c` and `x <= c` it is `x < c`, just before
+//! `x > c` and `x >= c` it is `x >= c`; just after, the other way round. A stopped clock is as the
+//! reference clock: what runs is compared with it.
 //!
 //! Cost: one closing for each zone.
 
@@ -29,7 +32,8 @@ pub fn before_within(
     moved(federation, stopped, (&weak, &strict), patience)
 }
 
-/// The valuations that every small enough delay has just led out of the federation, or on within it.
+/// The valuations that every small enough delay has just led out of the federation, or on within
+/// it.
 #[must_use]
 pub fn after(federation: &Federation, stopped: &ClockSet) -> Federation {
     after_within(federation, stopped, &mut Patience::endless())

@@ -1,17 +1,20 @@
 //! Zones described by their fewest constraints.
 //!
-//! A closed matrix says most things twice. The minimal constraints are those that cannot be left out; closing them
-//! gives the matrix back. There are two sources of redundancy, and both have to be treated in the right order:
+//! A closed matrix says most things twice. The minimal constraints are those that cannot be left
+//! out; closing them gives the matrix back. There are two sources of redundancy, and both have to
+//! be treated in the right order:
 //!
-//! * clocks at a fixed distance from each other (a cycle of bounds that sums to `<= 0`) fall into classes. Each class is
-//!   described by one cycle through its clocks in ascending order, and by its least clock to the outside;
-//! * between these representatives there is no such cycle, so all constraints that are the sum of two others can be
-//!   left out at once, and the result does not depend on the order.
+//! * clocks at a fixed distance from each other (a cycle of bounds that sums to `<= 0`) fall into
+//!   classes. Each class is described by one cycle through its clocks in ascending order, and by
+//!   its least clock to the outside;
+//! * between these representatives there is no such cycle, so all constraints that are the sum of
+//!   two others can be left out at once, and the result does not depend on the order.
 //!
-//! `x >= 0` holds in every zone; neither it nor what follows from it is said, so nothing is said of the universe.
+//! `x >= 0` holds in every zone; neither it nor what follows from it is said, so nothing is said of
+//! the universe.
 //!
-//! Source: K. G. Larsen, F. Larsson, P. Pettersson, W. Yi, "Efficient Verification of Real-Time Systems: Compact Data
-//! Structure and State-Space Reduction", RTSS 1997, section 3.
+//! Source: K. G. Larsen, F. Larsson, P. Pettersson, W. Yi, "Efficient Verification of Real-Time
+//! Systems: Compact Data Structure and State-Space Reduction", RTSS 1997, section 3.
 //!
 //! Cost: O(n^3).
 
@@ -63,7 +66,8 @@ fn visit_minimal(
     }
 }
 
-/// Writes for every clock the least sum of two bounds from `left` to it over a third representative.
+/// Writes for every clock the least sum of two bounds from `left` to it over a third
+/// representative.
 fn find_detours(
     zone: &[Bound],
     dimension: usize,
@@ -110,9 +114,11 @@ fn cycle_successor(zone: &[Bound], dimension: usize, clock: usize) -> Option<usi
         .or_else(|| (0..clock).find(is_tied))
 }
 
-/// Whether the lower bound of a clock follows from `x >= 0` for itself or for a clock that is tied to it.
+/// Whether the lower bound of a clock follows from `x >= 0` for itself or for a clock that is tied
+/// to it.
 ///
-/// Clocks tied to the reference clock have the cycle of their class through it, which must stay whole.
+/// Clocks tied to the reference clock have the cycle of their class through it, which must stay
+/// whole.
 fn is_implied_by_sign(zone: &[Bound], dimension: usize, clock: usize) -> bool {
     let follows =
         |tied: usize| zone[tied] == Bound::LE_ZERO && zone[tied * dimension + clock] <= zone[clock];

@@ -1,13 +1,17 @@
-//! Sets of clock valuations: bounds, zones as difference bound matrices, federations, extrapolation.
+//! Sets of clock valuations: bounds, zones as difference bound matrices, federations,
+//! extrapolation.
 //!
-//! This room knows clocks by index and bounds, nothing of automata. Clock 0 is the reference clock, whose value is
-//! always 0; a zone of *dimension* n speaks about the n - 1 clocks 1..n. The modules stand in reading order:
+//! This room knows clocks by index and bounds, nothing of automata. Clock 0 is the reference clock,
+//! whose value is always 0; a zone of *dimension* n speaks about the n - 1 clocks 1..n. The modules
+//! stand in reading order:
 //!
 //! * [`bound`]: one bound `x - y < c` or `x - y <= c` in an `i32`;
 //! * [`clock_set`]: a set of clocks as a bit set;
 //! * `rows`: the innermost loops;
-//! * [`dbm`]: zones on slices, so that callers keep them in arenas; the contract of a zone stands at its top;
-//! * [`clocks`]: what moves clocks: delay, reset, assignment, freeing, and the way back of an update;
+//! * [`dbm`]: zones on slices, so that callers keep them in arenas; the contract of a zone stands
+//!   at its top;
+//! * [`clocks`]: what moves clocks: delay, reset, assignment, freeing, and the way back of an
+//!   update;
 //! * [`zone`]: one zone that owns its matrix;
 //! * [`zone_table`]: zones, each stored once;
 //! * [`minimal`]: zones stored by their fewest constraints;
@@ -19,8 +23,8 @@
 //! * [`patience`]: an end to operations that take too long;
 //! * [`instants`]: what lies just before and just after a set.
 //!
-//! Sources: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, for the operations on zones;
-//! the others are named where they are used.
+//! Sources: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, for the
+//! operations on zones; the others are named where they are used.
 
 pub mod bound;
 pub mod clock_set;

@@ -1,31 +1,33 @@
 //! Safe timed predecessors: from where can time pass into a good set without meeting a bad one?
 //!
-//! `Pred_t(G, B)` holds the valuations that reach G by some delay d >= 0 such that no valuation on the way is in B, both
-//! ends included: where a good and a bad move are possible at the same instant, the opponent may come first.
+//! `Pred_t(G, B)` holds the valuations that reach G by some delay d >= 0 such that no valuation on
+//! the way is in B, both ends included: where a good and a bad move are possible at the same
+//! instant, the opponent may come first.
 //!
-//! For zones G and B, with `Z↓` for the past of Z,
-//! `Pred_t(G, B) = (G↓ \ B↓) ∪ ((G ∩ B↓) \ B)↓`: either B never comes, or G is met before it. For unions it is the union
-//! over the zones of G of the intersection over the zones of B: from one valuation the delays that reach a zone of G
-//! form an interval, each zone of B cuts off a final part of it, and of finitely many initial parts the shortest is
-//! contained in all.
+//! For zones G and B, with `Z↓` for the past of Z, `Pred_t(G, B) = (G↓ \ B↓) ∪ ((G ∩ B↓) \ B)↓`:
+//! either B never comes, or G is met before it. For unions it is the union over the zones of G of
+//! the intersection over the zones of B: from one valuation the delays that reach a zone of G form
+//! an interval, each zone of B cuts off a final part of it, and of finitely many initial parts the
+//! shortest is contained in all.
 //!
-//! Where we differ: instead of intersecting unions, which multiplies overlapping zones, we collect what each zone of B
-//! takes away, `(G↓ ∩ B↓) \ ((G ∩ B↓) \ B)↓`, and subtract that from `G↓` once.
+//! Where we differ: instead of intersecting unions, which multiplies overlapping zones, we collect
+//! what each zone of B takes away, `(G↓ ∩ B↓) \ ((G ∩ B↓) \ B)↓`, and subtract that from `G↓` once.
 //!
-//! With stopped clocks the past of a zone is over-approximated (see [`super::clocks`]), so the result is an
-//! approximation in either direction and a verdict that rests on it is "maybe".
+//! With stopped clocks the past of a zone is over-approximated (see [`super::clocks`]), so the
+//! result is an approximation in either direction and a verdict that rests on it is "maybe".
 //!
-//! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis of
-//! Timed Games", CONCUR 2005, section 4.
+//! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms
+//! for the Analysis of Timed Games", CONCUR 2005, section 4.
 
 use super::federation::Federation;
 use super::{Bound, ClockSet, Patience, clocks, dbm};
 
-/// Subtracting a zone can multiply the zones of the rest, reducing costs the square of their number: from about this
-/// many zones on, reducing first was faster on random federations.
+/// Subtracting a zone can multiply the zones of the rest, reducing costs the square of their
+/// number: from about this many zones on, reducing first was faster on random federations.
 const WORTH_REDUCING: usize = 16;
 
-/// The safe timed predecessors of `good` with respect to `bad`, with the clocks of `stopped` at rest.
+/// The safe timed predecessors of `good` with respect to `bad`, with the clocks of `stopped` at
+/// rest.
 #[must_use]
 pub fn predecessors(good: &Federation, bad: &Federation, stopped: &ClockSet) -> Federation {
     predecessors_within(good, bad, stopped, &mut Patience::endless())

@@ -1,7 +1,7 @@
 //! Patience with operations on large federations, which can take very long.
 //!
-//! They ask now and then whether to go on. Once the answer was no, all that is asked with the same patience ends soon, and what it
-//! returns is of no use.
+//! They ask now and then whether to go on. Once the answer was no, all that is asked with the same
+//! patience ends soon, and what it returns is of no use.
 
 /// A question whether to go on, with how many zones are at hand.
 type Question<'q> = dyn FnMut(usize) -> bool + 'q;
@@ -74,7 +74,8 @@ impl<'q> Patience<'q> {
         self.is_over
     }
 
-    /// Notes that so many zones at hand are gone through, and asks if these have become many; returns whether it is over.
+    /// Notes that so many zones at hand are gone through, and asks if these have become many;
+    /// returns whether it is over.
     pub(super) fn ends_through(&mut self, zones: usize) -> bool {
         self.gone_through += zones;
         if self.gone_through < MANY {

@@ -1,8 +1,8 @@
 //! The innermost loops: rows of a matrix, and the step that all closing consists of.
 //!
-//! Rows are relaxed as vectors of four entries, the last of which may overlap the one before it. That is sound because
-//! relaxing is idempotent, and it spares short rows a scalar rest. Everything here is inlined into loops whose bounds are
-//! constants for small dimensions.
+//! Rows are relaxed as vectors of four entries, the last of which may overlap the one before it.
+//! That is sound because relaxing is idempotent, and it spares short rows a scalar rest. Everything
+//! here is inlined into loops whose bounds are constants for small dimensions.
 
 #![expect(
     clippy::inline_always,
@@ -30,7 +30,8 @@ macro_rules! for_small_dimension {
 }
 pub(super) use for_small_dimension;
 
-/// The rows of a matrix: as `chunks_exact_mut`, without its division, which is a good part of an operation.
+/// The rows of a matrix: as `chunks_exact_mut`, without its division, which is a good part of an
+/// operation.
 #[inline(always)]
 pub(super) fn rows_mut(
     matrix: &mut [Bound],
@@ -69,7 +70,8 @@ pub(super) fn with_row<R>(dimension: usize, action: impl FnOnce(&mut [Bound]) ->
     }
 }
 
-/// Tightens every entry of `target` to the sum of `via` and the entry of `source`, where that is less.
+/// Tightens every entry of `target` to the sum of `via` and the entry of `source`, where that is
+/// less.
 #[inline(always)]
 pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
     if via.is_infinite() {
@@ -95,8 +97,8 @@ pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
     }
 }
 
-/// The last four entries after relaxing, computed before any other is written so that no load waits for a store that
-/// overlaps it; none if the row is shorter.
+/// The last four entries after relaxing, computed before any other is written so that no load waits
+/// for a store that overlaps it; none if the row is shorter.
 #[inline(always)]
 fn last_relaxed(target: &[Bound], via: Bound, source: &[Bound]) -> Option<[Bound; 4]> {
     Some(relaxed_four(

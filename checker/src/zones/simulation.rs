@@ -1,27 +1,31 @@
 //! Inclusion up to what comparisons can tell: the abstraction `aLU`.
 //!
-//! A valuation w *simulates* v if on each clock it agrees with v, or is less but above L, or is greater where v is above U
-//! already: whatever comparisons let v do they let w do. `aLU(Z)` is the set of the valuations that some valuation of Z
-//! simulates. It is the coarsest abstraction that L and U allow. It is no zone, but its *demands* determine it:
+//! A valuation w *simulates* v if on each clock it agrees with v, or is less but above L, or is
+//! greater where v is above U already: whatever comparisons let v do they let w do. `aLU(Z)` is the
+//! set of the valuations that some valuation of Z simulates. It is the coarsest abstraction that L
+//! and U allow. It is no zone, but its *demands* determine it:
 //!
-//! The zone Z lies within `aLU(Z')` exactly if no entry of Z' is less than its counterpart among the demands of Z. That of entry
-//! (y, x) is the lesser of the entry of Z itself and of the least even bound from `2 L(y) + (0, x)` on, both encoded; there is none
-//! if y has no L, or if x is certainly above U. This is the theorem on inclusion of the source, read for all entries at once: an
-//! entry of Z' refutes the inclusion exactly if x may be at most U in Z, the entry is less than that of Z, and its sum
-//! with `< -L(y)` is less than (0, x).
+//! The zone Z lies within `aLU(Z')` exactly if no entry of Z' is less than its counterpart among
+//! the demands of Z. That of entry (y, x) is the lesser of the entry of Z itself and of the least
+//! even bound from `2 L(y) + (0, x)` on, both encoded; there is none if y has no L, or if x is
+//! certainly above U. This is the theorem on inclusion of the source, read for all entries at once:
+//! an entry of Z' refutes the inclusion exactly if x may be at most U in Z, the entry is less than
+//! that of Z, and its sum with `< -L(y)` is less than (0, x).
 //!
 //! From this follows:
 //!
-//! * Z lies within `aLU(Z')` exactly if no demand of Z exceeds that of Z'. For if Z does, the entries (0, x) of Z are at most those of
-//!   Z' where x may be at most U, and so are the bounds that are made of them; the other way round, demands are at most entries. So
-//!   zones have the same `aLU` exactly if they have the same demands.
-//! * The zone *reduced* to those of its entries that are demands, infinite elsewhere and without a demand for (0, x) if x is certainly
-//!   above U, has these demands, and is determined by them. Unlike demands it does not show L, so that it is the same more often.
-//! * What [`super::extrapolate::lu_plus`] makes of Z has the demands of Z. It is the closure of the reduced zone, with `< -U(x)` for
-//!   the entries (0, x) without a demand.
+//! * Z lies within `aLU(Z')` exactly if no demand of Z exceeds that of Z'. For if Z does, the
+//!   entries (0, x) of Z are at most those of Z' where x may be at most U, and so are the bounds
+//!   that are made of them; the other way round, demands are at most entries. So zones have the
+//!   same `aLU` exactly if they have the same demands.
+//! * The zone *reduced* to those of its entries that are demands, infinite elsewhere and without a
+//!   demand for (0, x) if x is certainly above U, has these demands, and is determined by them.
+//!   Unlike demands it does not show L, so that it is the same more often.
+//! * What [`super::extrapolate::lu_plus`] makes of Z has the demands of Z. It is the closure of the
+//!   reduced zone, with `< -U(x)` for the entries (0, x) without a demand.
 //!
-//! Source: F. Herbreteau, B. Srivathsan, I. Walukiewicz, "Better abstractions for timed automata", Information and Computation
-//! 251, 2016 (LICS 2012). What follows is derived here.
+//! Source: F. Herbreteau, B. Srivathsan, I. Walukiewicz, "Better abstractions for timed automata",
+//! Information and Computation 251, 2016 (LICS 2012). What follows is derived here.
 //!
 //! Cost: n^2 / 4 vector steps; for restoring as many as for [`super::extrapolate::lu_plus`].
 
@@ -60,8 +64,9 @@ fn leave_demands(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
     }
 }
 
-/// Writes the demands of a reduced zone; `limits` are those of its ceilings. A zone lies within `aLU` of another exactly if
-/// [`super::dbm::is_subset`] holds of its demands and the other, reduced or not, or the demands of the other.
+/// Writes the demands of a reduced zone; `limits` are those of its ceilings. A zone lies within
+/// `aLU` of another exactly if [`super::dbm::is_subset`] holds of its demands and the other,
+/// reduced or not, or the demands of the other.
 pub fn demands(reduced: &[Bound], dimension: usize, limits: &[Bound], target: &mut [Bound]) {
     for_small_dimension!(dimension, write_demands(reduced, limits, target));
 }

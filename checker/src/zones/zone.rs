@@ -1,5 +1,5 @@
-//! One zone that owns its matrix: the comfortable face of [`super::dbm`] and [`super::clocks`] for code that is not
-//! in the innermost loop.
+//! One zone that owns its matrix: the comfortable face of [`super::dbm`] and [`super::clocks`] for
+//! code that is not in the innermost loop.
 
 use super::clocks::{self, Assignment};
 use super::dbm::{self, Constraint, Relation};
@@ -99,14 +99,16 @@ impl Zone {
         !self.is_empty() && dbm::intersect(&mut self.bounds, &other.bounds, self.dimension)
     }
 
-    /// Lets any time pass while the clocks of `stopped` keep their values; see [`clocks::up_stopped`].
+    /// Lets any time pass while the clocks of `stopped` keep their values; see
+    /// [`clocks::up_stopped`].
     pub fn up(&mut self, stopped: &ClockSet) {
         if !self.is_empty() {
             clocks::up_stopped(&mut self.bounds, self.dimension, stopped);
         }
     }
 
-    /// Lets time run backwards while the clocks of `stopped` keep their values; see [`clocks::down_stopped`].
+    /// Lets time run backwards while the clocks of `stopped` keep their values; see
+    /// [`clocks::down_stopped`].
     pub fn down(&mut self, stopped: &ClockSet) {
         if !self.is_empty() {
             clocks::down_stopped(&mut self.bounds, self.dimension, stopped);
@@ -118,7 +120,8 @@ impl Zone {
         !self.is_empty() && clocks::assign(&mut self.bounds, self.dimension, assignments)
     }
 
-    /// Replaces the zone by its preimage under a guard and assignments; returns whether something is left.
+    /// Replaces the zone by its preimage under a guard and assignments; returns whether something
+    /// is left.
     pub fn preimage(&mut self, guard: &[Constraint], assignments: &[Assignment]) -> bool {
         !self.is_empty() && clocks::preimage(&mut self.bounds, self.dimension, guard, assignments)
     }

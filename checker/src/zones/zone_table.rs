@@ -1,6 +1,7 @@
 //! Zones, each stored once: states share them.
 //!
-//! Invariant: two zones get the same [`ZoneId`] exactly if their closed matrices are equal, that is, if they are the same set.
+//! Invariant: two zones get the same [`ZoneId`] exactly if their closed matrices are equal, that
+//! is, if they are the same set.
 
 use hashbrown::HashTable;
 

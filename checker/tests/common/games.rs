@@ -1,6 +1,7 @@
 //! A family of timed games that grows.
 
-/// Trains that come to a bridge when they like, and a gate that can stop them for a while. `arrow` says who lets them come: `->` or `-u->`.
+/// Trains that come to a bridge when they like, and a gate that can stop them for a while. `arrow`
+/// says who lets them come: `->` or `-u->`.
 pub(crate) fn trains(count: usize, arrow: &str) -> String {
     format!(
         "const int N = {count};

@@ -1,10 +1,12 @@
 //! A game with many zones for each discrete state.
 
-/// Some plates on poles, one pair of hands: each is to be spun again within so many units after it began to shake, which takes one. A
-/// few thousand states have many zones for each discrete state, of which there are few. With all that invariants allow, the plates
-/// may have been left alone for any time, and where they are lost falls into ever more pieces.
+/// Some plates on poles, one pair of hands: each is to be spun again within so many units after it
+/// began to shake, which takes one. A few thousand states have many zones for each discrete state,
+/// of which there are few. With all that invariants allow, the plates may have been left alone for
+/// any time, and where they are lost falls into ever more pieces.
 ///
-/// `[steady, shaking, falling]` are when a plate may begin to shake, when it must have been spun, and when it may fall.
+/// `[steady, shaking, falling]` are when a plate may begin to shake, when it must have been spun,
+/// and when it may fall.
 pub(crate) fn plates(count: usize, [steady, shaking, falling]: [i32; 3]) -> String {
     format!(
         "const int N = {count};

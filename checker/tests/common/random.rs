@@ -4,7 +4,8 @@
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
-    /// The generator of a network with this number; its first numbers, which are alike for neighbouring seeds, are left out.
+    /// The generator of a network with this number; its first numbers, which are alike for
+    /// neighbouring seeds, are left out.
     pub(crate) fn of_network(number: u64) -> Random {
         let mut random = Random(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
         for _ in 0..4 {

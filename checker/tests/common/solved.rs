@@ -5,7 +5,8 @@ use std::path::Path;
 
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options};
 
-/// The answer to a query, with what the winner does, if the model of the file accepts the query; and the model.
+/// The answer to a query, with what the winner does, if the model of the file accepts the query;
+/// and the model.
 pub(crate) fn solved(path: &Path, query: &str) -> Option<(LoadedModel, Answer)> {
     let bytes = fs::read(path).expect("the model is there");
     let mut model = LoadedModel::load("model.xta", &bytes).expect("the model is right");

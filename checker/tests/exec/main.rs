@@ -1,4 +1,5 @@
-//! Running code: every operator against a table made by hand, and all engines against each other on random programs and on models.
+//! Running code: every operator against a table made by hand, and all engines against each other on
+//! random programs and on models.
 
 mod models;
 mod operators;

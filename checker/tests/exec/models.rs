@@ -1,4 +1,5 @@
-//! Whole models: on random walks through each model of the corpus, all engines must see the same states.
+//! Whole models: on random walks through each model of the corpus, all engines must see the same
+//! states.
 //!
 //! * `ENGINES_STEPS`: how many moves a walk has.
 //! * `ENGINES_MODELS`: folders with more models, separated by colons.

@@ -1,5 +1,5 @@
-//! Every operator on its edge cases. The expectations are written by hand from the definitions and not computed with the
-//! code under test.
+//! Every operator on its edge cases. The expectations are written by hand from the definitions and
+//! not computed with the code under test.
 
 use checker::exec::RunTimeError;
 use checker::ir::{
@@ -16,7 +16,8 @@ const MIN: i32 = i32::MIN;
 const MAX: i32 = i32::MAX;
 const SITE: SiteId = SiteId(77);
 
-/// Runs instructions over registers of the given types, of which the first take the arguments, on every engine.
+/// Runs instructions over registers of the given types, of which the first take the arguments, on
+/// every engine.
 fn check(
     registers: &[RegisterType],
     arguments: &[i32],
@@ -31,7 +32,8 @@ fn check(
     }
 }
 
-/// What a call returns, with the state, or how it ends; and the first place where a result wrapped round.
+/// What a call returns, with the state, or how it ends; and the first place where a result wrapped
+/// round.
 type Expected<'e> = (&'e Result<(i32, Vec<i32>), Kind>, Option<SiteId>);
 
 fn check_on(overflow: Overflow, functions: &[Function], arguments: &[i32], expected: Expected<'_>) {
@@ -51,7 +53,8 @@ fn check_on(overflow: Overflow, functions: &[Function], arguments: &[i32], expec
     }
 }
 
-/// Checks what computing this comes to where its result does not fit: the wrapped result with a note, or an error.
+/// Checks what computing this comes to where its result does not fit: the wrapped result with a
+/// note, or an error.
 fn check_wrapping(
     registers: &[RegisterType],
     arguments: &[i32],

@@ -1,9 +1,10 @@
 //! Random programs: whatever they do, all engines must do the same.
 //!
-//! A program is a few functions, of which each calls only earlier ones and the last is called from outside. Functions work
-//! on small pools of registers that are written over and over, on 64 words each of state, constants and frame, cut into
-//! blocks of four, and through addresses of blocks. Loops have few rounds. Numbers are mostly small, so that many programs
-//! run to their end, and sometimes extreme, so that results wrap round and every error comes up.
+//! A program is a few functions, of which each calls only earlier ones and the last is called from
+//! outside. Functions work on small pools of registers that are written over and over, on 64 words
+//! each of state, constants and frame, cut into blocks of four, and through addresses of blocks.
+//! Loops have few rounds. Numbers are mostly small, so that many programs run to their end, and
+//! sometimes extreme, so that results wrap round and every error comes up.
 
 use std::fmt::Write;
 
@@ -564,7 +565,8 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// A place with room for a double; the third pick says which word of a block, and how it is indexed.
+    /// A place with room for a double; the third pick says which word of a block, and how it is
+    /// indexed.
     fn place(&mut self, base: u8, block: u8, how: u8, may_be_constant: bool) -> Address {
         let base = self.base(base, may_be_constant, true);
         let in_block = u32::from(how) % 3;

@@ -1,9 +1,9 @@
-//! Files of evidence: certificates, traces, strategies and machines for the models of the corpus, and what is done with a
-//! mutated one.
+//! Files of evidence: certificates, traces, strategies and machines for the models of the corpus,
+//! and what is done with a mutated one.
 //!
-//! An input begins with a line that holds the number of its model; the file follows. It is read as `ntagen verify` reads it. If
-//! it passes, the engine must not give the opposite answer to the query in the file: no mutation may make evidence that is accepted
-//! for a wrong verdict.
+//! An input begins with a line that holds the number of its model; the file follows. It is read as
+//! `ntagen verify` reads it. If it passes, the engine must not give the opposite answer to the
+//! query in the file: no mutation may make evidence that is accepted for a wrong verdict.
 
 use std::fmt::Write as _;
 use std::time::Duration;

@@ -1,13 +1,16 @@
-//! Hostile inputs: whatever is read, loading, asking and checking end in a value or in a diagnostic, and soon.
+//! Hostile inputs: whatever is read, loading, asking and checking end in a value or in a
+//! diagnostic, and soon.
 //!
-//! Inputs are made from those of the corpus by mutation, one from each number, so that a failure is found again by its
-//! number. A panic, and an input that takes longer than [`SLOW`] or [`SLOW_CHECK`], fails the test; a stack overflow ends it.
+//! Inputs are made from those of the corpus by mutation, one from each number, so that a failure is
+//! found again by its number. A panic, and an input that takes longer than [`SLOW`] or
+//! [`SLOW_CHECK`], fails the test; a stack overflow ends it.
 //!
 //! * `FUZZ_CASES`: how many inputs (a few thousand otherwise).
 //! * `FUZZ_FIRST`: the number of the first one.
 //! * `FUZZ_SEEDS`: folders with more inputs to begin from, separated by colons.
 //! * `FUZZ_KIND`: one of the kinds of [`Kind`] only.
-//! * `FUZZ_SHOW`: say the number of each input before it is tried, to find one that never ends (with `--nocapture`).
+//! * `FUZZ_SHOW`: say the number of each input before it is tried, to find one that never ends
+//!   (with `--nocapture`).
 
 mod evidence;
 mod mutate;

@@ -1,4 +1,5 @@
-//! Mutations: bytes and tokens are removed, doubled, swapped, replaced by words of the language, or taken from another seed.
+//! Mutations: bytes and tokens are removed, doubled, swapped, replaced by words of the language, or
+//! taken from another seed.
 
 use super::seeds::Seeds;
 use super::targets::Kind;

@@ -85,7 +85,8 @@ impl Seeds {
         if kind == Kind::Xml {
             self.add_parts(&String::from_utf8_lossy(&bytes));
         } else if kind == Kind::Xta {
-            // The declarations stand before the first process, and those of the corpus name their queries in comments.
+            // The declarations stand before the first process, and those of the corpus name their
+            // queries in comments.
             let text = String::from_utf8_lossy(&bytes);
             let declarations = text.split("process").next().unwrap_or("");
             self.add(Kind::Declarations, declarations.as_bytes());

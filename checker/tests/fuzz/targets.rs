@@ -1,4 +1,5 @@
-//! What is done with an input: it is loaded, asked a query, and walked through for a few moves; evidence is checked.
+//! What is done with an input: it is loaded, asked a query, and walked through for a few moves;
+//! evidence is checked.
 
 use std::time::Duration;
 
@@ -108,7 +109,8 @@ fn few_states() -> Options {
     options
 }
 
-/// A model with the text as guard, invariant, update and select; which of them is up to its first byte.
+/// A model with the text as guard, invariant, update and select; which of them is up to its first
+/// byte.
 fn with_expression(input: &[u8]) -> Vec<u8> {
     let hole: &[u8] = match input.first().map_or(0, |byte| byte % 5) {
         0 | 1 => b"trans A -> B { guard ",

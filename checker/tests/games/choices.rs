@@ -1,5 +1,6 @@
-//! Of several ways to evade, a verdict needs one: the others are explored only where the seeker wins against those before. Where time
-//! passes, the evader may wait: no way is explored before there is something to evade.
+//! Of several ways to evade, a verdict needs one: the others are explored only where the seeker
+//! wins against those before. Where time passes, the evader may wait: no way is explored before
+//! there is something to evade.
 
 use crate::families;
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
@@ -21,7 +22,8 @@ process Store() {
 system Store;
 ";
 
-/// Whether the controller wins if it tries gifts in this order, and how many states were explored for it.
+/// Whether the controller wins if it tries gifts in this order, and how many states were explored
+/// for it.
 fn asked(order: &str, query: &str, verify: bool) -> (bool, u64) {
     let text = TEXT.replace("ORDER", order);
     let options = Options {
@@ -84,7 +86,8 @@ fn ways_that_turn_out_to_be_lost_are_left() {
 
 #[test]
 fn losses_that_come_late_are_found() {
-    // The environment takes one more than it can be given, in each of twenty rounds; every round is like the one before.
+    // The environment takes one more than it can be given, in each of twenty rounds; every round is
+    // like the one before.
     for order in ["g % 4", "3 - g % 4"] {
         for verify in [false, true] {
             let (is_safe, _) = asked(order, "control: A[] stock >= 0", verify);
@@ -112,8 +115,9 @@ fn while_time_passes_moves_are_explored_as_they_are_needed() {
     }
 }
 
-/// An attacker that strikes three time units after it has begun, at the earliest, and a shield that takes a while to go up and only does
-/// so during an attack. Decoys move now and then, without any effect.
+/// An attacker that strikes three time units after it has begun, at the earliest, and a shield that
+/// takes a while to go up and only does so during an attack. Decoys move now and then, without any
+/// effect.
 const SHIELD: &str = "
 const int DECOYS = 1;
 typedef int[0, DECOYS - 1] decoy_t;

@@ -1,7 +1,8 @@
 //! Controllers in C: compiled, they decide as the strategy does that they were made of.
 //!
-//! Each is asked in all discrete states of its strategy and in some beside them, at all clock values of a grid and at random ones. What
-//! is expected is looked up in the strategy itself, decision by decision.
+//! Each is asked in all discrete states of its strategy and in some beside them, at all clock
+//! values of a grid and at random ones. What is expected is looked up in the strategy itself,
+//! decision by decision.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -19,7 +20,8 @@ use checker::network::{Part, is_same_entry};
 use crate::c_programs::{compiled, games, in_folder};
 use crate::solved::solved;
 
-/// Ticks of a unit of time. Clock values are whole numbers of two of them, so that every bound and the middle between is met.
+/// Ticks of a unit of time. Clock values are whole numbers of two of them, so that every bound and
+/// the middle between is met.
 const TICKS_PER_UNIT: i64 = 4;
 
 /// The greatest clock value that is asked about, in ticks.
@@ -193,7 +195,8 @@ impl Case {
             assert_eq!(is_allowed == 1, wanted || is_picked, "{place}: {action}");
         }
         if action == -1 {
-            // Every bound is a whole number of ticks, so looking at each tick and between is enough.
+            // Every bound is a whole number of ticks, so looking at each tick and between is
+            // enough.
             let end = if wait < 0 { 3 * GREATEST } else { wait };
             for ticks in 0..end {
                 assert!(

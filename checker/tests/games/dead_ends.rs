@@ -1,9 +1,10 @@
-//! What follows after a dead end is not explored, however the goal is written; where only variables make one, or the locations do not
-//! show it, all of it is.
+//! What follows after a dead end is not explored, however the goal is written; where only variables
+//! make one, or the locations do not show it, all of it is.
 
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
 
-/// Two counters run for two hundred states each: after `Lost` nothing can be won, after `Late` it can.
+/// Two counters run for two hundred states each: after `Lost` nothing can be won, after `Late` it
+/// can.
 const TEXT: &str = "
 const int N = 2;
 typedef int[0, N - 1] id_t;

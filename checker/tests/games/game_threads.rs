@@ -55,7 +55,8 @@ fn games_do_not_depend_on_the_number_of_threads() {
     }
 }
 
-/// Discrete states are tried, and given up when they have taken so many operations, which is when they are nearly done.
+/// Discrete states are tried, and given up when they have taken so many operations, which is when
+/// they are nearly done.
 #[test]
 fn giving_up_does_not_depend_on_the_number_of_threads() {
     let text = plates(5, [12, 12, 12]);

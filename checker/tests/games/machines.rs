@@ -1,4 +1,5 @@
-//! Machines of games under partial observation in C: compiled, they propose and go on as the machine that they were made of.
+//! Machines of games under partial observation in C: compiled, they propose and go on as the
+//! machine that they were made of.
 //!
 //! Of each, all states are asked for all observations.
 

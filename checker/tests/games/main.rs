@@ -1,4 +1,5 @@
-//! Timed games: who wins, what strategies in every form do, and how far the solver gets within its limits.
+//! Timed games: who wins, what strategies in every form do, and how far the solver gets within its
+//! limits.
 
 #[path = "../common/c_programs.rs"]
 mod c_programs;

@@ -1,4 +1,5 @@
-//! Where discrete states with all that invariants allow take more work than those that are reached, games are played in the latter.
+//! Where discrete states with all that invariants allow take more work than those that are reached,
+//! games are played in the latter.
 
 use std::time::Duration;
 

@@ -264,7 +264,8 @@ fn strategies_are_saved_and_loaded_beside_the_model() {
 
 const RACE: &str = "clock x; process P() { state A { x <= 5 }, B, C; init A; trans A -> B { guard x >= 1; }, B -> C { }; } system P;";
 
-/// Under the strategy of a time-optimal game, the goal comes within the time; traces are about the model, without the clock.
+/// Under the strategy of a time-optimal game, the goal comes within the time; traces are about the
+/// model, without the clock.
 #[test]
 fn strategies_within_a_time_are_asked_under() {
     let mut model = LoadedModel::load("model.xta", RACE.as_bytes()).expect("the model is right");

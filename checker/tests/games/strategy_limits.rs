@@ -1,4 +1,5 @@
-//! Limits that come while a strategy is made: what is known is answered, and why there is no strategy is said.
+//! Limits that come while a strategy is made: what is known is answered, and why there is no
+//! strategy is said.
 
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
@@ -25,8 +26,8 @@ fn check(text: &str, query: &str, limits: Limits) -> Answer {
 
 #[test]
 fn memory_ends_a_strategy_and_not_the_answer() {
-    // Of each kind of strategy some: permissive, seeking, evading, with a goal that comes again and one that is denied, after a way, and
-    // from anywhere.
+    // Of each kind of strategy some: permissive, seeking, evading, with a goal that comes again and
+    // one that is denied, after a way, and from anywhere.
     let queries = [
         ONE_ON_THE_BRIDGE,
         "control: A<> Train(0).Stopped",

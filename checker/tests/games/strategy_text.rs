@@ -1,7 +1,9 @@
-//! Strategies as text, line by line: `tests/corpus/games`, where the lines `// strategy: …` below a query are the text of the
-//! winner's strategy, from the line on that says whose it is. Each discrete state is a paragraph; their order says nothing.
+//! Strategies as text, line by line: `tests/corpus/games`, where the lines `// strategy: …` below a
+//! query are the text of the winner's strategy, from the line on that says whose it is. Each
+//! discrete state is a paragraph; their order says nothing.
 //!
-//! The running example of the TIGA manual must come out as the manual prints it (section 3, figure 8).
+//! The running example of the TIGA manual must come out as the manual prints it (section 3, figure
+//! 8).
 
 use std::fs;
 use std::path::{Path, PathBuf};

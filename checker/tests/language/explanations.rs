@@ -1,4 +1,5 @@
-//! Every diagnostic has a page, the wrong example of which gives that diagnostic and the right one none.
+//! Every diagnostic has a page, the wrong example of which gives that diagnostic and the right one
+//! none.
 
 use std::collections::BTreeSet;
 

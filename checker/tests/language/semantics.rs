@@ -1,14 +1,18 @@
-//! The corpus of `tests/corpus/language`: models with the diagnostics, values and run-time errors that they must give.
+//! The corpus of `tests/corpus/language`: models with the diagnostics, values and run-time errors
+//! that they must give.
 //!
 //! Directives are comments that begin with a word and a colon:
-//! * `// expect: E0201 at 3:5 "part of the message"`: a diagnostic; a file gives exactly those that it expects. With
-//!   `at next:5` or `at this:5` the line is that after, or of, the directive.
+//! * `// expect: E0201 at 3:5 "part of the message"`: a diagnostic; a file gives exactly those that
+//!   it expects. With `at next:5` or `at this:5` the line is that after, or of, the directive.
 //! * `// run: condition`: the condition holds in the initial state.
-//! * `// fails: condition with DivisionByZero at 1 / n`: evaluating it there ends in that error, in that expression; results that do not
-//!   fit are errors.
-//! * `// wraps: condition at n * n`: the condition holds there, and that result does not fit and wraps round.
-//! * `// accept: query`, `// refuse: query with E0271 "part of the message"`: whether a query can be asked.
-//! * `// warn: query with W0204`: the query can be asked, and gives this warning. There is a strategy with the name `known`.
+//! * `// fails: condition with DivisionByZero at 1 / n`: evaluating it there ends in that error, in
+//!   that expression; results that do not fit are errors.
+//! * `// wraps: condition at n * n`: the condition holds there, and that result does not fit and
+//!   wraps round.
+//! * `// accept: query`, `// refuse: query with E0271 "part of the message"`: whether a query can
+//!   be asked.
+//! * `// warn: query with W0204`: the query can be asked, and gives this warning. There is a
+//!   strategy with the name `known`.
 //!
 //! Models below `ok` give no error; those below `err` give at least one.
 
@@ -305,8 +309,9 @@ fn every_code_is_unique() {
     assert_eq!(codes.len(), count);
 }
 
-/// Codes of files that no corpus can hold: 256 MiB, a hundred mistakes, nothing at all, other encodings, a thousand brackets.
-/// `tests/syntax/limits.rs`, `models.rs` and the pages of `ntagen explain` have them.
+/// Codes of files that no corpus can hold: 256 MiB, a hundred mistakes, nothing at all, other
+/// encodings, a thousand brackets. `tests/syntax/limits.rs`, `models.rs` and the pages of `ntagen
+/// explain` have them.
 const OUTSIDE_CORPUS: [&str; 7] = [
     "E0106", "E0111", "E0122", "E0123", "E0129", "E0144", "W0106",
 ];
@@ -341,7 +346,8 @@ fn every_code_has_a_line_in_the_corpus() {
     assert_eq!(missing, OUTSIDE_CORPUS);
 }
 
-/// Whether static analysis takes comparisons of clocks in a guard for able to matter, and the guard for able to hold.
+/// Whether static analysis takes comparisons of clocks in a guard for able to matter, and the guard
+/// for able to hold.
 fn matters(guard: &str) -> (bool, bool) {
     let text = format!(
         "const bool late[3] = {{false, false, false}};

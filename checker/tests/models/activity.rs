@@ -1,8 +1,10 @@
-//! Which clocks matter where: models in which a clock is compared with a great constant, but only behind a flag that is set together
-//! with the clock. Where this is seen, few states are stored; where it is not so, the states that it takes must all be there.
+//! Which clocks matter where: models in which a clock is compared with a great constant, but only
+//! behind a flag that is set together with the clock. Where this is seen, few states are stored;
+//! where it is not so, the states that it takes must all be there.
 //!
-//! That nothing is lost by it, random networks show: they must give the same answers with a process beside them that could write the
-//! flags and take part in the synchronisations, as far as the analysis of a single process knows.
+//! That nothing is lost by it, random networks show: they must give the same answers with a process
+//! beside them that could write the flags and take part in the synchronisations, as far as the
+//! analysis of a single process knows.
 
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 
@@ -21,7 +23,8 @@ fn check(text: &str, query: &str) -> Answer {
         .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
 }
 
-/// A worker ticks every time unit until it starts the timer's clock `x`, and stops when it shows 300.
+/// A worker ticks every time unit until it starts the timer's clock `x`, and stops when it shows
+/// 300.
 struct Timer<'a> {
     declarations: &'a str,
     /// The guard with which it stops, in the location in which it ticks.
@@ -166,7 +169,8 @@ fn receivers_of_a_broadcast_know_what_their_sender_resets() {
 
 #[test]
 fn clocks_matter_before_a_flag_that_is_set_without_them() {
-    // `x` and `y` run in step, so that they never show 5 and 7 together; a search that has forgotten them would not know.
+    // `x` and `y` run in step, so that they never show 5 and 7 together; a search that has
+    // forgotten them would not know.
     for (declarations, update, wanted) in [
         ("bool flag;", "flag = true", "flag"),
         ("int[0,3] stage;", "stage = (stage + 1) % 4", "stage == 3"),
@@ -256,7 +260,8 @@ impl Random {
                 ),
                 _ => String::new(),
             };
-            // Guards of receivers of a broadcast are kept free of clocks: what they then mean is not the matter here.
+            // Guards of receivers of a broadcast are kept free of clocks: what they then mean is
+            // not the matter here.
             let guard = match sync {
                 "sync all?;" => format!("{flag} == {}", self.below(3)),
                 _ => self.guard(&flag),

@@ -184,7 +184,8 @@ fn file_is_checked() {
     );
 }
 
-/// Deadlocks, urgent channels with clock guards, priorities and receivers that abstain have rules of their own in the check.
+/// Deadlocks, urgent channels with clock guards, priorities and receivers that abstain have rules
+/// of their own in the check.
 #[test]
 fn certificates_of_all_constructs_hold() {
     let models = [
@@ -237,7 +238,8 @@ fn certificates_of_all_constructs_hold() {
     }
 }
 
-/// Which of two states that differ in a `meta` variable is kept decides what is found; a certificate cannot take sides.
+/// Which of two states that differ in a `meta` variable is kept decides what is found; a
+/// certificate cannot take sides.
 #[test]
 fn certificate_that_hangs_on_meta_variables_is_refused() {
     let text = "meta int[0,1] m;
@@ -254,8 +256,8 @@ fn certificate_that_hangs_on_meta_variables_is_refused() {
     );
 }
 
-/// Whoever listens for long enough hears the call: each listener has a clock of its own, so that without zones any set of them
-/// might hear it.
+/// Whoever listens for long enough hears the call: each listener has a clock of its own, so that
+/// without zones any set of them might hear it.
 fn listeners(count: usize) -> String {
     format!(
         "broadcast chan call; process Caller() {{ clock t; state S {{ t <= 40 }}, Done; init S; trans S -> Done {{ sync call!; }}; }}

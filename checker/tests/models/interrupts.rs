@@ -1,7 +1,8 @@
-//! Limits and interruptions in the middle of one call of the model's code, of one enumeration of moves, or of one operation on zones.
+//! Limits and interruptions in the middle of one call of the model's code, of one enumeration of
+//! moves, or of one operation on zones.
 //!
-//! What runs there would end in an error of the model, or take more memory than there is, if nothing ended it before, so that no test
-//! measures time.
+//! What runs there would end in an error of the model, or take more memory than there is, if
+//! nothing ended it before, so that no test measures time.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -33,8 +34,8 @@ const CROWD: &str = "
       trans A -> A { sync go?; assign n = me % 4; }, A -> A { sync go?; assign n = (n * 3) % 4; }; }
     system S, R;";
 
-/// Where one sender has priority, what is left for the other one is cut out of all valuations, in as many zones as there are sets of
-/// receivers that abstain.
+/// Where one sender has priority, what is left for the other one is cut out of all valuations, in
+/// as many zones as there are sets of receivers that abstain.
 const CUTTING: &str = "
     broadcast chan go, first; chan priority go < first; int[0,3] n;
     process S() { state S; init S; trans S -> S { sync go!; assign n = 1; }, S -> S { sync first!; assign n = 2; }; }

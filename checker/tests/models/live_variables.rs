@@ -1,10 +1,13 @@
-//! Searches that forget variables where nothing reads them any more, against searches that keep all values.
+//! Searches that forget variables where nothing reads them any more, against searches that keep all
+//! values.
 //!
-//! Models in which a value is passed on and not needed again show what is gained; models in which it is needed on a hidden way
-//! show what must be kept; random networks that pass values in all ways show that verdicts and values stay what they are. Every run
-//! that is found must pass its replay, which knows nothing of the reduction.
+//! Models in which a value is passed on and not needed again show what is gained; models in which
+//! it is needed on a hidden way show what must be kept; random networks that pass values in all
+//! ways show that verdicts and values stay what they are. Every run that is found must pass its
+//! replay, which knows nothing of the reduction.
 //!
-//! `NETWORKS=50000 cargo test --release --test models live_variables::` runs more of them than the usual number.
+//! `NETWORKS=50000 cargo test --release --test models live_variables::` runs more of them than the
+//! usual number.
 
 use crate::searches;
 use std::fmt::Write as _;
@@ -33,7 +36,8 @@ fn answer(text: &str, query: &str, live_variables: bool, manner: (Order, usize))
     })
 }
 
-/// How many states are stored without and with the reduction, which must agree in any manner of search.
+/// How many states are stored without and with the reduction, which must agree in any manner of
+/// search.
 fn stored(text: &str, query: &str) -> (u64, u64) {
     let one = (Order::BreadthFirst, 1);
     let full = answer(text, query, false, one);
@@ -46,7 +50,8 @@ fn stored(text: &str, query: &str) -> (u64, u64) {
     let reduced = manners.map(|manner| {
         let reduced = answer(text, query, true, manner);
         let is_cut = |answer: &Answer| matches!(answer.verdict, Verdict::Unknown(_));
-        // Where a failure can be met and what is looked for can be found, either may come first in another manner.
+        // Where a failure can be met and what is looked for can be found, either may come first in
+        // another manner.
         let is_end = |answer: &Answer| !answer.evidence.witnesses.is_empty();
         let agree = full.verdict == reduced.verdict
             && format!("{:?}", full.value) == format!("{:?}", reduced.value);
@@ -66,7 +71,8 @@ fn stored(text: &str, query: &str) -> (u64, u64) {
     (full.counters.stored, reduced[0])
 }
 
-/// A sender passes one of sixteen values by a variable in common; the receiver takes it over, looks at it once, and waits again.
+/// A sender passes one of sixteen values by a variable in common; the receiver takes it over, looks
+/// at it once, and waits again.
 const PASSING: &str = "
     chan pass; int[0,15] message; int[0,15] rounds;
     process Sender() { state Idle, Busy; init Idle; trans
@@ -81,7 +87,8 @@ const PASSING: &str = "
 
 #[test]
 fn a_value_that_was_passed_on_is_forgotten() {
-    // The value counts only where it is read: sixteen states there, one in each of the two other places, each with the sender in two.
+    // The value counts only where it is read: sixteen states there, one in each of the two other
+    // places, each with the sender in two.
     assert_eq!(stored(PASSING, "E<> false"), (80, 36));
     assert_eq!(
         stored(PASSING, "sup: Receiver.value"),
@@ -90,8 +97,8 @@ fn a_value_that_was_passed_on_is_forgotten() {
     );
 }
 
-/// In each of these a value is read on a way on which a careless analysis does not see it: edges of a process, those of another one,
-/// and what can be reached only with the value.
+/// In each of these a value is read on a way on which a careless analysis does not see it: edges of
+/// a process, those of another one, and what can be reached only with the value.
 #[test]
 fn values_that_are_read_are_kept() {
     let cases = [
@@ -319,7 +326,8 @@ fn process(random: &mut Random, index: usize) -> String {
             };
             let sync = random.chance(40).then(|| random.one_of(&SYNCS));
             let guard = random.chance(25).then(|| random.one_of(&GUARDS));
-            // Whether a broadcast is heard must not hang on clocks, or deadlocks could not be asked for.
+            // Whether a broadcast is heard must not hang on clocks, or deadlocks could not be asked
+            // for.
             let is_timed = |guard: &&str| sync == Some("b?") && guard.starts_with('x');
             let guard = guard.filter(|guard| !is_timed(guard));
             let mut updates: Vec<&str> = (0..random.below(3))

@@ -1,4 +1,5 @@
-//! Models and their queries: verdicts, traces, certificates, reductions, threads and limits, on the corpus and on random networks.
+//! Models and their queries: verdicts, traces, certificates, reductions, threads and limits, on the
+//! corpus and on random networks.
 
 mod activity;
 mod certificates;

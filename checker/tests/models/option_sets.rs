@@ -1,11 +1,12 @@
-//! The same question with different options: engine, order, threads, nodes of game graphs, reductions, and what is wanted besides.
-//! None of them may change the answer.
+//! The same question with different options: engine, order, threads, nodes of game graphs,
+//! reductions, and what is wanted besides. None of them may change the answer.
 //!
-//! Questions are the queries of the corpus, asked of its models as they are or with some of their numbers changed. Each is asked
-//! twice, with two random sets of options. If both answers are definite, they must be the same, and all evidence must pass its
-//! independent check.
+//! Questions are the queries of the corpus, asked of its models as they are or with some of their
+//! numbers changed. Each is asked twice, with two random sets of options. If both answers are
+//! definite, they must be the same, and all evidence must pass its independent check.
 //!
-//! `NETWORKS=20000 cargo test --release --test models option_sets::` tries more pairs than the usual number.
+//! `NETWORKS=20000 cargo test --release --test models option_sets::` tries more pairs than the
+//! usual number.
 
 use std::fs;
 use std::path::Path;
@@ -50,7 +51,8 @@ fn corpus() -> Vec<Model> {
     models
 }
 
-/// The text with up to three of the numbers of its declarations changed to a small one; comments stay as they are.
+/// The text with up to three of the numbers of its declarations changed to a small one; comments
+/// stay as they are.
 fn changed(text: &str, random: &mut Random) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for _ in 0..random.below(4) {
@@ -117,7 +119,8 @@ fn answer(text: &str, query: &str, options: &Options) -> Option<Answer> {
     model.check(&query, options).ok()
 }
 
-/// What options may not change, if the answer is definite. Whether an error of the model is met depends on what is looked at.
+/// What options may not change, if the answer is definite. Whether an error of the model is met
+/// depends on what is looked at.
 fn definite(answer: &Answer) -> Option<String> {
     match answer.verdict {
         Verdict::Satisfied | Verdict::NotSatisfied => {

@@ -1,9 +1,13 @@
-//! Searches that leave out orders of independent moves where time stands still, against searches of all moves.
+//! Searches that leave out orders of independent moves where time stands still, against searches of
+//! all moves.
 //!
-//! Random networks have urgent and committed locations, invariants, variables and clocks of their own and in common, and channels of every
-//! kind; in some of them mostly urgent locations keep time from passing, in others mostly invariants and urgent channels. Every run that is found must pass its replay, which knows nothing of the reduction.
+//! Random networks have urgent and committed locations, invariants, variables and clocks of their
+//! own and in common, and channels of every kind; in some of them mostly urgent locations keep time
+//! from passing, in others mostly invariants and urgent channels. Every run that is found must pass
+//! its replay, which knows nothing of the reduction.
 //!
-//! `NETWORKS=50000 cargo test --release --test models partial_order::` runs more of them than the usual number.
+//! `NETWORKS=50000 cargo test --release --test models partial_order::` runs more of them than the
+//! usual number.
 
 use crate::searches;
 use std::fmt::Write as _;
@@ -32,7 +36,8 @@ fn answer_in(manner: (Order, usize), text: &str, query: &str, partial_order: boo
 /// Larger networks are left out.
 const MOST_STATES: u64 = 4000;
 
-/// Whether verdicts of two searches agree: where a failure can be met and what is looked for can be found, either may come first.
+/// Whether verdicts of two searches agree: where a failure can be met and what is looked for can be
+/// found, either may come first.
 fn agree(one: Verdict, other: Verdict, found: Verdict) -> bool {
     let is_end = |verdict| verdict == found || matches!(verdict, Verdict::Error(_));
     one == other
@@ -42,7 +47,8 @@ fn agree(one: Verdict, other: Verdict, found: Verdict) -> bool {
             .any(|one| matches!(one, Verdict::Unknown(_)))
 }
 
-/// How many states are stored without and with the reduction, which must agree in any manner of search.
+/// How many states are stored without and with the reduction, which must agree in any manner of
+/// search.
 fn stored(text: &str, query: &str) -> (u64, u64) {
     let one = (Order::BreadthFirst, 1);
     let found = if query.starts_with("E<>") {
@@ -132,7 +138,8 @@ fn roll_call(count: usize) -> String {
 
 #[test]
 fn who_has_come_to_the_bound_of_an_invariant_is_not_interleaved() {
-    // Of each sensor three states between its window and the next one, and of each pair one while they begin again.
+    // Of each sensor three states between its window and the next one, and of each pair one while
+    // they begin again.
     let (full, reduced) = stored(&roll_call(9), "A[] not deadlock");
     assert_eq!((full, reduced), (538, 72));
     let query = "E<> Sensor(3).listening && Sensor(2).before";
@@ -327,7 +334,8 @@ const SYNCS: [&str; 9] = [
     "d[v]!",
 ];
 
-/// In `timed` processes few locations are urgent or committed, and time comes to the bounds of invariants.
+/// In `timed` processes few locations are urgent or committed, and time comes to the bounds of
+/// invariants.
 fn process(random: &mut Random, index: usize, count: usize, is_timed: bool) -> String {
     // Most of what a process does concerns itself, else there is nothing to reduce.
     let is_sociable = random.chance(25);
@@ -402,7 +410,8 @@ fn process(random: &mut Random, index: usize, count: usize, is_timed: bool) -> S
             } else {
                 ""
             };
-            // Clocks in guards of receivers of broadcasts and on urgent channels are left out as often as not.
+            // Clocks in guards of receivers of broadcasts and on urgent channels are left out as
+            // often as not.
             let guards: Vec<&str> = guards
                 .into_iter()
                 .filter(|guard| {

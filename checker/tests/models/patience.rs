@@ -1,4 +1,5 @@
-//! Operations on large federations end when they are told to, and only then do they give less than all.
+//! Operations on large federations end when they are told to, and only then do they give less than
+//! all.
 
 use checker::zones::{Bound, ClockSet, Federation, Patience, Zone, past};
 
@@ -23,7 +24,8 @@ fn boxes(first: i32) -> Federation {
     federation
 }
 
-/// What an operation gives with a patience that ends after so many questions, and how often it asked.
+/// What an operation gives with a patience that ends after so many questions, and how often it
+/// asked.
 fn asked<R>(most: u32, operation: impl FnOnce(&mut Patience<'_>) -> R) -> (R, u32, bool) {
     let mut questions = 0;
     let mut goes_on = |_| {

@@ -1,11 +1,13 @@
-//! The answers to queries on random networks against a search of the region graph, written from the definitions and sharing
-//! nothing with the engine but the text of the model.
+//! The answers to queries on random networks against a search of the region graph, written from the
+//! definitions and sharing nothing with the engine but the text of the model.
 //!
-//! A region fixes the integer parts of all clocks up to [`TOP`], which of them have no fraction, and the order of the fractions
-//! (Alur and Dill, "A Theory of Timed Automata", 1994). Networks have two processes of two or three locations, two clocks, one channel
-//! of any kind, constants up to 3, committed and urgent locations, and priorities.
+//! A region fixes the integer parts of all clocks up to [`TOP`], which of them have no fraction,
+//! and the order of the fractions (Alur and Dill, "A Theory of Timed Automata", 1994). Networks
+//! have two processes of two or three locations, two clocks, one channel of any kind, constants up
+//! to 3, committed and urgent locations, and priorities.
 //!
-//! `NETWORKS=50000 cargo test --release --test models random_queries::` runs more of them than the usual number.
+//! `NETWORKS=50000 cargo test --release --test models random_queries::` runs more of them than the
+//! usual number.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -90,7 +92,8 @@ struct Network {
     priority: usize,
 }
 
-/// Of each clock the integer part and the rank of its fraction, 0 for none; `(TOP, 1)` is anything above.
+/// Of each clock the integer part and the rank of its fraction, 0 for none; `(TOP, 1)` is anything
+/// above.
 type Region = [(i32, i32); 2];
 type State = ([usize; 2], Region);
 
@@ -354,7 +357,8 @@ impl Network {
         false
     }
 
-    /// Whether the engine has to decide deadlocks: not with priorities or guarded receivers of a broadcast.
+    /// Whether the engine has to decide deadlocks: not with priorities or guarded receivers of a
+    /// broadcast.
     fn has_deadlock_queries(&self) -> bool {
         let has_guard = |edge: &Edge| edge.sync == 2 && !edge.guard.is_empty();
         let is_refused = (1..=3).contains(&self.priority)
@@ -362,8 +366,8 @@ impl Network {
         !is_refused
     }
 
-    /// The states from which a run stays in `keep` for ever: what remains when states without a way on are taken away again
-    /// and again.
+    /// The states from which a run stays in `keep` for ever: what remains when states without a way
+    /// on are taken away again and again.
     fn staying(&self, states: &BTreeSet<State>, keep: &dyn Fn(&State) -> bool) -> BTreeSet<State> {
         // Time alone goes on for ever only in the last region; all other cycles have a move.
         let goes_on = |state: &State| {
@@ -543,9 +547,9 @@ fn check_verdict(text: &str, query: &str, expected: bool) {
     );
 }
 
-/// A greatest value up to [`TOP`] is exact in the region graph, one above is only known to be there.
-/// A shortest trace has as many moves as the way through the region graph with the fewest; a fastest one takes the least time, as a
-/// clock that nothing sets says.
+/// A greatest value up to [`TOP`] is exact in the region graph, one above is only known to be
+/// there. A shortest trace has as many moves as the way through the region graph with the fewest; a
+/// fastest one takes the least time, as a clock that nothing sets says.
 fn check_best_traces(network: &Network, text: &str, condition: &Condition) {
     let query = format!("E<> {}", condition.text());
     let run_of = |trace| {

@@ -1,4 +1,5 @@
-//! Runs with exact times: what they look like, and that runs that were made wrong on purpose are caught.
+//! Runs with exact times: what they look like, and that runs that were made wrong on purpose are
+//! caught.
 
 #![expect(
     clippy::needless_raw_string_hashes,
@@ -12,7 +13,8 @@ use checker::ir::{Predicate, QueryKind};
 use checker::verify::replay::{self, Claim, Coverage, Defect, End, Moment, Outcome, Run};
 use expect_test::{Expect, expect};
 
-/// A lamp that must burn for more than one and less than two units, and warms up before it can be dimmed.
+/// A lamp that must burn for more than one and less than two units, and warms up before it can be
+/// dimmed.
 const LAMP: &str = "
 clock x, y;
 urgent chan press;
@@ -239,8 +241,8 @@ fn stopped_clocks_have_exact_times() {
     }
 }
 
-/// A loop closes where the clocks have the values again that they had; one that is never set, or counts only above a constant, does not
-/// keep it open.
+/// A loop closes where the clocks have the values again that they had; one that is never set, or
+/// counts only above a constant, does not keep it open.
 #[test]
 fn runs_without_end_and_values_are_sure_beside_stopped_clocks() {
     let mut model = model(
@@ -269,7 +271,8 @@ fn runs_without_end_and_values_are_sure_beside_stopped_clocks() {
     }
 }
 
-/// The zones contain what no run reaches: that t is as large as the two clocks together, of which one stands still at a time.
+/// The zones contain what no run reaches: that t is as large as the two clocks together, of which
+/// one stands still at a time.
 #[test]
 fn what_only_too_large_zones_have_stays_a_maybe() {
     let mut model = model(

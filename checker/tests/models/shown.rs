@@ -1,4 +1,5 @@
-//! What files of traces show: all that the corpus gives holds, and nothing that is changed in one passes.
+//! What files of traces show: all that the corpus gives holds, and nothing that is changed in one
+//! passes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -41,8 +42,8 @@ fn trace(path: &Path, query: &str) -> Option<Json> {
 
 /// The pointers to all leaves that say something which is checked.
 fn leaves(value: &Json, pointer: &str, into: &mut Vec<String>) {
-    // Other values than those shown may be right too: another wait, another moment from which something stays, another state that a loop leads back
-    // to, a value that is nearly reached.
+    // Other values than those shown may be right too: another wait, another moment from which
+    // something stays, another state that a loop leads back to, a value that is nearly reached.
     let free = [
         "/format",
         "/version",

@@ -1,11 +1,13 @@
-//! Random networks with stopwatches and `meta` variables: nothing that a walk in concrete states meets may contradict an answer or
-//! lie outside a certificate that was verified, mutilated ones included.
+//! Random networks with stopwatches and `meta` variables: nothing that a walk in concrete states
+//! meets may contradict an answer or lie outside a certificate that was verified, mutilated ones
+//! included.
 //!
-//! Reachability with stopwatches is undecidable, so that a walk cannot prove that something does not come; it stays below a value of
-//! clocks and a number of states. It takes steps of half a unit, which meets all values that closed and strict bounds on two
-//! clocks tell apart.
+//! Reachability with stopwatches is undecidable, so that a walk cannot prove that something does
+//! not come; it stays below a value of clocks and a number of states. It takes steps of half a
+//! unit, which meets all values that closed and strict bounds on two clocks tell apart.
 //!
-//! `NETWORKS=20000 cargo test --release --test models stopwatches::` runs more of them than the usual number.
+//! `NETWORKS=20000 cargo test --release --test models stopwatches::` runs more of them than the
+//! usual number.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;

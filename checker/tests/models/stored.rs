@@ -1,10 +1,13 @@
-//! How many states are stored of small models, one for each abstraction and reduction: each is chosen so that its part decides the count.
+//! How many states are stored of small models, one for each abstraction and reduction: each is
+//! chosen so that its part decides the count.
 //!
-//! Where an option or another abstraction switches the part off, the count without it stands beside the count with it. The other parts are
-//! switched off by a change to the model that takes from the engine what it needs to know, and that leaves what can happen as it is; for
-//! two there is only the count.
+//! Where an option or another abstraction switches the part off, the count without it stands beside
+//! the count with it. The other parts are switched off by a change to the model that takes from the
+//! engine what it needs to know, and that leaves what can happen as it is; for two there is only
+//! the count.
 //!
-//! A count that falls is a gain and is written down here; one that rises is a loss that is to be explained.
+//! A count that falls is a gain and is written down here; one that rises is a loss that is to be
+//! explained.
 
 use checker::analysis::{Abstraction, ClockBounds};
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, TraceWanted};
@@ -114,7 +117,8 @@ fn comparisons_of_two_clocks_keep_zones_finite() {
     assert_eq!(stored(text), 5);
 }
 
-/// A worker ticks until it starts the timer's clock, and stops when it shows 300; `further` is what else there is.
+/// A worker ticks until it starts the timer's clock, and stops when it shows 300; `further` is what
+/// else there is.
 fn timer(channel: &str, further: &str) -> String {
     format!(
         "clock x; {channel} go; bool running = false; {SPOILER}
@@ -169,8 +173,8 @@ fn states_are_left_out_where_another_can_do_as_much() {
              system User;"
         )
     };
-    // By inclusion of zones it is more than four times as many: how long ago the last certificate came makes zones that do not contain
-    // each other.
+    // By inclusion of zones it is more than four times as many: how long ago the last certificate
+    // came makes zones that do not contain each other.
     assert_eq!(stored(&collectors(2)), 137);
 }
 

@@ -1,9 +1,12 @@
-//! States are left out where a stored one can do all that they can do, though its zone does not contain theirs.
+//! States are left out where a stored one can do all that they can do, though its zone does not
+//! contain theirs.
 
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 
-/// Users who collect certificates, each of which takes more than 2, for one of two policies, and have access if that took less than
-/// 10. How long ago the last certificate came hardly ever matters, but no two zones that differ in it contain each other.
+/// Users who collect certificates, each of which takes more than 2, for one of two policies, and
+/// have access if that took less than
+/// 10. How long ago the last certificate came hardly ever matters, but no two zones that differ in
+///     it contain each other.
 fn collectors(users: usize, further: &str) -> String {
     format!(
         "const int N = {users};
@@ -42,8 +45,8 @@ fn check(text: &str, query: &str, threads: usize) -> Answer {
 
 #[test]
 fn states_are_at_most_as_many_as_abstractions_that_differ() {
-    // What `tck-reach -a aLU-covreach` of TChecker stores of the same automata; with inclusion of zones it is 573 and 61,948.
-    // Bounds that depend on variables make it fewer here.
+    // What `tck-reach -a aLU-covreach` of TChecker stores of the same automata; with inclusion of
+    // zones it is 573 and 61,948. Bounds that depend on variables make it fewer here.
     for (users, stored) in [(2, 265), (3, 8_746)] {
         let answer = check(&collectors(users, ""), "E<> false", 1);
         assert_eq!(answer.verdict, Verdict::NotSatisfied);

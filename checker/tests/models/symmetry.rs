@@ -1,10 +1,12 @@
-//! Searches that take states that differ only by exchanged members of scalar sets for the same, against searches of all states.
+//! Searches that take states that differ only by exchanged members of scalar sets for the same,
+//! against searches of all states.
 //!
-//! Random networks have three processes that are told apart by scalars, one beside them, variables, arrays and clocks of and
-//! over the set, and constructs that tell members apart. Every run that is found must pass its replay, which knows nothing of
-//! symmetry.
+//! Random networks have three processes that are told apart by scalars, one beside them, variables,
+//! arrays and clocks of and over the set, and constructs that tell members apart. Every run that is
+//! found must pass its replay, which knows nothing of symmetry.
 //!
-//! `NETWORKS=50000 cargo test --release --test models symmetry::` runs more of them than the usual number.
+//! `NETWORKS=50000 cargo test --release --test models symmetry::` runs more of them than the usual
+//! number.
 
 use crate::searches;
 use std::fmt::Write as _;

@@ -1,6 +1,8 @@
-//! Searches by several threads: the same verdicts as one thread, and with the same number of threads everything the same again.
+//! Searches by several threads: the same verdicts as one thread, and with the same number of
+//! threads everything the same again.
 //!
-//! The models are large enough that many states wait at once: where few do, one thread runs all shards.
+//! The models are large enough that many states wait at once: where few do, one thread runs all
+//! shards.
 
 use std::fmt::Write as _;
 use std::panic;
@@ -22,8 +24,9 @@ use checker::zones::Zone;
 
 const THREADS: [usize; 4] = [1, 2, 3, 4];
 
-/// Machines that take parts in turn, drop or pass them on where it is urgent, and rest for a while: 6,500 states with `machines` 4.
-/// `extra` stands among the declarations, `update` is run where a part is passed on.
+/// Machines that take parts in turn, drop or pass them on where it is urgent, and rest for a while:
+/// 6,500 states with `machines` 4. `extra` stands among the declarations, `update` is run where a
+/// part is passed on.
 fn line(machines: usize, extra: &str, update: &str) -> String {
     let mut text = format!("int[0,40] made; bool busy[{machines}]; {extra}\n");
     for index in 0..machines {
@@ -122,7 +125,8 @@ fn the_same_number_of_threads_gives_the_same_answer_again() {
 
 #[test]
 fn traces_are_as_short_as_those_of_one_thread() {
-    // Without committed locations every state is stored, and its level is the number of transitions to it.
+    // Without committed locations every state is stored, and its level is the number of transitions
+    // to it.
     let text = line(4, "", "").replace("commit Choose;", "");
     let query = "E<> M0.Full and M1.Full and M2.Full and M3.Full";
     let length = |threads| {
@@ -155,7 +159,8 @@ fn errors_are_found_with_the_way_to_them() {
 
 #[test]
 fn error_goes_before_a_state_that_is_found_in_the_same_round() {
-    // Each of the states of one level leads to an error or to what is looked for, and each thread ends its round at its first one.
+    // Each of the states of one level leads to an error or to what is looked for, and each thread
+    // ends its round at its first one.
     let text = "int[0,999] v; process P() { state A, B, Won; init A; trans
           A -> B { select i : int[0,999]; assign v = i; },
           B -> Won { guard v % 2 == 0; },

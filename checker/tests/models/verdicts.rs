@@ -1,9 +1,11 @@
 //! Models with the verdicts of their queries: `tests/corpus/verdicts` and `tests/corpus/games`.
 //!
-//! A file begins with lines `// query: …`, each followed by `// verdict: …` (`// verdict neutral: …` and `// verdict product: …`
-//! where the rule for forced moves matters, `// verdict priorities: …` where priorities are to count) and `// origin: …`, which says how the verdict is known. A line `// given: …` is a query that
-//! is answered before those below it, for the strategy that it defines. Other comment lines are
-//! prose. The verdict of a query for values is the values. Every trace must pass its replay. Every query is answered with every search order, by several threads,
+//! A file begins with lines `// query: …`, each followed by `// verdict: …` (`// verdict neutral:
+//! …` and `// verdict product: …` where the rule for forced moves matters, `// verdict priorities:
+//! …` where priorities are to count) and `// origin: …`, which says how the verdict is known. A
+//! line `// given: …` is a query that is answered before those below it, for the strategy that it
+//! defines. Other comment lines are prose. The verdict of a query for values is the values. Every
+//! trace must pass its replay. Every query is answered with every search order, by several threads,
 //! and with the interpreter and compiled code, and must come out the same.
 
 use std::fs;
@@ -114,7 +116,8 @@ fn verdict_of(path: &Path, bytes: &[u8], case: &Case, options: &Options) -> Stri
     }
 }
 
-/// The values of a query for them: `3`, `> 3` and `< 3` for one that is not reached, `inf`, `none`; bounds as `1..3`.
+/// The values of a query for them: `3`, `> 3` and `< 3` for one that is not reached, `inf`, `none`;
+/// bounds as `1..3`.
 fn value_text(values: &Values) -> String {
     let one = |extreme: Option<Extreme>, strict: &str| match extreme {
         None => "none".to_owned(),

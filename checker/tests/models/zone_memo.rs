@@ -1,4 +1,5 @@
-//! What is remembered of zones changes nothing: searches come to the same end with whatever limits, by the same steps.
+//! What is remembered of zones changes nothing: searches come to the same end with whatever limits,
+//! by the same steps.
 
 use checker::analysis::{Abstraction, ClockBounds};
 use checker::engine::LoadedModel;
@@ -41,7 +42,8 @@ process Machine() {
 system Worker, Machine;
 ";
 
-/// Looks for a state in which processes are in locations, and a clock can be at least so great, if one is named.
+/// Looks for a state in which processes are in locations, and a clock can be at least so great, if
+/// one is named.
 #[derive(Clone)]
 struct Wanted {
     locations: Vec<(usize, i32)>,
@@ -108,7 +110,8 @@ fn limits_of_memory_change_nothing() {
         clock,
     };
     let goals = [
-        // Two at one machine are never there; the clock z is less than 10 at work, and x of the third at most 5 where it asks.
+        // Two at one machine are never there; the clock z is less than 10 at work, and x of the
+        // third at most 5 where it asks.
         (false, wanted(&[(0, 2), (1, 2)], None)),
         (false, wanted(&[(3, 1)], Some((7, 10)))),
         (true, wanted(&[(2, 1)], Some((5, 5)))),

@@ -1,9 +1,10 @@
 //! Zones and federations against sets of points.
 //!
-//! A zone with integer bounds over n clocks is determined by the points whose coordinates are multiples of 1 / (n + 1):
-//! they meet every order of the fractional parts. Up to two clocks every such point up to [`LARGEST`] is looked at,
-//! beyond that a sample. Whatever an operation promises about a set is asked point by point, and every zone that comes
-//! out must be closed, consistent and positive, which makes its matrix unique.
+//! A zone with integer bounds over n clocks is determined by the points whose coordinates are
+//! multiples of 1 / (n + 1): they meet every order of the fractional parts. Up to two clocks every
+//! such point up to [`LARGEST`] is looked at, beyond that a sample. Whatever an operation promises
+//! about a set is asked point by point, and every zone that comes out must be closed, consistent
+//! and positive, which makes its matrix unique.
 
 #![expect(clippy::unwrap_used, reason = "a helper that panics is a failed test")]
 
@@ -22,7 +23,8 @@ use proptest::test_runner::FileFailurePersistence;
 const CONSTANT: i32 = 4;
 /// The greatest coordinate of the points that are looked at.
 const LARGEST: i64 = 6;
-/// The greatest delay or forgotten value that an existence question tries: beyond it nothing new can happen.
+/// The greatest delay or forgotten value that an existence question tries: beyond it nothing new
+/// can happen.
 const HORIZON: i64 = 40;
 /// Points in a sample.
 const SAMPLE: usize = 300;
@@ -58,7 +60,8 @@ fn points(dimension: usize, seed: u64) -> Vec<Point> {
     for index in 0..SAMPLE {
         let mut point: Point = (0..dimension).map(|_| coordinate()).collect();
         point[0] = 0;
-        // Half of the points get clocks with equal fractional parts, where weak and strict bounds differ.
+        // Half of the points get clocks with equal fractional parts, where weak and strict bounds
+        // differ.
         if index % 2 == 0 {
             let unit = denominator(dimension);
             let fraction = point[1] % unit;
@@ -168,7 +171,8 @@ fn check_zone(zone: &Zone, seed: u64, expected: impl Fn(&Point) -> bool) {
     }
 }
 
-/// Asserts that the zones of the federation are closed and not empty, and that it contains exactly those points.
+/// Asserts that the zones of the federation are closed and not empty, and that it contains exactly
+/// those points.
 fn check_federation(federation: &Federation, seed: u64, expected: impl Fn(&Point) -> bool) {
     for zone in federation.zones() {
         assert!(!dbm::is_empty(zone), "an empty zone in a federation");
@@ -223,7 +227,8 @@ fn assignments(dimension: usize) -> impl Strategy<Value = Assignment> {
     ]
 }
 
-/// Zones that are not empty: constraints that would empty one are left out; some have let time pass.
+/// Zones that are not empty: constraints that would empty one are left out; some have let time
+/// pass.
 fn zones(dimension: usize) -> impl Strategy<Value = Zone> {
     let parts = (
         constraints(dimension, 6),
@@ -298,8 +303,9 @@ fn scaled(zone: &Zone, factor: i32) -> Zone {
     Zone::from_bounds(zone.dimension(), &bounds)
 }
 
-/// Whether some valuation of the zone simulates the point with respect to the constants: on each clock it agrees, or is
-/// less but above L, or is greater where the point is above U already (Behrmann et al. 2004, definition 3).
+/// Whether some valuation of the zone simulates the point with respect to the constants: on each
+/// clock it agrees, or is less but above L, or is greater where the point is above U already
+/// (Behrmann et al. 2004, definition 3).
 fn is_simulated(zone: &Zone, point: &Point, lower: &Constants, upper: &Constants) -> bool {
     let unit = i32::try_from(denominator(point.len())).unwrap();
     let mut candidates = scaled(zone, unit);
@@ -378,8 +384,9 @@ fn extrapolated_by_definition(
     })
 }
 
-/// The matrix without the entries that inclusion in `aLU` does not look at, closed: those of a clock without L, those
-/// against a clock above U, and those whose sum with `< -L` is not below the lower bound of the other clock.
+/// The matrix without the entries that inclusion in `aLU` does not look at, closed: those of a
+/// clock without L, those against a clock above U, and those whose sum with `< -L` is not below the
+/// lower bound of the other clock.
 fn reduced_by_definition(zone: &Zone, lower: &Constants, upper: &Constants) -> Zone {
     replaced(zone, |left, right| {
         let (l, u) = (constant(lower, left), constant(upper, right));
@@ -395,8 +402,8 @@ fn reduced_by_definition(zone: &Zone, lower: &Constants, upper: &Constants) -> Z
     })
 }
 
-/// `aLU` of a zone, exactly: for each way in which clocks can be simulated, the valuations v for which there is a w in
-/// the zone. A zone of both v and w, of which the part of v remains.
+/// `aLU` of a zone, exactly: for each way in which clocks can be simulated, the valuations v for
+/// which there is a w in the zone. A zone of both v and w, of which the part of v remains.
 fn all_simulated(zone: &Zone, lower: &Constants, upper: &Constants) -> Federation {
     let dimension = zone.dimension();
     let clocks = dimension - 1;
@@ -962,7 +969,8 @@ fn clock_set_lists_its_clocks_in_order() {
 proptest! {
     #![proptest_config(configuration())]
 
-    /// A set of any clocks is what a tree of numbers is; the first 256 and those beyond lie in different places.
+    /// A set of any clocks is what a tree of numbers is; the first 256 and those beyond lie in
+    /// different places.
     #[test]
     fn clock_sets_are_sets_of_numbers(
         left in prop::collection::btree_set(0_usize..1500, 0..40),

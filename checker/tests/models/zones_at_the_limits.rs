@@ -1,8 +1,10 @@
-//! Operations on zones and federations with bounds near the limits of their range, against the same in 64 bits.
+//! Operations on zones and federations with bounds near the limits of their range, against the same
+//! in 64 bits.
 //!
-//! The other side is written from the definitions: matrices of bounds with all sums in `i64`, closed by Floyd and Warshall. Every
-//! operation starts from zones within [`Bound::most_in_zone`], as the engine makes sure of, and may end beyond it; no bound may wrap. Games with
-//! such bounds have the answers of those with small ones.
+//! The other side is written from the definitions: matrices of bounds with all sums in `i64`,
+//! closed by Floyd and Warshall. Every operation starts from zones within [`Bound::most_in_zone`],
+//! as the engine makes sure of, and may end beyond it; no bound may wrap. Games with such bounds
+//! have the answers of those with small ones.
 
 use checker::engine::{LoadedModel, Options, Verdict};
 use checker::zones::clocks::Assignment;
@@ -295,8 +297,9 @@ proptest! {
     }
 }
 
-/// A watchman makes eight rounds of `length` units each, so that a difference of clocks grows to eight times as much; then he may go home.
-/// That he sleeps needs a difference that no round leaves.
+/// A watchman makes eight rounds of `length` units each, so that a difference of clocks grows to
+/// eight times as much; then he may go home. That he sleeps needs a difference that no round
+/// leaves.
 fn watch(length: i32) -> String {
     format!(
         "clock x, y; int[0, 8] rounds;

@@ -1,8 +1,9 @@
 //! Queries under a strategy: random strategies, right or wrong, against the closed loop of regions.
 //!
-//! The explicit side follows the definition: the first decision that applies counts, or all, and where there is none, everything
-//! is allowed. From a region in which waiting is allowed, time passes to the next; from others only if time led there without a
-//! first moment, and within the same decision.
+//! The explicit side follows the definition: the first decision that applies counts, or all, and
+//! where there is none, everything is allowed. From a region in which waiting is allowed, time
+//! passes to the next; from others only if time led there without a first moment, and within the
+//! same decision.
 
 use std::collections::HashMap;
 
@@ -145,8 +146,8 @@ fn entry(parts: &[Part]) -> Vec<(u32, u32, u32)> {
         .collect()
 }
 
-/// What the strategy says in a state: the decisions that count; `None` is nothing, so that everything is allowed. Then whose strategy it
-/// is, and the legs that apply, in order.
+/// What the strategy says in a state: the decisions that count; `None` is nothing, so that
+/// everything is allowed. Then whose strategy it is, and the legs that apply, in order.
 pub(crate) struct Said<'s>(Option<Vec<Counting<'s>>>, Player, Vec<&'s [Part]>);
 
 /// A decision by its index, with what it does.
@@ -203,8 +204,8 @@ impl<'s> Said<'s> {
     }
 }
 
-/// A region of the closed loop. There are more nodes of it if time led into acting decisions without a first moment, and runs in
-/// them.
+/// A region of the closed loop. There are more nodes of it if time led into acting decisions
+/// without a first moment, and runs in them.
 struct Node {
     state: State,
     steps: Vec<usize>,
@@ -336,7 +337,8 @@ impl Loop {
             .collect()
     }
 
-    /// The nodes from which some run never leaves `keep`. Where time runs in an acting decision, it does not do so for ever.
+    /// The nodes from which some run never leaves `keep`. Where time runs in an acting decision, it
+    /// does not do so for ever.
     fn staying(&self, keep: &[bool]) -> Vec<bool> {
         let mut staying = keep.to_vec();
         loop {

@@ -146,7 +146,8 @@ pub(crate) fn regions(
     }
 }
 
-/// The regions that tell formulas with constants up to this one apart, or why a query fails; `None`, counted, if they are too many.
+/// The regions that tell formulas with constants up to this one apart, or why a query fails;
+/// `None`, counted, if they are too many.
 pub(crate) fn regions_for(
     model: &LoadedModel,
     (formulas, constant): (&[Formula], i32),

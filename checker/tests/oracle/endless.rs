@@ -1,7 +1,8 @@
-//! Runs through the regions that never end: how few moves they need, by trying all sequences of moves.
+//! Runs through the regions that never end: how few moves they need, by trying all sequences of
+//! moves.
 //!
-//! A run is given by its moves up to a loop and those of the loop, which must lead to the same words again and again, whatever waits lie
-//! between.
+//! A run is given by its moves up to a loop and those of the loop, which must lead to the same
+//! words again and again, whatever waits lie between.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +13,8 @@ use crate::explicit::Graph;
 /// What a sequence of moves leads to.
 type Places = BTreeSet<usize>;
 
-/// The regions of the way to a run, and once more those of the run itself, which stays in some of them.
+/// The regions of the way to a run, and once more those of the run itself, which stays in some of
+/// them.
 pub(crate) struct Endless<'g> {
     graph: &'g Graph,
     /// Where a run may begin; at the start only, if there are none.
@@ -62,7 +64,8 @@ impl<'g> Endless<'g> {
             .collect()
     }
 
-    /// Whether the run can end in one of the places: in a region without a way on, or waiting for ever.
+    /// Whether the run can end in one of the places: in a region without a way on, or waiting for
+    /// ever.
     fn ends_in(&self, places: &Places) -> bool {
         let count = self.count();
         let mut begun = places.iter().filter(|&&place| place >= count);
@@ -70,7 +73,8 @@ impl<'g> Endless<'g> {
             let here = place - count;
             let facts = &self.graph.nodes[here];
             let later = std::iter::successors(facts.later, |&node| self.graph.nodes[node].later);
-            // Where clocks are compared, time that goes on for ever goes through several regions again and again.
+            // Where clocks are compared, time that goes on for ever goes through several regions
+            // again and again.
             let mut kept = later.take(count).take_while(|&node| self.keep[node]);
             facts.steps.is_empty() && facts.later.is_none() || kept.any(|node| node == here)
         })
@@ -102,7 +106,8 @@ impl<'g> Endless<'g> {
         })
     }
 
-    /// The fewest moves of a run, those of its loop once; at most so many, and `None` if there are only longer ones.
+    /// The fewest moves of a run, those of its loop once; at most so many, and `None` if there are
+    /// only longer ones.
     pub(crate) fn fewest_moves(&self, most: Option<usize>) -> Option<usize> {
         let start = if self.open.is_some() { 0 } else { self.count() };
         let first = self.with_waits(&Places::from([start]));

@@ -1,4 +1,5 @@
-//! The other kinds of symbolic queries: `E[]`, `A<>`, `-->`, `bounds`, and the shortest and fastest traces of `E<>`.
+//! The other kinds of symbolic queries: `E[]`, `A<>`, `-->`, `bounds`, and the shortest and fastest
+//! traces of `E<>`.
 
 use std::time::Duration;
 
@@ -50,8 +51,9 @@ fn negated(labels: &[bool]) -> Vec<bool> {
     labels.iter().map(|holds| !holds).collect()
 }
 
-/// The nodes from which a run stays for ever where `keep` holds: what remains when nodes without a way on are taken away again and
-/// again. Time alone goes on for ever only in a region without end; all other cycles have a move.
+/// The nodes from which a run stays for ever where `keep` holds: what remains when nodes without a
+/// way on are taken away again and again. Time alone goes on for ever only in a region without end;
+/// all other cycles have a move.
 fn staying(graph: &Graph, keep: &[bool]) -> Vec<bool> {
     let mut staying = keep.to_vec();
     loop {
@@ -202,7 +204,8 @@ fn compare_values(
     Ok(())
 }
 
-/// The extremes over the regions of a clock's value where something holds, doubled as in [`doubled`].
+/// The extremes over the regions of a clock's value where something holds, doubled as in
+/// [`doubled`].
 fn extremes(graph: &Graph, wanted: &[bool], clock: usize) -> (Option<i64>, Option<i64>) {
     let counting = (0..wanted.len()).filter(|&node| wanted[node]).map(|node| {
         let ticks = graph.nodes[node].state.clocks[1 + clock];
@@ -239,8 +242,8 @@ fn compare_clocks_in_step(
     Ok(())
 }
 
-/// The shortest run to a least or greatest value of a clock has as many moves as the way through the regions with the fewest, and the
-/// fastest takes the least time.
+/// The shortest run to a least or greatest value of a clock has as many moves as the way through
+/// the regions with the fewest, and the fastest takes the least time.
 fn check_best_values(
     network: &Network,
     (condition, clock): (&str, usize),
@@ -290,7 +293,8 @@ fn check_best_values(
     Ok(())
 }
 
-/// A fastest run takes the least time, as a clock that nothing sets says; less than a unit more where the least is not reached.
+/// A fastest run takes the least time, as a clock that nothing sets says; less than a unit more
+/// where the least is not reached.
 fn check_time(text: &str, condition: &str, run: &Run, tally: &Tally) -> Result<(), TestCaseError> {
     let End::After(last) = run.end else {
         return Err(TestCaseError::fail(format!("{text}{condition}\n{run:?}")));
@@ -337,7 +341,8 @@ fn answer(
         trace,
         ..compare::options()
     };
-    // A clock without greatest value that is copied to and fro is followed up to the limit of clock values.
+    // A clock without greatest value that is copied to and fro is followed up to the limit of clock
+    // values.
     options.limits.timeout = Some(Duration::from_secs(1));
     let answer = model.check(&query_text, &options);
     let answer = answer.map_err(|rejection| TestCaseError::fail(rejection.rendered.join("\n")))?;

@@ -32,7 +32,8 @@ pub(crate) fn entry(parts: &[Part]) -> Vec<(u32, u32, u32)> {
         .collect()
 }
 
-/// What tells controllable moves apart under partial observation: the channel, else the edge with its select values.
+/// What tells controllable moves apart under partial observation: the channel, else the edge with
+/// its select values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Label {
     Channel(u32),
@@ -96,7 +97,8 @@ impl Known {
     }
 }
 
-/// Explores all regions, up to a number. If priorities count, only moves of the highest level are possible in each.
+/// Explores all regions, up to a number. If priorities count, only moves of the highest level are
+/// possible in each.
 pub(crate) fn explore(
     semantics: &Semantics<'_>,
     regions: &Regions,
@@ -212,7 +214,8 @@ pub(crate) enum Rule {
     Neutral,
 }
 
-/// The nodes from which the controller wins: the least fixpoint if the goal must be reached, else the greatest.
+/// The nodes from which the controller wins: the least fixpoint if the goal must be reached, else
+/// the greatest.
 pub(crate) fn winning(graph: &Graph, objective: &Objective<'_>, rule: Rule) -> Vec<bool> {
     let mut win = vec![!objective.must_reach; graph.nodes.len()];
     loop {
@@ -229,8 +232,8 @@ pub(crate) fn winning(graph: &Graph, objective: &Objective<'_>, rule: Rule) -> V
     }
 }
 
-/// The nodes from which the controller can keep for ever, and have the goal again and again: a greatest fixpoint around a least
-/// one. Where play ends, the goal must hold.
+/// The nodes from which the controller can keep for ever, and have the goal again and again: a
+/// greatest fixpoint around a least one. Where play ends, the goal must hold.
 pub(crate) fn recurring(graph: &Graph, goal: &[bool], keep: &[bool], rule: Rule) -> Vec<bool> {
     let mut kept = vec![true; graph.nodes.len()];
     loop {
@@ -284,7 +287,8 @@ fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule
     !others.is_empty() && is_forced(&node.stoppers, &own, rule) || !must_reach && own.is_empty()
 }
 
-/// Whether the environment must move where time is stopped: something stops time to which the controller has no move.
+/// Whether the environment must move where time is stopped: something stops time to which the
+/// controller has no move.
 pub(crate) fn is_forced(stoppers: &[Stopper], own: &[&Step], rule: Rule) -> bool {
     stoppers.iter().any(|stopper| match (rule, stopper) {
         (Rule::Neutral, _) => true,

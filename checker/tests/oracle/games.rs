@@ -182,10 +182,11 @@ pub(crate) fn wins(
     winning(graph, &objective, rule)
 }
 
-/// What holds under a strategy of the winner, as far as it can be said without play ending on the way: in every run if it is the
-/// controller's, and in some run if it is the environment's. In a game the environment is faster where both act at the same
-/// instant, but the closed loop leaves all moves of the other player possible, so that it also has the runs in which the controller
-/// was faster.
+/// What holds under a strategy of the winner, as far as it can be said without play ending on the
+/// way: in every run if it is the controller's, and in some run if it is the environment's. In a
+/// game the environment is faster where both act at the same instant, but the closed loop leaves
+/// all moves of the other player possible, so that it also has the runs in which the controller was
+/// faster.
 fn enforced(kind: Kind, owner: Player, (goal, keep): (&str, &str)) -> Vec<String> {
     match (kind, owner) {
         (Kind::Reach | Kind::Until, Player::Controller) => vec![format!("A<> {goal}")],
@@ -242,7 +243,8 @@ fn games_equal_brute_force() {
     compare::run("games", 150, &strategy, compare);
 }
 
-/// The least time of `control_t*` must be the least bound within which an ordinary game with a clock of its own is won.
+/// The least time of `control_t*` must be the least bound within which an ordinary game with a
+/// clock of its own is won.
 fn compare_times(
     (network, goal, keep): &(Network, Formula, Formula),
     tally: &Tally,
@@ -275,7 +277,8 @@ fn compare_times(
         let value = answer.as_ref().ok().and_then(|answer| answer.value.clone());
         let least = value.and_then(|values| values.items[0].least);
         let expected = if let Some(Extreme::Value { value, is_reached }) = least {
-            // At the time itself it is won if the time is reached, before it never, after it always.
+            // At the time itself it is won if the time is reached, before it never, after it
+            // always.
             for (value, wins) in [(value, is_reached), (value - 1, false), (value + 1, true)] {
                 let game = within(value);
                 compare::check(&ask(&mut model, &game), Ok(wins), tally, || {
@@ -378,10 +381,12 @@ fn least_times_are_the_bounds_of_ordinary_games() {
     compare::run("least times", 100, &strategy, compare_times);
 }
 
-/// A scale for which all constants stay allowed, and differences leave the range of zones in a few rounds of a loop.
+/// A scale for which all constants stay allowed, and differences leave the range of zones in a few
+/// rounds of a loop.
 const SCALE: i32 = (checker::zones::Bound::MAX_VALUE / SHAPE.constant) - 1;
 
-/// Who wins does not depend on the unit of time: with all clock values multiplied, the engine must say what brute force says without.
+/// Who wins does not depend on the unit of time: with all clock values multiplied, the engine must
+/// say what brute force says without.
 fn compare_scaled(
     (network, goal, keep): &(Network, Formula, Formula),
     tally: &Tally,

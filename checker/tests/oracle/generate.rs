@@ -1,6 +1,7 @@
 //! Random networks and formulas, as trees of small numbers that shrink well, and their text.
 //!
-//! Numbers are taken modulo what there is (clocks, locations, …) when the text is written, so every tree is a model.
+//! Numbers are taken modulo what there is (clocks, locations, …) when the text is written, so every
+//! tree is a model.
 
 use std::fmt::Write as _;
 
@@ -21,7 +22,8 @@ pub(crate) struct Network {
     priority: usize,
     /// Whether edges on urgent channels keep their clock guards.
     guards_urgency: bool,
-    /// Whether controllable edges have no strict lower bounds, and receivers of a broadcast no clock guards at all.
+    /// Whether controllable edges have no strict lower bounds, and receivers of a broadcast no
+    /// clock guards at all.
     is_observable: bool,
     /// What every clock value is multiplied by in the text. Who wins does not depend on it.
     scale: i32,
@@ -100,7 +102,8 @@ enum Sync {
     },
 }
 
-/// The channels with their declarations. Edges on urgent ones have no clock guards unless the network has them.
+/// The channels with their declarations. Edges on urgent ones have no clock guards unless the
+/// network has them.
 const CHANNELS: [(&str, &str); 5] = [
     ("a", "chan"),
     ("b", "chan"),
@@ -109,7 +112,8 @@ const CHANNELS: [(&str, &str); 5] = [
     ("w", "urgent broadcast chan"),
 ];
 
-/// Declarations of channel priorities, each with whether processes have priorities too. The first is for networks without any.
+/// Declarations of channel priorities, each with whether processes have priorities too. The first
+/// is for networks without any.
 const PRIORITIES: [(&str, bool); 6] = [
     ("", false),
     ("", true),
@@ -735,7 +739,8 @@ impl Network {
         (process, location % self.processes[process].locations.len())
     }
 
-    /// Whether a formula without `deadlock` holds; clock values in ticks, the reference clock first.
+    /// Whether a formula without `deadlock` holds; clock values in ticks, the reference clock
+    /// first.
     pub(crate) fn holds(
         &self,
         formula: &Formula,

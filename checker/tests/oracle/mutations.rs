@@ -1,6 +1,7 @@
 //! Strategies that were made wrong on purpose must be caught.
 //!
-//! The first game is the running example of the TIGA manual (section 3), for which every decision matters.
+//! The first game is the running example of the TIGA manual (section 3), for which every decision
+//! matters.
 
 use std::sync::Arc;
 
@@ -285,7 +286,8 @@ fn counter_strategies_as_they_are_pass() {
 fn counter_strategy_that_waits_is_caught() {
     let defects = counter_strategies()
         .map(|solved| defect_of(solved, 0, |decisions| everywhere(decisions, None)));
-    // Where it declines at the end of the invariant, the controller has to move to where it says nothing.
+    // Where it declines at the end of the invariant, the controller has to move to where it says
+    // nothing.
     assert_eq!(
         defects,
         [Some(Defect::GoalReached), Some(Defect::NoDecision)]
@@ -364,7 +366,8 @@ fn strategies_with_a_condition_on_the_way_are_checked_too() {
     }
 }
 
-/// The environment leads play away again and again, and into the trap if the controller does not come back at once.
+/// The environment leads play away again and again, and into the trap if the controller does not
+/// come back at once.
 const RETURNING: &str = "
 process P() {
   clock x;
@@ -384,7 +387,8 @@ fn strategy_that_does_not_let_the_goal_recur_is_caught() {
     assert_eq!(defect_of(game(), 1, |_| {}), None);
     let wait = |decisions: &mut Vec<Decision>| acts(decisions).action = None;
     let widen_waiting = |decisions: &mut Vec<Decision>| everywhere(decisions, None);
-    // Past the moment of the action nothing is decided; and where waiting is, the invariant ends it, out of the goal.
+    // Past the moment of the action nothing is decided; and where waiting is, the invariant ends
+    // it, out of the goal.
     assert_eq!(defect_of(game(), 1, wait), Some(Defect::NoDecision));
     assert_eq!(defect_of(game(), 1, widen_waiting), Some(Defect::Stuck));
     let widen_action = |decisions: &mut Vec<Decision>| {

@@ -1,9 +1,11 @@
 //! Games under partial observation, against the subset construction on the graph of regions.
 //!
-//! Regions are exact here: two valuations of one region allow the same observations, moves and goals, now and after delays into the
-//! same regions, and a controller that sees observations only cannot tell how long it takes. So plays over regions have the same
-//! observations as plays over valuations. Where time passes from region to region, an observation `x >= c` or `x < c` changes when a
-//! region is entered, and so does what is possible for the controller: strict lower bounds are not generated for it.
+//! Regions are exact here: two valuations of one region allow the same observations, moves and
+//! goals, now and after delays into the same regions, and a controller that sees observations only
+//! cannot tell how long it takes. So plays over regions have the same observations as plays over
+//! valuations. Where time passes from region to region, an observation `x >= c` or `x < c` changes
+//! when a region is entered, and so does what is possible for the controller: strict lower bounds
+//! are not generated for it.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -53,7 +55,8 @@ struct Game<'g> {
 type Set = BTreeSet<usize>;
 
 impl Game<'_> {
-    /// The sets that the action leads to, by what is seen in them; `None` if play may be lost before.
+    /// The sets that the action leads to, by what is seen in them; `None` if play may be lost
+    /// before.
     fn outcome(&self, from: &Set, action: Option<Label>) -> Option<Vec<Set>> {
         let nodes = &self.graph.nodes;
         let Objective {
@@ -157,8 +160,8 @@ impl Game<'_> {
     }
 }
 
-/// Whether a machine wins: the sets that its actions lead to, one after the other, are never lost and, if the goal must be reached,
-/// come to an end. `None` if there are too many.
+/// Whether a machine wins: the sets that its actions lead to, one after the other, are never lost
+/// and, if the goal must be reached, come to an end. `None` if there are too many.
 fn wins(game: &Game<'_>, machine: &[MachineState]) -> Option<bool> {
     if game.objective.goal[0] {
         return Some(true);
@@ -202,7 +205,8 @@ fn wins(game: &Game<'_>, machine: &[MachineState]) -> Option<bool> {
     Some(!(game.objective.must_reach && goes_on_for_ever(&edges)))
 }
 
-/// The check in closed loop says of a machine, and of the same with another action in one of its states, what brute force says.
+/// The check in closed loop says of a machine, and of the same with another action in one of its
+/// states, what brute force says.
 fn check_machine(
     model: &mut LoadedModel,
     query: &str,
@@ -414,8 +418,9 @@ fn games_under_partial_observation_equal_the_subset_construction() {
     compare::run("games under partial observation", 150, &strategy, compare);
 }
 
-/// A game in two rounds that follow each other, each with locations of its own: in each an action leads to some locations of the next
-/// round, of which the environment chooses one. Without clocks many knowledge sets contain others.
+/// A game in two rounds that follow each other, each with locations of its own: in each an action
+/// leads to some locations of the next round, of which the environment chooses one. Without clocks
+/// many knowledge sets contain others.
 #[derive(Clone, Debug)]
 struct Rounds {
     /// By round, location and action: where it leads to.

@@ -1,6 +1,7 @@
-//! Strategies of random games, made wrong at random: the check in closed loop must come to what a fixpoint over the graph of regions
-//! comes to, and those that lose by it are caught. Those of `E<> control:` have to win after a way, or from everywhere; those of
-//! `control_t*` are about a graph with a clock of its own that nothing resets.
+//! Strategies of random games, made wrong at random: the check in closed loop must come to what a
+//! fixpoint over the graph of regions comes to, and those that lose by it are caught. Those of `E<>
+//! control:` have to win after a way, or from everywhere; those of `control_t*` are about a graph
+//! with a clock of its own that nothing resets.
 
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
@@ -179,7 +180,8 @@ impl Closed<'_> {
             let has_to_reach = matches!(self.kind, Kind::Reach | Kind::Until);
             return fixpoint(controller != has_to_reach, &[]);
         }
-        // The controller gets from every goal to another one; the environment sees only finitely many.
+        // The controller gets from every goal to another one; the environment sees only finitely
+        // many.
         let mut outer = vec![controller; says.len()];
         loop {
             let next = fixpoint(!controller, &outer);
@@ -277,7 +279,8 @@ struct Game<'a> {
     keep: Vec<bool>,
 }
 
-/// Compares the check of the strategy of a query, as it is and made wrong, with the fixpoint on the game that fits its limit of time.
+/// Compares the check of the strategy of a query, as it is and made wrong, with the fixpoint on the
+/// game that fits its limit of time.
 fn compare_query<'g>(
     model: &mut LoadedModel,
     (query, (rule, forced)): (&QueryText, (Rule, Forced)),

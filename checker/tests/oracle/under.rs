@@ -1,5 +1,5 @@
-//! Games under a strategy of the controller: random strategies, and most permissive ones, against the graph of regions of which
-//! only what they allow is left.
+//! Games under a strategy of the controller: random strategies, and most permissive ones, against
+//! the graph of regions of which only what they allow is left.
 
 use std::sync::Arc;
 

@@ -1,11 +1,12 @@
 //! Certificates as files, and the check of files with evidence.
 //!
-//! A certificate has one JSON value a line. The first has `format` "ntagen-certificate", `version` 1, the `query`, the names of the
-//! `processes`, of the scalar `variables` and of the `clocks`, and the number of `states`. Each further line is a state:
-//! its `words` (the index of each process's location, then the variables, doubles as two words of bits) and its `zones`. A
-//! zone is a list of constraints that all hold, each `[left, right, bound, strict]`: clock left minus clock right is at most
-//! bound, or less if strict is 1; clocks count from 1, and 0 stands for the number 0. What it claims is in
-//! [`crate::verify::certificate`].
+//! A certificate has one JSON value a line. The first has `format` "ntagen-certificate", `version`
+//! 1, the `query`, the names of the `processes`, of the scalar `variables` and of the `clocks`, and
+//! the number of `states`. Each further line is a state: its `words` (the index of each process's
+//! location, then the variables, doubles as two words of bits) and its `zones`. A zone is a list of
+//! constraints that all hold, each `[left, right, bound, strict]`: clock left minus clock right is
+//! at most bound, or less if strict is 1; clocks count from 1, and 0 stands for the number 0. What
+//! it claims is in [`crate::verify::certificate`].
 
 use serde_json::{Value as Json, json};
 
@@ -59,16 +60,16 @@ pub(in crate::engine) fn stop_text(reason: StopReason) -> &'static str {
 /// Bytes of a certificate between two looks at the memory that it takes.
 const BYTES_BETWEEN_LOOKS: usize = 1 << 20;
 
-/// The network with `meta` variables as ordinary ones: whether states that differ in them alone are the same decides which of them
-/// a search meets, but not what it claims of those that it meets.
+/// The network with `meta` variables as ordinary ones: whether states that differ in them alone are
+/// the same decides which of them a search meets, but not what it claims of those that it meets.
 pub(in crate::engine) fn with_all_words(network: &Network) -> Network {
     let mut whole = network.clone();
     whole.layout.identity_words = whole.layout.words;
     whole
 }
 
-/// Searches again without short cuts for a state that satisfies the predicate, of which there is none; what was reached. `symbolic`
-/// is about a network [`with_all_words`].
+/// Searches again without short cuts for a state that satisfies the predicate, of which there is
+/// none; what was reached. `symbolic` is about a network [`with_all_words`].
 pub(in crate::engine) fn reached(
     symbolic: &mut Symbolic<'_>,
     avoided: &Predicate,
@@ -204,8 +205,9 @@ pub(in crate::engine) type Unreadable = String;
 const HINT: &str = "hint: it must come from `ntagen check` for this model: with --certificate FILE, --trace FILE.json or --strategy FILE.json; or from `ntagen play` with --log FILE";
 
 impl LoadedModel {
-    /// Checks a certificate, a trace or a strategy that was written for this model, independently of how it was found. `rules` are
-    /// those for forced moves and priorities that a strategy was made for.
+    /// Checks a certificate, a trace or a strategy that was written for this model, independently
+    /// of how it was found. `rules` are those for forced moves and priorities that a strategy was
+    /// made for.
     pub fn verify_evidence(
         &mut self,
         path: &str,
@@ -463,7 +465,8 @@ fn check_traces(
 /// What of a trace is not checked, or what it shows that is not so.
 type Agreement = Result<Vec<&'static str>, String>;
 
-/// Replays a run that is to show what its file says of the query, and compares it with all that is shown beside it.
+/// Replays a run that is to show what its file says of the query, and compares it with all that is
+/// shown beside it.
 fn replay_of(
     network: &Network,
     query: &QueryKind,

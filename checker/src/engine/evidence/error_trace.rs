@@ -1,8 +1,10 @@
-//! The way to a run-time error: the states to the one in which it happens, and the move that it happens in.
+//! The way to a run-time error: the states to the one in which it happens, and the move that it
+//! happens in.
 //!
-//! Searches give a trace to the state that they were at when the model failed. Some look one move ahead, so that the last state can be
-//! missing; here it is added, and the failing move is found by trying all moves of the last state. A game has no trace of its own:
-//! the shortest way to an error is searched for, among the states that come before the end of play.
+//! Searches give a trace to the state that they were at when the model failed. Some look one move
+//! ahead, so that the last state can be missing; here it is added, and the failing move is found by
+//! trying all moves of the last state. A game has no trace of its own: the shortest way to an error
+//! is searched for, among the states that come before the end of play.
 
 use crate::analysis::Abstraction;
 use crate::ir::{Objective, Predicate, Query, QueryKind};
@@ -17,7 +19,8 @@ use crate::engine::query::answer::{self, Answer, Subject, Verdict};
 use crate::engine::session::walk::{Point, successors_or_failure};
 use crate::engine::{LoadedModel, Options};
 
-/// The way to the error in a game is searched for among this many times the states that the game explored,
+/// The way to the error in a game is searched for among this many times the states that the game
+/// explored,
 const EFFORT: u64 = 10;
 
 /// and at least among so many.
@@ -73,7 +76,8 @@ impl LoadedModel {
         witness
     }
 
-    /// The move at the end of a trace that fails, if it is one that does; a state is added if the failure is one move further on.
+    /// The move at the end of a trace that fails, if it is one that does; a state is added if the
+    /// failure is one move further on.
     fn failing_move(
         &self,
         predicates: &[&Predicate],
@@ -113,7 +117,8 @@ impl LoadedModel {
         })
     }
 
-    /// The shortest way to an error that a game can run into, if it is found with a reasonable effort.
+    /// The shortest way to an error that a game can run into, if it is found with a reasonable
+    /// effort.
     fn shortest_way(
         &self,
         predicates: &[&Predicate],

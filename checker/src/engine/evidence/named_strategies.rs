@@ -1,9 +1,11 @@
 //! Strategies that have a name: what queries define, save, load, and are asked under.
 //!
-//! A name stays for all later queries of the same loaded model. Its strategy is missing if the query that defines it did not come
-//! out satisfied; to be asked under such a name is an error. Who wins is often known long before the whole strategy is, so unless it is
-//! wanted with the answer, it is made when it is first used. Files lie relative to the folder that [`crate::engine::Options`] names, else
-//! to the folder of the model; `strategy_place` says which of them may be written.
+//! A name stays for all later queries of the same loaded model. Its strategy is missing if the
+//! query that defines it did not come out satisfied; to be asked under such a name is an error. Who
+//! wins is often known long before the whole strategy is, so unless it is wanted with the answer,
+//! it is made when it is first used. Files lie relative to the folder that
+//! [`crate::engine::Options`] names, else to the folder of the model; `strategy_place` says which
+//! of them may be written.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -80,7 +82,8 @@ impl LoadedModel {
         self.strategies.push(named);
     }
 
-    /// The strategy that a query is asked under, or that is to be saved; it is made within these limits if that is due.
+    /// The strategy that a query is asked under, or that is to be saved; it is made within these
+    /// limits if that is due.
     pub(in crate::engine) fn existing_strategy(
         &mut self,
         name: &str,
@@ -110,7 +113,8 @@ impl LoadedModel {
         Err(Rejection::new(vec![diagnostic], &self.sources))
     }
 
-    /// Makes a strategy that is due. Returns what is known of why there is none; then it is tried again with the next use.
+    /// Makes a strategy that is due. Returns what is known of why there is none; then it is tried
+    /// again with the next use.
     fn make_strategy(&mut self, name: &str, due: Due, options: &Options) -> Option<String> {
         let with_strategy = Options {
             strategy: true,
@@ -190,7 +194,8 @@ impl LoadedModel {
         Ok(answer)
     }
 
-    /// Reads a strategy from the bytes of a file; gives the query that it answers, and the strategy. `path` names the file.
+    /// Reads a strategy from the bytes of a file; gives the query that it answers, and the
+    /// strategy. `path` names the file.
     pub fn read_strategy(
         &self,
         path: &str,

@@ -1,5 +1,6 @@
-//! What files of evidence show beside what their check goes by: states, labels of edges, zones. All of it must agree with what was
-//! checked, and a name that nothing here knows is refused, so that nobody reads in a file that holds what is not so.
+//! What files of evidence show beside what their check goes by: states, labels of edges, zones. All
+//! of it must agree with what was checked, and a name that nothing here knows is refused, so that
+//! nobody reads in a file that holds what is not so.
 
 use serde_json::Value as Json;
 
@@ -72,7 +73,8 @@ pub(in crate::engine) fn compare(
     }
 }
 
-/// Compares all that a trace shows with the run in it, which was replayed; what of it is not checked, by name.
+/// Compares all that a trace shows with the run in it, which was replayed; what of it is not
+/// checked, by name.
 pub(super) fn compare_trace(
     network: &Network,
     trace: &Json,
@@ -111,8 +113,8 @@ pub(super) fn compare_trace(
         let text = "its symbolic states and transitions are not those of its run";
         return Err(Difference::False(text.to_owned()));
     }
-    // Of a run without end zones are those in which something stays, and those of another round; where zones are split a state has a
-    // part that its run need not enter.
+    // Of a run without end zones are those in which something stays, and those of another round;
+    // where zones are split a state has a part that its run need not enter.
     let features = &network.features;
     let is_split = features.clock_guarded_urgent
         || features.guarded_receivers
@@ -170,7 +172,8 @@ fn compare_ending(ending: &Json, end: End) -> Result<(), Difference> {
     Err(Difference::False(text.to_owned()))
 }
 
-/// Whether the zone of a symbolic state, if it shows one, contains the clock values of a state on entry.
+/// Whether the zone of a symbolic state, if it shows one, contains the clock values of a state on
+/// entry.
 fn contains(
     network: &Network,
     shown: &At<'_>,

@@ -99,7 +99,8 @@ impl<'s> Played<'s> {
     }
 }
 
-/// Checks that the owner of a strategy wins, in closed loop. The network must hold the code of the query.
+/// Checks that the owner of a strategy wins, in closed loop. The network must hold the code of the
+/// query.
 pub fn verify(
     network: &Network,
     asked: Asked<'_>,
@@ -149,7 +150,8 @@ pub fn verify(
     strategy::verify(&game.network, played.decisions, &claim, &start, effort)
 }
 
-/// The run that a way is, with its states in ticks: on entry of each, and after the last wait; `None` if it is not possible.
+/// The run that a way is, with its states in ticks: on entry of each, and after the last wait;
+/// `None` if it is not possible.
 pub(in crate::engine) fn follow(
     network: &Network,
     way: &Way,
@@ -208,8 +210,8 @@ pub(in crate::engine) fn is_for(
     Ok(has_start && is_for_time(network, asked, owner, time_limit)?)
 }
 
-/// Whether a strategy that wins with a limit of time answers the query: the controller is to need no more time than the query leaves it,
-/// the environment to hold out for as long.
+/// Whether a strategy that wins with a limit of time answers the query: the controller is to need
+/// no more time than the query leaves it, the environment to hold out for as long.
 fn is_for_time(
     network: &Network,
     asked: Asked<'_>,
@@ -278,8 +280,8 @@ pub(in crate::engine) fn constants<'p>(
     (constant.unwrap_or(0), has_differences)
 }
 
-/// The decisions of a strategy by words, in the order of their ranks. There are none where play is said to have ended, so that a state
-/// in which it has not is found.
+/// The decisions of a strategy by words, in the order of their ranks. There are none where play is
+/// said to have ended, so that a state in which it has not is found.
 pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
     let states = closed_loop::joined(network, strategy).into_iter();
     let states = states.map(|joined| {

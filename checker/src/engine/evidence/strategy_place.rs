@@ -1,8 +1,9 @@
 //! Where queries save and load strategies.
 //!
-//! A model comes from anybody, and its own queries name files. So a strategy is saved below the current folder or one that the user
-//! allows, links followed, and over nothing but a strategy; one is loaded from any plain file. A file is written completely or not at
-//! all, and an existing one keeps its mode and, where that is allowed, its owner.
+//! A model comes from anybody, and its own queries name files. So a strategy is saved below the
+//! current folder or one that the user allows, links followed, and over nothing but a strategy; one
+//! is loaded from any plain file. A file is written completely or not at all, and an existing one
+//! keeps its mode and, where that is allowed, its owner.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
@@ -24,7 +25,8 @@ pub(super) struct Refusal {
     pub help: String,
 }
 
-/// Saves the text of a strategy; `allowed` are the folders below which this may be, beside the current one.
+/// Saves the text of a strategy; `allowed` are the folders below which this may be, beside the
+/// current one.
 pub(super) fn save(path: &Path, text: &str, allowed: &[PathBuf]) -> Result<(), Refusal> {
     let failed = |error: &io::Error| Refusal {
         message: format!("{} cannot be written: {error}", path.display()),
@@ -109,7 +111,8 @@ fn is_free(place: &Path) -> io::Result<bool> {
     Ok(start.is_empty() || is_strategy(&String::from_utf8_lossy(&start)))
 }
 
-/// Whether a file that begins so is a strategy: of ours, in both forms, or of UPPAAL's, learned ones and those in zones.
+/// Whether a file that begins so is a strategy: of ours, in both forms, or of UPPAAL's, learned
+/// ones and those in zones.
 fn is_strategy(start: &str) -> bool {
     let has = |name: &str| start.contains(&format!("\"{name}\""));
     if start.trim_start().starts_with('{') {
@@ -137,7 +140,8 @@ fn write_whole(place: &Path, text: &str) -> io::Result<()> {
     written
 }
 
-/// A new file beside a place. What takes the place of another is nobody else's to read until it has the other's mode.
+/// A new file beside a place. What takes the place of another is nobody else's to read until it has
+/// the other's mode.
 fn new_part(place: &Path, is_replaced: bool) -> io::Result<(PathBuf, File)> {
     static PARTS: AtomicU64 = AtomicU64::new(0);
     let mut options = OpenOptions::new();

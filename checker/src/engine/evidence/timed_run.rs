@@ -1,10 +1,12 @@
 //! From a symbolic trace to a run with exact times that was replayed independently.
 //!
-//! The search leaves a sequence of moves, and how it ends. [`crate::search::timed_trace::schedule`] finds times for it, and
-//! [`crate::verify::replay`] follows the run and checks what it is said to show. A run that fails there is a mistake of the engine.
+//! The search leaves a sequence of moves, and how it ends. [`crate::search::timed_trace::schedule`]
+//! finds times for it, and [`crate::verify::replay`] follows the run and checks what it is said to
+//! show. A run that fails there is a mistake of the engine.
 //!
-//! The loop of a run that never ends is found by taking the loop of the trace ever more often: the earliest times settle into a
-//! pattern, and then two states on entry of the loop lie in the same region.
+//! The loop of a run that never ends is found by taking the loop of the trace ever more often: the
+//! earliest times settle into a pattern, and then two states on entry of the loop lie in the same
+//! region.
 
 use crate::ir::{Measure, Network, Predicate};
 use crate::network::{Failure, Part, Symbolic};
@@ -267,8 +269,8 @@ pub(in crate::engine) fn timed(
 /// Rounds of a loop, at most, before the one in which a run with stopwatches closes it.
 const MOST_EARLIER_ROUNDS: usize = 3;
 
-/// A run that ends in a loop of a network with stopwatches: after some rounds of the loop of the trace, one more comes back to the same
-/// values.
+/// A run that ends in a loop of a network with stopwatches: after some rounds of the loop of the
+/// trace, one more comes back to the same values.
 fn closed(
     symbolic: &mut Symbolic<'_>,
     network: &Network,

@@ -1,8 +1,8 @@
 //! Strategies as tables: of each discrete state, one rule for each thing that is done in it.
 //!
-//! A strategy lists decisions by rank, and which counts may depend on their order. In a table the order says nothing: each rule
-//! has the clock values for which it counts, in as few and as large zones as are found. So it is shorter than the strategy, and reads
-//! line by line.
+//! A strategy lists decisions by rank, and which counts may depend on their order. In a table the
+//! order says nothing: each rule has the clock values for which it counts, in as few and as large
+//! zones as are found. So it is shorter than the strategy, and reads line by line.
 
 use crate::game::strategy::attractor::Strategy;
 use crate::game::strategy::closed_loop;
@@ -11,7 +11,8 @@ use crate::network::Part;
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone, minimal};
 
-/// Zones of a rule up to which they are made larger; the effort grows with the square of their number.
+/// Zones of a rule up to which they are made larger; the effort grows with the square of their
+/// number.
 const MOST_GROWN_ZONES: usize = 64;
 
 /// Something that is done, and where.
@@ -30,14 +31,16 @@ pub struct Entry<'s> {
     pub words: &'s [i32],
     /// Whether play has ended here, won, whatever the clocks say.
     pub is_goal: bool,
-    /// What is done: waiting first, then moves in the order of their ranks. Of a strategy of which the first decision counts, rules
-    /// have no clock values in common.
+    /// What is done: waiting first, then moves in the order of their ranks. Of a strategy of which
+    /// the first decision counts, rules have no clock values in common.
     pub rules: Vec<Rule>,
-    /// If the strategy is the environment's: the legs that it picks, in no particular order; those of one entry have no clock values in common.
+    /// If the strategy is the environment's: the legs that it picks, in no particular order; those
+    /// of one entry have no clock values in common.
     pub legs: Vec<Rule>,
 }
 
-/// The table of a strategy of this network, which has the clock that measures time if the strategy looks at it: the states about which it says something, in its order.
+/// The table of a strategy of this network, which has the clock that measures time if the strategy
+/// looks at it: the states about which it says something, in its order.
 pub fn entries<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Entry<'s>> {
     let dimension = network.clocks.len().max(1);
     let joined = closed_loop::joined(network, strategy).into_iter();
@@ -108,7 +111,8 @@ fn simplify_inside(federation: &mut Federation, whole: &Federation) {
     *federation = grown;
 }
 
-/// A zone inside the federation that contains this one and has no constraint that could be left out.
+/// A zone inside the federation that contains this one and has no constraint that could be left
+/// out.
 fn grow(zone: &[Bound], whole: &Federation) -> Vec<Bound> {
     let dimension = whole.dimension();
     let mut constraints: Vec<Constraint> = Vec::new();

@@ -1,8 +1,10 @@
-//! The pages of the diagnostics: what a code means, an example of the mistake, how to mend it, the example mended.
+//! The pages of the diagnostics: what a code means, an example of the mistake, how to mend it, the
+//! example mended.
 //!
-//! A page is Markdown. Its examples are fenced, and the word behind the opening fence says what they are: a language (`xta`, `xml`; `query` for
-//! one query, `q` for a file of queries) and then `wrong`, `right`, or `model` for the model that queries are about. In a wrong example
-//! `\xE9` stands for the byte of this number. Tests load every example.
+//! A page is Markdown. Its examples are fenced, and the word behind the opening fence says what
+//! they are: a language (`xta`, `xml`; `query` for one query, `q` for a file of queries) and then
+//! `wrong`, `right`, or `model` for the model that queries are about. In a wrong example `\xE9`
+//! stands for the byte of this number. Tests load every example.
 
 use crate::diagnostics::Code;
 use crate::{semantics, syntax};

@@ -1,4 +1,5 @@
-//! Answers as JSON: traces, values and plans in the words of the model. Strategies are in [`super::strategy_json`].
+//! Answers as JSON: traces, values and plans in the words of the model. Strategies are in
+//! [`super::strategy_json`].
 
 use serde_json::{Map, Value as Json, json};
 
@@ -44,7 +45,8 @@ pub fn parts(network: &Network, list: &[Part]) -> Json {
     Json::Array(list.iter().map(|&one| part(network, one)).collect())
 }
 
-/// What it takes to write the location of a process, with its share of the state: see [`cancellation::work`].
+/// What it takes to write the location of a process, with its share of the state: see
+/// [`cancellation::work`].
 const UNITS_FOR_LOCATION: usize = 256;
 
 /// The location of each process.
@@ -76,8 +78,9 @@ pub fn variables(network: &Network, words: &[i32]) -> Json {
     Json::Object(values)
 }
 
-/// The values of a query for them: of one item its value, of several a list. A value is a number, or "inf" without a greatest one, or
-/// null if no state counts; for `bounds` it is the pair of the least and the greatest.
+/// The values of a query for them: of one item its value, of several a list. A value is a number,
+/// or "inf" without a greatest one, or null if no state counts; for `bounds` it is the pair of the
+/// least and the greatest.
 pub fn values(values: &Values) -> Json {
     let one = |extreme: Option<Extreme>| match extreme {
         None => Json::Null,
@@ -98,12 +101,15 @@ pub fn values(values: &Values) -> Json {
 
 /// The witnesses of an answer: one object, or, for values, one with a list of `traces`.
 ///
-/// A trace has `format` "ntagen-trace" and `version` 1. `kind` is "failure" where it leads to a failure of the model, and `value` says
-/// which value it shows. `states` are symbolic, `transitions` the edges between them, `ending` says why
-/// the run never ends: `loop` is the index of the state that its last state leads back to. `run` has exact times, in ticks of
-/// which `ticks_per_unit` make a unit of time: its `steps` each wait and take edges, `end` says what comes then, `from` from which
-/// moment on what must stay does, and `states` are those on entry, with the one after the last wait. On the way to an error, `failing` has
-/// the edges of the transition that fails in the last state; it is not there if looking at guards, invariants or the query fails.
+/// A trace has `format` "ntagen-trace" and `version` 1. `kind` is "failure" where it leads to a
+/// failure of the model, and `value` says which value it shows. `states` are symbolic,
+/// `transitions` the edges between them, `ending` says why the run never ends: `loop` is the index
+/// of the state that its last state leads back to. `run` has exact times, in ticks of which
+/// `ticks_per_unit` make a unit of time: its `steps` each wait and take edges, `end` says what
+/// comes then, `from` from which moment on what must stay does, and `states` are those on entry,
+/// with the one after the last wait. On the way to an error, `failing` has the edges of the
+/// transition that fails in the last state; it is not there if looking at guards, invariants or the
+/// query fails.
 pub fn witnesses(network: &Network, witnesses: &[Witness], query: &str) -> Json {
     let mut json = json!({ "format": TRACE_FORMAT, "version": 1, "query": query });
     let traces = witnesses.iter().map(|one| witness(network, one));
@@ -202,7 +208,8 @@ pub fn discrete(network: &Network, words: &[i32]) -> Json {
     json!({ "locations": locations(network, words), "variables": variables(network, words) })
 }
 
-/// What can happen in a state: of each choice the edges, and the windows of waits in ticks, null for one without end.
+/// What can happen in a state: of each choice the edges, and the windows of waits in ticks, null
+/// for one without end.
 pub fn choices(network: &Network, choices: &[Choice]) -> Json {
     let list = choices.iter().map(|choice| {
         let edges = choice.parts.iter().map(|&one| part(network, one.into()));
@@ -211,7 +218,8 @@ pub fn choices(network: &Network, choices: &[Choice]) -> Json {
     list.collect()
 }
 
-/// Plans: of each, the transitions that leave a state without committed locations; all others follow from them.
+/// Plans: of each, the transitions that leave a state without committed locations; all others
+/// follow from them.
 pub fn plans(network: &Network, plans: &[Plan], query: &str, has_more: bool) -> Json {
     let list = plans.iter().map(|plan| {
         let steps = plan.steps.iter().filter(|step| !step.was_committed);

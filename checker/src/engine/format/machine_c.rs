@@ -1,6 +1,8 @@
-//! Machines of games under partial observation as controllers: a file in C99 that depends on nothing, with two functions and tables.
+//! Machines of games under partial observation as controllers: a file in C99 that depends on
+//! nothing, with two functions and tables.
 //!
-//! A state has one observation, so the table of what is observed next is that of the states which may come next.
+//! A state has one observation, so the table of what is observed next is that of the states which
+//! may come next.
 
 use std::fmt::Write as _;
 

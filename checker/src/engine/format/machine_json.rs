@@ -1,8 +1,11 @@
-//! Strategies that go by observations, as files: written as JSON and as text, and read again to be checked.
+//! Strategies that go by observations, as files: written as JSON and as text, and read again to be
+//! checked.
 //!
-//! The format is described in `docs/observations.md`. In short: an object with `format` "ntagen-machine", `version` 1, the `query`, the
-//! `observations`, and `states`, the initial one first, each with what is seen in it, the action that is proposed, the next state for
-//! each next observation, and what the controller knows on entry. What is known, and what is seen in a state itself, is for people: reading passes over it.
+//! The format is described in `docs/observations.md`. In short: an object with `format`
+//! "ntagen-machine", `version` 1, the `query`, the `observations`, and `states`, the initial one
+//! first, each with what is seen in it, the action that is proposed, the next state for each next
+//! observation, and what the controller knows on entry. What is known, and what is seen in a state
+//! itself, is for people: reading passes over it.
 
 use std::fmt::Write as _;
 
@@ -108,7 +111,8 @@ fn knowledge(network: &Network, knowledge: &Knowledge) -> Vec<Json> {
     states.collect()
 }
 
-/// Reads what a machine does; gives the query that it answers, and its states. `seen` is the number of observations of the query.
+/// Reads what a machine does; gives the query that it answers, and its states. `seen` is the number
+/// of observations of the query.
 ///
 /// # Errors
 /// It is no JSON of the format, or names what the network does not have.
@@ -209,8 +213,8 @@ pub fn to_check(machine: &Machine) -> Vec<check::MachineState> {
     states.collect()
 }
 
-/// A machine as text: a paragraph for each state, with what is seen in it, what is proposed, where each next observation leads, and
-/// where play may be on entry.
+/// A machine as text: a paragraph for each state, with what is seen in it, what is proposed, where
+/// each next observation leads, and where play may be on entry.
 pub fn text(network: &Network, machine: &Machine, query: &str) -> String {
     let names = observations(query);
     let seen = |values: &[bool]| {

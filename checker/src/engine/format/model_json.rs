@@ -1,19 +1,26 @@
-//! What is in a model, as JSON: the object that `ntagen info --json` prints and that Python's `Model` is made of.
+//! What is in a model, as JSON: the object that `ntagen info --json` prints and that Python's
+//! `Model` is made of.
 //!
 //! It has `format` "ntagen-model" and `version` 1, and then
-//! * `templates` as written: `name`, `parameters` (texts), `locations`, `branch_points`, `edges`. A location has `id`, `name` (empty
-//!   without one), `kind` ("normal", "urgent", "committed"), `initial`, `invariant` and `rate` as text; a branch point has `id`; an edge has
-//!   `source` and `target` (ids), `controllable`, `select`, `guard`, `sync`, `update` and `weight` as text, `nails`. All three have
-//!   where they are drawn, as far as the file says so: `position`, `color`, and `labels`, a position by kind of label. Positions are pairs
-//!   in the editor's units, x to the right and y down.
-//! * `processes` after instantiation: `name`, `template`, `priority`, and how many `locations` and `edges` they have; the legs of a branch
-//!   point are one edge.
-//! * `variables`: `name`, `process` (null if global), `type`, `dimensions`, `meta`, `words`; constants are none.
-//! * `clocks`: `name`, `process`, `hybrid`; `channels`: `name`, `broadcast`, `urgent`, `priority`; arrays of both part by part.
+//! * `templates` as written: `name`, `parameters` (texts), `locations`, `branch_points`, `edges`. A
+//!   location has `id`, `name` (empty without one), `kind` ("normal", "urgent", "committed"),
+//!   `initial`, `invariant` and `rate` as text; a branch point has `id`; an edge has `source` and
+//!   `target` (ids), `controllable`, `select`, `guard`, `sync`, `update` and `weight` as text,
+//!   `nails`. All three have where they are drawn, as far as the file says so: `position`, `color`,
+//!   and `labels`, a position by kind of label. Positions are pairs in the editor's units, x to the
+//!   right and y down.
+//! * `processes` after instantiation: `name`, `template`, `priority`, and how many `locations` and
+//!   `edges` they have; the legs of a branch point are one edge.
+//! * `variables`: `name`, `process` (null if global), `type`, `dimensions`, `meta`, `words`;
+//!   constants are none.
+//! * `clocks`: `name`, `process`, `hybrid`; `channels`: `name`, `broadcast`, `urgent`, `priority`;
+//!   arrays of both part by part.
 //! * `features`: names of what the model uses beyond plain timed automata.
-//! * `scalar_sets`: `size`, whether symmetry reduction applies (`reduced`), and else why not (`obstacle`, a text) and, if something tells
-//!   members apart, its place and text (`place`, `at`), or null.
-//! * `state`: the 32-bit `words` of the discrete state, and of these the `location_words`, `variable_words`, `meta_words`.
+//! * `scalar_sets`: `size`, whether symmetry reduction applies (`reduced`), and else why not
+//!   (`obstacle`, a text) and, if something tells members apart, its place and text (`place`,
+//!   `at`), or null.
+//! * `state`: the 32-bit `words` of the discrete state, and of these the `location_words`,
+//!   `variable_words`, `meta_words`.
 //! * `queries`: `text`, `comment`, `expect` (the verdict that the file states, or null).
 //! * `warnings` as text, and `load_seconds`.
 

@@ -1,9 +1,12 @@
-//! Strategies as compact controllers: a file in C99 that depends on nothing, for running a strategy elsewhere.
+//! Strategies as compact controllers: a file in C99 that depends on nothing, for running a strategy
+//! elsewhere.
 //!
-//! The file has two functions: what the strategy does in a state, and whether it allows an action there (see the comment that it
-//! begins with). The rest is tables. A discrete state is packed into a key of as many bits as the values need that its words take;
-//! the keys are sorted, and each has a row of rules. A rule is a zone and an action. Rows, zones and constraints are there once,
-//! whoever shares them. Where the first rule that applies counts, zones are made larger by what earlier rules decide.
+//! The file has two functions: what the strategy does in a state, and whether it allows an action
+//! there (see the comment that it begins with). The rest is tables. A discrete state is packed into
+//! a key of as many bits as the values need that its words take; the keys are sorted, and each has
+//! a row of rules. A rule is a zone and an action. Rows, zones and constraints are there once,
+//! whoever shares them. Where the first rule that applies counts, zones are made larger by what
+//! earlier rules decide.
 //!
 //! The same strategy gives the same text.
 
@@ -109,8 +112,8 @@ struct Tables {
     spans: Vec<Span>,
     /// The packed states with the numbers of their rows, ascending by key.
     states: Vec<(Vec<u32>, usize)>,
-    /// Rules by zone and action; 0 is to wait. Behind them the legs that are picked, from this index on. The first row stands for the
-    /// end of play.
+    /// Rules by zone and action; 0 is to wait. Behind them the legs that are picked, from this
+    /// index on. The first row stands for the end of play.
     rows: Pool<(Vec<(usize, usize)>, usize)>,
     /// Zones as lists of constraints.
     zones: Pool<Vec<usize>>,

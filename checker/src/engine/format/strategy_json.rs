@@ -1,9 +1,11 @@
 //! Strategies as files: written as JSON, and read again for a model.
 //!
-//! The format is described in `docs/strategy.md`. In short: an object with `format` "ntagen-strategy", `version` 1, the `query`,
-//! the `owner`, the `selection`, and `states`, each with `locations` by process, `variables` by name, `goal`, `decisions` with the
-//! `zones` where they apply, and `legs` if the environment picks some. Reading looks names up in the model and refuses what is not in it, so a file fits
-//! every model with the same processes, locations, variables, clocks and edges.
+//! The format is described in `docs/strategy.md`. In short: an object with `format`
+//! "ntagen-strategy", `version` 1, the `query`, the `owner`, the `selection`, and `states`, each
+//! with `locations` by process, `variables` by name, `goal`, `decisions` with the `zones` where
+//! they apply, and `legs` if the environment picks some. Reading looks names up in the model and
+//! refuses what is not in it, so a file fits every model with the same processes, locations,
+//! variables, clocks and edges.
 
 use std::sync::Arc;
 
@@ -46,7 +48,8 @@ const OTHER_MODEL: &str =
     "the strategy was made for another model, or the model has changed: synthesise it again";
 const SEE_FORMAT: &str = "docs/strategy.md describes the format";
 
-/// A strategy as JSON. Decisions of states with the same words are joined and come in the order of their ranks.
+/// A strategy as JSON. Decisions of states with the same words are joined and come in the order of
+/// their ranks.
 pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
     let network = &*time_clock::network_of(network, strategy);
     let mut file = frame(network, strategy, query);
@@ -58,7 +61,8 @@ pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
     file
 }
 
-/// The text of what [`write`] gives, made state by state, since the whole takes twenty times the memory of the text.
+/// The text of what [`write`] gives, made state by state, since the whole takes twenty times the
+/// memory of the text.
 pub fn text(network: &Network, strategy: &Strategy, query: &str) -> String {
     let network = &*time_clock::network_of(network, strategy);
     let frame = frame(network, strategy, query).to_string();
@@ -331,7 +335,8 @@ fn time_limit(at: &At<'_>) -> Result<i32, Mismatch> {
     limit.ok_or_else(|| at.wrong(format!("{} is no limit of time", at.0), SEE_FORMAT))
 }
 
-/// The words of a state that is given as an object with `locations` and `variables`, as in a strategy.
+/// The words of a state that is given as an object with `locations` and `variables`, as in a
+/// strategy.
 ///
 /// # Errors
 /// It is none of the network.

@@ -1,4 +1,5 @@
-//! Strategies as text, in the form that TIGA's command-line checker prints: for each discrete state, where to wait and where to act.
+//! Strategies as text, in the form that TIGA's command-line checker prints: for each discrete
+//! state, where to wait and where to act.
 
 use std::fmt::Write as _;
 
@@ -11,8 +12,9 @@ use super::decision_table::{self, Rule};
 use super::text;
 use crate::engine::query::time_clock;
 
-/// A strategy as text: the initial state, whose strategy it is, and a paragraph for each discrete state about which it says
-/// something. Each line stands on its own; of a strategy that leaves a choice, several may apply.
+/// A strategy as text: the initial state, whose strategy it is, and a paragraph for each discrete
+/// state about which it says something. Each line stands on its own; of a strategy that leaves a
+/// choice, several may apply.
 pub fn write(network: &Network, strategy: &Strategy) -> String {
     let network = &*time_clock::network_of(network, strategy);
     let mut text = format!(

@@ -1,6 +1,7 @@
 //! States, moves and zones in the words of the model.
 //!
-//! The text of a trace follows the form that UPPAAL's command-line checker prints, so that scripts written for that can read it.
+//! The text of a trace follows the form that UPPAAL's command-line checker prints, so that scripts
+//! written for that can read it.
 
 use std::fmt::Write as _;
 
@@ -94,8 +95,8 @@ pub fn location_name<'n>(network: &'n Network, process: usize, words: &[i32]) ->
     &network.processes[process].locations[words[process] as usize].name
 }
 
-/// The constraints of a zone that say something, as `x-y <= 3` and its kin; differences that follow from bounds of the clocks alone
-/// are left out.
+/// The constraints of a zone that say something, as `x-y <= 3` and its kin; differences that follow
+/// from bounds of the clocks alone are left out.
 pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
     let name = |clock: usize| network.clocks[clock].name.as_str();
     let mut constraints = Vec::new();
@@ -137,7 +138,8 @@ pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
     constraints
 }
 
-/// The fewest constraints that make a zone: first the equalities, as `x == 3` and `x-y == 2`, then the others, as `x <= 3` and `x-y >= 1`.
+/// The fewest constraints that make a zone: first the equalities, as `x == 3` and `x-y == 2`, then
+/// the others, as `x <= 3` and `x-y >= 1`.
 pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
     let ties = |left: usize, right: usize| {
         zone.bound(left, right) + zone.bound(right, left) == Bound::LE_ZERO

@@ -52,7 +52,8 @@ pub enum Verdict {
 pub struct Evidence {
     /// Witnesses, counterexamples, or the way to a failure: one, or one a value.
     pub witnesses: Vec<Witness>,
-    /// The states that a search for such a state has reached, if there is none and they were wanted.
+    /// The states that a search for such a state has reached, if there is none and they were
+    /// wanted.
     pub certificate: Option<Certificate>,
     /// The strategy of the player who wins, if it was wanted.
     pub strategy: Option<Arc<Strategy>>,
@@ -62,7 +63,8 @@ pub struct Evidence {
     pub verification: Option<Verification>,
     /// Plans, if they were wanted.
     pub plans: Option<Vec<Plan>>,
-    /// Whether there are more plans than were wanted, or may be: after the first, no other is looked for.
+    /// Whether there are more plans than were wanted, or may be: after the first, no other is
+    /// looked for.
     pub has_more_plans: bool,
 }
 
@@ -81,7 +83,8 @@ impl Evidence {
         }
     }
 
-    /// Whether the strategy and all runs passed their independent checks; `None` if there was none, or one came to no end.
+    /// Whether the strategy and all runs passed their independent checks; `None` if there was none,
+    /// or one came to no end.
     pub fn is_verified(&self) -> Option<bool> {
         let strategy = self.verification.iter().map(|check| match check {
             Ok(StrategyCheck::Verified(_)) => Some(true),
@@ -134,7 +137,8 @@ pub struct Answer {
     pub seconds: f64,
     /// Seconds of loading the model and compiling its code.
     pub load_seconds: f64,
-    /// The first place, in the order of the model, where the result of integer arithmetic did not fit and wrapped round.
+    /// The first place, in the order of the model, where the result of integer arithmetic did not
+    /// fit and wrapped round.
     pub wrapped: Option<SiteId>,
 }
 
@@ -191,8 +195,8 @@ pub(in crate::engine) fn answer(subject: Subject<'_>, query: &Query, options: &O
     answer
 }
 
-/// So many zones stand side by side in one step of the search, beside those of its account, at most about: where it is a matter of cutting
-/// zones by each other, more.
+/// So many zones stand side by side in one step of the search, beside those of its account, at most
+/// about: where it is a matter of cutting zones by each other, more.
 fn zones_at_hand(kind: &QueryKind) -> usize {
     match kind {
         QueryKind::Reachable(predicate) | QueryKind::Invariantly(predicate)
@@ -289,9 +293,10 @@ fn answer_within(
     }
 }
 
-/// Answers with a search that takes states that differ only by exchanged members of scalar sets for the same, if that is
-/// wanted and sound. Whether a failure is met can hang on the order in which a quantifier runs through members, so that one
-/// that is found so is looked for again among all states.
+/// Answers with a search that takes states that differ only by exchanged members of scalar sets for
+/// the same, if that is wanted and sound. Whether a failure is met can hang on the order in which a
+/// quantifier runs through members, so that one that is found so is looked for again among all
+/// states.
 fn reduced(
     subject: Subject<'_>,
     options: &Options,
@@ -310,8 +315,8 @@ fn reduced(
     }
 }
 
-/// The variables that a search whose question reads words by `functions` may forget where they are not live. What a strategy
-/// allows hangs on all of them.
+/// The variables that a search whose question reads words by `functions` may forget where they are
+/// not live. What a strategy allows hangs on all of them.
 pub(super) fn live_variables(
     subject: Subject<'_>,
     functions: impl IntoIterator<Item = FunctionId>,
@@ -321,7 +326,8 @@ pub(super) fn live_variables(
     if !options.live_variables || subject.under.is_some() {
         return None;
     }
-    // An initial value is the same member for all, so that states would no longer be each other's images.
+    // An initial value is the same member for all, so that states would no longer be each other's
+    // images.
     let keeps_scalars = symmetry.is_some();
     LiveVariables::new(subject.network, functions, keeps_scalars).map(Arc::new)
 }
@@ -370,8 +376,8 @@ pub(in crate::engine) fn has_differences(network: &Network, atoms: &[ClockAtom])
     network.features.diagonals || atoms.iter().any(ClockAtom::is_difference)
 }
 
-/// Zones for searches, with an abstraction that is sound for the network and these predicates, and keeps what further
-/// comparisons tell.
+/// Zones for searches, with an abstraction that is sound for the network and these predicates, and
+/// keeps what further comparisons tell.
 pub(in crate::engine) fn symbolic<'a>(
     subject: Subject<'a>,
     predicates: &[&Predicate],
@@ -417,8 +423,9 @@ pub(in crate::engine) fn symbolic<'a>(
     }
 }
 
-/// Zones that may be too large for what is asked, where those of [`symbolic`] would be many more: nothing that these zones do not
-/// have is there, but what they have may not be. `None` if there are none but those of [`symbolic`].
+/// Zones that may be too large for what is asked, where those of [`symbolic`] would be many more:
+/// nothing that these zones do not have is there, but what they have may not be. `None` if there
+/// are none but those of [`symbolic`].
 pub(super) fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Option<Symbolic<'a>> {
     if predicate::depends_on_negations(subject.network) {
         return None;
@@ -435,7 +442,8 @@ pub(super) fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Op
     if has_differences(subject.network, &all) {
         return None;
     }
-    // What simulates a valuation may have more moves: a deadlock could be left out for a state that has none.
+    // What simulates a valuation may have more moves: a deadlock could be left out for a state that
+    // has none.
     Some(symbolic(subject, &[], &atoms, Abstraction::LowerUpper).comparing_as_sets())
 }
 
@@ -470,7 +478,8 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         }
     }
 
-    /// The same for what is sure only if a run is replayed, where there is a doubt beside zones that are too large.
+    /// The same for what is sure only if a run is replayed, where there is a doubt beside zones
+    /// that are too large.
     pub(super) fn doubting(self, is_doubtful: bool) -> Witnesses<'w, 'a> {
         Witnesses {
             is_doubtful: self.is_doubtful || is_doubtful,
@@ -483,8 +492,8 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         self.is_doubtful
     }
 
-    /// Adds a trace, with its run if runs are wanted; returns the verdict on what it shows: a run is also looked for where there is a
-    /// doubt, since then it alone makes sure.
+    /// Adds a trace, with its run if runs are wanted; returns the verdict on what it shows: a run
+    /// is also looked for where there is a doubt, since then it alone makes sure.
     pub(super) fn add(
         &mut self,
         trace: Trace,
@@ -497,8 +506,8 @@ impl<'w, 'a> Witnesses<'w, 'a> {
             Shows::Takes(takes) => Kind::Value(takes.item, takes.shown),
         };
         let mut witness = Witness::new(trace, ending, kind);
-        // An initial state that cannot be entered is no run.
-        // What is stuck under a strategy may go on in the model, which is what the replay knows, and priorities count in the model.
+        // An initial state that cannot be entered is no run. What is stuck under a strategy may go
+        // on in the model, which is what the replay knows, and priorities count in the model.
         let is_dead = match shows {
             Shows::Reaches(predicate, _) | Shows::Takes(Takes { predicate, .. }) => {
                 predicate::has_deadlock(predicate)

@@ -2,28 +2,32 @@
 
 use crate::game::backward::budget::Allowance;
 
-/// States that a game is explored for without abstraction where two clocks are compared. Many such games are finite so, and then far
-/// smaller than with zones that are cut along the comparisons.
+/// States that a game is explored for without abstraction where two clocks are compared. Many such
+/// games are finite so, and then far smaller than with zones that are cut along the comparisons.
 const MOST_EXACT_STATES: u64 = 4096;
 
-/// States that a game is explored for before it is looked whether there are many zones for each discrete state.
+/// States that a game is explored for before it is looked whether there are many zones for each
+/// discrete state.
 pub(super) const STATES_BEFORE_CROWD: u64 = 2048;
 
 /// So many zones for each discrete state are many.
 pub(super) const CROWD: usize = 4;
 
-/// Discrete states that are explored instead, at most. More of them are rather such that no run reaches.
+/// Discrete states that are explored instead, at most. More of them are rather such that no run
+/// reaches.
 const MOST_DISCRETE_STATES: u64 = 64 * STATES_BEFORE_CROWD;
 
-/// Bytes that a discrete state may take, on average, before zones that are reached are looked at again: winning sets of all that
-/// invariants allow can fall into many more pieces than those of what is reached.
+/// Bytes that a discrete state may take, on average, before zones that are reached are looked at
+/// again: winning sets of all that invariants allow can fall into many more pieces than those of
+/// what is reached.
 const MOST_BYTES_OF_DISCRETE_STATE: u64 = 64 << 10;
 
-/// Operations on many zones that a discrete state may take, on average, for the same reason. Where the pieces stay few there are some
-/// dozens, and where they do not, thousands soon.
+/// Operations on many zones that a discrete state may take, on average, for the same reason. Where
+/// the pieces stay few there are some dozens, and where they do not, thousands soon.
 const MOST_OPERATIONS_ON_DISCRETE_STATE: u64 = 256;
 
-/// States that are counted beside those that are stored, for the bytes and the operations that an average one may take.
+/// States that are counted beside those that are stored, for the bytes and the operations that an
+/// average one may take.
 const STATES_OF_GRACE: u64 = 256;
 
 /// To play a game without abstraction.
@@ -42,7 +46,8 @@ pub(super) const IN_DISCRETE_STATES: Allowance = Allowance {
     states_of_grace: STATES_OF_GRACE,
 };
 
-/// To play a game with a goal that is to recur in discrete states. All nodes are computed in each round, in symbolic states too.
+/// To play a game with a goal that is to recur in discrete states. All nodes are computed in each
+/// round, in symbolic states too.
 pub(super) const IN_DISCRETE_STATES_BY_ROUNDS: Allowance = Allowance {
     operations_each: 16 * MOST_OPERATIONS_ON_DISCRETE_STATE,
     ..IN_DISCRETE_STATES

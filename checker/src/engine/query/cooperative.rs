@@ -1,5 +1,5 @@
-//! Strategies of `E<> control: …`: from where both players get to together if the controller wins from there, and of the environment
-//! from everywhere if it wins from nowhere.
+//! Strategies of `E<> control: …`: from where both players get to together if the controller wins
+//! from there, and of the environment from everywhere if it wins from nowhere.
 
 use crate::game::Player;
 use crate::game::backward::solver::{Solver, Win};
@@ -20,8 +20,9 @@ use crate::engine::evidence::timed_run::Missing;
 use crate::engine::evidence::{strategy_check, timed_run};
 use crate::engine::format::text;
 
-/// The strategy of the winner of a game that was solved with both players working together. `rounds` are those of a goal that is to
-/// recur, and `zones` fresh ones of the game. An error of the inner result says why there is none.
+/// The strategy of the winner of a game that was solved with both players working together.
+/// `rounds` are those of a goal that is to recur, and `zones` fresh ones of the game. An error of
+/// the inner result says why there is none.
 pub(super) fn strategy(
     solver: &mut Solver<'_, '_, '_>,
     (winner, rounds): (Player, Option<&[Vec<Win>]>),

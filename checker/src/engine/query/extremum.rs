@@ -70,7 +70,8 @@ pub(super) fn extremum(
     let mut message = values
         .as_ref()
         .and_then(|values| remark(values, question.items));
-    // Zones that are too large have all that is there; a value is sure if a run has it, and so is that there is none.
+    // Zones that are too large have all that is there; a value is sure if a run has it, and so is
+    // that there is none.
     if let Some(values) = &values
         && (options.runs || report.is_approximate)
     {
@@ -109,7 +110,8 @@ struct Runs<'q> {
 }
 
 impl Runs<'_> {
-    /// Adds a run to a state with each of the values; none for a clock without limit, and none beyond a limit of the search.
+    /// Adds a run to a state with each of the values; none for a clock without limit, and none
+    /// beyond a limit of the search.
     fn add_all<'a>(
         &mut self,
         values: &Values,

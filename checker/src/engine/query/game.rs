@@ -37,7 +37,8 @@ pub(super) const IGNORED_PRIORITIES: &str =
 /// What is said where plans are wanted of a game for which none are listed.
 const NO_PLANS: &str = "plans are listed for control: A<> and A[ U ] only, and not under a strategy; what to do is in the strategy";
 
-/// Says so if plans are wanted of a game that sees everything and for which none are listed, whoever wins.
+/// Says so if plans are wanted of a game that sees everything and for which none are listed,
+/// whoever wins.
 pub(super) fn note_missing_plans(answer: &mut Answer, query: &QueryKind, is_under: bool) {
     let QueryKind::Control {
         objective,
@@ -78,7 +79,8 @@ pub(in crate::engine) fn unsupported_game(
 /// The strategy that a game is played under: as a restriction, and as a value.
 pub(super) type Allowed<'a> = (&'a ClosedLoop, &'a Arc<Under>);
 
-/// Answers a game query: with Extra-M+, or, where two clocks are compared, without abstraction first.
+/// Answers a game query: with Extra-M+, or, where two clocks are compared, without abstraction
+/// first.
 pub(super) fn game(
     (network, under): (&Network, Option<Allowed<'_>>),
     executor: &dyn Executor,
@@ -165,8 +167,9 @@ pub(super) fn zones_of<'a>(
     }
 }
 
-/// Whether the game may be played in discrete states with all that invariants allow: if it does not matter what is reached, and if
-/// neither clocks that stop, nor priorities, nor clock guards on urgent channels make it hang on more than the state.
+/// Whether the game may be played in discrete states with all that invariants allow: if it does not
+/// matter what is reached, and if neither clocks that stop, nor priorities, nor clock guards on
+/// urgent channels make it hang on more than the state.
 pub(super) fn can_be_discrete(network: &Network, is_cooperative: bool, options: &Options) -> bool {
     let has_priorities = network.features.priorities && options.priorities == Priorities::Kept;
     let is_urgent = network.features.clock_guarded_urgent;
@@ -187,8 +190,8 @@ pub(super) fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
     both.flat_map(predicate::atoms).collect()
 }
 
-/// Plays the game of a query in these zones; also says whether it was given up, for having many zones for each discrete state or
-/// for taking more than is allowed.
+/// Plays the game of a query in these zones; also says whether it was given up, for having many
+/// zones for each discrete state or for taking more than is allowed.
 fn played(
     mut symbolic: Symbolic<'_>,
     ((objective, is_cooperative), within): ((&Objective, bool), Option<&Arc<Under>>),
@@ -215,8 +218,9 @@ fn played(
         keep,
         must_progress: seeker == Player::Controller,
         deadline: None,
-        // The most permissive strategy says what to do there too, and so does one that begins anywhere. Under a strategy the controller
-        // may be obliged to move there, and lose for having no move.
+        // The most permissive strategy says what to do there too, and so does one that begins
+        // anywhere. Under a strategy the controller may be obliged to move there, and lose for
+        // having no move.
         leaves_dead_ends: !is_recurring
             && within.is_none()
             && (!is_strategy_wanted || (seeker == Player::Controller && !is_cooperative)),
@@ -351,8 +355,8 @@ fn played(
     (answer, false)
 }
 
-/// The strategy of the player who wins a solved game; that of the environment where a goal does not recur is in these rounds. An error of
-/// the inner result is why it was not finished.
+/// The strategy of the player who wins a solved game; that of the environment where a goal does not
+/// recur is in these rounds. An error of the inner result is why it was not finished.
 fn strategy_of(
     solver: &mut Solver<'_, '_, '_>,
     denied: Option<&[Vec<Win>]>,

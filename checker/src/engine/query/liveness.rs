@@ -1,7 +1,8 @@
-//! Is there a run that never ends? `E[]`, `A<>` and `-->`, with the shortest trace if that is wanted.
+//! Is there a run that never ends? `E[]`, `A<>` and `-->`, with the shortest trace if that is
+//! wanted.
 //!
-//! A run is first looked for in zones that may be too large, where that is sound for there being none; what they have is looked for
-//! again in exact ones.
+//! A run is first looked for in zones that may be too large, where that is sound for there being
+//! none; what they have is looked for again in exact ones.
 
 use crate::analysis::Abstraction;
 use crate::ir::Predicate;
@@ -20,7 +21,8 @@ use crate::engine::evidence::timed_run::Shows;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted};
 use crate::engine::{Options, TraceWanted};
 
-/// What a search in coarser zones came to, unless it found something that may not be there; else that of the same search in exact ones.
+/// What a search in coarser zones came to, unless it found something that may not be there; else
+/// that of the same search in exact ones.
 fn settle<'a, T>(
     subject: Subject<'a>,
     predicates: &[&Predicate],

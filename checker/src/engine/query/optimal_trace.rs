@@ -29,8 +29,8 @@ pub(super) fn not_the_best(reason: &str) -> String {
     format!("the trace is not the one wanted: {reason}")
 }
 
-/// The trace with the fewest moves or the least time, and its time; `None` if any trace will do. `zones` keeps the comparisons of what
-/// is sought.
+/// The trace with the fewest moves or the least time, and its time; `None` if any trace will do.
+/// `zones` keeps the comparisons of what is sought.
 pub(super) fn best(
     subject: Subject<'_>,
     zones: &mut Symbolic<'_>,

@@ -102,7 +102,8 @@ pub(super) fn game(
     answer
 }
 
-/// Checks in closed loop that a machine of the controller wins. The network must hold the code of the query.
+/// Checks in closed loop that a machine of the controller wins. The network must hold the code of
+/// the query.
 pub fn verify(
     network: &Network,
     (objective, observations): (&Objective, &[Predicate]),
@@ -163,7 +164,8 @@ pub(in crate::engine) fn unsupported(
     }
 }
 
-/// Whether some invariant says `x > c`: then an action that leads into its location has no first moment at which it is possible.
+/// Whether some invariant says `x > c`: then an action that leads into its location has no first
+/// moment at which it is possible.
 fn has_strict_lower_invariant(network: &Network) -> bool {
     let mut locations = network.processes.iter().flat_map(|one| &one.locations);
     locations.any(|location| {

@@ -1,4 +1,5 @@
-//! Is there a state? `E<>`, and what `A[]` asks for; with the trace that is wanted or a certificate.
+//! Is there a state? `E<>`, and what `A[]` asks for; with the trace that is wanted or a
+//! certificate.
 
 use std::sync::Arc;
 
@@ -45,8 +46,8 @@ pub(super) fn reachable<'a>(
     conclude(subject, &mut symbolic, goal, report, options, watch)
 }
 
-/// Looks for a deadlock in zones that are too large for it. One that is found counts if it remains in the exact zones of its trace.
-/// `None` if this settles nothing, or does not apply.
+/// Looks for a deadlock in zones that are too large for it. One that is found counts if it remains
+/// in the exact zones of its trace. `None` if this settles nothing, or does not apply.
 fn reach_coarsely<'a>(
     subject: Subject<'a>,
     goal: &Predicate,
@@ -54,7 +55,8 @@ fn reach_coarsely<'a>(
     reduced: impl FnOnce(Symbolic<'a>) -> Symbolic<'a>,
     watch: &mut LimitWatch,
 ) -> Option<(Symbolic<'a>, Report)> {
-    // The zones of a certificate must be free of deadlocks themselves, and the best trace is found in them.
+    // The zones of a certificate must be free of deadlocks themselves, and the best trace is found
+    // in them.
     let is_exact = options.certificate || options.trace != TraceWanted::Any;
     if is_exact || !predicate::has_deadlock(goal) {
         return None;

@@ -1,7 +1,8 @@
 //! The clock that measures time: for traces, and for games that are to be won within a time.
 //!
-//! Nothing sets it, and no model can name it. It is the last clock of a network that has it. A game that is to be won within a
-//! limit is an ordinary game of such a network, whose predicates compare the clock with the limit.
+//! Nothing sets it, and no model can name it. It is the last clock of a network that has it. A game
+//! that is to be won within a limit is an ordinary game of such a network, whose predicates compare
+//! the clock with the limit.
 
 use std::borrow::Cow;
 
@@ -49,8 +50,8 @@ pub(in crate::engine) struct Game<'n> {
     pub(in crate::engine) objective: Cow<'n, Objective>,
 }
 
-/// The game for an objective, within a limit if there is one. `rest` is how much of it must be left wherever the goal does not hold
-/// yet; a negative value counts as 0.
+/// The game for an objective, within a limit if there is one. `rest` is how much of it must be left
+/// wherever the goal does not hold yet; a negative value counts as 0.
 pub(in crate::engine) fn game<'n>(
     network: &'n Network,
     objective: &'n Objective,

@@ -1,15 +1,20 @@
-//! Time-optimal games, `control_t*(u, g)`: the least time within which the controller can force the goal.
+//! Time-optimal games, `control_t*(u, g)`: the least time within which the controller can force the
+//! goal.
 //!
-//! A clock of its own measures the time. The game is solved once, with the goal to be reached before that clock passes the limit u;
-//! the clock may start at any value up to u, and the greatest one from which the controller wins leaves just the time that is
-//! needed: the least limit with which the game is won. Where g is what it is meant to be, a time that certainly passes before the
-//! goal, that is the least time. Without u, the limit is doubled until it is enough, if the goal can be forced at all.
+//! A clock of its own measures the time. The game is solved once, with the goal to be reached
+//! before that clock passes the limit u; the clock may start at any value up to u, and the greatest
+//! one from which the controller wins leaves just the time that is needed: the least limit with
+//! which the game is won. Where g is what it is meant to be, a time that certainly passes before
+//! the goal, that is the least time. Without u, the limit is doubled until it is enough, if the
+//! goal can be forced at all.
 //!
-//! The clock tells apart when a state is reached, so that there are soon many zones for each discrete state. Then there is one node for each,
-//! if that is possible: how much time is needed does not hang on how much has passed. The limit has no part in how many these are, so that a
+//! The clock tells apart when a state is reached, so that there are soon many zones for each
+//! discrete state. Then there is one node for each, if that is possible: how much time is needed
+//! does not hang on how much has passed. The limit has no part in how many these are, so that a
 //! generous one is tried first.
 //!
-//! For a strategy the game is solved again, with the time that was found as the limit and a clock that starts at 0.
+//! For a strategy the game is solved again, with the time that was found as the limit and a clock
+//! that starts at 0.
 
 use std::sync::Arc;
 
@@ -44,7 +49,8 @@ const FIRST_LIMIT_IN_DISCRETE_STATES: i32 = 1 << 12;
 /// So many zones for each discrete state are many: with more of them, there will be more still.
 const CROWD: usize = 2;
 
-/// Discrete states that are explored, at most. Beside the clock, zones that are reached are rarely few enough to be worth more.
+/// Discrete states that are explored, at most. Beside the clock, zones that are reached are rarely
+/// few enough to be worth more.
 const MOST_DISCRETE_STATES: u64 = 1 << 20;
 
 /// What is asked: the goal, what is kept, and the bounds u and g.
@@ -270,8 +276,8 @@ impl Timed<'_, '_> {
         })
     }
 
-    /// Solves the game with a limit: as far as it takes to know who wins if the clock starts at 0, or in these nodes wholly, with a clock
-    /// that starts anywhere up to the limit.
+    /// Solves the game with a limit: as far as it takes to know who wins if the clock starts at 0,
+    /// or in these nodes wholly, with a clock that starts anywhere up to the limit.
     fn solve<R>(
         &self,
         (limit, nodes): (i32, Option<Nodes>),

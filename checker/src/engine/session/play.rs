@@ -1,6 +1,8 @@
-//! Strategies that are followed: what one says in a state with exact clock values, and playing against it.
+//! Strategies that are followed: what one says in a state with exact clock values, and playing
+//! against it.
 //!
-//! Whatever happens here is computed by [`crate::verify`], so that playing does not depend on the solver.
+//! Whatever happens here is computed by [`crate::verify`], so that playing does not depend on the
+//! solver.
 
 use std::borrow::Cow;
 use std::hash::BuildHasher as _;
@@ -34,7 +36,8 @@ pub struct Follower {
     pub query: String,
     /// The strategy.
     pub strategy: Arc<Strategy>,
-    /// By the words that tell states apart: the index of the first state in the strategy with these.
+    /// By the words that tell states apart: the index of the first state in the strategy with
+    /// these.
     by_words: HashTable<u32>,
     /// By state: the index of the next one with the same words, [`NONE`] without one.
     next: Vec<u32>,
@@ -125,7 +128,8 @@ impl Follower {
         }
     }
 
-    /// Where play begins, as JSON: "initial", "anywhere", or the run that leads there; null if it is not possible.
+    /// Where play begins, as JSON: "initial", "anywhere", or the run that leads there; null if it
+    /// is not possible.
     pub fn start(&self, network: &Network, priorities: Priorities) -> Result<Json, verify::Error> {
         Ok(match &self.strategy.start {
             Start::Initial => json!("initial"),
@@ -148,9 +152,10 @@ impl Follower {
         }
     }
 
-    /// What the strategy says in a state, as JSON: whether play is `over` there; the decisions that apply `now`, each with its `edges`
-    /// (null: it waits) and its `rank`; and if one of them is to wait, for how many `ticks` of `ticks_per_unit` (null: for ever), and
-    /// the decisions that apply `then`.
+    /// What the strategy says in a state, as JSON: whether play is `over` there; the decisions that
+    /// apply `now`, each with its `edges` (null: it waits) and its `rank`; and if one of them is to
+    /// wait, for how many `ticks` of `ticks_per_unit` (null: for ever), and the decisions that
+    /// apply `then`.
     pub fn advice(&self, network: &Network, state: &Json) -> Result<Json, Unadvised> {
         let network = &*time_clock::network_of(network, &self.strategy);
         let words = strategy_json::read_words(network, state)?;
@@ -191,7 +196,8 @@ impl Follower {
         Ok(json!({ "over": false, "now": described(&advice.now), "waiting": waiting }))
     }
 
-    /// Checks in closed loop that the owner wins: whether that is so (`None` if the check does not cover it), and what was looked at.
+    /// Checks in closed loop that the owner wins: whether that is so (`None` if the check does not
+    /// cover it), and what was looked at.
     pub fn verify(
         &self,
         model: &mut LoadedModel,
@@ -320,12 +326,14 @@ pub struct Play {
     /// How many steps lead to where it begins.
     start: usize,
     states: Vec<Timed>,
-    /// Between the states: the wait in ticks of the state before, doubled, and the edges; none if it is a wait alone.
+    /// Between the states: the wait in ticks of the state before, doubled, and the edges; none if
+    /// it is a wait alone.
     steps: Vec<(i64, Vec<Part>)>,
 }
 
 impl LoadedModel {
-    /// Begins a play. The strategy must be for the objective of the query, which its owner tries to reach or to prevent.
+    /// Begins a play. The strategy must be for the objective of the query, which its owner tries to
+    /// reach or to prevent.
     pub fn play(
         &mut self,
         follower: Arc<Follower>,
@@ -462,13 +470,16 @@ impl Play {
 
     /// What can happen in the state, as JSON.
     ///
-    /// `replies` are the moves of the strategy's opponent: of each the `edges` and the `windows` in which it is possible. A window is
-    /// a list: where it begins, whether it begins only after that, where it ends (null: never), and whether it ends before that. It may
-    /// wait within `waits`. Where the strategy takes an edge to a branch point, its opponent picks the leg: then the legs are replies at the
-    /// moment of `next`. `allowed` are likewise the moves that a permissive strategy allows its owner. `next` is what happens after `ticks` (null: never) if it does not move: `kind` "acts" with the `edges` of the
-    /// strategy; "won" with the `winner`, and `by` "goal", "broken", "stopped" or "endless"; "must", if it has to move before; "fails", if the
-    /// strategy does not say how to go on, with `gap`. All times are in ticks of which `ticks_per_unit` make a unit of time. `goal` is
-    /// whether the goal holds now.
+    /// `replies` are the moves of the strategy's opponent: of each the `edges` and the `windows` in
+    /// which it is possible. A window is a list: where it begins, whether it begins only after
+    /// that, where it ends (null: never), and whether it ends before that. It may wait within
+    /// `waits`. Where the strategy takes an edge to a branch point, its opponent picks the leg:
+    /// then the legs are replies at the moment of `next`. `allowed` are likewise the moves that a
+    /// permissive strategy allows its owner. `next` is what happens after `ticks` (null: never) if
+    /// it does not move: `kind` "acts" with the `edges` of the strategy; "won" with the `winner`,
+    /// and `by` "goal", "broken", "stopped" or "endless"; "must", if it has to move before;
+    /// "fails", if the strategy does not say how to go on, with `gap`. All times are in ticks of
+    /// which `ticks_per_unit` make a unit of time. `goal` is whether the goal holds now.
     pub fn situation(&self, network: &Network) -> Result<Json, verify::Error> {
         let now = self.now();
         let situation = self.look(network, now)?;
@@ -552,7 +563,8 @@ impl Play {
         self.step(network, &now, wait, parts)
     }
 
-    /// The strategy goes on: time passes until it acts, and then it does, by the first leg that is possible.
+    /// The strategy goes on: time passes until it acts, and then it does, by the first leg that is
+    /// possible.
     pub fn follow(&mut self, network: &Network) -> Result<(), Refused> {
         let now = self.now().clone();
         let situation = self.look(network, &now)?;
@@ -589,7 +601,8 @@ impl Play {
         self.states.truncate(self.start + length + 1);
     }
 
-    /// The play so far as a trace that [`LoadedModel::verify_evidence`] checks; `None` if its times have no common resolution.
+    /// The play so far as a trace that [`LoadedModel::verify_evidence`] checks; `None` if its times
+    /// have no common resolution.
     pub fn trace(&self, network: &Network) -> Result<Option<Json>, verify::Error> {
         let units = self.states.iter().map(|state| 2 * state.ticks_per_unit);
         let unit = units.into_iter().try_fold(1, least_multiple);

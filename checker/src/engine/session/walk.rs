@@ -1,7 +1,8 @@
 //! Walking through a model by hand: a state, its moves, the state after one of them.
 //!
-//! A state is symbolic: its zone holds all clock values that the moves so far allow. A move is listed if it is possible at some
-//! of them. Nothing is extrapolated, except in the list of all states, which would have no end otherwise.
+//! A state is symbolic: its zone holds all clock values that the moves so far allow. A move is
+//! listed if it is possible at some of them. Nothing is extrapolated, except in the list of all
+//! states, which would have no end otherwise.
 
 use crate::analysis::{Abstraction, ClockBounds};
 use crate::exec::Executor;
@@ -53,13 +54,14 @@ impl LoadedModel {
         Ok(Point { words, zone })
     }
 
-    /// The moves of a state, and where each leads. More than one entry for a move if a receiver abstains.
+    /// The moves of a state, and where each leads. More than one entry for a move if a receiver
+    /// abstains.
     pub fn successors(&self, point: &Point) -> Result<Successors, Failure> {
         successors(&mut self.symbolic(), point)
     }
 
-    /// Follows moves as long as time cannot pass and there is exactly one; the state where time can pass, or there is a choice,
-    /// or no move.
+    /// Follows moves as long as time cannot pass and there is exactly one; the state where time can
+    /// pass, or there is a choice, or no move.
     pub fn settle(&self, mut point: Point) -> Result<Point, Failure> {
         for _ in 0..LONGEST_WAY {
             if self.symbolic().may_delay(&mut point.words)? {
@@ -74,8 +76,9 @@ impl LoadedModel {
         Ok(point)
     }
 
-    /// The reachable states, breadth first, the fewest moves first, at most `limits.states` of them; and what stopped the search,
-    /// if they are not all. A state that an earlier one contains is left out. Zones are extrapolated by the constants of the model.
+    /// The reachable states, breadth first, the fewest moves first, at most `limits.states` of
+    /// them; and what stopped the search, if they are not all. A state that an earlier one contains
+    /// is left out. Zones are extrapolated by the constants of the model.
     pub fn reached(&self, limits: Limits) -> Result<(Vec<Met>, Option<StopReason>), Failure> {
         let network = self.network();
         let abstraction = if has_differences(network, &[]) {
@@ -113,7 +116,8 @@ pub fn symbolic<'a>(network: &'a Network, executor: &'a dyn Executor) -> Symboli
     Symbolic::new(Stepper::new(network, executor), bounds)
 }
 
-/// The moves of a state, and where each leads. More than one entry for a move if a receiver abstains.
+/// The moves of a state, and where each leads. More than one entry for a move if a receiver
+/// abstains.
 pub fn successors(symbolic: &mut Symbolic<'_>, point: &Point) -> Result<Successors, Failure> {
     successors_or_failure(symbolic, point).map_err(|(failure, _)| failure)
 }

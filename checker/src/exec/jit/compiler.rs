@@ -1,7 +1,8 @@
 //! Owns the compiled code and makes more of it on demand.
 //!
-//! Functions are optimised, and compiled together with everything they call that is not compiled yet. Calls go to absolute addresses, since
-//! code that is compiled late may lie anywhere. The memory of the code is freed with the compiler.
+//! Functions are optimised, and compiled together with everything they call that is not compiled
+//! yet. Calls go to absolute addresses, since code that is compiled late may lie anywhere. The
+//! memory of the code is freed with the compiler.
 //!
 //! Cost: some 10 to 50 µs, and then about 1 µs an instruction.
 
@@ -90,7 +91,8 @@ impl Compiler {
         })
     }
 
-    /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
+    /// Takes over what was appended since: both arguments are the whole of it, and begin with what
+    /// was given before.
     pub(super) fn extend(&mut self, functions: &[Function], constants: &[i32]) {
         self.optimiser.extend(functions, constants);
     }
@@ -100,13 +102,15 @@ impl Compiler {
         self.compiled
     }
 
-    /// Whether a call of the function is likely to run so much that it should be compiled before the first one.
+    /// Whether a call of the function is likely to run so much that it should be compiled before
+    /// the first one.
     pub(super) fn is_heavy(&mut self, function: FunctionId) -> bool {
         let given = self.optimiser.given();
         self.needs.of(given, function.0 as usize).are_heavy()
     }
 
-    /// Compiles a function that can be called from outside and all that it calls; `None` if it is none or too large.
+    /// Compiles a function that can be called from outside and all that it calls; `None` if it is
+    /// none or too large.
     pub(super) fn compile(
         &mut self,
         function: FunctionId,
@@ -224,8 +228,8 @@ impl Drop for Compiler {
         reason = "the module leaves freeing its memory to its owner"
     )]
     fn drop(&mut self) {
-        // SAFETY: the module is taken out only here. Its code runs only in calls that borrow the owner of this compiler, and
-        // none can be left when that is dropped.
+        // SAFETY: the module is taken out only here. Its code runs only in calls that borrow the
+        // owner of this compiler, and none can be left when that is dropped.
         unsafe { ManuallyDrop::take(&mut self.module).free_memory() }
     }
 }

@@ -1,15 +1,20 @@
 //! Native code by Cranelift: the fast engine.
 //!
-//! Functions that loop much are compiled beforehand ([`Jit::prepare`]). Any other function is interpreted until it has run for a while, and then optimised and compiled with all that it calls. A model with thousands
-//! of small guards pays for the few that matter, and a model that is solved at once for none. As interpreted and compiled
-//! code agree in everything, it makes no difference to results when this happens.
+//! Functions that loop much are compiled beforehand ([`Jit::prepare`]). Any other function is
+//! interpreted until it has run for a while, and then optimised and compiled with all that it
+//! calls. A model with thousands of small guards pays for the few that matter, and a model that is
+//! solved at once for none. As interpreted and compiled code agree in everything, it makes no
+//! difference to results when this happens.
 //!
 //! Invariants
-//! * Compiled code is never moved or freed before the engine is dropped; queries that come later only add to it.
-//! * `unsafe` is confined to this module: calling compiled code, what compiled code calls back, and freeing it.
-//! * The code that is compiled is trusted as the interpreter trusts it not, and so it is validated before: registers have the
-//!   types that instructions say, indices were checked ([`crate::ir::Instruction::ScaleIndex`]), accesses stay inside their
-//!   memory, and functions do not call themselves.
+//! * Compiled code is never moved or freed before the engine is dropped; queries that come later
+//!   only add to it.
+//! * `unsafe` is confined to this module: calling compiled code, what compiled code calls back, and
+//!   freeing it.
+//! * The code that is compiled is trusted as the interpreter trusts it not, and so it is validated
+//!   before: registers have the types that instructions say, indices were checked
+//!   ([`crate::ir::Instruction::ScaleIndex`]), accesses stay inside their memory, and functions do
+//!   not call themselves.
 
 mod compiler;
 mod needs;
@@ -29,7 +34,8 @@ use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, va
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};
 
-/// After so many interpreted instructions a function is compiled. They take about as long as compiling a small one.
+/// After so many interpreted instructions a function is compiled. They take about as long as
+/// compiling a small one.
 const HOT_INSTRUCTIONS: u64 = 20_000;
 /// Preparing stops after so many instructions, which take some milliseconds to compile.
 const MOST_PREPARED: usize = 6_000;
@@ -111,8 +117,9 @@ impl Jit {
         Ok(jit)
     }
 
-    /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
-    /// What is compiled stays so. An error for code that is no valid program ([`validate`]), and then nothing is taken over.
+    /// Takes over what was appended since: both arguments are the whole of it, and begin with what
+    /// was given before. What is compiled stays so. An error for code that is no valid program
+    /// ([`validate`]), and then nothing is taken over.
     pub fn extend(&mut self, functions: &[Function], constants: &[i32]) -> Result<(), JitError> {
         let words =
             validate(functions, self.entries.len(), constants.len()).map_err(JitError::new)?;
@@ -149,8 +156,8 @@ impl Jit {
         compiled.map(|_| ())
     }
 
-    /// Compiles those of the functions of which a single call runs so much that interpreting it would cost more, as long as this takes
-    /// no more than some milliseconds in all.
+    /// Compiles those of the functions of which a single call runs so much that interpreting it
+    /// would cost more, as long as this takes no more than some milliseconds in all.
     pub fn prepare(&self, functions: impl IntoIterator<Item = FunctionId>) {
         for function in functions {
             let mut compiler = self
@@ -187,7 +194,8 @@ impl Jit {
         let heat = heat + effort.instructions;
         entry.heat.store(heat, Ordering::Relaxed);
         if heat > HOT_INSTRUCTIONS {
-            // A function that cannot be compiled goes on being interpreted, which gives the same results.
+            // A function that cannot be compiled goes on being interpreted, which gives the same
+            // results.
             let _ = self.compile_function(function);
         }
         result
@@ -258,10 +266,12 @@ impl Jit {
     ) -> Result<i32, RunTimeError> {
         let (mut native, state) = NativeContext::new(&self.constants, context);
         let state = state.as_mut_ptr();
-        // SAFETY: `code` was made by the compiler of the engine that is borrowed for this call, for a function with as many
-        // parameters as there are arguments (a precondition of `Executor::call`), with the signature of an entry if there are
-        // any and its own if not. The context lives on this stack, the frame is as long as the compiler said that the function
-        // and all that it calls need, and the state has the words of the layout that the code was made for.
+        // SAFETY: `code` was made by the compiler of the engine that is borrowed for this call, for
+        // a function with as many parameters as there are arguments (a precondition of
+        // `Executor::call`), with the signature of an entry if there are any and its own if not.
+        // The context lives on this stack, the frame is as long as the compiler said that the
+        // function and all that it calls need, and the state has the words of the layout that the
+        // code was made for.
         let status = unsafe {
             if arguments.is_empty() {
                 let code = std::mem::transmute::<*mut u8, Plain>(code);

@@ -107,7 +107,8 @@ impl AllNeeds {
     }
 }
 
-/// Whether some block goes on to one that stands before it: the front end writes no such jump but for loops.
+/// Whether some block goes on to one that stands before it: the front end writes no such jump but
+/// for loops.
 fn has_loop(function: &Function) -> bool {
     let mut blocks = function.blocks.iter().enumerate();
     blocks.any(|(index, block)| match block.terminator {

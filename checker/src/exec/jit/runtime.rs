@@ -1,8 +1,9 @@
-//! What compiled code and the engine share: the context that every compiled function gets, how it says what went wrong, and
-//! the functions that it calls back.
+//! What compiled code and the engine share: the context that every compiled function gets, how it
+//! says what went wrong, and the functions that it calls back.
 //!
-//! The status of a call is 64 bits: negative for a run-time error (its kind and site in the lower bits), else the integer
-//! that the function returned, or 0. A double or an address is returned beside the status.
+//! The status of a call is 64 bits: negative for a run-time error (its kind and site in the lower
+//! bits), else the integer that the function returned, or 0. A double or an address is returned
+//! beside the status.
 
 use crate::cancellation;
 use crate::exec::{
@@ -11,7 +12,8 @@ use crate::exec::{
 };
 use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
 
-/// The first argument of every compiled function. Compiled code reads and writes `rounds_left` and reads `constants`.
+/// The first argument of every compiled function. Compiled code reads and writes `rounds_left` and
+/// reads `constants`.
 #[derive(Debug)]
 #[repr(C)]
 pub(super) struct NativeContext<'call> {
@@ -21,7 +23,8 @@ pub(super) struct NativeContext<'call> {
     pub(super) constants: *const i32,
     /// How many rounds it may take beyond these.
     rounds_beyond: u64,
-    /// The first site where a result wrapped round in this call, or [`Wraps::NOWHERE`]. Compiled code writes it.
+    /// The first site where a result wrapped round in this call, or [`Wraps::NOWHERE`]. Compiled
+    /// code writes it.
     pub(super) wrapped: u32,
     constraints: &'call mut Vec<EmittedConstraint>,
     assignments: &'call mut Vec<EmittedAssignment>,
@@ -97,7 +100,8 @@ const NO_RESULT: i64 = -1;
 /// The bit of [`power`] that says that the result wrapped round.
 pub(super) const HAS_WRAPPED: i64 = 1 << 32;
 
-/// `base ** exponent` as an unsigned word, with [`HAS_WRAPPED`] if it wrapped round; the exponent is not negative.
+/// `base ** exponent` as an unsigned word, with [`HAS_WRAPPED`] if it wrapped round; the exponent
+/// is not negative.
 pub(super) extern "C" fn power(base: i32, exponent: i32) -> i64 {
     arithmetic::power(base, exponent).map_or(NO_RESULT, |(power, has_wrapped)| {
         i64::from(power as u32) | if has_wrapped { HAS_WRAPPED } else { 0 }
@@ -149,8 +153,8 @@ pub(super) unsafe extern "C" fn zero_words(target: *mut i32, words: u64) {
 /// Copies words between ranges that are the same or disjoint.
 #[expect(unsafe_code, reason = "compiled code passes raw addresses")]
 pub(super) unsafe extern "C" fn copy_words(target: *mut i32, source: *const i32, words: u64) {
-    // SAFETY: compiled code passes places of arrays or structs of so many words, whose indices were checked; `copy` allows
-    // the two to be the same.
+    // SAFETY: compiled code passes places of arrays or structs of so many words, whose indices were
+    // checked; `copy` allows the two to be the same.
     unsafe { target.copy_from(source, words as usize) }
 }
 
@@ -161,8 +165,8 @@ pub(super) unsafe extern "C" fn equal_words(
     right: *const i32,
     words: u64,
 ) -> i32 {
-    // SAFETY: compiled code passes places of arrays or structs of so many words, whose indices were checked, and nothing
-    // writes during the comparison.
+    // SAFETY: compiled code passes places of arrays or structs of so many words, whose indices were
+    // checked, and nothing writes during the comparison.
     let (left, right) = unsafe {
         (
             std::slice::from_raw_parts(left, words as usize),

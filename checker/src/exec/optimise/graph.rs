@@ -29,8 +29,8 @@ pub(super) fn predecessors(function: &Function) -> Vec<Vec<usize>> {
     predecessors
 }
 
-/// Removes unreachable blocks, joins blocks that always follow each other, and puts the rest into reverse postorder, so
-/// that every block stands behind its dominators.
+/// Removes unreachable blocks, joins blocks that always follow each other, and puts the rest into
+/// reverse postorder, so that every block stands behind its dominators.
 pub(super) fn clean(function: &mut Function) {
     join_chains(function);
     let order = reverse_postorder(function);

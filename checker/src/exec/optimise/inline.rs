@@ -11,7 +11,8 @@ use super::size_of;
 /// Larger frames are not taken over: every call would zero them word by word.
 const MAX_FRAME_WORDS: u32 = 16;
 
-/// Inlines the calls for which `inlined` gives code, as long as the function does not grow beyond `max_size`.
+/// Inlines the calls for which `inlined` gives code, as long as the function does not grow beyond
+/// `max_size`.
 pub(super) fn inline_calls<'a>(
     function: &mut Function,
     inlined: &dyn Fn(FunctionId) -> Option<&'a Function>,
@@ -43,7 +44,8 @@ pub(super) fn inline_calls<'a>(
     }
 }
 
-/// Replaces a call by the code of the callee. The block ends before it; what followed moves to a new block.
+/// Replaces a call by the code of the callee. The block ends before it; what followed moves to a
+/// new block.
 fn inline_call(function: &mut Function, block: usize, position: usize, callee: &Function) {
     let rest = function.blocks[block].instructions.split_off(position + 1);
     let call = function.blocks[block].instructions.pop();

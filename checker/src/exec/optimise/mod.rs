@@ -1,11 +1,13 @@
-//! From code to faster code that does the same: for compiled code, and testable with the interpreter.
+//! From code to faster code that does the same: for compiled code, and testable with the
+//! interpreter.
 //!
-//! Invariant: results, states, emitted constraints and assignments, the sites where results wrap round, and the kind and site of a
-//! run-time error stay what they were. Only rounds of loops that are written out are no longer counted.
+//! Invariant: results, states, emitted constraints and assignments, the sites where results wrap
+//! round, and the kind and site of a run-time error stay what they were. Only rounds of loops that
+//! are written out are no longer counted.
 //!
-//! A function is optimised after the functions that it calls: their code is taken in where they are small, or made to
-//! measure where they are called with constants ([`Optimiser::specialise`]); then values are numbered and loops of few
-//! rounds written out, innermost first.
+//! A function is optimised after the functions that it calls: their code is taken in where they are
+//! small, or made to measure where they are called with constants ([`Optimiser::specialise`]); then
+//! values are numbered and loops of few rounds written out, innermost first.
 //!
 //! Cost: about a microsecond an instruction of the result.
 
@@ -35,7 +37,8 @@ const MAX_VARIANTS: usize = 16;
 /// Larger functions are left as they are.
 const MAX_SIZE_TO_OPTIMISE: usize = 20_000;
 
-/// Optimises all functions of a program, which must not call each other thousands deep. Copies that were made to measure stand behind the functions that were given.
+/// Optimises all functions of a program, which must not call each other thousands deep. Copies that
+/// were made to measure stand behind the functions that were given.
 pub fn optimise(functions: &[Function], constants: &[i32]) -> Vec<Function> {
     let mut optimiser = Optimiser::default();
     optimiser.extend(functions, constants);
@@ -90,7 +93,8 @@ pub(super) struct Optimiser {
 }
 
 impl Optimiser {
-    /// Takes over what was appended since: both arguments are the whole of it, and begin with what was given before.
+    /// Takes over what was appended since: both arguments are the whole of it, and begin with what
+    /// was given before.
     pub(super) fn extend(&mut self, functions: &[Function], constants: &[i32]) {
         let known = self.functions.len();
         self.functions.extend_from_slice(&functions[known..]);
@@ -115,8 +119,8 @@ impl Optimiser {
         self.specialise(function, Vec::new())
     }
 
-    /// Whether a function is to be made to measure. Without a limit, functions that hand on their arguments to each other
-    /// in several ways would multiply.
+    /// Whether a function is to be made to measure. Without a limit, functions that hand on their
+    /// arguments to each other in several ways would multiply.
     fn may_specialise(&self, function: FunctionId, arguments: &Constants) -> bool {
         let general = (function, Constants::new());
         let variants = self.numbers.range(general..).take(MAX_VARIANTS);
@@ -169,7 +173,8 @@ impl Optimiser {
         }
     }
 
-    /// Numbers the values and removes what is dead; once more if branches fell away, for then blocks can be joined.
+    /// Numbers the values and removes what is dead; once more if branches fell away, for then
+    /// blocks can be joined.
     fn tidy(&self, function: &mut Function) {
         graph::clean(function);
         if numbering::number_values(function, &self.constants) {

@@ -1,9 +1,10 @@
 //! Writes out loops that run a known, small number of rounds.
 //!
-//! How often a loop runs is found by running it on what is known: from the constants that its registers hold on entry, the
-//! blocks that every round passes are evaluated until one of them leaves the loop. Whatever depends on memory, parameters
-//! or ways that not every round takes is unknown, and a loop that leaves by such a value alone is not written out. (It may
-//! leave early by one.)
+//! How often a loop runs is found by running it on what is known: from the constants that its
+//! registers hold on entry, the blocks that every round passes are evaluated until one of them
+//! leaves the loop. Whatever depends on memory, parameters or ways that not every round takes is
+//! unknown, and a loop that leaves by such a value alone is not written out. (It may leave early by
+//! one.)
 
 use rustc_hash::FxHashMap;
 
@@ -17,8 +18,8 @@ use super::size_of_blocks;
 /// Loops of more rounds are left alone.
 const MAX_ROUNDS: usize = 64;
 
-/// Writes out one innermost loop of a [`super::graph::clean`] function, if there is one and the function stays below
-/// `max_size`; says whether it did.
+/// Writes out one innermost loop of a [`super::graph::clean`] function, if there is one and the
+/// function stays below `max_size`; says whether it did.
 pub(super) fn unroll_one(function: &mut Function, max_size: usize) -> bool {
     let predecessors = predecessors(function);
     let dominators = dominators(function, &predecessors);
@@ -157,7 +158,8 @@ fn integers_at_entry(function: &Function, found: &Loop, dominators: &[usize]) ->
     {
         way.push(dominators[block]);
     }
-    // Only registers that are written once, or in the block before the loop, are sure to hold their constant still.
+    // Only registers that are written once, or in the block before the loop, are sure to hold their
+    // constant still.
     let mut writes: FxHashMap<Register, u32> = FxHashMap::default();
     for instruction in function.blocks.iter().flat_map(|block| &block.instructions) {
         if let Some(target) = target(instruction) {
@@ -213,8 +215,8 @@ fn evaluate(instruction: &Instruction, integers: &mut Integers) {
     };
 }
 
-/// Appends a copy of the loop for every round after the first; in the last round, the block that leaves the loop only
-/// does so.
+/// Appends a copy of the loop for every round after the first; in the last round, the block that
+/// leaves the loop only does so.
 fn write_out(function: &mut Function, found: &Loop, end: &End) {
     let count = found.blocks.len();
     let first_copy = function.blocks.len();

@@ -1,6 +1,7 @@
 //! What a way to play a game may take before it is given up for another one.
 //!
-//! What is looked at does not hang on the number of threads: operations are counted by task, and what threads have at hand does not count.
+//! What is looked at does not hang on the number of threads: operations are counted by task, and
+//! what threads have at hand does not count.
 
 use crate::search::limits::{StopReason, Watch};
 
@@ -20,7 +21,8 @@ pub struct Allowance {
 }
 
 impl Solver<'_, '_, '_> {
-    /// Lets the solver give up when it has taken more than this: it stops then for the number of states, and [`Solver::has_given_up`] is set.
+    /// Lets the solver give up when it has taken more than this: it stops then for the number of
+    /// states, and [`Solver::has_given_up`] is set.
     pub fn give_up_beyond(&mut self, allowance: Option<Allowance>) {
         self.allowance = allowance;
     }

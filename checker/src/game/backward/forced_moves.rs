@@ -8,8 +8,8 @@ use super::solver::Solver;
 use crate::game::{Forced, Player};
 
 impl Solver<'_, '_, '_> {
-    /// The valuations in which time stops, the environment has a move, and must take one; those that are bad for the controller are
-    /// left out.
+    /// The valuations in which time stops, the environment has a move, and must take one; those
+    /// that are bad for the controller are left out.
     pub(super) fn forced_environment(
         &self,
         node: u32,
@@ -43,8 +43,8 @@ impl Solver<'_, '_, '_> {
         all
     }
 
-    /// The valuations in which the controller must move: where it is obliged to, and where time stops, it has a move, and the
-    /// environment need not move.
+    /// The valuations in which the controller must move: where it is obliged to, and where time
+    /// stops, it has a move, and the environment need not move.
     pub(in crate::game) fn forced_controller(
         &self,
         node: u32,
@@ -93,7 +93,8 @@ impl Solver<'_, '_, '_> {
         enabled
     }
 
-    /// The valuations in which time cannot pass, with the process that stops it (`None`: an urgent channel).
+    /// The valuations in which time cannot pass, with the process that stops it (`None`: an urgent
+    /// channel).
     pub(super) fn stops(
         &mut self,
         node: u32,
@@ -109,8 +110,9 @@ impl Solver<'_, '_, '_> {
         Ok(stops)
     }
 
-    /// The controllable edges of a node, each with the processes that take part in its first move; none if they do not matter, since
-    /// the environment has no move there, or must move whatever the controller can do.
+    /// The controllable edges of a node, each with the processes that take part in its first move;
+    /// none if they do not matter, since the environment has no move there, or must move whatever
+    /// the controller can do.
     pub(super) fn controllable_movers(
         &mut self,
         node: u32,
@@ -138,9 +140,9 @@ impl Solver<'_, '_, '_> {
     }
 }
 
-/// The valuations of a state in which time cannot pass, with the process that stops it (`None`: an urgent channel without clock
-/// guards). `whole` is what counts of the zone of the state, and `delays` says whether time may pass as far as locations and such
-/// channels say.
+/// The valuations of a state in which time cannot pass, with the process that stops it (`None`: an
+/// urgent channel without clock guards). `whole` is what counts of the zone of the state, and
+/// `delays` says whether time may pass as far as locations and such channels say.
 pub(in crate::game) fn stops(
     symbolic: &mut Symbolic<'_>,
     words: &mut [i32],

@@ -1,12 +1,14 @@
-//! What all nodes of a graph win, computed in sweeps: the graph is explored first, and then the nodes are computed from what is
-//! sought back to the start.
+//! What all nodes of a graph win, computed in sweeps: the graph is explored first, and then the
+//! nodes are computed from what is sought back to the start.
 //!
-//! A node is on a higher *level* than those that it leads to and that do not lead back to it. The nodes that wait on the lowest level
-//! are computed first, so that each meets all that its successors win at once, and where no play comes to a node twice, each is computed
-//! once. A solver that goes forward and backward in turns may end before it has seen everything; where everything is wanted anyway, it
-//! computes most nodes several times.
+//! A node is on a higher *level* than those that it leads to and that do not lead back to it. The
+//! nodes that wait on the lowest level are computed first, so that each meets all that its
+//! successors win at once, and where no play comes to a node twice, each is computed once. A solver
+//! that goes forward and backward in turns may end before it has seen everything; where everything
+//! is wanted anyway, it computes most nodes several times.
 //!
-//! Source of the levels: R. Tarjan, "Depth-First Search and Linear Graph Algorithms", SIAM Journal on Computing, 1972.
+//! Source of the levels: R. Tarjan, "Depth-First Search and Linear Graph Algorithms", SIAM Journal
+//! on Computing, 1972.
 
 use std::collections::VecDeque;
 

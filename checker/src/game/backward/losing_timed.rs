@@ -1,17 +1,20 @@
 //! What the seeker may still win, where clocks decide.
 //!
-//! If all that is not explored counts as won by the seeker, then all that it can win at all is won: the *prospects*. They are computed
-//! from what is won, and where the initial valuation is not among them the evader has won, whatever waits. Else they show where the
-//! evader is threatened, also many moves before it is too late; so moves that it has held back ([`crate::game::exploration::lazy_safety`]) are chosen
-//! against the attacks of the whole game, those that aim at somebody who takes part first, and weak moves only where there are no others.
+//! If all that is not explored counts as won by the seeker, then all that it can win at all is won:
+//! the *prospects*. They are computed from what is won, and where the initial valuation is not
+//! among them the evader has won, whatever waits. Else they show where the evader is threatened,
+//! also many moves before it is too late; so moves that it has held back
+//! ([`crate::game::exploration::lazy_safety`]) are chosen against the attacks of the whole game,
+//! those that aim at somebody who takes part first, and weak moves only where there are no others.
 //!
-//! Prospects shrink as the graph grows, so each time they are computed anew. That costs as much as all that was computed before, and is
-//! done only if there are several times as many explored states as before, ever more times, and if some node is pressed; in between
-//! the evader uses weak moves as well. Where the controller seeks a goal they are computed a few times early on.
+//! Prospects shrink as the graph grows, so each time they are computed anew. That costs as much as
+//! all that was computed before, and is done only if there are several times as many explored
+//! states as before, ever more times, and if some node is pressed; in between the evader uses weak
+//! moves as well. Where the controller seeks a goal they are computed a few times early on.
 //!
-//! Source: the losing states of F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis
-//! of Timed Games", CONCUR 2005. There they are kept beside the winning ones as the graph grows; here they are what lies outside of the
-//! prospects.
+//! Source: the losing states of F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient
+//! On-the-Fly Algorithms for the Analysis of Timed Games", CONCUR 2005. There they are kept beside
+//! the winning ones as the graph grows; here they are what lies outside of the prospects.
 
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
@@ -21,15 +24,17 @@ use super::memory::{table_bytes, wins_bytes};
 use super::solver::{Solver, Win};
 use crate::game::Player;
 
-/// Prospects are computed again when there are so many times as many explored states as the first time,
+/// Prospects are computed again when there are so many times as many explored states as the first
+/// time,
 const FIRST_GROWTH: u64 = 3;
 /// and so many more. Each time they did not end the game, the next ones wait for twice the growth.
 const LEAST_GROWTH: u64 = 16;
 
-/// Where the controller seeks a goal, nothing is held back, and prospects only tell that it has lost. They are computed each time that
-/// there are so many times as many explored states,
+/// Where the controller seeks a goal, nothing is held back, and prospects only tell that it has
+/// lost. They are computed each time that there are so many times as many explored states,
 const GROWTH_OF_A_GOAL: u64 = 6;
-/// up to about so many: losing shows early, or rather late, and beside many states they took a third of the time that winning takes.
+/// up to about so many: losing shows early, or rather late, and beside many states they took a
+/// third of the time that winning takes.
 const MOST_STATES_OF_A_GOAL: u64 = 1 << 13;
 
 /// How the game goes on.
@@ -90,8 +95,8 @@ impl Solver<'_, '_, '_> {
         is_of_use && explored >= self.schedule.next
     }
 
-    /// Computes the prospects, when all else is computed. If there are none, they count as won afterwards, so that the strategy of the
-    /// evader keeps out of all that is not explored.
+    /// Computes the prospects, when all else is computed. If there are none, they count as won
+    /// afterwards, so that the strategy of the evader keeps out of all that is not explored.
     ///
     /// # Errors
     /// The model fails in computing what a node wins.
@@ -151,7 +156,8 @@ impl Solver<'_, '_, '_> {
         reason
     }
 
-    /// Lets the evader use a move in every node that is threatened: the strongest there is, none that is weak if there are others anywhere.
+    /// Lets the evader use a move in every node that is threatened: the strongest there is, none
+    /// that is weak if there are others anywhere.
     fn defend_against(
         &mut self,
         prospects: &Prospects,

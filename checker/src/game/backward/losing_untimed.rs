@@ -1,15 +1,18 @@
 //! Where the seeker may still win, as far as the graph is explored.
 //!
-//! A node has *hope* if the seeker has won some of it, or if it is not expanded, or if a move of the seeker leads to a node with
-//! hope. A move of the evader gives hope only if it may have to be made:
+//! A node has *hope* if the seeker has won some of it, or if it is not expanded, or if a move of
+//! the seeker leads to a node with hope. A move of the evader gives hope only if it may have to be
+//! made:
 //! * if time may stop in the node, since it need not move before,
 //! * if no other move leads the evader from everywhere in the node to one without hope, and
-//! * if the evader is the controller and the environment has to move wherever it can ([`Forced::Neutral`]), unless it can everywhere in
-//!   the node: then the controller may leave it to that.
+//! * if the evader is the controller and the environment has to move wherever it can
+//!   ([`Forced::Neutral`]), unless it can everywhere in the node: then the controller may leave it
+//!   to that.
 //!
-//! Nodes without hope are lost: the evader stays among them whatever the seeker does. So if the initial node has none, the game is
-//! over, however much of the graph waits; and what only nodes without hope lead to need not be explored. Clocks are not looked at,
-//! so a node with hope may be lost.
+//! Nodes without hope are lost: the evader stays among them whatever the seeker does. So if the
+//! initial node has none, the game is over, however much of the graph waits; and what only nodes
+//! without hope lead to need not be explored. Clocks are not looked at, so a node with hope may be
+//! lost.
 //!
 //! Nodes lose hope as the graph grows and never gain it again.
 
@@ -18,8 +21,9 @@ use crate::game::forward::graph::{Edge, NONE};
 use crate::game::{Forced, Player};
 
 impl Solver<'_, '_, '_> {
-    /// Finds the nodes with hope anew, and returns whether the initial one is among them. If it is not, all nodes with hope count as
-    /// won afterwards, so that the strategy of the evader keeps out of them.
+    /// Finds the nodes with hope anew, and returns whether the initial one is among them. If it is
+    /// not, all nodes with hope count as won afterwards, so that the strategy of the evader keeps
+    /// out of them.
     pub(super) fn has_hope(&mut self) -> bool {
         let count = self.graph.nodes.len() as u32;
         let mut has_hope = vec![false; count as usize];
@@ -69,7 +73,8 @@ impl Solver<'_, '_, '_> {
         self.has_hope.get(node as usize).is_none_or(|&it| it)
     }
 
-    /// Counts the nodes that were left unexpanded as won, once the evader has won: it has no need of them, and nobody knows more.
+    /// Counts the nodes that were left unexpanded as won, once the evader has won: it has no need
+    /// of them, and nobody knows more.
     pub(super) fn keep_out_of_unexpanded(&mut self) {
         for node in 0..self.win.len() {
             if !self.graph.nodes[node].is_expanded && !self.is_decided(node as u32) {
@@ -78,7 +83,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Whether the evader has a move from everywhere in a node to one without hope, or may leave it to the environment to move.
+    /// Whether the evader has a move from everywhere in a node to one without hope, or may leave it
+    /// to the environment to move.
     fn gets_away(&self, node: u32, has_hope: &[bool]) -> bool {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         edges.any(|edge| {

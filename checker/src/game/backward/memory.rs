@@ -1,10 +1,12 @@
 //! The bytes that a game takes, by which the limit of memory goes.
 //!
-//! Everything that grows with the game counts: the graph, what nodes win with what is left of them and what was gained when, the lists of
-//! nodes, what was computed before, and what is set aside meanwhile. Zones at hand in an operation are told by its patience.
+//! Everything that grows with the game counts: the graph, what nodes win with what is left of them
+//! and what was gained when, the lists of nodes, what was computed before, and what is set aside
+//! meanwhile. Zones at hand in an operation are told by its patience.
 //!
 //! Invariants:
-//! * Vectors that only grow count by what is in them: room at their end takes no memory before it is written to. Hash tables count whole.
+//! * Vectors that only grow count by what is in them: room at their end takes no memory before it
+//!   is written to. Hash tables count whole.
 //! * The valuations that are kept have no room to spare.
 
 use crate::search::limits::Counters;
@@ -63,7 +65,8 @@ pub(in crate::game) fn wins_bytes(wins: &[Win]) -> u64 {
     size_of_val(wins) as u64 + wins.iter().map(Win::heap_bytes).sum::<u64>()
 }
 
-/// The bytes of a hash table with room for so many entries: a power of two of places, of which an eighth stays free, and a byte for each.
+/// The bytes of a hash table with room for so many entries: a power of two of places, of which an
+/// eighth stays free, and a byte for each.
 pub(in crate::game) fn table_bytes<T>(capacity: usize) -> usize {
     if capacity == 0 {
         return 0;

@@ -1,7 +1,8 @@
 //! Computing what several nodes win, by several threads.
 //!
-//! All tasks start from the same winning valuations, and what comes out is recorded in the order of the tasks when all are done. So
-//! the result does not hang on how many threads there are, nor on how fast they are.
+//! All tasks start from the same winning valuations, and what comes out is recorded in the order of
+//! the tasks when all are done. So the result does not hang on how many threads there are, nor on
+//! how fast they are.
 
 use std::panic;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -73,13 +74,15 @@ struct Progress {
 }
 
 impl Solver<'_, '_, '_> {
-    /// Computes what the nodes of some tasks win, and records it, unless there is a reason to stop before.
+    /// Computes what the nodes of some tasks win, and records it, unless there is a reason to stop
+    /// before.
     pub(super) fn compute(
         &mut self,
         tasks: Vec<Task>,
         watch: &mut dyn Watch,
     ) -> Option<StopReason> {
-        // Whatever is seen before or afterwards, however many threads there are, no thread sees by chance.
+        // Whatever is seen before or afterwards, however many threads there are, no thread sees by
+        // chance.
         let reason = self.look(watch);
         if reason.is_some() || tasks.is_empty() {
             return reason;
@@ -230,7 +233,8 @@ impl Solver<'_, '_, '_> {
             else {
                 return done;
             };
-            // Each task has a patience of its own, so that what it asks does not hang on who does it.
+            // Each task has a patience of its own, so that what it asks does not hang on who does
+            // it.
             let mut patience = Patience::as_long_as(&mut ask);
             let (won, defence) = self.winnable_against_defence(*node, situation, &mut patience);
             let gained = self.gained(*node, won, &mut patience);

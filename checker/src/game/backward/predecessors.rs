@@ -1,4 +1,5 @@
-//! What a node wins by what is known of its successors: the formulas at the head of [`super::solver`].
+//! What a node wins by what is known of its successors: the formulas at the head of
+//! [`super::solver`].
 
 use crate::network::Failure;
 use crate::zones::{ClockSet, Federation, Patience, past};
@@ -23,7 +24,8 @@ impl Solver<'_, '_, '_> {
         self.situation_with(node, true)
     }
 
-    /// The situation in a node, as far as it matters for what is won there: time that stops does so only for who may be forced.
+    /// The situation in a node, as far as it matters for what is won there: time that stops does so
+    /// only for who may be forced.
     pub(super) fn situation_for_win(&mut self, node: u32) -> Result<Situation, Failure> {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         let may_be_forced = edges.any(|edge| !self.seeker.owns(edge.controllable));
@@ -58,8 +60,8 @@ impl Solver<'_, '_, '_> {
         self.winnable_without(node, situation, &[], patience).0
     }
 
-    /// The valuations of a node that are won if the evader does not use the edges that are held back, and those in which it does not matter
-    /// what it uses.
+    /// The valuations of a node that are won if the evader does not use the edges that are held
+    /// back, and those in which it does not matter what it uses.
     pub(in crate::game) fn winnable_without(
         &self,
         node: u32,
@@ -162,7 +164,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// The valuations of a node that get into `good` without meeting `bad`, by waiting if time may pass.
+    /// The valuations of a node that get into `good` without meeting `bad`, by waiting if time may
+    /// pass.
     pub(in crate::game) fn safe_past(
         &self,
         node: u32,

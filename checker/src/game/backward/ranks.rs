@@ -1,9 +1,10 @@
 //! Stamps by layers: how far valuations are from what is sought.
 //!
-//! The solver computes nodes in an order that suits it, and the stamps of gains follow that order. A strategy that is read from them is
-//! right, but may go a longer way than it has to, and another order gives another one. In layers, all nodes gain at once what the
-//! layers before give them. So a stamp is the least number of turns (to wait and then move, or be moved) after which play has got
-//! there, whatever the order of the search was.
+//! The solver computes nodes in an order that suits it, and the stamps of gains follow that order.
+//! A strategy that is read from them is right, but may go a longer way than it has to, and another
+//! order gives another one. In layers, all nodes gain at once what the layers before give them. So
+//! a stamp is the least number of turns (to wait and then move, or be moved) after which play has
+//! got there, whatever the order of the search was.
 //!
 //! Cost: as much as computing what the explored nodes win.
 
@@ -18,8 +19,9 @@ use super::solver::{Gain, Solver, Win};
 const BETWEEN_LOOKS: u32 = 64;
 
 impl Solver<'_, '_, '_> {
-    /// Gives the gains of a game that the seeker wins stamps by layers, up to the first in which the initial valuation is won. They stay
-    /// as they are if a limit comes first, and where what is sought is to come again and again.
+    /// Gives the gains of a game that the seeker wins stamps by layers, up to the first in which
+    /// the initial valuation is won. They stay as they are if a limit comes first, and where what
+    /// is sought is to come again and again.
     ///
     /// # Errors
     /// The model fails in computing what a node wins.

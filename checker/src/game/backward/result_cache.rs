@@ -1,15 +1,19 @@
-//! Winning valuations that were computed before, for nodes that differ in nothing that they hang on.
+//! Winning valuations that were computed before, for nodes that differ in nothing that they hang
+//! on.
 //!
-//! In models with much data, many nodes have the same zone, the same edges as far as clocks go, and the same successors won. What they
-//! win first is computed once. It hangs on nothing but what the key of such a case holds:
-//! * the zone of the node, whether time may pass, which clocks stand still, and where invariants stop time;
-//! * of each edge what it does to clocks, who owns it, the zone of its target, and whether all of the target is won or nothing,
-//!   and whether the evader holds it back;
-//! * if that may decide whether the environment is forced to move ([`super::forced_moves`]): which processes stop time, and which take part in
-//!   the moves of the controller.
+//! In models with much data, many nodes have the same zone, the same edges as far as clocks go, and
+//! the same successors won. What they win first is computed once. It hangs on nothing but what the
+//! key of such a case holds:
+//! * the zone of the node, whether time may pass, which clocks stand still, and where invariants
+//!   stop time;
+//! * of each edge what it does to clocks, who owns it, the zone of its target, and whether all of
+//!   the target is won or nothing, and whether the evader holds it back;
+//! * if that may decide whether the environment is forced to move ([`super::forced_moves`]): which
+//!   processes stop time, and which take part in the moves of the controller.
 //!
-//! Other nodes are no such cases: those in which the goal or what must be kept hang on clocks, or time is cut short, those of which
-//! something is won or that lead to nodes of which a part is; and those in which it matters which processes move, if there are more than
+//! Other nodes are no such cases: those in which the goal or what must be kept hang on clocks, or
+//! time is cut short, those of which something is won or that lead to nodes of which a part is; and
+//! those in which it matters which processes move, if there are more than
 //! [`Edge::movers`](crate::game::forward::graph::Edge::movers) tells apart.
 
 use rustc_hash::FxHashMap;
@@ -104,7 +108,8 @@ impl Solver<'_, '_, '_> {
         !has_part && (processes.len() <= u32::BITS as usize || !self.hangs_on_movers(node))
     }
 
-    /// Whether it may matter which processes move in a node: the environment may be forced to move because of them.
+    /// Whether it may matter which processes move in a node: the environment may be forced to move
+    /// because of them.
     fn hangs_on_movers(&self, node: u32) -> bool {
         let mut has_owner = [false; 2];
         for edge in &self.graph.edges[self.graph.edges_of(node)] {

@@ -1,43 +1,51 @@
-//! Attractor games: can one player, the *seeker*, force play into a set, whatever the other one, the *evader*, does?
+//! Attractor games: can one player, the *seeker*, force play into a set, whatever the other one,
+//! the *evader*, does?
 //!
-//! For reachability the controller seeks the goal. For safety the environment seeks a valuation in which what must be kept is
-//! broken; the controller wins where it does not get there. In both, play ends in the goal, if there is one.
+//! For reachability the controller seeks the goal. For safety the environment seeks a valuation in
+//! which what must be kept is broken; the controller wins where it does not get there. In both,
+//! play ends in the goal, if there is one.
 //!
-//! The algorithm is on the fly and goes forward and backward in turns. Forward, nodes are expanded; backward, the valuations of a
-//! node from which the seeker wins are computed anew when those of a successor have grown. For the controller as the seeker:
+//! The algorithm is on the fly and goes forward and backward in turns. Forward, nodes are expanded;
+//! backward, the valuations of a node from which the seeker wins are computed anew when those of a
+//! successor have grown. For the controller as the seeker:
 //!
 //! ```text
-//! good   = goal ∪ ⋃ Pre_c(win)                     what the controller can reach by a move, whichever leg of it is picked
+//! good   = goal ∪ ⋃ Pre_c(win)                     what a controllable move reaches
 //! bad    = ⋃ Pre_u(not win) ∪ broken, less goal    what the environment can spoil
 //! forced = stop ∩ ⋃ enabled_u, less bad and less where the controller could move (see Forced)
 //! win    = Pred_t(good ∪ forced, bad)              wait into good without meeting bad
 //! ```
 //!
-//! For the environment, which is faster, and whose opponent must move where time stops and the environment need not:
+//! For the environment, which is faster, and whose opponent must move where time stops and the
+//! environment need not:
 //!
 //! ```text
-//! now    = broken ∪ ⋃ Pre_u(win), less goal        what the environment has at once, whatever the controller does
-//! escape = ⋃ Pre_c(not win), less now              where the controller gets away, whichever leg is picked
+//! now    = broken ∪ ⋃ Pre_u(win), less goal        what the environment has at once, in any case
+//! escape = ⋃ Pre_c(not win), less now              where the controller gets away, on any leg
 //! held   = stop ∩ ⋃ enabled_c, less escape and less where the environment must move (see Forced)
 //! win    = Pred_t(now ∪ held, escape ∪ goal)
 //! ```
 //!
-//! A move of the evader into a node that is not explored counts as an escape, so every intermediate result is sound, and the
-//! search ends as soon as the initial valuation is won. Each gain is recorded with a stamp: a strategy that moves from
-//! valuations of one stamp into those of smaller ones makes progress. Where the seeker wins nowhere any more, the evader has only
-//! to stay outside of what is won.
+//! A move of the evader into a node that is not explored counts as an escape, so every intermediate
+//! result is sound, and the search ends as soon as the initial valuation is won. Each gain is
+//! recorded with a stamp: a strategy that moves from valuations of one stamp into those of smaller
+//! ones makes progress. Where the seeker wins nowhere any more, the evader has only to stay outside
+//! of what is won.
 //!
-//! Forward, the solver dives ([`crate::game::exploration::waiting`]), and explores only as many moves of the evader as it needs ([`crate::game::exploration::lazy_zero_time`],
-//! [`crate::game::exploration::lazy_safety`]). From time to time it is looked whether the seeker may still win at all ([`super::losing_untimed`], and with zones
-//! [`super::losing_timed`]), so that both answers can come early.
+//! Forward, the solver dives ([`crate::game::exploration::waiting`]), and explores only as many
+//! moves of the evader as it needs ([`crate::game::exploration::lazy_zero_time`],
+//! [`crate::game::exploration::lazy_safety`]). From time to time it is looked whether the seeker
+//! may still win at all ([`super::losing_untimed`], and with zones [`super::losing_timed`]), so
+//! that both answers can come early.
 //!
-//! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not decide who wins, all are. What
-//! takes zones is put off until the graph has grown by a part of itself, and goes round in turns: so a node meets what several of
-//! its successors have gained at once.
+//! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not
+//! decide who wins, all are. What takes zones is put off until the graph has grown by a part of
+//! itself, and goes round in turns: so a node meets what several of its successors have gained at
+//! once.
 //!
-//! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms for the Analysis of Timed
-//! Games", CONCUR 2005; the forced moves are those of G. Behrmann et al., "UPPAAL-TIGA: Time for Playing Games!", CAV 2007,
-//! and the tool's manual, section 3.1.
+//! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms
+//! for the Analysis of Timed Games", CONCUR 2005; the forced moves are those of G. Behrmann et al.,
+//! "UPPAAL-TIGA: Time for Playing Games!", CAV 2007, and the tool's manual, section 3.1.
 
 use std::collections::VecDeque;
 
@@ -63,15 +71,16 @@ pub(super) const LOOK_EVERY: u64 = 64;
 /// Bytes of zones that are made between two looks at the limits, at most, one expansion aside.
 const ZONE_BYTES_BETWEEN_LOOKS: u64 = 4 << 20;
 
-/// Nodes whose winning valuations hang on clocks are computed when the explored states have grown by this part of them. Each time
-/// costs more than looking at words, and the more is known by then, the fewer are computed twice.
+/// Nodes whose winning valuations hang on clocks are computed when the explored states have grown
+/// by this part of them. Each time costs more than looking at words, and the more is known by then,
+/// the fewer are computed twice.
 const BETWEEN_COMPUTATIONS: u64 = 4;
 
 /// It is looked what is still in play when the explored states have grown by this part of them.
 const BETWEEN_PLAYS: u64 = 3;
 
-/// Nodes that are computed from the same winning valuations, at most. Some of them may gain more from each other, and are computed
-/// again; among so many that is rare.
+/// Nodes that are computed from the same winning valuations, at most. Some of them may gain more
+/// from each other, and are computed again; among so many that is rare.
 pub(super) const MOST_TASKS: usize = 64;
 
 /// Updates by words between two looks at the limits, where no node is expanded.
@@ -105,7 +114,8 @@ pub struct Gain {
 pub enum Extent {
     /// Until the verdict is known.
     Verdict,
-    /// Until the verdict is known, and if the seeker loses, until nothing is left out that the evader may do.
+    /// Until the verdict is known, and if the seeker loses, until nothing is left out that the
+    /// evader may do.
     Permissive,
     /// The winning valuations of all nodes that can be reached.
     Everything,
@@ -137,7 +147,8 @@ pub struct Solver<'g, 's, 'a> {
     pub graph: &'g mut Graph<'s, 'a>,
     /// Who seeks.
     pub seeker: Player,
-    /// What is sought, by node, if it is not where the goal holds. Play does not end there, and all nodes are expanded.
+    /// What is sought, by node, if it is not where the goal holds. Play does not end there, and all
+    /// nodes are expanded.
     pub(in crate::game) targets: Option<Vec<Win>>,
     pub(in crate::game) after_goal: AfterGoal,
     /// Whether it matters what can be reached at all, through whatever has been won or lost.
@@ -154,18 +165,21 @@ pub struct Solver<'g, 's, 'a> {
     pub gains: Vec<Vec<Gain>>,
     pub(super) forced: Forced,
     pub(super) stamp: u32,
-    /// After how many explored states it is looked whether there are many nodes for each discrete state.
+    /// After how many explored states it is looked whether there are many nodes for each discrete
+    /// state.
     crowded_from: u64,
     /// So many are many.
     crowd: usize,
-    /// Whether the solver has given up: for having many nodes for each discrete state, or for what it has taken.
+    /// Whether the solver has given up: for having many nodes for each discrete state, or for what
+    /// it has taken.
     pub has_given_up: bool,
     pub(super) allowance: Option<Allowance>,
     /// How many operations on many zones were done in computing what nodes win.
     pub(super) operations: u64,
     /// The nodes to be expanded.
     pub(in crate::game) frontier: Frontier,
-    /// By node, as far as it was looked at: whether the seeker may still win; see [`super::losing_untimed`].
+    /// By node, as far as it was looked at: whether the seeker may still win; see
+    /// [`super::losing_untimed`].
     pub(super) has_hope: Vec<bool>,
     /// Nodes to be looked at again, first those that were put in first.
     pub(super) updates: VecDeque<u32>,
@@ -234,8 +248,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         solver
     }
 
-    /// Lets the solver give up, when it has explored so many states, if it has so many nodes for each discrete state. It stops then for
-    /// their number, and [`Solver::has_given_up`] is set.
+    /// Lets the solver give up, when it has explored so many states, if it has so many nodes for
+    /// each discrete state. It stops then for their number, and [`Solver::has_given_up`] is set.
     pub fn give_up_if_crowded(&mut self, explored: u64, crowd: usize) {
         self.crowded_from = explored;
         self.crowd = crowd;
@@ -374,7 +388,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    /// Takes some deferred nodes whose winning valuations are to be computed; those of nodes that are known cases are recorded.
+    /// Takes some deferred nodes whose winning valuations are to be computed; those of nodes that
+    /// are known cases are recorded.
     fn next_tasks(&mut self) -> Result<Vec<Task>, Failure> {
         let mut tasks = Vec::new();
         while tasks.len() < MOST_TASKS
@@ -389,7 +404,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         Ok(tasks)
     }
 
-    /// The task to compute what a node wins; if it is a known case, that is recorded, and there is none.
+    /// The task to compute what a node wins; if it is a known case, that is recorded, and there is
+    /// none.
     pub(super) fn task_of(&mut self, node: u32) -> Result<Option<Task>, Failure> {
         let key = match self.case_of(node)? {
             Case::Known(gained, defence) => {
@@ -474,8 +490,9 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    /// Computes anew, in an explored graph, from where the environment can break what must be kept, whether the goal was met or not. A chain
-    /// in which the controller waits counts as a way to get away, since it chooses how long.
+    /// Computes anew, in an explored graph, from where the environment can break what must be kept,
+    /// whether the goal was met or not. A chain in which the controller waits counts as a way to
+    /// get away, since it chooses how long.
     pub(in crate::game) fn seek_to_break(
         &mut self,
         watch: &mut dyn Watch,
@@ -489,7 +506,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         Ok(reason)
     }
 
-    /// Lets nodes be expanded in which the goal holds; in a cooperative game also those that are broken.
+    /// Lets nodes be expanded in which the goal holds; in a cooperative game also those that are
+    /// broken.
     pub(in crate::game) fn go_on(&mut self, is_cooperative: bool) {
         self.after_goal = AfterGoal::GoesOn;
         self.is_cooperative = is_cooperative;
@@ -551,8 +569,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    /// Decides without zones whether the node is won as a whole (`true`) or nothing new is won (`false`); `None` if zones
-    /// are needed.
+    /// Decides without zones whether the node is won as a whole (`true`) or nothing new is won
+    /// (`false`); `None` if zones are needed.
     pub(super) fn quick(&self, node: u32) -> Option<bool> {
         let mut can_move = false;
         let mut is_spoiled = false;
@@ -598,14 +616,16 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         if self.seeker == Player::Environment && self.is_obliged(node) {
             return None;
         }
-        // Without a winning move and without an evader that could be forced, there is nothing to gain.
+        // Without a winning move and without an evader that could be forced, there is nothing to
+        // gain.
         if self.graph.edges_of(node).all(wins_nothing) && (!has_evader || is_spoiled) {
             return Some(false);
         }
         None
     }
 
-    /// Does something with zones unless, or until, the watch gives a reason to stop; then the result is of no use.
+    /// Does something with zones unless, or until, the watch gives a reason to stop; then the
+    /// result is of no use.
     pub(in crate::game) fn patiently<R>(
         &mut self,
         watch: &mut dyn Watch,

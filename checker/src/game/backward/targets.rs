@@ -70,7 +70,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Where the goal holds, or what is sought lies, in a node that is neither a goal nor broken as a whole.
+    /// Where the goal holds, or what is sought lies, in a node that is neither a goal nor broken as
+    /// a whole.
     pub(in crate::game) fn goal(&self, node: u32) -> Federation {
         let dimension = self.graph.dimension();
         if let Some(targets) = &self.targets {

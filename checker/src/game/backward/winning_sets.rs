@@ -79,7 +79,8 @@ impl Solver<'_, '_, '_> {
         self.record(node, Win::Everything, rest);
     }
 
-    /// Replaces what is left of a node, of which a part is won if there is a rest; gives what it was.
+    /// Replaces what is left of a node, of which a part is won if there is a rest; gives what it
+    /// was.
     pub(super) fn replace_rest(
         &mut self,
         node: u32,
@@ -143,7 +144,8 @@ impl Solver<'_, '_, '_> {
         self.gained_bytes -= if is_first { 0 } else { bytes(room) as u64 };
     }
 
-    /// The valuations of an edge's source from which it leads into the given valuations of its target.
+    /// The valuations of an edge's source from which it leads into the given valuations of its
+    /// target.
     pub fn before(&self, edge: &Edge, target: &Win) -> Federation {
         let dimension = self.graph.dimension();
         let mut part = match target {
@@ -180,9 +182,10 @@ impl Solver<'_, '_, '_> {
         self.missing(edge, (&self.win[edge.target as usize], is_missed), patience)
     }
 
-    /// The valuations from which an edge is possible and does not lead into the given valuations of its target, whose others are
-    /// computed unless they are given too. In a chain somebody may still wait or get stuck, so there it is what is not led into
-    /// them; other edges may be pieces of a move, and lead into the rest of their own target.
+    /// The valuations from which an edge is possible and does not lead into the given valuations of
+    /// its target, whose others are computed unless they are given too. In a chain somebody may
+    /// still wait or get stuck, so there it is what is not led into them; other edges may be pieces
+    /// of a move, and lead into the rest of their own target.
     pub(in crate::game) fn missing(
         &self,
         edge: &Edge,

@@ -1,18 +1,24 @@
-//! Which moves the evader defends itself with where time passes: as few as it needs, as far as known.
+//! Which moves the evader defends itself with where time passes: as few as it needs, as far as
+//! known.
 //!
-//! Where time passes, the evader may wait, and as long as the seeker has no way to win it needs no move, but for one wherever it must move because
-//! time stops. So in a safety game for a verdict its other moves are *held back*, and what they lead to is not explored, until the seeker *threatens* to win something more: if
-//! the evader did not use the held moves, it would win valuations that it has not won. Then those of them that help are taken, one
-//! after the other: first such in which a process takes part that also takes part in the attack. Moves that share no process with the
-//! attack are *weak*. They rather put things off, and there may be many of them, so a node against which nothing else helps is left
-//! *pressed*, until a look at the whole game says what to do ([`crate::game::backward::losing_timed`]).
+//! Where time passes, the evader may wait, and as long as the seeker has no way to win it needs no
+//! move, but for one wherever it must move because time stops. So in a safety game for a verdict
+//! its other moves are *held back*, and what they lead to is not explored, until the seeker
+//! *threatens* to win something more: if the evader did not use the held moves, it would win
+//! valuations that it has not won. Then those of them that help are taken, one after the other:
+//! first such in which a process takes part that also takes part in the attack. Moves that share no
+//! process with the attack are *weak*. They rather put things off, and there may be many of them,
+//! so a node against which nothing else helps is left *pressed*, until a look at the whole game
+//! says what to do ([`crate::game::backward::losing_timed`]).
 //!
-//! A held move counts as an escape for what the seeker wins, and what is won is recorded only where it does not help. So all that is
-//! known stays sound, and when nothing is left to be explored or computed and no node is pressed, then the seeker wins nothing
-//! that is not known: as in [`super::lazy_zero_time`], what it wins of the nodes in play follows from what it wins of each other.
+//! A held move counts as an escape for what the seeker wins, and what is won is recorded only where
+//! it does not help. So all that is known stays sound, and when nothing is left to be explored or
+//! computed and no node is pressed, then the seeker wins nothing that is not known: as in
+//! [`super::lazy_zero_time`], what it wins of the nodes in play follows from what it wins of each
+//! other.
 //!
-//! Where the controller seeks a goal, nothing is held back: there the moves of the environment are rather the way to it, and whether
-//! dives that leave them out find it sooner is a matter of luck.
+//! Where the controller seeks a goal, nothing is held back: there the moves of the environment are
+//! rather the way to it, and whether dives that leave them out find it sooner is a matter of luck.
 
 use crate::network::Failure;
 use crate::zones::federation::block_bytes;
@@ -42,7 +48,8 @@ pub(in crate::game) enum Hold {
 pub(in crate::game) struct Defences {
     /// By edge; edges behind the last one are not held.
     holds: Vec<Hold>,
-    /// By node: the processes that take part in the moves by which the seeker wins something of it, as in [`Edge::movers`].
+    /// By node: the processes that take part in the moves by which the seeker wins something of it,
+    /// as in [`Edge::movers`].
     pub(in crate::game) attackers: Vec<u32>,
     /// The processes that take part in most moves, so that they tell nothing.
     hubs: u32,
@@ -114,7 +121,8 @@ impl Defence {
 }
 
 impl Solver<'_, '_, '_> {
-    /// Holds the evader's moves from a node back that was just expanded, if it may wait there; returns whether it does.
+    /// Holds the evader's moves from a node back that was just expanded, if it may wait there;
+    /// returns whether it does.
     ///
     /// # Errors
     /// The model fails in saying where time stops.
@@ -190,7 +198,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Takes no weak moves any more, and holds the moves back again that lead to what is not explored.
+    /// Takes no weak moves any more, and holds the moves back again that lead to what is not
+    /// explored.
     pub(in crate::game) fn hold_back_again(&mut self) {
         self.defences.uses_weak = false;
         for index in 0..self.defences.holds.len() {
@@ -220,7 +229,8 @@ impl Solver<'_, '_, '_> {
         })
     }
 
-    /// The processes by which moves are told that help against an attack: not those that take part in most moves, if there are others.
+    /// The processes by which moves are told that help against an attack: not those that take part
+    /// in most moves, if there are others.
     pub(in crate::game) fn aims(&self, node: u32, win: &[Win], attackers: &[u32]) -> u32 {
         let attack = self.attack(node, win, attackers);
         match attack & !self.defences.hubs {
@@ -246,7 +256,8 @@ impl Solver<'_, '_, '_> {
         self.defences.hubs = hubs.fold(0, |all, bit| all | 1 << bit);
     }
 
-    /// What a node wins by what is known of its successors, and which moves that the evader holds back it is to use against more.
+    /// What a node wins by what is known of its successors, and which moves that the evader holds
+    /// back it is to use against more.
     pub(in crate::game) fn winnable_against_defence(
         &self,
         node: u32,
@@ -303,8 +314,8 @@ impl Solver<'_, '_, '_> {
         (!part.is_empty()).then_some(part)
     }
 
-    /// Of some moves that are held back the first one, of those that help somewhere in these valuations, in which most of the processes
-    /// take part; with how many that are.
+    /// Of some moves that are held back the first one, of those that help somewhere in these
+    /// valuations, in which most of the processes take part; with how many that are.
     pub(in crate::game) fn strongest(
         &self,
         held: &[usize],

@@ -1,19 +1,23 @@
 //! Which moves of the evader are explored: as many as it needs, as far as known.
 //!
-//! When only a verdict is wanted, a single way to evade is enough. So where time does not pass, and the evader has moves that lead
-//! on from everywhere, one of these after the other is explored, in the order of moves: the next one when the seeker has won
-//! something of all before. The others are in *reserve*. Where time passes, moves are held back instead: see [`super::lazy_safety`].
+//! When only a verdict is wanted, a single way to evade is enough. So where time does not pass, and
+//! the evader has moves that lead on from everywhere, one of these after the other is explored, in
+//! the order of moves: the next one when the seeker has won something of all before. The others are
+//! in *reserve*. Where time passes, moves are held back instead: see [`super::lazy_safety`].
 //!
-//! The nodes *in play* are those that play gets to by moves of the seeker, and by those of the evader that are neither in reserve
-//! nor held back; it does not go on where the seeker has won everything, or has no hope ([`crate::game::backward::losing_untimed`]). Only they need to be explored. If all of
-//! them are, and no wins are to be computed any more, but the initial valuation is not won, then the evader wins. For in the game in
-//! which it never moves to what is in reserve, what the seeker wins of the nodes in play follows from what it wins of each other,
-//! and it wins nothing that is not known; and more moves do the evader no harm.
+//! The nodes *in play* are those that play gets to by moves of the seeker, and by those of the
+//! evader that are neither in reserve nor held back; it does not go on where the seeker has won
+//! everything, or has no hope ([`crate::game::backward::losing_untimed`]). Only they need to be
+//! explored. If all of them are, and no wins are to be computed any more, but the initial valuation
+//! is not won, then the evader wins. For in the game in which it never moves to what is in reserve,
+//! what the seeker wins of the nodes in play follows from what it wins of each other, and it wins
+//! nothing that is not known; and more moves do the evader no harm.
 
 use crate::game::backward::solver::{Solver, Win};
 use crate::game::forward::graph::Edge;
 
-/// So many nodes may be looked at for each explored state to find those in play; if that is not enough, reserves do not pay.
+/// So many nodes may be looked at for each explored state to find those in play; if that is not
+/// enough, reserves do not pay.
 const MOST_LOOKS: u64 = 32;
 
 /// States that are counted beside those that are explored, for that.
@@ -61,7 +65,8 @@ impl Solver<'_, '_, '_> {
         is_kept
     }
 
-    /// Lets the node be explored that the evader is to move to from a node with a reserve; all, if it wins nowhere for sure.
+    /// Lets the node be explored that the evader is to move to from a node with a reserve; all, if
+    /// it wins nowhere for sure.
     pub(in crate::game) fn choose(&mut self, node: u32) {
         if !self.frontier.reserve.sources[node as usize] {
             return;
@@ -76,7 +81,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// The node that the evader is to move to from a node in which time does not pass: the first one of which nothing is won.
+    /// The node that the evader is to move to from a node in which time does not pass: the first
+    /// one of which nothing is won.
     fn chosen(&self, node: u32) -> Option<u32> {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         let open = edges.find(|edge| {
@@ -97,7 +103,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Lets the unexplored nodes wait that are in play, and no others; returns by node whether it is in play.
+    /// Lets the unexplored nodes wait that are in play, and no others; returns by node whether it
+    /// is in play.
     pub(in crate::game) fn wait_for_nodes_in_play(&mut self) -> Vec<bool> {
         let reserve = &mut self.frontier.reserve;
         if reserve.looks > MOST_LOOKS * (self.graph.explored + STATES_OF_GRACE) {
@@ -135,7 +142,8 @@ impl Solver<'_, '_, '_> {
         is_in_play
     }
 
-    /// Counts the nodes out of play as won, once the evader has won: nobody knows who wins there, and it has no need of them.
+    /// Counts the nodes out of play as won, once the evader has won: nobody knows who wins there,
+    /// and it has no need of them.
     pub(in crate::game) fn keep_in_play(&mut self, is_in_play: &[bool]) {
         for (node, is_in_play) in is_in_play.iter().enumerate() {
             if !is_in_play && self.may_have_hope(node as u32) && !self.is_decided(node as u32) {

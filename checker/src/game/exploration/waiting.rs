@@ -1,13 +1,15 @@
 //! The order in which nodes are expanded: dives.
 //!
-//! A dive follows a random move of each newly made node as far as this goes, in every other dive one of the seeker where there is
-//! one: those of the evader rather lead away from what is sought, but sometimes they are the way. Dives from everywhere meet wins
-//! that lie close together sooner than dives in the order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial Search
-//! Through Randomization", AAAI 1998). The random numbers are the same in every run.
+//! A dive follows a random move of each newly made node as far as this goes, in every other dive
+//! one of the seeker where there is one: those of the evader rather lead away from what is sought,
+//! but sometimes they are the way. Dives from everywhere meet wins that lie close together sooner
+//! than dives in the order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial
+//! Search Through Randomization", AAAI 1998). The random numbers are the same in every run.
 //!
-//! After a dive come first the nodes that the evader may move to from where the seeker has won something, since the win hangs on
-//! them; then the next dive starts from one of the nodes that wait, at random. Now and then it starts from the one that was made
-//! first instead, so that a win near the start is found however far dives go.
+//! After a dive come first the nodes that the evader may move to from where the seeker has won
+//! something, since the win hangs on them; then the next dive starts from one of the nodes that
+//! wait, at random. Now and then it starts from the one that was made first instead, so that a win
+//! near the start is found however far dives go.
 
 use crate::network::Failure;
 
@@ -25,7 +27,8 @@ pub(in crate::game) struct Frontier {
     waiting: Vec<u32>,
     /// By node.
     is_waiting: Vec<bool>,
-    /// Nodes that moves of the evader lead to, and of which it hangs whether more of a node is won; those met last stand last.
+    /// Nodes that moves of the evader lead to, and of which it hangs whether more of a node is won;
+    /// those met last stand last.
     spoilers: Vec<u32>,
     /// All nodes before this one were expanded, or do not wait.
     oldest: u32,
@@ -82,7 +85,8 @@ impl Frontier {
     }
 }
 
-/// Random numbers: G. L. Steele, D. Lea, C. H. Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014.
+/// Random numbers: G. L. Steele, D. Lea, C. H. Flood, "Fast Splittable Pseudorandom Number
+/// Generators", OOPSLA 2014.
 #[derive(Clone, Copy, Debug, Default)]
 struct Random(u64);
 
@@ -196,7 +200,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Lets the nodes be expanded soon to which the evader may move from a node of which more may be won.
+    /// Lets the nodes be expanded soon to which the evader may move from a node of which more may
+    /// be won.
     pub(in crate::game) fn note_spoilers(&mut self, node: u32) {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         if edges.all(|edge| matches!(self.win[edge.target as usize], Win::Nothing)) {
@@ -214,7 +219,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Whether the winning valuations of some predecessor with hope may still grow by those of the node.
+    /// Whether the winning valuations of some predecessor with hope may still grow by those of the
+    /// node.
     pub(in crate::game) fn is_relevant(&self, node: u32) -> bool {
         if node == 0 {
             return true;

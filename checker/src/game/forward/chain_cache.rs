@@ -1,14 +1,15 @@
 //! Chains of moves that were followed before, remembered.
 //!
-//! What a move does to clocks mostly hangs on the locations, the zone and the answers of guards, not on variables. A *trail* is
-//! what is known at a point of a chain: the zone there and what the moves so far do to clocks. Trails make trees; their roots
-//! are moves of nodes, by offer and zone. Following a chain along its trail evaluates guards and runs updates, and handles no
-//! zone at all.
+//! What a move does to clocks mostly hangs on the locations, the zone and the answers of guards,
+//! not on variables. A *trail* is what is known at a point of a chain: the zone there and what the
+//! moves so far do to clocks. Trails make trees; their roots are moves of nodes, by offer and zone.
+//! Following a chain along its trail evaluates guards and runs updates, and handles no zone at all.
 //!
 //! Invariants:
-//! * A trail says what [`super::graph::Graph`] would find by following the chain move by move; where that hangs on
-//!   variables, the trail ends and the graph goes on from its end in that way.
-//! * Trails never decide which states there are, only how fast they are found. Their memory is bounded.
+//! * A trail says what [`super::graph::Graph`] would find by following the chain move by move;
+//!   where that hangs on variables, the trail ends and the graph goes on from its end in that way.
+//! * Trails never decide which states there are, only how fast they are found. Their memory is
+//!   bounded.
 
 use rustc_hash::FxHashMap;
 
@@ -70,7 +71,8 @@ pub(super) struct Ending {
     pub(super) id: ZoneId,
     /// What the edge does to clocks.
     pub(super) program: ProgramId,
-    /// The zone of the node that was entered last, and whether the edge leads from every valuation into it.
+    /// The zone of the node that was entered last, and whether the edge leads from every valuation
+    /// into it.
     pub(super) totality: Option<(ZoneId, bool)>,
 }
 
@@ -81,7 +83,8 @@ pub(super) struct Trails {
     is_useful: bool,
     /// Whether locations alone decide where the objective holds.
     is_objective_fixed: bool,
-    /// By offer and zone of a node: where its moves are in `first`; `None` if the two were met once.
+    /// By offer and zone of a node: where its moves are in `first`; `None` if the two were met
+    /// once.
     roots: FxHashMap<(OfferId, ZoneId), Option<u32>>,
     /// What the first moves lead to.
     first: Vec<Onward>,
@@ -116,7 +119,8 @@ impl Trails {
         self.is_useful
     }
 
-    /// The root of the moves of an offer at a zone; `None` if they were not met before, as most are never met again.
+    /// The root of the moves of an offer at a zone; `None` if they were not met before, as most are
+    /// never met again.
     pub(super) fn root(&mut self, offer: OfferId, zone: ZoneId, moves: &Moves) -> Option<Root> {
         if self.bytes > MOST_BYTES {
             return self.roots.get(&(offer, zone)).copied().flatten().map(Root);
@@ -151,8 +155,8 @@ impl Trails {
 }
 
 impl Graph<'_, '_> {
-    /// Follows a move of a node along its trail, if there is one, and adds the edge. Returns false, with the words as they were, if
-    /// the chain must be followed move by move from its start.
+    /// Follows a move of a node along its trail, if there is one, and adds the edge. Returns false,
+    /// with the words as they were, if the chain must be followed move by move from its start.
     pub(super) fn follow_trail(
         &mut self,
         root: Root,
@@ -351,7 +355,8 @@ impl Graph<'_, '_> {
         self.add_edge(words, ending, origin, trail.length)
     }
 
-    /// Whether play goes on: neither the goal holds anywhere in the state, nor is anything broken, nor is it a dead end.
+    /// Whether play goes on: neither the goal holds anywhere in the state, nor is anything broken,
+    /// nor is it a dead end.
     pub(super) fn is_open(&mut self, words: &mut [i32], zone: &Zone) -> Result<bool, Failure> {
         if self.dead_ends.contain(words) {
             return Ok(false);

@@ -1,8 +1,10 @@
-//! Branch points behind edges of the controller: it chooses the edge, the environment picks the leg.
+//! Branch points behind edges of the controller: it chooses the edge, the environment picks the
+//! leg.
 //!
-//! The *entry* of a move are its edges with their `select` values, without the legs. The controller gets into some valuations by an entry
-//! where one of its legs is possible and all that are lead there. A strategy of the controller names entries; one of the environment
-//! says which leg it picks.
+//! The *entry* of a move are its edges with their `select` values, without the legs. The controller
+//! gets into some valuations by an entry where one of its legs is possible and all that are lead
+//! there. A strategy of the controller names entries; one of the environment says which leg it
+//! picks.
 //!
 //! Moves with the same entry follow each other in the order of moves.
 
@@ -49,7 +51,8 @@ impl Chances {
         self.bytes + table_bytes::<(u32, Vec<Vec<u32>>)>(self.entries.capacity())
     }
 
-    /// Marks the legs among the edges of a node that was just expanded, which are those from `first` on.
+    /// Marks the legs among the edges of a node that was just expanded, which are those from
+    /// `first` on.
     pub(super) fn find(&mut self, node: u32, (edges, first): (&mut [Edge], usize), moves: &Moves) {
         if !self.is_possible {
             return;
@@ -93,8 +96,8 @@ impl Chances {
 }
 
 impl Solver<'_, '_, '_> {
-    /// The valuations from which all legs of an entry that are possible lead into the given valuations of their targets, and some leg is
-    /// possible.
+    /// The valuations from which all legs of an entry that are possible lead into the given
+    /// valuations of their targets, and some leg is possible.
     pub(in crate::game) fn before_all<'w>(
         &self,
         legs: impl IntoIterator<Item = (u32, &'w Win)>,
@@ -111,8 +114,8 @@ impl Solver<'_, '_, '_> {
         into
     }
 
-    /// The valuations from which all legs of an entry that are possible lead into valuations that the seeker is not known to win, and some
-    /// leg is possible. The controller is the evader.
+    /// The valuations from which all legs of an entry that are possible lead into valuations that
+    /// the seeker is not known to win, and some leg is possible. The controller is the evader.
     pub(in crate::game) fn spoiling_all(
         &self,
         legs: &[u32],
@@ -132,8 +135,8 @@ impl Solver<'_, '_, '_> {
         away
     }
 
-    /// The valuations from which the environment, which seeks something, gets into some of the target of a leg by picking it: nowhere if the
-    /// controller may wait on the way.
+    /// The valuations from which the environment, which seeks something, gets into some of the
+    /// target of a leg by picking it: nowhere if the controller may wait on the way.
     pub(in crate::game) fn won_by_leg(&self, leg: u32, hit: &Win) -> Federation {
         let edge = &self.graph.edges[leg as usize];
         if self.graph.programs.waits(edge.program) {
@@ -154,7 +157,8 @@ impl Solver<'_, '_, '_> {
         })
     }
 
-    /// Whether the controller, which seeks something, gets into won nodes by an entry from everywhere in a node, as far as words decide.
+    /// Whether the controller, which seeks something, gets into won nodes by an entry from
+    /// everywhere in a node, as far as words decide.
     pub(in crate::game) fn wins_by_an_entry(&self, node: u32) -> bool {
         let is_won = |leg: &u32| {
             let edge = &self.graph.edges[*leg as usize];
@@ -167,8 +171,9 @@ impl Solver<'_, '_, '_> {
             && entries.any(|legs| legs.iter().all(is_won) && legs.iter().any(is_total))
     }
 
-    /// Adds the legs that the environment picks in some valuations of a node, each where the ones before it are not picked; `picked` says where a
-    /// leg is good for it. Adds their edges to those that play may take.
+    /// Adds the legs that the environment picks in some valuations of a node, each where the ones
+    /// before it are not picked; `picked` says where a leg is good for it. Adds their edges to
+    /// those that play may take.
     pub(in crate::game) fn pick_legs(
         &mut self,
         node: u32,

@@ -1,5 +1,5 @@
-//! What an edge of the game graph does to clocks: the effects of the moves that it stands for, one after the other. The first
-//! move is always there; later ones that change nothing are left out.
+//! What an edge of the game graph does to clocks: the effects of the moves that it stands for, one
+//! after the other. The first move is always there; later ones that change nothing are left out.
 //!
 //! Edges with the same effects share one program. Most models have few.
 
@@ -33,7 +33,8 @@ pub struct Programs {
     /// The index of the program that was asked for last.
     last: u32,
     index: FxHashMap<Vec<ProgramStep>, u32>,
-    /// By program, source zone and target zone: whether every valuation of the source gets into the target.
+    /// By program, source zone and target zone: whether every valuation of the source gets into the
+    /// target.
     totals: FxHashMap<(ProgramId, ZoneId, ZoneId), bool>,
     /// What the steps take.
     step_bytes: usize,
@@ -104,7 +105,8 @@ impl Programs {
         }
     }
 
-    /// The zones that the program reaches from a zone; with their future within the invariant if time may pass at the end.
+    /// The zones that the program reaches from a zone; with their future within the invariant if
+    /// time may pass at the end.
     pub fn image(&self, program: ProgramId, zone: &Zone, delays: bool) -> Vec<Zone> {
         let dimension = zone.dimension();
         let mut zones = vec![zone.clone()];

@@ -1,8 +1,8 @@
 //! Dead ends: states from which what is sought cannot come any more, as locations show.
 //!
-//! For each process it is known from which of its locations some edges, whatever their guards, lead to one in which what is sought
-//! may be. In a state in which one process is in none of these the seeker has lost, whoever moves. Nothing of the words but
-//! locations is looked at, nor clocks.
+//! For each process it is known from which of its locations some edges, whatever their guards, lead
+//! to one in which what is sought may be. In a state in which one process is in none of these the
+//! seeker has lost, whoever moves. Nothing of the words but locations is looked at, nor clocks.
 
 use crate::analysis::may_hold::Possibility;
 use crate::ir::{LocationId, Network, Process, ProcessId};
@@ -27,7 +27,8 @@ pub(super) struct DeadEnds {
 }
 
 impl DeadEnds {
-    /// The dead ends of an objective: of the goal if the controller seeks it, else of breaking what must be kept.
+    /// The dead ends of an objective: of the goal if the controller seeks it, else of breaking what
+    /// must be kept.
     pub(super) fn new(network: &Network, objective: &Objective<'_>) -> DeadEnds {
         let (sought, truth) = match (objective.goal, objective.keep) {
             (Some(goal), _) if objective.must_progress => (goal, true),
@@ -124,7 +125,8 @@ impl Graph<'_, '_> {
 }
 
 impl Solver<'_, '_, '_> {
-    /// Explores what follows after dead ends if the evader has won: its strategy says what to do there too.
+    /// Explores what follows after dead ends if the evader has won: its strategy says what to do
+    /// there too.
     ///
     /// # Errors
     /// The model fails in a state that follows.

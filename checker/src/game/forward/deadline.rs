@@ -1,7 +1,7 @@
 //! Games in which the goal is to be reached in time.
 //!
-//! A clock that nothing sets measures the time. What is later than the deadline is lost for good, so zones end there: no state past it is
-//! ever made.
+//! A clock that nothing sets measures the time. What is later than the deadline is lost for good,
+//! so zones end there: no state past it is ever made.
 
 use crate::ir::FunctionId;
 use crate::network::{Extent, Failure};
@@ -17,10 +17,11 @@ pub struct Deadline {
     pub clock: usize,
     /// The limit.
     pub limit: i32,
-    /// Whether the clock may start at any value up to the limit, so that the valuations of the initial node show how much time is
-    /// needed; else it starts at 0.
+    /// Whether the clock may start at any value up to the limit, so that the valuations of the
+    /// initial node show how much time is needed; else it starts at 0.
     pub starts_anywhere: bool,
-    /// How much time, at least, is still to be left in a state before the goal; a negative value counts as 0.
+    /// How much time, at least, is still to be left in a state before the goal; a negative value
+    /// counts as 0.
     pub rest: Option<FunctionId>,
 }
 

@@ -1,26 +1,30 @@
-//! The forward part of a game: nodes are symbolic states, edges are moves, and both are made as they are asked for.
+//! The forward part of a game: nodes are symbolic states, edges are moves, and both are made as
+//! they are asked for.
 //!
 //! Invariants:
 //! * A node's zone contains its own future where time may pass, and satisfies the invariants.
-//! * An edge may stand for a *chain* of moves: a move and the moves that follow without any choice. A state belongs to the
-//!   inside of a chain if it has exactly one move as far as words decide, the goal holds nowhere in it and what must be
-//!   kept everywhere, and time cannot pass in it, or (if waiting never helps the controller) the one move is the
-//!   controller's. Nothing of the inside is stored. The winning valuations of the inside follow from those of the end,
-//!   since nobody has a choice.
-//! * Where a move of the controller leads to a branch point, its edges are the *legs* of one entry ([`super::chance`]): the controller
-//!   chooses among entries only.
+//! * An edge may stand for a *chain* of moves: a move and the moves that follow without any choice.
+//!   A state belongs to the inside of a chain if it has exactly one move as far as words decide,
+//!   the goal holds nowhere in it and what must be kept everywhere, and time cannot pass in it, or
+//!   (if waiting never helps the controller) the one move is the controller's. Nothing of the
+//!   inside is stored. The winning valuations of the inside follow from those of the end, since
+//!   nobody has a choice.
+//! * Where a move of the controller leads to a branch point, its edges are the *legs* of one entry
+//!   ([`super::chance`]): the controller chooses among entries only.
 //! * An edge leads to a node whose zone contains the zone that the moves reach.
-//! * In a graph of discrete states ([`Graph::of_discrete_states`]) there is one node for each discrete state, whose zone is all that its
-//!   invariants allow. Who wins from a valuation does not hang on how it is reached, so the answer is the same. There may be far
-//!   fewer nodes, but also ones that no run reaches, so a run-time error in such a graph means nothing.
-//! * All states from which what is sought cannot come any more are one node ([`super::dead_ends`]), unless the initial one is among them;
-//!   what follows after them is left out.
+//! * In a graph of discrete states ([`Graph::of_discrete_states`]) there is one node for each
+//!   discrete state, whose zone is all that its invariants allow. Who wins from a valuation does
+//!   not hang on how it is reached, so the answer is the same. There may be far fewer nodes, but
+//!   also ones that no run reaches, so a run-time error in such a graph means nothing.
+//! * All states from which what is sought cannot come any more are one node ([`super::dead_ends`]),
+//!   unless the initial one is among them; what follows after them is left out.
 //!
-//! Where synchronisations on urgent channels have clock guards, time does not reach all of a node's zone: see
-//! [`super::urgent_nodes`].
+//! Where synchronisations on urgent channels have clock guards, time does not reach all of a node's
+//! zone: see [`super::urgent_nodes`].
 //!
-//! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly. Where two clocks are compared,
-//! zones are cut along the comparisons, and a move has an edge for each piece; there are no chains then.
+//! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly.
+//! Where two clocks are compared, zones are cut along the comparisons, and a move has an edge for
+//! each piece; there are no chains then.
 
 use crate::cancellation;
 use crate::ir::Predicate;
@@ -105,7 +109,8 @@ pub struct Edge {
     pub program: ProgramId,
     /// The index of the first move among the moves of the source.
     pub ordinal: u32,
-    /// The processes that take part in the first move, a bit for each; those with the same index modulo 32 share one.
+    /// The processes that take part in the first move, a bit for each; those with the same index
+    /// modulo 32 share one.
     pub movers: u32,
     /// How many moves it stands for.
     pub length: u8,
@@ -206,8 +211,8 @@ impl<'s, 'a> Graph<'s, 'a> {
 
     /// A graph of discrete states that holds the initial node only. No clock may be stopped.
     ///
-    /// Source: N. Jensen, K. G. Larsen, D. Lime, J. Srba, "On-the-Fly Symbolic Algorithm for Timed ATL with Abstractions", CONCUR 2025
-    /// (expansion abstraction).
+    /// Source: N. Jensen, K. G. Larsen, D. Lime, J. Srba, "On-the-Fly Symbolic Algorithm for Timed
+    /// ATL with Abstractions", CONCUR 2025 (expansion abstraction).
     pub fn of_discrete_states(
         symbolic: &'s mut Symbolic<'a>,
         objective: Objective<'s>,
@@ -589,7 +594,8 @@ impl<'s, 'a> Graph<'s, 'a> {
         self.go_on(origin, target, zone, (1, may_delay))
     }
 
-    /// Goes on with a chain of which `length` moves were taken, and adds its edge. The zone contains its future if time may pass.
+    /// Goes on with a chain of which `length` moves were taken, and adds its edge. The zone
+    /// contains its future if time may pass.
     pub(super) fn go_on(
         &mut self,
         origin: Origin,
@@ -609,8 +615,9 @@ impl<'s, 'a> Graph<'s, 'a> {
         self.end(target, zone, origin, length)
     }
 
-    /// Takes the only move of a state inside a chain: leaves its effect in `effect`, the words after it in `spare`, and the zone on
-    /// entry in `zone`. Returns false, with the zone as it was, if the chain ends with the state.
+    /// Takes the only move of a state inside a chain: leaves its effect in `effect`, the words
+    /// after it in `spare`, and the zone on entry in `zone`. Returns false, with the zone as it
+    /// was, if the chain ends with the state.
     fn only_move(
         &mut self,
         words: &mut [i32],
@@ -699,8 +706,8 @@ impl<'s, 'a> Graph<'s, 'a> {
         self.add_edge(target, &mut ending, origin, length)
     }
 
-    /// Asks whether there may be the zones that the account was not told of yet, if they are many: one node can have thousands of
-    /// successors.
+    /// Asks whether there may be the zones that the account was not told of yet, if they are many:
+    /// one node can have thousands of successors.
     fn ask_for_zones(&self) {
         let count = self.zones.len() - self.counted_zones;
         let bytes = count * self.dimension().pow(2) * size_of::<Bound>();
@@ -772,7 +779,8 @@ impl<'s, 'a> Graph<'s, 'a> {
     }
 }
 
-/// Lets time pass in a state that the steps lead to, within its invariant and until it is too late, if it may; returns whether it may.
+/// Lets time pass in a state that the steps lead to, within its invariant and until it is too late,
+/// if it may; returns whether it may.
 pub(super) fn delay_after(
     symbolic: &mut Symbolic<'_>,
     words: &mut [i32],
@@ -785,12 +793,14 @@ pub(super) fn delay_after(
     Ok(may_delay)
 }
 
-/// The invariant of the state that the steps lead to: that of the last step, since steps that are left out have none.
+/// The invariant of the state that the steps lead to: that of the last step, since steps that are
+/// left out have none.
 fn invariant_after(steps: &[ProgramStep]) -> &[Constraint] {
     steps.last().map_or(&[][..], |last| &last.effect.invariant)
 }
 
-/// Adds a step to a program. One that changes nothing is left out, unless it is the first or ends an invariant.
+/// Adds a step to a program. One that changes nothing is left out, unless it is the first or ends
+/// an invariant.
 pub(super) fn push_step(steps: &mut Vec<ProgramStep>, delays: bool, effect: &ClockEffect) {
     let is_kept = steps
         .last()

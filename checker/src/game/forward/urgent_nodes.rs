@@ -1,19 +1,22 @@
 //! Nodes in which something stops time at some clock values only.
 //!
-//! A synchronisation on an urgent channel with clock guards stops time where it is enabled: see `network/symbolic/delay.rs`; and a strategy
-//! under which the game is played where it lets the controller not wait: there the controller is *obliged* to move. The zone of such
-//! a node contains its future as if nothing stopped time, so that it is one zone; which part of it is *reached* is kept beside it, and
-//! nothing outside of that part counts. Invariants:
+//! A synchronisation on an urgent channel with clock guards stops time where it is enabled: see
+//! `network/symbolic/delay.rs`; and a strategy under which the game is played where it lets the
+//! controller not wait: there the controller is *obliged* to move. The zone of such a node contains
+//! its future as if nothing stopped time, so that it is one zone; which part of it is *reached* is
+//! kept beside it, and nothing outside of that part counts. Invariants:
 //! * The reached part contains its own future up to where time stops.
-//! * An edge leads from the reached part of its source, and whatever it leads to is in the reached part of a target.
+//! * An edge leads from the reached part of its source, and whatever it leads to is in the reached
+//!   part of a target.
 //!
 //! There are no chains then, and no clocks that stand still.
 //!
-//! Where an urgent synchronisation has no first moment, time stops before it. Where an obligation has none, the controller moves
-//! soon after: time gets to moments as soon as one likes.
+//! Where an urgent synchronisation has no first moment, time stops before it. Where an obligation
+//! has none, the controller moves soon after: time gets to moments as soon as one likes.
 //!
-//! Zones are extrapolated on entry, before time passes: valuations that differ only above all constants are bisimilar, so each
-//! valuation that is added does, also while time passes, what one does that was there before.
+//! Zones are extrapolated on entry, before time passes: valuations that differ only above all
+//! constants are bisimilar, so each valuation that is added does, also while time passes, what one
+//! does that was there before.
 
 use crate::network::{Failure, Moves};
 use crate::zones::dbm::Constraint;
@@ -47,7 +50,8 @@ impl Urgent {
         stops
     }
 
-    /// All valuations at which time cannot pass for an urgent channel: where it stops time, and what is followed by that at once.
+    /// All valuations at which time cannot pass for an urgent channel: where it stops time, and
+    /// what is followed by that at once.
     pub(in crate::game) fn standstill(&self) -> Federation {
         let mut all = instants::before(&self.channel, &ClockSet::EMPTY);
         all.unite(&self.channel);
@@ -73,9 +77,10 @@ impl Urgent {
             .collect()
     }
 
-    /// The safe timed predecessors of `good` with respect to `bad` where time is stopped on the way: a valuation that stops time can
-    /// be the last one of a delay, and no other. So of those in `good` only the first moments are led to, and where an
-    /// obligation has none, those as soon as one likes.
+    /// The safe timed predecessors of `good` with respect to `bad` where time is stopped on the
+    /// way: a valuation that stops time can be the last one of a delay, and no other. So of those
+    /// in `good` only the first moments are led to, and where an obligation has none, those as soon
+    /// as one likes.
     pub(in crate::game) fn predecessors(
         &self,
         good: &Federation,

@@ -1,23 +1,27 @@
 //! Games with a goal that is to come again and again: `A[] (p && A<> q)`.
 //!
-//! The controller wins a play if p always holds and q holds at some instant from every one on. A play that ends wins if q holds
-//! at its end. What it wins is the greatest X such that from every valuation in X it can get, within p, into q, and go on from there
-//! without leaving X:
+//! The controller wins a play if p always holds and q holds at some instant from every one on. A
+//! play that ends wins if q holds at its end. What it wins is the greatest X such that from every
+//! valuation in X it can get, within p, into q, and go on from there without leaving X:
 //!
 //! ```text
-//! leave  = what the controller cannot keep from leaving X: Pred_t(not X ∪ Pre_u(not X) ∪ held, ⋃ Pre_c(X), less Pre_u(not X))
+//! leave  = Pred_t(not X ∪ Pre_u(not X) ∪ held, ⋃ Pre_c(X), less Pre_u(not X))
+//!          (what the controller cannot keep from leaving X)
 //! target = p ∩ q, less leave
-//! X      = from where the controller can force play into the target, within p ([`crate::game::backward::solver`])
+//! X      = from where the controller can force play into the target, within p
+//!          (see [`crate::game::backward::solver`])
 //! ```
 //!
-//! The graph is explored before. X begins with what the controller wins of the game in which it has to keep p only, and shrinks until it stays;
-//! what breaks p would else come off it round by round. With the goals that are met at the start of
-//! each round, the strategy of the last one is a strategy for the whole: see [`crate::game::strategy::attractor`]. What each round takes away shows how
-//! the environment wins there, if X begins with everything: see [`crate::game::strategy::co_buchi`]. So it does in a second solution, once it is known that the
+//! The graph is explored before. X begins with what the controller wins of the game in which it has
+//! to keep p only, and shrinks until it stays; what breaks p would else come off it round by round.
+//! With the goals that are met at the start of each round, the strategy of the last one is a
+//! strategy for the whole: see [`crate::game::strategy::attractor`]. What each round takes away
+//! shows how the environment wins there, if X begins with everything: see
+//! [`crate::game::strategy::co_buchi`]. So it does in a second solution, once it is known that the
 //! environment wins.
 //!
-//! Source: L. de Alfaro, M. Faella, T. Henzinger, R. Majumdar, M. Stoelinga, "The Element of Surprise in Timed Games", CONCUR 2003
-//! (nested fixpoints over timed predecessors).
+//! Source: L. de Alfaro, M. Faella, T. Henzinger, R. Majumdar, M. Stoelinga, "The Element of
+//! Surprise in Timed Games", CONCUR 2003 (nested fixpoints over timed predecessors).
 
 use crate::network::Failure;
 use crate::search::limits::Watch;
@@ -31,9 +35,10 @@ use crate::game::forward::graph::Standing;
 /// Nodes between two looks at the limits.
 const NODES_BETWEEN_LOOKS: u32 = 64;
 
-/// Solves the game of a new solver with the controller as its seeker. The goal of its graph must be p ∩ q, and p what is kept.
-/// On a win, the strategy can be read from it. If the players work together, it is enough that it can be won from somewhere.
-/// `rounds`, if wanted, becomes the sets X by node, the first one first, unless the controller wins.
+/// Solves the game of a new solver with the controller as its seeker. The goal of its graph must be
+/// p ∩ q, and p what is kept. On a win, the strategy can be read from it. If the players work
+/// together, it is enough that it can be won from somewhere. `rounds`, if wanted, becomes the sets
+/// X by node, the first one first, unless the controller wins.
 pub fn solve(
     solver: &mut Solver<'_, '_, '_>,
     is_cooperative: bool,
@@ -182,7 +187,8 @@ fn is_within(
     }
 }
 
-/// The part of a node in which the goal holds, and from which the controller can go on without leaving what is kept.
+/// The part of a node in which the goal holds, and from which the controller can go on without
+/// leaving what is kept.
 fn target(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,

@@ -1,8 +1,8 @@
 //! Games in which both players first work together: `E<> control: …`.
 //!
-//! The graph is explored through everything, whoever has won there, and without chains, so that every state is a node. If the
-//! controller wins from somewhere, its strategy begins there; a search finds the way. If it wins nowhere, the environment has a
-//! strategy from everywhere.
+//! The graph is explored through everything, whoever has won there, and without chains, so that
+//! every state is a node. If the controller wins from somewhere, its strategy begins there; a
+//! search finds the way. If it wins nowhere, the environment has a strategy from everywhere.
 
 use crate::network::{Failure, Symbolic};
 use crate::search::StateStore;

@@ -1,12 +1,15 @@
 //! The play inside one observation: what an action leads to from a knowledge set.
 //!
-//! Symbolic states are explored whose zones are those on entry. From each, time passes as long as the goal does not hold, up to the
-//! first moment at which the observation changes or the action is possible; then the environment moves, or the action is taken.
+//! Symbolic states are explored whose zones are those on entry. From each, time passes as long as
+//! the goal does not hold, up to the first moment at which the observation changes or the action is
+//! possible; then the environment moves, or the action is taken.
 //!
-//! A cycle of this graph is a run without end only if states are told apart by equality of zones: an edge to a state with a larger
-//! zone can close a cycle that no run takes. So the graph is first made with inclusion, which is smaller; without a cycle there is
-//! none in the other one either. Source: A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G. Larsen, J. van de Pol, "Multi-core
-//! Emptiness Checking of Timed Büchi Automata Using Inclusion Abstraction", CAV 2013 (what inclusion does to cycles).
+//! A cycle of this graph is a run without end only if states are told apart by equality of zones:
+//! an edge to a state with a larger zone can close a cycle that no run takes. So the graph is first
+//! made with inclusion, which is smaller; without a cycle there is none in the other one either.
+//! Source: A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G. Larsen, J. van de Pol, "Multi-core
+//! Emptiness Checking of Timed Büchi Automata Using Inclusion Abstraction", CAV 2013 (what
+//! inclusion does to cycles).
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -32,7 +35,8 @@ pub(super) enum Outcome {
     Stopped(StopReason),
 }
 
-/// What is asked again and again while play inside an observation is explored: the number of states that it has so far.
+/// What is asked again and again while play inside an observation is explored: the number of states
+/// that it has so far.
 pub(super) type Look<'l> = dyn FnMut(usize, usize) -> Option<StopReason> + 'l;
 
 /// Explores play inside observations.
@@ -76,8 +80,8 @@ struct Class<'c> {
 }
 
 impl Explorer<'_, '_, '_> {
-    /// Where an action leads from a knowledge set. For [`Action::Wait`] the actions that become possible on the way are added to
-    /// `offers`: any other one is the same as waiting.
+    /// Where an action leads from a knowledge set. For [`Action::Wait`] the actions that become
+    /// possible on the way are added to `offers`: any other one is the same as waiting.
     pub(super) fn outcome(
         &mut self,
         knowledge: &Knowledge,
@@ -208,8 +212,8 @@ impl Explorer<'_, '_, '_> {
         Ok(enabled)
     }
 
-    /// Whether play may be lost by standing still in one of these states: by waiting for ever, or where time stops. `own` is where
-    /// the action is possible.
+    /// Whether play may be lost by standing still in one of these states: by waiting for ever, or
+    /// where time stops. `own` is where the action is possible.
     fn may_stay(
         &mut self,
         place: &Place,

@@ -1,7 +1,8 @@
-//! Discrete states with what does not hang on how they are reached: observations, goal, moves, and where time stops.
+//! Discrete states with what does not hang on how they are reached: observations, goal, moves, and
+//! where time stops.
 //!
-//! All federations are parts of what the invariants allow. Moves are evaluated when a zone first meets their guards, so that no
-//! update runs that cannot happen.
+//! All federations are parts of what the invariants allow. Moves are evaluated when a zone first
+//! meets their guards, so that no update runs that cannot happen.
 
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -138,7 +139,8 @@ impl Place {
         cell.map(|(_, part)| part)
     }
 
-    /// What a move does if its guards leave something of one of these zones, and it is possible at all.
+    /// What a move does if its guards leave something of one of these zones, and it is possible at
+    /// all.
     pub(super) fn taken(
         &self,
         symbolic: &mut Symbolic<'_>,

@@ -1,18 +1,23 @@
 //! Who wins the game on knowledge sets, on the fly.
 //!
-//! From a knowledge set the controller chooses an action, the environment one of the knowledge sets that this leads to. A set is won
-//! with an action all of whose sets are won, and lost if each action is lost or leads to one that is lost. Both spread backwards
-//! as soon as they are known. If everything that matters is explored, what is still open is lost if the goal must be reached,
+//! From a knowledge set the controller chooses an action, the environment one of the knowledge sets
+//! that this leads to. A set is won with an action all of whose sets are won, and lost if each
+//! action is lost or leads to one that is lost. Both spread backwards as soon as they are known. If
+//! everything that matters is explored, what is still open is lost if the goal must be reached,
 //! since play could go from one observation to the next for ever, and won if it is enough to keep.
 //!
-//! Sets are explored breadth first, and only where the answer can still hang on them. Equal sets are one. With what wins from a set the
-//! controller wins from its subsets, and if it loses from a set it loses from what contains it. So
-//! * in place of a set comes one that is won and contains it, or one that is lost and is contained in it;
-//! * a set is *covered* while it lies in an open one, if it is enough to keep, or contains an open one, if the goal must be reached: as long
-//!   as the other one is not lost, or not won, neither is it, and it is not explored. What covers is not covered itself.
+//! Sets are explored breadth first, and only where the answer can still hang on them. Equal sets
+//! are one. With what wins from a set the controller wins from its subsets, and if it loses from a
+//! set it loses from what contains it. So
+//! * in place of a set comes one that is won and contains it, or one that is lost and is contained
+//!   in it;
+//! * a set is *covered* while it lies in an open one, if it is enough to keep, or contains an open
+//!   one, if the goal must be reached: as long as the other one is not lost, or not won, neither is
+//!   it, and it is not explored. What covers is not covered itself.
 //!
-//! Sources: X. Liu, S. Smolka, "Simple linear-time algorithms for minimal fixed points", ICALP 1998, in both directions; M. De Wulf,
-//! L. Doyen, J.-F. Raskin, "A Lattice Theory for Solving Games of Imperfect Information", HSCC 2006 (antichains of knowledge sets).
+//! Sources: X. Liu, S. Smolka, "Simple linear-time algorithms for minimal fixed points", ICALP
+//! 1998, in both directions; M. De Wulf, L. Doyen, J.-F. Raskin, "A Lattice Theory for Solving
+//! Games of Imperfect Information", HSCC 2006 (antichains of knowledge sets).
 
 use std::collections::VecDeque;
 
@@ -26,7 +31,8 @@ use super::class::{Explorer, Outcome};
 use super::place::Places;
 use super::{Action, Knowledge, Machine, MachineState, Observation, Question};
 
-/// How often limits are looked at: after so many symbolic states inside an observation, and after each knowledge set.
+/// How often limits are looked at: after so many symbolic states inside an observation, and after
+/// each knowledge set.
 const STATES_BETWEEN_LOOKS: usize = 64;
 
 /// Who wins.
@@ -124,7 +130,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// What was done: symbolic states inside observations are explored, zones of knowledge sets stored.
+    /// What was done: symbolic states inside observations are explored, zones of knowledge sets
+    /// stored.
     pub fn counters(&self) -> Counters {
         Counters {
             explored: self.explorer.explored,
@@ -271,7 +278,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// Whether the answer may hang on an open node: some choice of an open node that is not lost leads to it, or to one that it covers.
+    /// Whether the answer may hang on an open node: some choice of an open node that is not lost
+    /// leads to it, or to one that it covers.
     fn matters(&self, node: usize) -> bool {
         let one = &self.nodes[node];
         if one.is_expanded || one.standing != Standing::Open {
@@ -483,7 +491,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         node
     }
 
-    /// The choice of a node that is not lost, and that is played as itself: the one by which it was won, else the first that is not lost.
+    /// The choice of a node that is not lost, and that is played as itself: the one by which it was
+    /// won, else the first that is not lost.
     fn chosen(&self, node: usize) -> usize {
         let node = &self.nodes[node];
         let is_left = |choice: &&usize| !self.choices[**choice].is_lost;

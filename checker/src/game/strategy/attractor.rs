@@ -1,25 +1,29 @@
 //! Strategies: what a player does, state by state.
 //!
-//! A strategy lists, for each discrete state that play under it can reach, decisions. A decision is a move of its owner, or to
-//! wait: let time pass as long as the zones of the decision go, and leave moving to the opponent. A decision of the controller names the
-//! edges that it takes, and the environment picks the legs of branch points behind them: a strategy of the environment lists which. States
-//! inside chains of forced moves are listed too, so that a strategy can be followed, and checked, move by move. Where play has ended there is nothing to
-//! decide.
+//! A strategy lists, for each discrete state that play under it can reach, decisions. A decision is
+//! a move of its owner, or to wait: let time pass as long as the zones of the decision go, and
+//! leave moving to the opponent. A decision of the controller names the edges that it takes, and
+//! the environment picks the legs of branch points behind them: a strategy of the environment lists
+//! which. States inside chains of forced moves are listed too, so that a strategy can be followed,
+//! and checked, move by move. Where play has ended there is nothing to decide.
 //!
 //! There are six kinds, by who wins and how:
-//! * The controller of a reachability game, and the environment of a safety game, follow the stamps of the gains: from valuations
-//!   of stamp k they move only into valuations of smaller stamps, or wait for them; so they make progress and get there.
-//! * The controller of a game with a goal that is to come again and again does the same, and from the goal goes on into anything
-//!   from which it wins; the ranks count anew from there.
-//! * The controller of a safety game may do whatever keeps it safe: its strategy allows all such moves and all such waiting. It is
-//!   the most permissive one, with one choice made: where what is safe has no last moment, and a move must be made before, it is
-//!   made in the last stretch of time in which it is possible.
-//! * The environment of a game with a goal that is to come again and again keeps it from coming, or leads play to where the
-//!   goal comes less often: see [`super::co_buchi`].
-//! * The environment of a reachability game that it wins moves where that leads to what the controller does not win, and else
-//!   waits: it never gets under pressure there.
+//! * The controller of a reachability game, and the environment of a safety game, follow the stamps
+//!   of the gains: from valuations of stamp k they move only into valuations of smaller stamps, or
+//!   wait for them; so they make progress and get there.
+//! * The controller of a game with a goal that is to come again and again does the same, and from
+//!   the goal goes on into anything from which it wins; the ranks count anew from there.
+//! * The controller of a safety game may do whatever keeps it safe: its strategy allows all such
+//!   moves and all such waiting. It is the most permissive one, with one choice made: where what is
+//!   safe has no last moment, and a move must be made before, it is made in the last stretch of
+//!   time in which it is possible.
+//! * The environment of a game with a goal that is to come again and again keeps it from coming, or
+//!   leads play to where the goal comes less often: see [`super::co_buchi`].
+//! * The environment of a reachability game that it wins moves where that leads to what the
+//!   controller does not win, and else waits: it never gets under pressure there.
 //!
-//! Source: Cassez et al., CONCUR 2005, section 5 (strategies from the order in which winning states were found).
+//! Source: Cassez et al., CONCUR 2005, section 5 (strategies from the order in which winning states
+//! were found).
 
 use std::sync::Arc;
 
@@ -40,10 +44,11 @@ use crate::game::forward::graph::{Edge, Standing};
 pub struct Decision {
     /// Where it applies.
     pub zones: Federation,
-    /// The move to take, where its owner is the controller with whichever branches; `None` is to wait.
+    /// The move to take, where its owner is the controller with whichever branches; `None` is to
+    /// wait.
     pub action: Option<Vec<Part>>,
-    /// The rank of the valuations: all moves lead to smaller ones, also inside chains. 0 is where what was sought is reached, and
-    /// everywhere in a strategy that only has to avoid.
+    /// The rank of the valuations: all moves lead to smaller ones, also inside chains. 0 is where
+    /// what was sought is reached, and everywhere in a strategy that only has to avoid.
     pub rank: u32,
 }
 
@@ -54,8 +59,8 @@ pub struct StrategyState {
     pub words: Vec<i32>,
     /// The decisions, in order.
     pub decisions: Vec<Decision>,
-    /// If the owner is the environment: the legs that it picks, as moves of the controller. Of those with the same entry the first
-    /// that applies is picked.
+    /// If the owner is the environment: the legs that it picks, as moves of the controller. Of
+    /// those with the same entry the first that applies is picked.
     pub legs: Vec<Decision>,
     /// Whether play has ended here, won, whatever the clocks say.
     pub is_goal: bool,
@@ -91,10 +96,12 @@ pub enum Selection {
 pub struct Strategy {
     /// Who plays by it.
     pub owner: Player,
-    /// Which of the decisions that apply counts. Decisions of states with the same words are one list, in the order of ranks.
+    /// Which of the decisions that apply counts. Decisions of states with the same words are one
+    /// list, in the order of ranks.
     pub selection: Selection,
-    /// Within which time the controller reaches the goal, or up to which the environment prevents it, if that is limited. Zones have
-    /// a clock more then: the last one is 0 in the initial state and nothing sets it.
+    /// Within which time the controller reaches the goal, or up to which the environment prevents
+    /// it, if that is limited. Zones have a clock more then: the last one is 0 in the initial state
+    /// and nothing sets it.
     pub time_limit: Option<i32>,
     /// The strategy of the controller under which the game is played, if it is under one.
     pub under: Option<Arc<Under>>,
@@ -109,7 +116,8 @@ pub struct Strategy {
 pub struct Under {
     /// The query that the strategy answers.
     pub query: String,
-    /// The strategy: where it says something, the controller makes no other moves and waits only where it does.
+    /// The strategy: where it says something, the controller makes no other moves and waits only
+    /// where it does.
     pub strategy: Arc<Strategy>,
 }
 
@@ -249,8 +257,9 @@ pub(super) fn keep(
     patience.keep(bytes.div_ceil(solver.zone_bytes()) as usize);
 }
 
-/// Ranks states inside chains above the end of their chain, by their steps to it. Their words may be those of a node as well; at
-/// equal ranks the chain could be entered again from where it has led.
+/// Ranks states inside chains above the end of their chain, by their steps to it. Their words may
+/// be those of a node as well; at equal ranks the chain could be entered again from where it has
+/// led.
 fn rank_chains(strategy: &mut Strategy, steps_to_end: &[u32]) {
     let states = strategy.states.iter().zip(steps_to_end);
     let mut ranks: Vec<(u32, u32)> = states
@@ -313,7 +322,8 @@ fn choices(
     let moves = moves_of(solver, node)?;
     for gain in solver.gains[node as usize].clone() {
         let mut rest = whole_or_part(solver, node, gain.part.as_ref());
-        // Where what is sought is to come again and again, play goes on from there into anything that is won.
+        // Where what is sought is to come again and again, play goes on from there into anything
+        // that is won.
         let goes_on = solver.targets.is_some();
         let earlier = |solver: &Solver<'_, '_, '_>, edge: u32, patience: &mut Patience<'_>| {
             let target = solver.graph.edges[edge as usize].target;
@@ -383,7 +393,8 @@ fn own_choices(solver: &Solver<'_, '_, '_>, node: u32) -> Vec<Vec<u32>> {
     choices
 }
 
-/// How a strategy names the first move of an edge, of a node with these moves, if the player who owns the move takes it.
+/// How a strategy names the first move of an edge, of a node with these moves, if the player who
+/// owns the move takes it.
 pub(super) fn named(solver: &Solver<'_, '_, '_>, moves: &Moves, edge: &Edge) -> Vec<Part> {
     let parts = moves.get(edge.ordinal as usize).parts;
     if solver.graph.chances.is_possible() && edge.controllable {
@@ -455,8 +466,9 @@ pub(super) struct Inner {
     pub(super) effect: ClockEffect,
 }
 
-/// Adds the states inside a chain. Each has one move, which is taken where the rest of the chain leads into valuations of
-/// the end that are won; the smaller their stamp, the better. Until then the strategy waits.
+/// Adds the states inside a chain. Each has one move, which is taken where the rest of the chain
+/// leads into valuations of the end that are won; the smaller their stamp, the better. Until then
+/// the strategy waits.
 fn inner_states(
     solver: &mut Solver<'_, '_, '_>,
     edge: u32,

@@ -1,9 +1,10 @@
 //! The closed loop: a network one of whose players follows a strategy.
 //!
-//! A strategy becomes a [`Restriction`] of the network, so that any search runs over what is left. In each valuation the
-//! decisions that count are allowed: to wait lets time pass, a move is possible; all other moves of the player are forbidden, and
-//! time stops if waiting is not allowed. Where a strategy has no decision, and where play has ended, it says nothing, and
-//! everything is allowed. So the closed loop holds every run of every player that follows the strategy.
+//! A strategy becomes a [`Restriction`] of the network, so that any search runs over what is left.
+//! In each valuation the decisions that count are allowed: to wait lets time pass, a move is
+//! possible; all other moves of the player are forbidden, and time stops if waiting is not allowed.
+//! Where a strategy has no decision, and where play has ended, it says nothing, and everything is
+//! allowed. So the closed loop holds every run of every player that follows the strategy.
 
 use crate::ir::{ClockAtom, ClockId, ClockRange, Network};
 use crate::network::{Allowed, Part, Restriction, is_same_entry};
@@ -25,7 +26,8 @@ pub struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// The restriction that a strategy is of its network, which has the clock that measures time if the strategy looks at it.
+    /// The restriction that a strategy is of its network, which has the clock that measures time if
+    /// the strategy looks at it.
     pub fn new(network: &Network, strategy: &Strategy) -> ClosedLoop {
         let dimension = network.clocks.len().max(1);
         let mut store = StateStore::new(network);
@@ -206,8 +208,8 @@ fn has_open_side(zone: &[Bound], dimension: usize) -> bool {
     zone[1..dimension].iter().any(|bound| bound.is_strict())
 }
 
-/// Adds the comparisons that tell the zones from the rest, in both directions. Comparisons of two clocks that follow from those of
-/// each with a constant are left out.
+/// Adds the comparisons that tell the zones from the rest, in both directions. Comparisons of two
+/// clocks that follow from those of each with a constant are left out.
 fn collect_atoms(zones: &Federation, atoms: &mut Vec<ClockAtom>) {
     let dimension = zones.dimension();
     for zone in zones.zones() {

@@ -1,17 +1,19 @@
 //! How the environment keeps a goal from coming again and again.
 //!
-//! Each round of [`crate::game::objectives::buchi`] takes away valuations from which the controller cannot get to the goal within p and go
-//! on from there inside what was kept before. Let X be what was kept before a round and Y what is kept after it. The valuations
-//! of *rank* k are those that round k took away. The environment plays by the rank:
-//! * Where it can make play leave X, it does: it waits until it has a move that leaves X, and takes it. What is outside X has a
-//!   smaller rank, or p does not hold there.
-//! * Elsewhere in X without Y it evades: it takes moves that stay outside Y wherever there are any, and else waits. So play never
-//!   gets to a goal from which the controller could go on inside X.
+//! Each round of [`crate::game::objectives::buchi`] takes away valuations from which the controller
+//! cannot get to the goal within p and go on from there inside what was kept before. Let X be what
+//! was kept before a round and Y what is kept after it. The valuations of *rank* k are those that
+//! round k took away. The environment plays by the rank:
+//! * Where it can make play leave X, it does: it waits until it has a move that leaves X, and takes
+//!   it. What is outside X has a smaller rank, or p does not hold there.
+//! * Elsewhere in X without Y it evades: it takes moves that stay outside Y wherever there are any,
+//!   and else waits. So play never gets to a goal from which the controller could go on inside X.
 //!
 //! Where the controller moves to a branch point, it picks a leg that leaves X, or stays outside Y.
 //!
-//! Along a play the rank never grows. A goal that is met is one from which play leaves X, so that the rank falls: there are no more
-//! goals than ranks, and after the last one the goal does not come again.
+//! Along a play the rank never grows. A goal that is met is one from which play leaves X, so that
+//! the rank falls: there are no more goals than ranks, and after the last one the goal does not
+//! come again.
 
 use crate::network::{Failure, Part};
 use crate::search::limits::{StopReason, Watch};
@@ -27,7 +29,8 @@ use crate::game::backward::solver::{Solver, Win};
 use crate::game::forward::graph::{Edge, Standing};
 use crate::game::objectives::buchi::{leave, to_federation};
 
-/// Reads the strategy of the environment, which wins from these nodes, from the rounds of the solution.
+/// Reads the strategy of the environment, which wins from these nodes, from the rounds of the
+/// solution.
 ///
 /// # Errors
 /// The model fails in a state of it. An error of the inner result says why it was not finished.
@@ -168,8 +171,8 @@ fn push(
     }
 }
 
-/// The states inside a chain, where the goal holds nowhere. Each has one move, which the environment takes, if it owns it,
-/// where the rest of the chain does not lead into what is kept.
+/// The states inside a chain, where the goal holds nowhere. Each has one move, which the
+/// environment takes, if it owns it, where the rest of the chain does not lead into what is kept.
 fn inner_states(
     solver: &mut Solver<'_, '_, '_>,
     edge: &Edge,

@@ -1,10 +1,12 @@
 //! Plans: all sequences of moves that win, for games in which only the controller has a choice.
 //!
-//! A plan is a path of the game graph from the initial node to a goal on which every move is winning. Zones are carried along
-//! exactly, so a plan is one that can be carried out, and no state comes twice on it. Plans come in the order of the moves of
-//! each state, which does not depend on the search.
+//! A plan is a path of the game graph from the initial node to a goal on which every move is
+//! winning. Zones are carried along exactly, so a plan is one that can be carried out, and no state
+//! comes twice on it. Plans come in the order of the moves of each state, which does not depend on
+//! the search.
 //!
-//! Cost: proportional to the nodes on winning paths; plans are found one after the other and never held all at once here.
+//! Cost: proportional to the nodes on winning paths; plans are found one after the other and never
+//! held all at once here.
 
 use crate::cancellation;
 use crate::network::{Failure, Moves, Part};
@@ -19,7 +21,8 @@ use crate::game::forward::graph::Standing;
 pub struct PlanStep {
     /// The edges that are taken.
     pub parts: Vec<Part>,
-    /// Whether some process was in a committed location before it: such a step follows from the one before it.
+    /// Whether some process was in a committed location before it: such a step follows from the one
+    /// before it.
     pub was_committed: bool,
 }
 
@@ -125,7 +128,8 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
         }
     }
 
-    /// The zones that an edge reaches from the last node of the path; `None` if a plan does not take it.
+    /// The zones that an edge reaches from the last node of the path; `None` if a plan does not
+    /// take it.
     fn follow(&mut self, edge: usize) -> Option<Vec<Zone>> {
         let graph = &*self.solver.graph;
         let edge = graph.edges[edge];

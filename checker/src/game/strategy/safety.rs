@@ -1,7 +1,8 @@
 //! How to stay where the other player, who seeks something, does not win.
 //!
-//! Outside of what the seeker wins, the evader always has a way to stay outside: a move, or waiting. The environment moves where
-//! it can, since the controller might get away later. The controller allows everything that stays outside.
+//! Outside of what the seeker wins, the evader always has a way to stay outside: a move, or
+//! waiting. The environment moves where it can, since the controller might get away later. The
+//! controller allows everything that stays outside.
 
 use crate::network::{Failure, Part};
 use crate::zones::{ClockSet, Federation, Patience, Zone, instants, past};
@@ -112,7 +113,8 @@ fn ended(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
     }
 }
 
-/// Where the controller may wait and stay safe. `free` is where it is safe and play goes on, `acting` where it has a safe move.
+/// Where the controller may wait and stay safe. `free` is where it is safe and play goes on,
+/// `acting` where it has a safe move.
 fn allowed_waiting(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
@@ -141,7 +143,8 @@ fn allowed_waiting(
         passing.subtract_within(&standstill, patience);
         impassable.unite(&urgent.stops());
     }
-    // What is safe may end in a limit that is not itself safe. Before such an end, the last valuations with a move must use it.
+    // What is safe may end in a limit that is not itself safe. Before such an end, the last
+    // valuations with a move must use it.
     let mut unsafe_ones = whole_or_part(solver, node, None);
     unsafe_ones.subtract_within(&safe, patience);
     let after = instants::after_within(&passing, &stopped, patience);
@@ -213,7 +216,8 @@ pub(super) fn inner_states(
     Ok(())
 }
 
-/// Where the move of a state inside a chain is possible, and leads to none of the valuations that are won.
+/// Where the move of a state inside a chain is possible, and leads to none of the valuations that
+/// are won.
 pub(super) fn spoiling(inner: &Inner, won: &Federation, patience: &mut Patience<'_>) -> Federation {
     let zone = Zone::of_constraints(won.dimension(), &inner.invariant);
     let mut acting = inner.effect.enabled_part(zone.bounds(), won.dimension());

@@ -1,10 +1,12 @@
-//! From the edges that take part to moves: the receivers of a broadcast, combined, and the branches of edges.
+//! From the edges that take part to moves: the receivers of a broadcast, combined, and the branches
+//! of edges.
 //!
-//! Invariant: moves come in a fixed order and each has a *rank*, its place among all that could be put together, counting those that a
-//! [`Scope`] leaves out. So the rank of a move of a state is the same in every scope.
+//! Invariant: moves come in a fixed order and each has a *rank*, its place among all that could be
+//! put together, counting those that a [`Scope`] leaves out. So the rank of a move of a state is
+//! the same in every scope.
 //!
-//! Cost: without a scope as many steps as there are combinations; within a zone every choice that is looked at leads to a
-//! combination that is possible, or is the last that is looked at.
+//! Cost: without a scope as many steps as there are combinations; within a zone every choice that
+//! is looked at leads to a combination that is possible, or is the last that is looked at.
 
 use crate::cancellation;
 use crate::exec::EmittedConstraint;
@@ -28,7 +30,8 @@ const UNITS_FOR_MOVE: usize = 256;
 /// The greatest rank, of what no scope would come to the end of.
 const MOST_RANKS: u64 = 1 << 62;
 
-/// As many combinations are put together without looking whether the zone allows them: this is seen later.
+/// As many combinations are put together without looking whether the zone allows them: this is seen
+/// later.
 const FEW_COMBINATIONS: u64 = 2;
 
 /// A receiving process of a broadcast: its candidates, and what it does in the combination at hand.
@@ -143,7 +146,8 @@ impl Stepper<'_> {
     /// The candidates from `first` on, all of one receiving process.
     pub(super) fn group(&self, first: usize) -> Group {
         let last = self.candidates.len();
-        // A receiver whose edges all have clock guards may have none that is open: abstaining comes after its candidates.
+        // A receiver whose edges all have clock guards may have none that is open: abstaining comes
+        // after its candidates.
         let guarded = |candidate: &Candidate| candidate.constraints.0 < candidate.constraints.1;
         let may_abstain = self.candidates[first..last].iter().all(guarded);
         let ways = (first..last).map(|candidate| self.ways(Choice::Takes(candidate as u32)));
@@ -158,8 +162,8 @@ impl Stepper<'_> {
         }
     }
 
-    /// Emits every combination of the receivers' alternatives with the sender that is in the scope; the last receiver's change
-    /// fastest.
+    /// Emits every combination of the receivers' alternatives with the sender that is in the scope;
+    /// the last receiver's change fastest.
     fn combine(
         &mut self,
         groups: &mut [Group],
@@ -183,8 +187,8 @@ impl Stepper<'_> {
         Ok(())
     }
 
-    /// The rank after all moves of a broadcast whose receivers can be combined in so many ways, which stand for so many moves, and the
-    /// scope in which they are.
+    /// The rank after all moves of a broadcast whose receivers can be combined in so many ways,
+    /// which stand for so many moves, and the scope in which they are.
     pub(super) fn ranks_and_scope<'z>(
         &self,
         combinations: u64,
@@ -238,7 +242,8 @@ impl Stepper<'_> {
                 check_count(out)?;
                 cancellation::work(UNITS_FOR_MOVE);
                 if out.len().is_multiple_of(MANY_MOVES) {
-                    // The lists are about to grow to more than this, and may double while the old ones are still there.
+                    // The lists are about to grow to more than this, and may double while the old
+                    // ones are still there.
                     cancellation::ask_for(3 * out.heap_bytes() + self.moves_beside);
                 }
             } else {
@@ -255,7 +260,8 @@ impl Stepper<'_> {
         }
     }
 
-    /// Adds a choice to the combination; returns false, with nothing added, if the scope has none with it.
+    /// Adds a choice to the combination; returns false, with nothing added, if the scope has none
+    /// with it.
     pub(super) fn choose(&mut self, choice: Choice, scope: Scope<'_>) -> Result<bool, Failure> {
         let (candidates, constraints) = (&self.candidates, &self.constraints);
         let constraints_of = |candidate: &Candidate| {
@@ -302,7 +308,8 @@ impl Stepper<'_> {
         })
     }
 
-    /// Emits the chosen combination, once for each combination of branches. `is_possible`: some valuation of the scope's zone allows it.
+    /// Emits the chosen combination, once for each combination of branches. `is_possible`: some
+    /// valuation of the scope's zone allows it.
     pub(super) fn emit(&mut self, is_possible: bool, out: &mut Moves) {
         let network = self.network;
         self.parts.clear();

@@ -1,9 +1,11 @@
 //! Which combinations of broadcast receivers are wanted, decided while they are put together.
 //!
-//! Where n receivers have clock guards there are up to 2^n combinations of who takes part, and a zone leaves most of them without a
-//! valuation. So a combination is given up with its first choice that leaves nothing.
+//! Where n receivers have clock guards there are up to 2^n combinations of who takes part, and a
+//! zone leaves most of them without a valuation. So a combination is given up with its first choice
+//! that leaves nothing.
 //!
-//! Invariant: what a scope leaves out is never possible, or not wanted; what it lets pass may still turn out to be impossible.
+//! Invariant: what a scope leaves out is never possible, or not wanted; what it lets pass may still
+//! turn out to be impossible.
 
 use crate::exec::EmittedConstraint;
 use crate::zones::dbm::{self, Constraint};
@@ -38,7 +40,8 @@ pub(super) enum Demand<'c> {
 #[derive(Debug)]
 pub(super) struct Sieve {
     dimension: usize,
-    /// After each choice that took something away the valuations at which all choices are possible, for [`Scope::Within`].
+    /// After each choice that took something away the valuations at which all choices are possible,
+    /// for [`Scope::Within`].
     left: Vec<Federation>,
     /// By choice, the first of which is none: the one of them that counts after it.
     places: Vec<usize>,
@@ -77,7 +80,8 @@ impl Sieve {
         }
     }
 
-    /// Makes a choice; returns false, with nothing chosen, if the scope leaves out everything with it.
+    /// Makes a choice; returns false, with nothing chosen, if the scope leaves out everything with
+    /// it.
     pub(super) fn choose<'c>(
         &mut self,
         scope: Scope<'_>,
@@ -133,7 +137,8 @@ impl Sieve {
         self.places.pop();
     }
 
-    /// What a demand leaves of the valuations at hand, as far as that is seen at a glance; reads its constraints.
+    /// What a demand leaves of the valuations at hand, as far as that is seen at a glance; reads
+    /// its constraints.
     fn leaves(&mut self, place: usize, demand: Demand<'_>) -> Result<Leaves, Failure> {
         let (Demand::Takes(_, emitted) | Demand::Abstains(_, emitted)) = demand;
         self.has_narrowed |= !emitted.is_empty();
@@ -154,7 +159,8 @@ impl Sieve {
         })
     }
 
-    /// Takes away what the demand does not leave, the constraints of which were read; returns whether something is left.
+    /// Takes away what the demand does not leave, the constraints of which were read; returns
+    /// whether something is left.
     fn narrow(&mut self, place: usize, demand: Demand<'_>) -> bool {
         let left = &mut self.left[place];
         match demand {

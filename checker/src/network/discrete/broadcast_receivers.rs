@@ -1,10 +1,11 @@
 //! Who hears a broadcast, looked for once for all its senders in a state.
 //!
-//! Where every process may send to all others, as many pairs would be looked at in each state as there are processes squared. The
-//! candidates of the receivers do not depend on who sends; the sender's own are left out of its combinations.
+//! Where every process may send to all others, as many pairs would be looked at in each state as
+//! there are processes squared. The candidates of the receivers do not depend on who sends; the
+//! sender's own are left out of its combinations.
 //!
-//! Invariant: guards are evaluated only of processes that may hear somebody, in the order of the receivers: one that is the only sender
-//! is not asked what it hears, since its guard could fail.
+//! Invariant: guards are evaluated only of processes that may hear somebody, in the order of the
+//! receivers: one that is the only sender is not asked what it hears, since its guard could fail.
 
 use crate::exec::EmittedConstraint;
 

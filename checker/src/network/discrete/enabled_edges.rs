@@ -19,8 +19,8 @@ use crate::network::failure::Failure;
 /// The number of no channel.
 const NO_CHANNEL: u32 = u32::MAX;
 
-/// What it takes to look at the location of a process, to ask whether one receives, and to put a move together: see
-/// [`cancellation::work`].
+/// What it takes to look at the location of a process, to ask whether one receives, and to put a
+/// move together: see [`cancellation::work`].
 const UNITS_FOR_PROCESS: usize = 8;
 const UNITS_FOR_RECEIVER: usize = 16;
 const UNITS_FOR_MOVE: usize = 256;
@@ -48,7 +48,8 @@ impl Candidate {
 }
 
 impl<'a> Stepper<'a> {
-    /// As [`Stepper::moves`], without remembering, and without combinations that the scope leaves out.
+    /// As [`Stepper::moves`], without remembering, and without combinations that the scope leaves
+    /// out.
     pub(in crate::network) fn put_together(
         &mut self,
         words: &mut [i32],
@@ -102,7 +103,8 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// The moves in which `edge` of `process` sends. `needs_committed`: another process must leave a committed location.
+    /// The moves in which `edge` of `process` sends. `needs_committed`: another process must leave
+    /// a committed location.
     fn synchronisations(
         &mut self,
         process: u32,
@@ -230,8 +232,8 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Makes sure that the channels of the instances of a receiving edge, the one with this index in its location, are known;
-    /// returns false if all have the same channel.
+    /// Makes sure that the channels of the instances of a receiving edge, the one with this index
+    /// in its location, are known; returns false if all have the same channel.
     fn hears(
         &mut self,
         process: u32,
@@ -263,8 +265,9 @@ impl<'a> Stepper<'a> {
         Ok(true)
     }
 
-    /// What an instance of a receiving edge listens to whose channel cannot be computed: nothing if its guard does not hold, for then
-    /// the channel does not count; else it is an error. The select values are in the buffer.
+    /// What an instance of a receiving edge listens to whose channel cannot be computed: nothing if
+    /// its guard does not hold, for then the channel does not count; else it is an error. The
+    /// select values are in the buffer.
     fn unheard(
         &mut self,
         entry: EdgeEntry<'a>,
@@ -324,7 +327,8 @@ impl<'a> Stepper<'a> {
         Ok(true)
     }
 
-    /// Evaluates a guard with the arguments in the buffer; its clock constraints are appended to the buffer.
+    /// Evaluates a guard with the arguments in the buffer; its clock constraints are appended to
+    /// the buffer.
     pub(super) fn guard(&mut self, guard: &Guard, words: &mut [i32]) -> Result<bool, RunTimeError> {
         let first = self.constraints.len();
         if guard.emits

@@ -1,7 +1,7 @@
 //! Which instances of a receiving edge listen to a channel, evaluated at most once for each state.
 //!
-//! Every sender of a state asks all its receivers; where the channel is chosen by an expression over `select` values, asking
-//! anew for each sender costs the product of both.
+//! Every sender of a state asks all its receivers; where the channel is chosen by an expression
+//! over `select` values, asking anew for each sender costs the product of both.
 
 use std::ops::Range;
 
@@ -10,7 +10,8 @@ use std::ops::Range;
 pub(super) struct Listening {
     /// The state that it holds for, by its number.
     round: u64,
-    /// By receiving edge of the location: where its instances lie in `instances`, if they were evaluated.
+    /// By receiving edge of the location: where its instances lie in `instances`, if they were
+    /// evaluated.
     edges: Vec<Option<Range<usize>>>,
     /// Channels with instances; in the range of an edge, ascending.
     instances: Vec<(u32, u32)>,

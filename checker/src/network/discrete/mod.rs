@@ -1,4 +1,5 @@
-//! Enabled edges, synchronisations and broadcasts of a discrete state, and what taking them does to its words.
+//! Enabled edges, synchronisations and broadcasts of a discrete state, and what taking them does to
+//! its words.
 
 pub(super) mod broadcast;
 pub(super) mod broadcast_filter;

@@ -16,8 +16,9 @@ use super::stepper::Stepper;
 use super::transition::{Label, Moves, Part};
 use crate::network::failure::Failure;
 
-/// Partners of a sending edge that has several instances are looked for among all processes that receive on one of its channels if these
-/// are not more than so many for each instance, else by channel.
+/// Partners of a sending edge that has several instances are looked for among all processes that
+/// receive on one of its channels if these are not more than so many for each instance, else by
+/// channel.
 const MOST_PARTNERS: usize = 4;
 
 /// A pair that synchronises.
@@ -32,7 +33,8 @@ pub(super) struct Pair<'a> {
     other: u32,
 }
 
-/// The processes that may receive on one of the channels of an array, for arrays on which edges send that have several instances.
+/// The processes that may receive on one of the channels of an array, for arrays on which edges
+/// send that have several instances.
 pub(super) type Partners = FxHashMap<(ChannelId, u32), Arc<[u32]>>;
 
 /// Finds the partners by the receivers of each channel.
@@ -123,7 +125,8 @@ impl<'a> Stepper<'a> {
         Some(())
     }
 
-    /// Adds the instances of a set to the candidates, if a channel is given those that listen to it.
+    /// Adds the instances of a set to the candidates, if a channel is given those that listen to
+    /// it.
     pub(super) fn add_candidates(
         &mut self,
         process: u32,
@@ -194,7 +197,8 @@ impl<'a> Stepper<'a> {
         self.add_candidate(process, entry, set, instance);
     }
 
-    /// Finds the pairs in which an edge sends on a binary channel; returns false if they must be looked for otherwise.
+    /// Finds the pairs in which an edge sends on a binary channel; returns false if they must be
+    /// looked for otherwise.
     fn pair(
         &mut self,
         sender: u32,
@@ -249,7 +253,8 @@ impl<'a> Stepper<'a> {
                     });
             }
         }
-        // The order is that of looking for receivers for one instance of the sender after the other.
+        // The order is that of looking for receivers for one instance of the sender after the
+        // other.
         self.pairs.sort_by_key(|pair| pair.own);
         true
     }

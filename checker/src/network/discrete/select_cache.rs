@@ -1,14 +1,16 @@
 //! The enabled instances of edges with `select`, remembered by the words that decide them.
 //!
-//! Guards and channel expressions of an edge often read few words, whose values come again and again: for each combination of
-//! values met so far there is a *set* of the edge's enabled instances, with their channels and clock constraints. Where two processes
-//! synchronise, who fits whom depends on two sets only, and is remembered too.
+//! Guards and channel expressions of an edge often read few words, whose values come again and
+//! again: for each combination of values met so far there is a *set* of the edge's enabled
+//! instances, with their channels and clock constraints. Where two processes synchronise, who fits
+//! whom depends on two sets only, and is remembered too.
 //!
 //! Invariants:
-//! * A set is what evaluating the edge's functions in the state gives, since these read no other words. Where evaluating fails there
-//!   is no set, and whoever asks evaluates one instance after the other, so that only what is needed can fail.
-//! * Sets stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes later is not remembered, nor are
-//!   edges whose words seldom come again.
+//! * A set is what evaluating the edge's functions in the state gives, since these read no other
+//!   words. Where evaluating fails there is no set, and whoever asks evaluates one instance after
+//!   the other, so that only what is needed can fail.
+//! * Sets stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes
+//!   later is not remembered, nor are edges whose words seldom come again.
 
 use std::hash::{Hash, Hasher};
 use std::ops::Range;
@@ -26,7 +28,8 @@ use crate::analysis::function_reads::read_words;
 const MOST_BYTES: usize = 16 << 20;
 /// Edges whose functions read more words are not remembered.
 const MOST_WORDS: usize = 16;
-/// After so many new sets an edge is given up unless [`LEAST_USES`] states on average asked for each.
+/// After so many new sets an edge is given up unless [`LEAST_USES`] states on average asked for
+/// each.
 const TRIAL: u32 = 256;
 const LEAST_USES: u64 = 4;
 
@@ -118,7 +121,8 @@ pub(super) struct Instances {
     memories: Vec<Memory>,
     sets: Vec<Set>,
     key: Vec<i32>,
-    /// By two sets, of a sender and of a receiver: where in `matches` the pairs of their instances with the same channel lie.
+    /// By two sets, of a sender and of a receiver: where in `matches` the pairs of their instances
+    /// with the same channel lie.
     pairs: HashTable<(SetId, SetId, u32, u32)>,
     matches: Vec<(u32, u32)>,
     bytes: usize,
@@ -188,7 +192,8 @@ impl Instances {
         Known::Set(memory.latest.1)
     }
 
-    /// Remembers the set of the edge that was asked for last and found new; `None` if there is no place for it.
+    /// Remembers the set of the edge that was asked for last and found new; `None` if there is no
+    /// place for it.
     pub(super) fn remember(
         &mut self,
         process: u32,
@@ -221,8 +226,8 @@ impl Instances {
         &self.sets[id as usize]
     }
 
-    /// Which instances of a sending and of a receiving edge have the same channel: adds the pairs of their places, by that of the
-    /// sender, then by that of the receiver.
+    /// Which instances of a sending and of a receiving edge have the same channel: adds the pairs
+    /// of their places, by that of the sender, then by that of the receiver.
     #[inline]
     pub(super) fn add_matches(
         &mut self,
@@ -262,7 +267,8 @@ impl Instances {
     }
 }
 
-/// The words that decide the instances of an edge; `None` if it is not worth remembering, or they are not known.
+/// The words that decide the instances of an edge; `None` if it is not worth remembering, or they
+/// are not known.
 fn deciding_words(network: &Network, edge: &Edge) -> Option<Vec<u32>> {
     let index = edge.sync.and_then(|sync| sync.index);
     let is_broadcast = |sync: crate::ir::Sync| network.channels[sync.channel.0 as usize].broadcast;

@@ -1,4 +1,5 @@
-//! The `select` bindings of an edge: combinations of their values, numbered in mixed radix, the last binding fastest.
+//! The `select` bindings of an edge: combinations of their values, numbered in mixed radix, the
+//! last binding fastest.
 
 use crate::ir::Edge;
 

@@ -2,10 +2,13 @@
 //!
 //! Invariants:
 //! * The words handed in are those of a whole state; queries for moves do not change them.
-//! * Moves come in a fixed order: by sending process, then edge, select values, partners, branches. Nothing depends on hashes.
-//! * Clock guards are not decided here: each move carries the constraints under which it is possible.
+//! * Moves come in a fixed order: by sending process, then edge, select values, partners, branches.
+//!   Nothing depends on hashes.
+//! * Clock guards are not decided here: each move carries the constraints under which it is
+//!   possible.
 //!
-//! Cost: proportional to the edges that leave the current locations; no allocation once the buffers have grown.
+//! Cost: proportional to the edges that leave the current locations; no allocation once the buffers
+//! have grown.
 
 use std::ops::Range;
 
@@ -56,7 +59,8 @@ pub struct Stepper<'a> {
     pub(super) partners: Partners,
     /// The pairs of the sending edge at hand.
     pub(super) pairs: Vec<Pair<'a>>,
-    /// By process: the channels of its receiving instances in the state at hand, whose number is `round`.
+    /// By process: the channels of its receiving instances in the state at hand, whose number is
+    /// `round`.
     pub(super) listening: Vec<Listening>,
     pub(super) round: u64,
     /// The channels of the instances of one edge.
@@ -148,9 +152,11 @@ impl<'a> Stepper<'a> {
             .any(|(tables, &location)| tables[location as usize].urgency != Urgency::Normal)
     }
 
-    /// Whether time may pass as far as locations and urgent channels say. `moves` are the moves of the state.
+    /// Whether time may pass as far as locations and urgent channels say. `moves` are the moves of
+    /// the state.
     ///
-    /// Synchronisations on urgent channels whose guards have clocks do not count here: see [`crate::network::Symbolic::barriers`].
+    /// Synchronisations on urgent channels whose guards have clocks do not count here: see
+    /// [`crate::network::Symbolic::barriers`].
     pub fn may_delay(&self, words: &[i32], moves: &Moves) -> bool {
         if self.is_urgent(words) {
             return false;
@@ -167,7 +173,8 @@ impl<'a> Stepper<'a> {
             .is_some_and(|channel| self.network.channels[channel.0 as usize].urgent)
     }
 
-    /// The level of a move: that of its channel, then the greatest of its processes; greater is more urgent.
+    /// The level of a move: that of its channel, then the greatest of its processes; greater is
+    /// more urgent.
     pub fn level(&self, one: MoveRef<'_>) -> (u32, u32) {
         let default = self.network.features.default_priority;
         let priority = |channel: ChannelId| self.network.channels[channel.0 as usize].priority;
@@ -193,12 +200,14 @@ impl<'a> Stepper<'a> {
         self.put_together(words, Scope::Everything, out)
     }
 
-    /// The location vector of the state, if it is known; it is after the first time that it was asked for.
+    /// The location vector of the state, if it is known; it is after the first time that it was
+    /// asked for.
     pub fn vector(&mut self, words: &[i32]) -> Option<VectorId> {
         self.offers.vector(words)
     }
 
-    /// As [`Stepper::moves`], without combinations that the scope leaves out: for a search, which cannot know whether remembering pays.
+    /// As [`Stepper::moves`], without combinations that the scope leaves out: for a search, which
+    /// cannot know whether remembering pays.
     pub(in crate::network) fn moves_in(
         &mut self,
         words: &mut [i32],
@@ -223,8 +232,8 @@ impl<'a> Stepper<'a> {
         self.put_together(words, scope, out)
     }
 
-    /// The moves of a state with this location vector, if they depend on locations and answers of guards alone and there is place
-    /// to remember them.
+    /// The moves of a state with this location vector, if they depend on locations and answers of
+    /// guards alone and there is place to remember them.
     pub fn offer(
         &mut self,
         vector: VectorId,
@@ -267,7 +276,8 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// Puts the moves of a state with this location vector together and remembers them if they do not depend on the scope.
+    /// Puts the moves of a state with this location vector together and remembers them if they do
+    /// not depend on the scope.
     fn remember(
         &mut self,
         vector: VectorId,
@@ -277,7 +287,8 @@ impl<'a> Stepper<'a> {
     ) -> Result<Option<OfferId>, Failure> {
         self.sieve.has_narrowed = false;
         self.record = Some(Record::default());
-        // Where it is cut off, what was recorded so far must not be taken for that of another state.
+        // Where it is cut off, what was recorded so far must not be taken for that of another
+        // state.
         let put_together = || self.put_together(words, scope, out);
         let result = cancellation::unless_cut(put_together).unwrap_or(Err(Failure::Interrupted));
         let mut record = self.record.take().unwrap_or_default();
@@ -298,7 +309,8 @@ impl<'a> Stepper<'a> {
         self.offers.bytes() + self.instances.bytes()
     }
 
-    /// Takes the move: changes locations and variables. The clock assignments, in order, are in the result.
+    /// Takes the move: changes locations and variables. The clock assignments, in order, are in the
+    /// result.
     pub fn fire(
         &mut self,
         parts: &[Part],
@@ -359,7 +371,8 @@ impl<'a> Stepper<'a> {
         self.executor.call(function, arguments, &mut context)
     }
 
-    /// Evaluates all invariants: `None` if the words break one, else the clock constraints that must hold.
+    /// Evaluates all invariants: `None` if the words break one, else the clock constraints that
+    /// must hold.
     pub fn invariants(
         &mut self,
         words: &mut [i32],

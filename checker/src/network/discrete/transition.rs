@@ -1,4 +1,5 @@
-//! Moves: one composed transition each, kept in flat buffers that are used again from state to state.
+//! Moves: one composed transition each, kept in flat buffers that are used again from state to
+//! state.
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ChannelId;
@@ -15,7 +16,8 @@ pub struct Part {
     pub edge: u32,
     /// Index of the branch of the edge.
     pub branch: u32,
-    /// Which combination of `select` values: the mixed-radix number over the bindings, the last binding fastest.
+    /// Which combination of `select` values: the mixed-radix number over the bindings, the last
+    /// binding fastest.
     pub select: u32,
 }
 
@@ -43,7 +45,8 @@ pub(in crate::network) struct Label {
     pub(super) controllable: bool,
     /// See [`MoveRef::rank`].
     pub(super) rank: u64,
-    /// Whether it is known that its guards leave something of the zone that the moves are asked for.
+    /// Whether it is known that its guards leave something of the zone that the moves are asked
+    /// for.
     pub(in crate::network) is_possible: bool,
 }
 
@@ -63,7 +66,8 @@ pub struct Moves {
     headers: Vec<Header>,
     parts: Vec<Part>,
     constraints: Vec<EmittedConstraint>,
-    /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast receivers that abstain.
+    /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast
+    /// receivers that abstain.
     excluded: Vec<(u32, u32)>,
     /// The offer that they are, if they are remembered.
     pub(super) offer: Option<OfferId>,
@@ -80,7 +84,8 @@ pub struct MoveRef<'a> {
     pub channel: Option<ChannelId>,
     /// Whether the controller owns the move: all participating edges are controllable.
     pub controllable: bool,
-    /// The place of the move among all that the locations and variables of the state allow, whatever the zone.
+    /// The place of the move among all that the locations and variables of the state allow,
+    /// whatever the zone.
     pub rank: u64,
     pub(in crate::network) label: Label,
     /// Of remembered moves: the offer and the place in it.

@@ -1,15 +1,18 @@
 //! Moves by location vector, remembered.
 //!
-//! The locations and the answers of guards decide which moves a state has. So each location vector keeps a tree of *questions*,
-//! the functions that [`crate::network::Stepper`] evaluates for it in their order, with a branch for each answer met so far. At a leaf
-//! stands an [`OfferId`]: the moves, put together once. For a state whose answers were met before, only guards are evaluated.
+//! The locations and the answers of guards decide which moves a state has. So each location vector
+//! keeps a tree of *questions*, the functions that [`crate::network::Stepper`] evaluates for it in
+//! their order, with a branch for each answer met so far. At a leaf stands an [`OfferId`]: the
+//! moves, put together once. For a state whose answers were met before, only guards are evaluated.
 //!
 //! Invariants:
-//! * A tree asks what putting the moves together asks, in the same order, so that the first run-time error is the same; only what was
-//!   asked before, with the same arguments, is not asked again.
-//! * The moves of an offer do not depend on variables otherwise. A location vector where some guard emits clock constraints
-//!   is *unsuited* and has no tree.
-//! * Ids stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes later is not remembered.
+//! * A tree asks what putting the moves together asks, in the same order, so that the first
+//!   run-time error is the same; only what was asked before, with the same arguments, is not asked
+//!   again.
+//! * The moves of an offer do not depend on variables otherwise. A location vector where some guard
+//!   emits clock constraints is *unsuited* and has no tree.
+//! * Ids stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes
+//!   later is not remembered.
 
 use std::hash::{Hash, Hasher};
 
@@ -31,10 +34,12 @@ const MOST_QUESTIONS: usize = 256;
 /// A question has few answers, mostly no and yes.
 const USUAL_ANSWERS: usize = 2;
 
-/// So many states of a search make a trial of whether remembering pays; one of [`LEAST_FOUND`] must find its moves.
+/// So many states of a search make a trial of whether remembering pays; one of [`LEAST_FOUND`] must
+/// find its moves.
 const TRIAL: u32 = 1024;
 const LEAST_FOUND: u32 = 4;
-/// After a trial that failed so many states do not ask, and four times as many after each further one.
+/// After a trial that failed so many states do not ask, and four times as many after each further
+/// one.
 const FIRST_PAUSE: u32 = 16 * TRIAL;
 const LONGEST_PAUSE: u32 = 256 * TRIAL;
 
@@ -134,7 +139,8 @@ pub(super) struct Offers {
     trial: Trial,
 }
 
-/// Whether remembering pays where nobody knows beforehand: for a search, which may meet most location vectors a few times only.
+/// Whether remembering pays where nobody knows beforehand: for a search, which may meet most
+/// location vectors a few times only.
 #[derive(Debug, Default)]
 struct Trial {
     /// How many states asked in this trial, and how many of them found their moves.
@@ -190,7 +196,8 @@ impl Offers {
         self.bytes
     }
 
-    /// The id of the state's location vector; `None` if it is new, as most that are met once are never met again.
+    /// The id of the state's location vector; `None` if it is new, as most that are met once are
+    /// never met again.
     pub(super) fn vector(&mut self, words: &[i32]) -> Option<VectorId> {
         let key = &words[..self.processes];
         let (locations, processes) = (&self.locations, self.processes);
@@ -247,7 +254,8 @@ impl Offers {
         &self.moves[offer.0 as usize]
     }
 
-    /// Remembers moves with the questions that led to them, and tells them so; `None` if the location vector is unsuited.
+    /// Remembers moves with the questions that led to them, and tells them so; `None` if the
+    /// location vector is unsuited.
     pub(super) fn remember(
         &mut self,
         vector: VectorId,
@@ -272,7 +280,8 @@ impl Offers {
         Some(offer)
     }
 
-    /// Adds to a tree the branch on which the questions have the recorded answers; returns the root.
+    /// Adds to a tree the branch on which the questions have the recorded answers; returns the
+    /// root.
     fn graft(&mut self, root: Option<Point>, record: Record, leaf: Point) -> Point {
         let mut way = root;
         let mut parent: Option<(u32, i32)> = None;

@@ -1,6 +1,8 @@
-//! Which processes may get in each other's way in a state in which time stands still, learnt when it is asked for.
+//! Which processes may get in each other's way in a state in which time stands still, learnt when
+//! it is asked for.
 //!
-//! A *situation* of a process is its location, and whether the edges that may sleep do; situations alone decide.
+//! A *situation* of a process is its location, and whether the edges that may sleep do; situations
+//! alone decide.
 
 use crate::ir::{LocationId, Network};
 use crate::zones::{Zone, dbm};
@@ -45,7 +47,8 @@ struct Table {
     /// By situation: the footprints now and in the future.
     now: Vec<Option<Box<Footprint>>>,
     future: Vec<Option<Box<Footprint>>>,
-    /// By situation of one process, then of another: whether what the other may do gets in the way of what the one can do now.
+    /// By situation of one process, then of another: whether what the other may do gets in the way
+    /// of what the one can do now.
     meets: Vec<Vec<Option<bool>>>,
 }
 
@@ -106,7 +109,8 @@ impl Interference {
             .unwrap_or_default()
     }
 
-    /// Whether what a process in the situation `other` may do may get in the way of what one in the situation `member` can do now.
+    /// Whether what a process in the situation `other` may do may get in the way of what one in the
+    /// situation `member` can do now.
     #[inline]
     pub(super) fn meets(
         &mut self,

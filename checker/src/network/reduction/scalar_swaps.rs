@@ -1,10 +1,12 @@
 //! What changes places with what when two members of a scalar set are exchanged.
 //!
-//! A set is left out if the model tells its members apart ([`crate::ir::ScalarSet::told_apart_by`]), if words that nothing writes
-//! do, or if the receivers of a broadcast run updates whose order matters: they run in the order of processes, which exchanging
-//! members would change.
+//! A set is left out if the model tells its members apart
+//! ([`crate::ir::ScalarSet::told_apart_by`]), if words that nothing writes do, or if the receivers
+//! of a broadcast run updates whose order matters: they run in the order of processes, which
+//! exchanging members would change.
 //!
-//! Invariant: every exchange is an involution, and it only moves words of the same range to each other.
+//! Invariant: every exchange is an involution, and it only moves words of the same range to each
+//! other.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,7 +21,8 @@ use crate::analysis::function_reads::read_words;
 const MOST_MEMBERS: u32 = 64;
 
 impl Symmetry {
-    /// The exchanges of members that leave the behaviour of a network as it is; `None` if there are none.
+    /// The exchanges of members that leave the behaviour of a network as it is; `None` if there are
+    /// none.
     pub fn of_network(network: &Network) -> Option<Arc<Symmetry>> {
         let places = Places::new(network);
         let mut symmetry = Symmetry {
@@ -205,7 +208,8 @@ impl<'n> Places<'n> {
         Some(swap)
     }
 
-    /// Whether a word may get another value: something writes it, or it would get the value that it has.
+    /// Whether a word may get another value: something writes it, or it would get the value that it
+    /// has.
     fn is_movable(&self, exchange: Exchange, (first, second): (u32, u32)) -> bool {
         let (word, source) = (exchange.word as usize, exchange.source as usize);
         let initial = &self.network.initial;
@@ -300,8 +304,8 @@ fn moved(place: u32, coordinates: &[Coordinate], set: u32, (first, second): (u32
     })
 }
 
-/// Whether two processes that exchanging members of a set reorders may receive the same broadcast, with updates whose order
-/// matters.
+/// Whether two processes that exchanging members of a set reorders may receive the same broadcast,
+/// with updates whose order matters.
 fn has_ordered_receivers(network: &Network, set: u32) -> bool {
     let mut groups: HashMap<u32, Vec<&Process>> = HashMap::new();
     for process in &network.processes {

@@ -1,23 +1,31 @@
-//! Partial-order reduction: where time stands still, independent processes need not be interleaved in every order.
+//! Partial-order reduction: where time stands still, independent processes need not be interleaved
+//! in every order.
 //!
-//! In a state in which time cannot pass, a set P of processes is *stubborn* if no process outside, whatever
-//! it may do while time stands still, gets in the way of an edge that leaves the current location of a process in P, or takes
-//! part in a move with it ([`crate::analysis::dependence`]), and if P has a process that keeps time from passing ([`super::time_stoppers`]), by staying in
-//! a committed location if there are any. As long as no process of P moves, time stands still and the moves of P stay what they are. So of every
-//! run from the state, the first move of P can be taken first, and if it has none, one of P can be put before it. Moves of P
-//! that cannot make what is looked for false again, or that nothing outside P can make true, are enough then to find it.
+//! In a state in which time cannot pass, a set P of processes is *stubborn* if no process outside,
+//! whatever it may do while time stands still, gets in the way of an edge that leaves the current
+//! location of a process in P, or takes part in a move with it ([`crate::analysis::dependence`]),
+//! and if P has a process that keeps time from passing ([`super::time_stoppers`]), by staying in a
+//! committed location if there are any. As long as no process of P moves, time stands still and the
+//! moves of P stay what they are. So of every run from the state, the first move of P can be taken
+//! first, and if it has none, one of P can be put before it. Moves of P that cannot make what is
+//! looked for false again, or that nothing outside P can make true, are enough then to find it.
 //!
-//! A run in which none of P takes part would be put off for ever where moves of P make a loop. So they are enough only if one of
-//! them is possible in the whole zone, and either leads to a state that is still to be explored, or cannot be on a loop in which
-//! no time passes ([`crate::analysis::zero_time_cycles`]); else all moves are taken. This keeps failures and
-//! deadlocks too: every failure that a search of all moves meets has its like, though perhaps another is met first.
+//! A run in which none of P takes part would be put off for ever where moves of P make a loop. So
+//! they are enough only if one of them is possible in the whole zone, and either leads to a state
+//! that is still to be explored, or cannot be on a loop in which no time passes
+//! ([`crate::analysis::zero_time_cycles`]); else all moves are taken. This keeps failures and
+//! deadlocks too: every failure that a search of all moves meets has its like, though perhaps
+//! another is met first.
 //!
-//! Sources: A. Valmari, "Stubborn Sets for Reduced State Space Generation", 1991; D. Bošnački, G. J. Holzmann, "Improving SPIN's
-//! Partial-Order Reduction for Breadth-First Search", SPIN 2005 (the condition on loops); K. G. Larsen, M. Mikučionis, M. Muñiz,
-//! J. Srba, "Urgent Partial Order Reduction for Extended Timed Automata", ATVA 2020 (states in which time stands still). Here sets are
-//! of processes and not of edges, and what they depend on is asked of locations only, so that it is remembered.
+//! Sources: A. Valmari, "Stubborn Sets for Reduced State Space Generation", 1991; D. Bošnački, G.
+//! J. Holzmann, "Improving SPIN's Partial-Order Reduction for Breadth-First Search", SPIN 2005 (the
+//! condition on loops); K. G. Larsen, M. Mikučionis, M. Muñiz, J. Srba, "Urgent Partial Order
+//! Reduction for Extended Timed Automata", ATVA 2020 (states in which time stands still). Here sets
+//! are of processes and not of edges, and what they depend on is asked of locations only, so that
+//! it is remembered.
 //!
-//! Cost: for some sets of a state a look-up for each pair of processes; given up where it seldom helps ([`TRIAL`]).
+//! Cost: for some sets of a state a look-up for each pair of processes; given up where it seldom
+//! helps ([`TRIAL`]).
 
 use std::sync::Arc;
 
@@ -56,7 +64,8 @@ pub struct PartialOrder {
 }
 
 impl PartialOrder {
-    /// What a search for a state with the predicate may reduce by; `None` if nothing can be gained, or that is not known to be sound.
+    /// What a search for a state with the predicate may reduce by; `None` if nothing can be gained,
+    /// or that is not known to be sound.
     pub fn new(network: &Network, goal: &Predicate) -> Option<Arc<PartialOrder>> {
         let locations: usize = network
             .processes
@@ -92,7 +101,8 @@ impl PartialOrder {
 /// Which of the moves of a state are taken first, and whether these are enough.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Agenda {
-    /// The indices of the moves in the order in which they are taken; empty if that is the order that they have.
+    /// The indices of the moves in the order in which they are taken; empty if that is the order
+    /// that they have.
     order: Vec<u32>,
     /// How many moves of a stubborn set stand first.
     first: usize,
@@ -173,7 +183,8 @@ impl StubbornSets {
         }
     }
 
-    /// Puts the moves of a stubborn set first, if the state with these words, zone and moves has one with fewer than all.
+    /// Puts the moves of a stubborn set first, if the state with these words, zone and moves has
+    /// one with fewer than all.
     pub(crate) fn choose(
         &mut self,
         symbolic: &mut Symbolic<'_>,
@@ -239,8 +250,8 @@ impl StubbornSets {
         self.gains += u32::from(agenda.are_enough);
     }
 
-    /// Looks for the stubborn set with the fewest possible moves, which is left in `best`; returns whether there is one with fewer
-    /// than all.
+    /// Looks for the stubborn set with the fewest possible moves, which is left in `best`; returns
+    /// whether there is one with fewer than all.
     fn find_best(
         &mut self,
         ground: Ground<'_>,

@@ -1,21 +1,27 @@
-//! Symmetry reduction: of states that differ only in which member of a scalar set is which, a search needs to see one.
+//! Symmetry reduction: of states that differ only in which member of a scalar set is which, a
+//! search needs to see one.
 //!
-//! Exchanging two members of a scalar set everywhere (in values, in arrays indexed by the set, among processes of which
-//! there is one for each member, and in their clocks) turns runs into runs, and does not change whether a predicate holds:
-//! neither the language of models nor that of queries can name a member. So a search may replace every state by another one
-//! of its orbit; if the start is s and p a permutation, all that is reachable from p(s) is p of what is reachable from s,
-//! and so the initial state need not look the same from all members. What *can* tell members apart is found when the model is
-//! loaded ([`crate::ir::ScalarSet`]) or here (`network/reduction/scalar_swaps.rs`), and sets of such members are left as they are.
+//! Exchanging two members of a scalar set everywhere (in values, in arrays indexed by the set,
+//! among processes of which there is one for each member, and in their clocks) turns runs into
+//! runs, and does not change whether a predicate holds: neither the language of models nor that of
+//! queries can name a member. So a search may replace every state by another one of its orbit; if
+//! the start is s and p a permutation, all that is reachable from p(s) is p of what is reachable
+//! from s, and so the initial state need not look the same from all members. What *can* tell
+//! members apart is found when the model is loaded ([`crate::ir::ScalarSet`]) or here
+//! (`network/reduction/scalar_swaps.rs`), and sets of such members are left as they are.
 //!
-//! [`Symmetry::normalise`] exchanges members as long as that makes the state less in a total order: the words one after the
-//! other, then the bounds of each clock against 0, then those of differences. So the result is the least state among all that
-//! differ from it by one exchange; orbits may keep several such. Every exchange is an element of the group, so that this costs
+//! [`Symmetry::normalise`] exchanges members as long as that makes the state less in a total order:
+//! the words one after the other, then the bounds of each clock against 0, then those of
+//! differences. So the result is the least state among all that differ from it by one exchange;
+//! orbits may keep several such. Every exchange is an element of the group, so that this costs
 //! states and never soundness.
 //!
-//! Source: M. Hendriks, G. Behrmann, K. G. Larsen, P. Niebert, F. Vaandrager, "Adding Symmetry Reduction to UPPAAL", FORMATS 2003
-//! (state swaps and their soundness). There, the order of resets decides between clocks; here, the order of bounds.
+//! Source: M. Hendriks, G. Behrmann, K. G. Larsen, P. Niebert, F. Vaandrager, "Adding Symmetry
+//! Reduction to UPPAAL", FORMATS 2003 (state swaps and their soundness). There, the order of resets
+//! decides between clocks; here, the order of bounds.
 //!
-//! Cost: for each pair of members that words tell apart a few comparisons; for others up to four rows of the zone.
+//! Cost: for each pair of members that words tell apart a few comparisons; for others up to four
+//! rows of the zone.
 
 use crate::ir::Network;
 use crate::zones::Bound;
@@ -194,8 +200,8 @@ impl Symmetry {
         self.sets.iter().flat_map(|set| 0..set.count).collect()
     }
 
-    /// Replaces a state by one that differs only in which member is which, mostly the same for all such states. Adds the
-    /// numbers of the exchanges that led there to `exchanges`.
+    /// Replaces a state by one that differs only in which member is which, mostly the same for all
+    /// such states. Adds the numbers of the exchanges that led there to `exchanges`.
     pub fn normalise(&self, words: &mut [i32], zone: &mut [Bound], exchanges: &mut Vec<u32>) {
         let mut tried = 0;
         // Round and round until no exchange has made the state less since it was last tried.
@@ -241,7 +247,8 @@ impl Symmetry {
         }
     }
 
-    /// The move among `moves`, those of a state, that becomes `image` when the members are permuted.
+    /// The move among `moves`, those of a state, that becomes `image` when the members are
+    /// permuted.
     pub fn find_original(
         &self,
         permutation: &Permutation,

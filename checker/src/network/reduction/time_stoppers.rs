@@ -1,11 +1,15 @@
-//! Who keeps time from passing in a state: which processes, as long as they do not move, leave it no way.
+//! Who keeps time from passing in a state: which processes, as long as they do not move, leave it
+//! no way.
 //!
 //! * Who stays in an urgent location, or in a committed one.
-//! * Who stays in a location whose invariant bounds a clock from above, where all valuations have reached the bound.
-//! * Who takes part in a synchronisation on an urgent channel that is possible whatever the clocks say.
+//! * Who stays in a location whose invariant bounds a clock from above, where all valuations have
+//!   reached the bound.
+//! * Who takes part in a synchronisation on an urgent channel that is possible whatever the clocks
+//!   say.
 //!
-//! The last two can also end because of others: who writes what the invariant, or the guards of the synchronisation, read. Those are the
-//! ones that get in the way of the holder (see [`crate::analysis::dependence`]).
+//! The last two can also end because of others: who writes what the invariant, or the guards of the
+//! synchronisation, read. Those are the ones that get in the way of the holder (see
+//! [`crate::analysis::dependence`]).
 //!
 //! Where the rate of a clock may be 0, bounds of invariants do not count.
 
@@ -77,8 +81,9 @@ impl Holders {
                 .any(|one| *one == Urgency::Urgent)
     }
 
-    /// Notes by process whether it keeps time from passing in a state with these words, zone and moves; returns why it stands still.
-    /// If some location is committed, only who stays in one counts.
+    /// Notes by process whether it keeps time from passing in a state with these words, zone and
+    /// moves; returns why it stands still. If some location is committed, only who stays in one
+    /// counts.
     pub(super) fn find(
         &self,
         symbolic: &mut Symbolic<'_>,
@@ -157,7 +162,8 @@ fn is_at_least(zone: &Zone, clock: usize, value: i32) -> bool {
     Bound::weak(value).is_some_and(|value| zone.bound(0, clock) + value <= Bound::LE_ZERO)
 }
 
-/// Whether all valuations of the zone have come to an upper bound that the invariant of a process has now.
+/// Whether all valuations of the zone have come to an upper bound that the invariant of a process
+/// has now.
 fn has_reached_limit(
     symbolic: &mut Symbolic<'_>,
     process: usize,

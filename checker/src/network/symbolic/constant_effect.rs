@@ -1,7 +1,8 @@
 //! Moves whose effect on clocks and locations does not depend on variables, worked out once.
 //!
-//! Invariant: taking a [`FixedMove`] runs the functions that taking the move runs, in the same order, and gives the same words;
-//! what it does to clocks is [`FixedMove::effect`] in every state of its location vector.
+//! Invariant: taking a [`FixedMove`] runs the functions that taking the move runs, in the same
+//! order, and gives the same words; what it does to clocks is [`FixedMove::effect`] in every state
+//! of its location vector.
 
 use crate::exec::{EmittedConstraint, RunTimeError};
 use crate::ir::{FunctionId, Update};
@@ -70,7 +71,8 @@ impl Stepper<'_> {
 }
 
 impl Symbolic<'_> {
-    /// Works out a move of a state with these words; `None` if its effect on clocks, or whether it is possible, may depend on variables.
+    /// Works out a move of a state with these words; `None` if its effect on clocks, or whether it
+    /// is possible, may depend on variables.
     pub fn fix(&self, one: MoveRef<'_>, words: &[i32]) -> Option<FixedMove> {
         let network = self.stepper.network();
         let mut fixed = FixedMove {
@@ -117,7 +119,8 @@ impl Symbolic<'_> {
         to_constraints(&emitted).ok()?
     }
 
-    /// Whether locations and the answers of guards decide which moves there are, and locations alone how time passes.
+    /// Whether locations and the answers of guards decide which moves there are, and locations
+    /// alone how time passes.
     pub fn is_fixed(&self) -> bool {
         if self.has_priorities || self.restriction.is_some() {
             return false;

@@ -1,13 +1,15 @@
 //! Deadlocks: the valuations of a state from which no move is possible, now or after any delay.
 //!
-//! Most states have a move that every valuation of the zone can wait for. Whether a move is one, its guard tells without an operation on
-//! zones ([`hold_sometime`]): a valuation v can wait until lower bounds `x >= l` and upper bounds `y <= u` hold, those of the invariant
-//! among these, exactly if `y - x <= u - l` holds of v for all pairs of them, and `y <= u` for the upper bounds of the guard. That is
-//! Fourier and Motzkin's elimination of the delay; the bound of a closed zone on `y - x` is what decides it for all its valuations.
+//! Most states have a move that every valuation of the zone can wait for. Whether a move is one,
+//! its guard tells without an operation on zones ([`hold_sometime`]): a valuation v can wait until
+//! lower bounds `x >= l` and upper bounds `y <= u` hold, those of the invariant among these,
+//! exactly if `y - x <= u - l` holds of v for all pairs of them, and `y <= u` for the upper bounds
+//! of the guard. That is Fourier and Motzkin's elimination of the delay; the bound of a closed zone
+//! on `y - x` is what decides it for all its valuations.
 //!
-//! Only where no move is within reach of the whole zone, the valuations before each move are made, and whether they cover the zone is
-//! decided part by part ([`Federation::includes_zone`]), so that no list of what is left grows. What is left is only computed where it
-//! is asked for.
+//! Only where no move is within reach of the whole zone, the valuations before each move are made,
+//! and whether they cover the zone is decided part by part ([`Federation::includes_zone`]), so that
+//! no list of what is left grows. What is left is only computed where it is asked for.
 
 use crate::zones::clocks::Assignment;
 use crate::zones::dbm::Constraint;
@@ -131,7 +133,8 @@ impl Symbolic<'_> {
         Ok(Alive::Within(alive))
     }
 
-    /// Whether one of the moves without guards, or of the others, is surely possible, now or later, from all of the zone.
+    /// Whether one of the moves without guards, or of the others, is surely possible, now or later,
+    /// from all of the zone.
     fn is_one_within_reach(
         &mut self,
         (words, zone): (&mut [i32], &[Bound]),
@@ -177,7 +180,8 @@ impl Symbolic<'_> {
         Ok(false)
     }
 
-    /// All that time reaches from the zone within the invariants if barriers may have cut it; `None` if the zone is that.
+    /// All that time reaches from the zone within the invariants if barriers may have cut it;
+    /// `None` if the zone is that.
     fn future_beside_barriers(
         &mut self,
         may_delay: bool,
@@ -202,8 +206,8 @@ fn hold_now(needs: &[Constraint], (zone, dimension): (&[Bound], usize)) -> bool 
     needs.iter().all(holds)
 }
 
-/// Whether every valuation of a closed zone can wait, within the invariant, until it meets the needs. The invariant only counts where
-/// there are lower bounds among them.
+/// Whether every valuation of a closed zone can wait, within the invariant, until it meets the
+/// needs. The invariant only counts where there are lower bounds among them.
 fn hold_sometime(
     needs: &[Constraint],
     (zone, dimension): (&[Bound], usize),
@@ -223,7 +227,8 @@ fn is_lower(constraint: &Constraint) -> bool {
     constraint.left == 0
 }
 
-/// Replaces `needs` by what must hold of a valuation for the move to be possible; returns false if that is not known, or never holds.
+/// Replaces `needs` by what must hold of a valuation for the move to be possible; returns false if
+/// that is not known, or never holds.
 fn add_needs(effect: &ClockEffect, needs: &mut Vec<Constraint>) -> bool {
     if !effect.excluded.is_empty() {
         return false;

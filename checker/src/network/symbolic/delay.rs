@@ -1,10 +1,13 @@
-//! How time passes where more than invariants decide: barriers, and delays of several zones at once.
+//! How time passes where more than invariants decide: barriers, and delays of several zones at
+//! once.
 //!
-//! A *barrier* is where a synchronisation on an urgent channel is enabled and its guards have clocks: time runs up to it and
-//! not on. If it lies everywhere or nowhere, whatever the clocks say, [`Symbolic::may_delay`] knows it; else the future of a
-//! zone within its barriers is a federation ([`crate::zones::future`]). A guard with a strict lower bound has no first moment:
-//! time stops before it, and the synchronisation never happens, as the definition of urgency has it. A restriction
-//! ([`super::restriction`]) has its barriers too: where it does not allow waiting.
+//! A *barrier* is where a synchronisation on an urgent channel is enabled and its guards have
+//! clocks: time runs up to it and not on. If it lies everywhere or nowhere, whatever the clocks
+//! say, [`Symbolic::may_delay`] knows it; else the future of a zone within its barriers is a
+//! federation ([`crate::zones::future`]). A guard with a strict lower bound has no first moment:
+//! time stops before it, and the synchronisation never happens, as the definition of urgency has
+//! it. A restriction ([`super::restriction`]) has its barriers too: where it does not allow
+//! waiting.
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ClockId;
@@ -18,7 +21,8 @@ use crate::network::discrete::broadcast_filter::Scope;
 use crate::network::{Failure, MoveRef, Moves, Part, Symbolic};
 
 impl Symbolic<'_> {
-    /// The part of the zone in which time cannot pass because of a clock-guarded urgent synchronisation or a restriction.
+    /// The part of the zone in which time cannot pass because of a clock-guarded urgent
+    /// synchronisation or a restriction.
     pub fn barriers(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Barriers, Failure> {
         let mut urgent = Federation::empty(self.dimension());
         if self.has_guarded_urgency {
@@ -84,7 +88,8 @@ impl Symbolic<'_> {
         Ok(urgent)
     }
 
-    /// Lets time pass in each of the zones on entry of a state; a zone with barriers in its future may become several.
+    /// Lets time pass in each of the zones on entry of a state; a zone with barriers in its future
+    /// may become several.
     pub fn let_time_pass(
         &mut self,
         words: &mut [i32],
@@ -129,11 +134,12 @@ impl Symbolic<'_> {
         reached
     }
 
-    /// All moves of a state, as far as the words decide, with those that priorities or a restriction forbid cut down to what is
-    /// left of them.
+    /// All moves of a state, as far as the words decide, with those that priorities or a
+    /// restriction forbid cut down to what is left of them.
     ///
-    /// A move is forbidden where one of a higher level is possible, its target's invariants included. Levels are those of
-    /// channels first, then the greatest of the participating processes.
+    /// A move is forbidden where one of a higher level is possible, its target's invariants
+    /// included. Levels are those of channels first, then the greatest of the participating
+    /// processes.
     pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         self.moves_in(words, Scope::Everything, out)
     }
@@ -232,8 +238,8 @@ impl Symbolic<'_> {
         Ok(())
     }
 
-    /// Whether the guards of a move leave anything of the zone that the moves were asked for. Asked before a move is taken, so that no
-    /// update runs that cannot happen.
+    /// Whether the guards of a move leave anything of the zone that the moves were asked for. Asked
+    /// before a move is taken, so that no update runs that cannot happen.
     pub fn is_enabled(&self, one: MoveRef<'_>, zone: &[Bound]) -> Result<bool, Failure> {
         if one.is_unconditional() || one.label.is_possible {
             return Ok(true);

@@ -1,7 +1,7 @@
 //! State predicates of queries on symbolic states.
 //!
-//! The extent of a predicate in a state is the part of the zone in which it holds. Predicates without clocks hold in all of it
-//! or in none, and cost no zone operation.
+//! The extent of a predicate in a state is the part of the zone in which it holds. Predicates
+//! without clocks hold in all of it or in none, and cost no zone operation.
 
 use crate::ir::{
     ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, FunctionId, Network, Predicate,
@@ -86,7 +86,8 @@ impl Symbolic<'_> {
         }
     }
 
-    /// Whether the predicate holds somewhere in the zone: what [`Symbolic::extent`] says, without computing where if that is dear.
+    /// Whether the predicate holds somewhere in the zone: what [`Symbolic::extent`] says, without
+    /// computing where if that is dear.
     pub fn holds_somewhere(
         &mut self,
         predicate: &Predicate,
@@ -296,8 +297,9 @@ fn negated(atom: &ClockAtom) -> ClockAtom {
     }
 }
 
-/// Whether something in the network depends on a guard's being false: what abstains from a broadcast, what priorities leave, and
-/// how long time may pass before something urgent. Then guards must be told apart from both sides.
+/// Whether something in the network depends on a guard's being false: what abstains from a
+/// broadcast, what priorities leave, and how long time may pass before something urgent. Then
+/// guards must be told apart from both sides.
 pub fn depends_on_negations(network: &Network) -> bool {
     let features = &network.features;
     features.guarded_receivers || features.priorities || features.clock_guarded_urgent

@@ -1,14 +1,18 @@
-//! What one player allows itself: moves are left out and delays cut short before any search sees them.
+//! What one player allows itself: moves are left out and delays cut short before any search sees
+//! them.
 //!
-//! Under a restriction the moves of its owner are possible only where it allows them, and time passes only where it allows
-//! waiting. All other moves stay as they are. Where waiting ends without a first moment (wait while `x <= 1`, act when `x > 1`),
-//! time runs on inside the valuations of one decision to act: the restriction leaves open which of its moments is taken.
+//! Under a restriction the moves of its owner are possible only where it allows them, and time
+//! passes only where it allows waiting. All other moves stay as they are. Where waiting ends
+//! without a first moment (wait while `x <= 1`, act when `x > 1`), time runs on inside the
+//! valuations of one decision to act: the restriction leaves open which of its moments is taken.
 //!
-//! The controller chooses edges, and the environment picks the legs of branch points. So what is said of a move of the controller counts for all
-//! legs of its edges, and a restriction of the environment may say which leg of a move of the controller is picked.
+//! The controller chooses edges, and the environment picks the legs of branch points. So what is
+//! said of a move of the controller counts for all legs of its edges, and a restriction of the
+//! environment may say which leg of a move of the controller is picked.
 //!
-//! What priorities leave of the moves is restricted further: a move that the restriction forbids still goes before those of lower
-//! levels. Whether priorities count is said elsewhere ([`crate::network::Symbolic::without_priorities`]).
+//! What priorities leave of the moves is restricted further: a move that the restriction forbids
+//! still goes before those of lower levels. Whether priorities count is said elsewhere
+//! ([`crate::network::Symbolic::without_priorities`]).
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ClockAtom;
@@ -26,7 +30,8 @@ pub struct Allowed {
     pub forbidden: Vec<(Vec<Part>, Federation)>,
     /// Where every move that is not listed is forbidden.
     pub others: Federation,
-    /// By move of the other player: where it is the one that is picked of those that take the same edges.
+    /// By move of the other player: where it is the one that is picked of those that take the same
+    /// edges.
     pub legs: Vec<(Vec<Part>, Federation)>,
 }
 

@@ -1,18 +1,21 @@
 //! What moves make of zones, remembered.
 //!
-//! The zone that a move leads to is a function of the zone that it starts from and of the move's *effect*: guard, assignments, the
-//! invariants behind it, whether time may pass there, and what clocks are compared with from there on. Models whose states have few
-//! zones meet the same pair of them again and again. So zones and effects get numbers, and for each pair that was met stands the
-//! zone on entry with time passed, and what is kept of it in a store.
+//! The zone that a move leads to is a function of the zone that it starts from and of the move's
+//! *effect*: guard, assignments, the invariants behind it, whether time may pass there, and what
+//! clocks are compared with from there on. Models whose states have few zones meet the same pair of
+//! them again and again. So zones and effects get numbers, and for each pair that was met stands
+//! the zone on entry with time passed, and what is kept of it in a store.
 //!
 //! Invariants:
-//! * Zones are compared bound by bound and effects word by word, so that what is found is what would be computed.
-//! * Guards, updates and invariants are evaluated as without it, in the same order; only operations on zones are spared.
-//! * Memory is bounded by [`MemoLimits`]: beyond it everything is forgotten. What was handed out before has another age then, and is
-//!   not looked up any more.
+//! * Zones are compared bound by bound and effects word by word, so that what is found is what
+//!   would be computed.
+//! * Guards, updates and invariants are evaluated as without it, in the same order; only operations
+//!   on zones are spared.
+//! * Memory is bounded by [`MemoLimits`]: beyond it everything is forgotten. What was handed out
+//!   before has another age then, and is not looked up any more.
 //!
-//! Cost: a look-up takes two hashes, of the effect and of the pair. Where fewer than half of the pairs are found it does not pay, and
-//! is given up for a while.
+//! Cost: a look-up takes two hashes, of the effect and of the pair. Where fewer than half of the
+//! pairs are found it does not pay, and is given up for a while.
 
 use hashbrown::HashTable;
 use rustc_hash::FxHashMap;
@@ -49,7 +52,8 @@ impl Default for MemoLimits {
     }
 }
 
-/// Where not as many zones fit nothing is remembered: a state and its successors would not be there together.
+/// Where not as many zones fit nothing is remembered: a state and its successors would not be there
+/// together.
 const FEWEST_ZONES: usize = 16;
 /// At most so many states do not ask.
 const LONGEST_PAUSE: u32 = 1 << 22;
@@ -102,7 +106,8 @@ pub(super) struct ZoneMemo {
     dimension: usize,
     /// Whether all that moves do to zones can be said by effects.
     is_possible: bool,
-    /// Whether zones are asked for as they are entered; else what is kept of them may stand in their place.
+    /// Whether zones are asked for as they are entered; else what is kept of them may stand in
+    /// their place.
     needs_entered: bool,
     pub(super) limits: MemoLimits,
     zones: ZoneTable,
@@ -261,7 +266,8 @@ impl<'a> Symbolic<'a> {
         self
     }
 
-    /// Says whether zones are needed as they are entered, before extrapolation. They are unless this was said.
+    /// Says whether zones are needed as they are entered, before extrapolation. They are unless
+    /// this was said.
     pub fn need_entered(&mut self, needs: bool) {
         if self.memo.needs_entered != needs {
             self.memo.forget();
@@ -269,7 +275,8 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// The number of the zone of a state that is explored; `None` where looking up moves by it is impossible or does not pay.
+    /// The number of the zone of a state that is explored; `None` where looking up moves by it is
+    /// impossible or does not pay.
     pub fn know(&mut self, zone: &[Bound]) -> Option<KnownZone> {
         if !self.memo.is_possible || self.has_barriers() || self.splits() {
             return None;
@@ -282,8 +289,9 @@ impl<'a> Symbolic<'a> {
         known.age == self.memo.age
     }
 
-    /// As [`Symbolic::take`], [`Symbolic::forget`] and [`Symbolic::pass_time`], for a move from a zone that is known and that each of its guards leaves
-    /// something of; `zone`, of the same dimension, is overwritten. `None` if the move is not possible.
+    /// As [`Symbolic::take`], [`Symbolic::forget`] and [`Symbolic::pass_time`], for a move from a
+    /// zone that is known and that each of its guards leaves something of; `zone`, of the same
+    /// dimension, is overwritten. `None` if the move is not possible.
     pub fn enter_known(
         &mut self,
         one: MoveRef<'_>,
@@ -363,7 +371,8 @@ impl<'a> Symbolic<'a> {
         Ok(self.memo.result(outcome, zone))
     }
 
-    /// Remembers the effect of a move of an offer, which led to these words, unless it may depend on variables.
+    /// Remembers the effect of a move of an offer, which led to these words, unless it may depend
+    /// on variables.
     fn fix_effect(&mut self, one: MoveRef<'_>, words: &[i32], effect: u32) {
         let Some(offered) = one.offered else { return };
         if self.memo.fixed.contains_key(&offered) {
@@ -433,13 +442,14 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// Whether the reduced forms of zones are kept (see [`Symbolic::to_stored`]): not where states are exchanged before.
+    /// Whether the reduced forms of zones are kept (see [`Symbolic::to_stored`]): not where states
+    /// are exchanged before.
     pub fn keeps_reduced(&self) -> bool {
         self.stores_reduced() && self.symmetry().is_none()
     }
 
-    /// What is kept of a zone that the last move entered: the reduced form and the limits of its ceilings, or the extrapolated zone and
-    /// no limits.
+    /// What is kept of a zone that the last move entered: the reduced form and the limits of its
+    /// ceilings, or the extrapolated zone and no limits.
     pub fn kept(&self, kept: KeptZone) -> (&[Bound], &[Bound]) {
         if self.keeps_reduced() {
             self.memo
@@ -457,8 +467,9 @@ impl<'a> Symbolic<'a> {
     }
 }
 
-/// Effects, each once, as the words that say all that the result hangs on: how many there are up to the end of the guard, of the
-/// assignments and of the invariant; these; whether time may pass; and what clocks are compared with from there on.
+/// Effects, each once, as the words that say all that the result hangs on: how many there are up to
+/// the end of the guard, of the assignments and of the invariant; these; whether time may pass; and
+/// what clocks are compared with from there on.
 #[derive(Debug, Default)]
 struct Effects {
     /// The words of all effects, one after the other.

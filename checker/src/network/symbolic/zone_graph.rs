@@ -1,10 +1,11 @@
 //! Symbolic states: words with a zone, and their successors.
 //!
 //! Invariants:
-//! * The zone of a state is closed, not empty, satisfies all invariants and, where time may pass, contains its own future
-//!   within them.
+//! * The zone of a state is closed, not empty, satisfies all invariants and, where time may pass,
+//!   contains its own future within them.
 //! * Successors are exact; extrapolation is a step of its own ([`Symbolic::extrapolate`]).
-//! * A clock bound or value that zones cannot hold ends in [`Failure::ClockLimit`], never in a wrong zone.
+//! * A clock bound or value that zones cannot hold ends in [`Failure::ClockLimit`], never in a
+//!   wrong zone.
 //!
 //! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4.
 
@@ -38,8 +39,8 @@ pub struct Symbolic<'a> {
     pub(super) dimension: usize,
     pub(super) bounds: ClockBounds,
     has_rates: bool,
-    /// How great bounds may become, if it is to be looked at: where they are not extrapolated, or constants are so large that they get there
-    /// in the few steps between two extrapolations.
+    /// How great bounds may become, if it is to be looked at: where they are not extrapolated, or
+    /// constants are so large that they get there in the few steps between two extrapolations.
     range: Option<i32>,
     has_urgent_channels: bool,
     pub(super) has_guarded_urgency: bool,
@@ -70,11 +71,13 @@ pub struct ClockEffect {
     pub invariant: Vec<Constraint>,
 }
 
-/// Constants up to this cannot make bounds too great between two extrapolations, of which there are fewer than a hundred steps.
+/// Constants up to this cannot make bounds too great between two extrapolations, of which there are
+/// fewer than a hundred steps.
 const CALM_CONSTANT: i32 = 1 << 20;
 
 impl<'a> Symbolic<'a> {
-    /// Zones for the network of `stepper`; `bounds` are the constants that extrapolation must keep apart.
+    /// Zones for the network of `stepper`; `bounds` are the constants that extrapolation must keep
+    /// apart.
     pub fn new(stepper: Stepper<'a>, bounds: ClockBounds) -> Symbolic<'a> {
         let network = stepper.network();
         let dimension = network.clocks.len().max(1);
@@ -144,7 +147,8 @@ impl<'a> Symbolic<'a> {
         self.stepper.network().features.priorities && !self.has_priorities
     }
 
-    /// The same, of states that may be exchanged for others by this symmetry; a search need only see one of each orbit.
+    /// The same, of states that may be exchanged for others by this symmetry; a search need only
+    /// see one of each orbit.
     #[must_use]
     pub fn reduced_by(mut self, symmetry: Option<Arc<Symmetry>>) -> Symbolic<'a> {
         self.symmetry = symmetry;
@@ -202,8 +206,8 @@ impl<'a> Symbolic<'a> {
         self.bounds.greatest()
     }
 
-    /// Whether some zone so far may contain more than what is reachable: delays of at least two running clocks beside
-    /// stopped ones have no exact zone.
+    /// Whether some zone so far may contain more than what is reachable: delays of at least two
+    /// running clocks beside stopped ones have no exact zone.
     pub fn is_approximate(&self) -> bool {
         self.is_approximate
     }
@@ -241,8 +245,8 @@ impl<'a> Symbolic<'a> {
         Ok((network.initial.clone(), zone))
     }
 
-    /// Takes a move on `words`, and gives its effect on clocks; `None` if the target's invariants or the guards forbid it
-    /// whatever the clocks say.
+    /// Takes a move on `words`, and gives its effect on clocks; `None` if the target's invariants
+    /// or the guards forbid it whatever the clocks say.
     pub fn fire(
         &mut self,
         one: MoveRef<'_>,
@@ -252,7 +256,8 @@ impl<'a> Symbolic<'a> {
         Ok(self.fire_into(one, words, &mut effect)?.then_some(effect))
     }
 
-    /// As [`Symbolic::fire`], with the effect in a value that is used again; returns whether the move is possible.
+    /// As [`Symbolic::fire`], with the effect in a value that is used again; returns whether the
+    /// move is possible.
     pub fn fire_into(
         &mut self,
         one: MoveRef<'_>,
@@ -292,8 +297,8 @@ impl<'a> Symbolic<'a> {
         Ok(())
     }
 
-    /// Whether [`Symbolic::take`] and [`Symbolic::pass_time`] can take the move from this zone: the state that it leads to has one zone,
-    /// since what must not hold is false everywhere.
+    /// Whether [`Symbolic::take`] and [`Symbolic::pass_time`] can take the move from this zone: the
+    /// state that it leads to has one zone, since what must not hold is false everywhere.
     pub fn stays_whole(&self, one: MoveRef<'_>, zone: &[Bound]) -> bool {
         !self.has_barriers()
             && !self.bounds.splits()
@@ -308,8 +313,8 @@ impl<'a> Symbolic<'a> {
         })
     }
 
-    /// Takes a move on words and zone at once; returns whether it is possible. If it is not, neither means anything, and no
-    /// update has run unless the guards leave something of the zone.
+    /// Takes a move on words and zone at once; returns whether it is possible. If it is not,
+    /// neither means anything, and no update has run unless the guards leave something of the zone.
     pub fn take(
         &mut self,
         one: MoveRef<'_>,
@@ -412,13 +417,15 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// Whether bounds of a zone have grown so much that it is better extrapolated before more steps. Zones of calm models are not looked at.
+    /// Whether bounds of a zone have grown so much that it is better extrapolated before more
+    /// steps. Zones of calm models are not looked at.
     pub fn is_almost_out_of_range(&self, zone: &[Bound]) -> bool {
         self.range
             .is_some_and(|most| !dbm::is_in_range(zone, most / 2))
     }
 
-    /// Whether bounds of a zone that was never extrapolated on a long way have grown so much that it is to be now.
+    /// Whether bounds of a zone that was never extrapolated on a long way have grown so much that
+    /// it is to be now.
     pub fn has_grown(&self, zone: &[Bound]) -> bool {
         let most = Bound::most_in_zone(self.dimension, self.bounds.has_differences());
         !dbm::is_in_range(zone, most / 2)
@@ -471,7 +478,8 @@ impl<'a> Symbolic<'a> {
         Ok(stopped)
     }
 
-    /// Forgets differences between clock values that no guard or invariant from here on can tell apart.
+    /// Forgets differences between clock values that no guard or invariant from here on can tell
+    /// apart.
     pub fn extrapolate(&mut self, words: &[i32], zone: &mut [Bound]) {
         if self.dimension > 1 {
             self.bounds
@@ -491,8 +499,9 @@ impl<'a> Symbolic<'a> {
         self.dimension > 1 && self.bounds.compares_by_simulation()
     }
 
-    /// Replaces the zone of a state, extrapolated or not, by its reduced form (see [`simulation`]), and gives the limits of its
-    /// ceilings. Leaves it as it is, without limits, where zones are compared as sets; then it must have been extrapolated.
+    /// Replaces the zone of a state, extrapolated or not, by its reduced form (see [`simulation`]),
+    /// and gives the limits of its ceilings. Leaves it as it is, without limits, where zones are
+    /// compared as sets; then it must have been extrapolated.
     pub fn to_stored(&mut self, words: &[i32], zone: &mut [Bound]) -> &[Bound] {
         if !self.stores_reduced() {
             return &[];
@@ -510,12 +519,14 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// Whether extrapolation cuts zones, so that one may become several: see [`Symbolic::extrapolate_all`].
+    /// Whether extrapolation cuts zones, so that one may become several: see
+    /// [`Symbolic::extrapolate_all`].
     pub fn splits(&self) -> bool {
         self.bounds.splits()
     }
 
-    /// Extrapolates each of the zones of a state; where guards compare clocks, one may become several.
+    /// Extrapolates each of the zones of a state; where guards compare clocks, one may become
+    /// several.
     pub fn extrapolate_all(&mut self, words: &[i32], zones: &mut Vec<Zone>) {
         if self.bounds.splits() {
             let mut parts = Federation::empty(self.dimension);
@@ -536,7 +547,8 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// The stop points that the invariant of each process makes: its weak upper bounds, with the process.
+    /// The stop points that the invariant of each process makes: its weak upper bounds, with the
+    /// process.
     pub fn upper_bounds(&mut self, words: &mut [i32]) -> Result<Vec<(u32, Constraint)>, Failure> {
         let mut bounds = Vec::new();
         for process in 0..self.stepper.network().processes.len() {
@@ -573,7 +585,8 @@ impl ClockEffect {
             && self.invariant.is_empty()
     }
 
-    /// Whether the move is possible at all valuations of a zone; of one that copies clocks that is not known.
+    /// Whether the move is possible at all valuations of a zone; of one that copies clocks that is
+    /// not known.
     pub fn keeps_all_of(&self, zone: &Zone) -> bool {
         let dimension = zone.dimension();
         let mut after = zone.clone();
@@ -588,8 +601,8 @@ impl ClockEffect {
             && self.invariant.iter().all(|one| holds(&after, one))
     }
 
-    /// The zones on entry of the target: the source's zone within the guard, after the assignments, within the invariant.
-    /// More than one only if some clock-guarded receiver abstains.
+    /// The zones on entry of the target: the source's zone within the guard, after the assignments,
+    /// within the invariant. More than one only if some clock-guarded receiver abstains.
     pub fn entry_zones(&self, zone: &[Bound], dimension: usize, out: &mut Vec<Zone>) {
         out.clear();
         let mut within = Zone::from_bounds(dimension, zone);
@@ -608,14 +621,16 @@ impl ClockEffect {
         }
     }
 
-    /// Carries a zone of the source over to the target, if no receiver abstains; returns whether something is left.
+    /// Carries a zone of the source over to the target, if no receiver abstains; returns whether
+    /// something is left.
     pub fn enter(&self, zone: &mut Zone) -> bool {
         zone.constrain_all(&self.guard)
             && zone.assign(&self.assignments)
             && zone.constrain_all(&self.invariant)
     }
 
-    /// The valuations from which the move leads into the federation, as far as guard and assignments say.
+    /// The valuations from which the move leads into the federation, as far as guard and
+    /// assignments say.
     pub fn preimage(&self, federation: &mut Federation) {
         if self.is_trivial() {
             return;
@@ -631,7 +646,8 @@ impl ClockEffect {
         enabled.constrain_all(&self.invariant);
         enabled.preimage(&self.guard, &self.assignments);
         enabled.intersect_zone(zone);
-        // What must not hold is cut out last: outside of the zone it would make zones without number.
+        // What must not hold is cut out last: outside of the zone it would make zones without
+        // number.
         self.subtract_excluded(&mut enabled);
         enabled
     }
@@ -651,7 +667,8 @@ pub(super) fn check_limit(value: i32) -> Result<(), Failure> {
     }
 }
 
-/// Emitted constraints as constraints on zones; `None` if one of them never holds (a clock compared with itself).
+/// Emitted constraints as constraints on zones; `None` if one of them never holds (a clock compared
+/// with itself).
 pub(super) fn to_constraints(
     emitted: &[EmittedConstraint],
 ) -> Result<Option<Vec<Constraint>>, Failure> {

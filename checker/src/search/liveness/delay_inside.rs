@@ -1,8 +1,9 @@
 //! How a run stays inside a predicate in one state.
 //!
-//! Where the predicate holds in a part of a zone only, that part is cut out exactly ([`crate::zones::future`]), so that a delay never
-//! crosses its outside. With stopped clocks it may, and beside two clocks that run a wait from which something is possible later may
-//! count as being stuck: every doubt is taken for a run, so that there being none is certain.
+//! Where the predicate holds in a part of a zone only, that part is cut out exactly
+//! ([`crate::zones::future`]), so that a delay never crosses its outside. With stopped clocks it
+//! may, and beside two clocks that run a wait from which something is possible later may count as
+//! being stuck: every doubt is taken for a run, so that there being none is certain.
 
 use crate::ir::Predicate;
 use crate::network::{Extent, Failure, Moves, Symbolic};
@@ -23,8 +24,8 @@ pub(super) struct Inside {
 }
 
 impl Inside {
-    /// What a run inside the predicate can reach by delay from a zone on entry of a state. Where that lies in an open part of a barrier,
-    /// `is_running` says whether time runs in it.
+    /// What a run inside the predicate can reach by delay from a zone on entry of a state. Where
+    /// that lies in an open part of a barrier, `is_running` says whether time runs in it.
     pub(super) fn of(
         symbolic: &mut Symbolic<'_>,
         keep: &Predicate,
@@ -68,8 +69,9 @@ impl Inside {
     }
 }
 
-/// The valuations of a state inside the predicate from which time can pass without limit, and those from which no wait leads to a
-/// move or out of the predicate; where clocks stand still, only such. `whole` is what the invariants allow.
+/// The valuations of a state inside the predicate from which time can pass without limit, and those
+/// from which no wait leads to a move or out of the predicate; where clocks stand still, only such.
+/// `whole` is what the invariants allow.
 pub(in crate::search) fn endings(
     symbolic: &mut Symbolic<'_>,
     keep: &Predicate,
@@ -93,8 +95,9 @@ struct Passage {
     whole: Zone,
     /// The part of it in which the predicate does not hold.
     outside: Federation,
-    /// Where what time leads to is looked for: the same, or where a clock stands still beside two that run all that the invariants allow;
-    /// and its part in which the predicate does not hold. A set of which no comparison cuts corners has an exact past there.
+    /// Where what time leads to is looked for: the same, or where a clock stands still beside two
+    /// that run all that the invariants allow; and its part in which the predicate does not hold. A
+    /// set of which no comparison cuts corners has an exact past there.
     frame: Zone,
     left: Federation,
     /// The part of it in which an urgent synchronisation or a restriction stops time.
@@ -140,8 +143,8 @@ impl Passage {
         })
     }
 
-    /// The valuations from which time leads into a part of the frame; where that cannot be told, those of the part alone if doubts count
-    /// as staying, and else more.
+    /// The valuations from which time leads into a part of the frame; where that cannot be told,
+    /// those of the part alone if doubts count as staying, and else more.
     fn past(&self, part: &Federation) -> Federation {
         let dimension = part.dimension();
         let mut past = part.clone();
@@ -215,7 +218,8 @@ impl Passage {
         waiting
     }
 
-    /// The valuations of the part that is reached from which no wait leads to a move or out of the predicate.
+    /// The valuations of the part that is reached from which no wait leads to a move or out of the
+    /// predicate.
     fn stuck(
         &self,
         symbolic: &mut Symbolic<'_>,
@@ -255,7 +259,8 @@ fn has_crooked_pasts(stopped: &ClockSet, dimension: usize) -> bool {
     !stopped.is_empty() && dimension - 1 > stopped.len() + 1
 }
 
-/// Whether the past of this zone is one: its bounds on differences between running and stopped clocks say no more than those on each.
+/// Whether the past of this zone is one: its bounds on differences between running and stopped
+/// clocks say no more than those on each.
 fn is_straight(zone: &[Bound], dimension: usize, stopped: &ClockSet) -> bool {
     let implied = |left: usize, right: usize| {
         zone[left * dimension + right] >= zone[left * dimension] + zone[right]

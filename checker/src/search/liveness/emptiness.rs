@@ -1,22 +1,26 @@
 //! Is there a run that stays inside a predicate for ever?
 //!
-//! A run counts if the predicate holds at all its moments and it cannot leave: it has infinitely many moves (in however little
-//! time), or from some moment on time can pass without limit inside predicate and invariants, or at some moment neither a move nor
-//! any wait that the invariants allow leads to a move or out of the predicate.
+//! A run counts if the predicate holds at all its moments and it cannot leave: it has infinitely
+//! many moves (in however little time), or from some moment on time can pass without limit inside
+//! predicate and invariants, or at some moment neither a move nor any wait that the invariants
+//! allow leads to a move or out of the predicate.
 //!
-//! The nodes of the search are words with a zone of valuations that lie inside the predicate and that some delay inside it reaches from
-//! the entry of the state ([`super::delay_inside`]). Every node is accepting, so one depth-first search is
-//! enough: there is a run with infinitely many moves exactly if the search comes back to a node on its stack, or to one that contains the zone of
-//! such a node (every valuation of that has a predecessor in itself, around and around, and the regions are finitely many). A
-//! node that was left without success starts no such run, nor does any that it contains.
+//! The nodes of the search are words with a zone of valuations that lie inside the predicate and
+//! that some delay inside it reaches from the entry of the state ([`super::delay_inside`]). Every
+//! node is accepting, so one depth-first search is enough: there is a run with infinitely many
+//! moves exactly if the search comes back to a node on its stack, or to one that contains the zone
+//! of such a node (every valuation of that has a predecessor in itself, around and around, and the
+//! regions are finitely many). A node that was left without success starts no such run, nor does
+//! any that it contains.
 //!
-//! For a run that is found, extrapolation must have kept all that comparisons can tell (Extra-M+), with those of the predicate
-//! among them. That there is none holds with any larger zones too.
+//! For a run that is found, extrapolation must have kept all that comparisons can tell (Extra-M+),
+//! with those of the predicate among them. That there is none holds with any larger zones too.
 //!
-//! Source: S. Tripakis, "Checking Timed Büchi Automata Emptiness on Simulation Graphs", ACM TOCL 10, 2009 (cycles of zones are
-//! cycles of runs); A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G. Larsen, J. van de Pol, "Multi-Core Emptiness Checking of Timed Büchi
-//! Automata using Inclusion Abstraction", CAV 2013 (which inclusions are sound).
-//! Where we differ: with stopped clocks the cut is left out and every doubt counts as a run, so that only the absence of one is certain.
+//! Source: S. Tripakis, "Checking Timed Büchi Automata Emptiness on Simulation Graphs", ACM TOCL
+//! 10, 2009 (cycles of zones are cycles of runs); A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G.
+//! Larsen, J. van de Pol, "Multi-Core Emptiness Checking of Timed Büchi Automata using Inclusion
+//! Abstraction", CAV 2013 (which inclusions are sound). Where we differ: with stopped clocks the
+//! cut is left out and every doubt counts as a run, so that only the absence of one is certain.
 
 use crate::ir::Predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
@@ -142,8 +146,9 @@ impl<'p> Liveness<'p> {
         self.from_entry(symbolic, (&words, &zone), false, Counters::default(), watch)
     }
 
-    /// Searches for a run that begins with some valuation of a zone. Where that lies in an open part of a barrier, `is_running` says
-    /// whether time runs in it. `before` is what was done outside this search, for the limits.
+    /// Searches for a run that begins with some valuation of a zone. Where that lies in an open
+    /// part of a barrier, `is_running` says whether time runs in it. `before` is what was done
+    /// outside this search, for the limits.
     pub fn from_entry(
         &mut self,
         symbolic: &mut Symbolic<'_>,
@@ -259,7 +264,8 @@ impl<'p> Liveness<'p> {
         Ok(None)
     }
 
-    /// Goes to a node, unless it is known to be the start of no run; finds out whether it closes a loop.
+    /// Goes to a node, unless it is known to be the start of no run; finds out whether it closes a
+    /// loop.
     fn visit(
         &mut self,
         symbolic: &mut Symbolic<'_>,
@@ -353,7 +359,8 @@ impl<'p> Liveness<'p> {
         moves
     }
 
-    /// Notes that no run starts in a node, and drops the nodes whose zones it contains from the list of its words.
+    /// Notes that no run starts in a node, and drops the nodes whose zones it contains from the
+    /// list of its words.
     fn leave(&mut self, node: u32) {
         self.nodes[node as usize].depth = NONE;
         let Node { discrete, zone, .. } = self.nodes[node as usize];

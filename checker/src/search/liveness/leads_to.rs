@@ -1,8 +1,9 @@
 //! `p --> q`: does q come after every p?
 //!
-//! It does not exactly if some reachable state satisfies p and starts a run that never meets q. So the search for reachable states
-//! looks, at each that satisfies p in some part where q does not hold, for a run inside `not q` that begins there
-//! ([`super::emptiness`]); what those searches learn they share.
+//! It does not exactly if some reachable state satisfies p and starts a run that never meets q. So
+//! the search for reachable states looks, at each that satisfies p in some part where q does not
+//! hold, for a run inside `not q` that begins there ([`super::emptiness`]); what those searches
+//! learn they share.
 
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
@@ -41,8 +42,8 @@ impl<'p> Unanswered<'p> {
         }
     }
 
-    /// Whether a doubt was counted as a run; see [`Liveness::is_coarse`], and whether the run is one only if time runs in an open part of
-    /// a barrier where it begins.
+    /// Whether a doubt was counted as a run; see [`Liveness::is_coarse`], and whether the run is
+    /// one only if time runs in an open part of a barrier where it begins.
     pub fn is_coarse(&self) -> bool {
         self.is_doubtful || self.liveness.is_coarse()
     }
@@ -102,7 +103,8 @@ impl Goal for Unanswered<'_> {
     }
 }
 
-/// The way to a state, and then a run from it: one trace, and the index of the run's first state in it.
+/// The way to a state, and then a run from it: one trace, and the index of the run's first state in
+/// it.
 pub fn joined(mut way: Trace, run: Trace) -> (Trace, usize) {
     let mut states = run.states.into_iter();
     let start = way.states.len().saturating_sub(1);

@@ -1,15 +1,18 @@
 //! The run with the fewest moves that stays inside a predicate for ever.
 //!
-//! The nodes of the search are words with an extrapolated zone: on the way to a state in which the run opens, if there is such a
-//! condition, and of the run itself, as in [`super::emptiness`]. The run ends in a node in which it can stay without a move; or it
-//! closes, where a way leads from a node to one with the same words, and can be taken again and again: after some rounds the zone
+//! The nodes of the search are words with an extrapolated zone: on the way to a state in which the
+//! run opens, if there is such a condition, and of the run itself, as in [`super::emptiness`]. The
+//! run ends in a node in which it can stay without a move; or it closes, where a way leads from a
+//! node to one with the same words, and can be taken again and again: after some rounds the zone
 //! contains that of a round before. What counts is the moves up to there, those of the loop once.
 //!
-//! Nodes are made in the order of their distance from the start, so that the first end is the nearest. Coming back to the words of a
-//! node on the way gives a first loop; then the nearest loop is looked for from each node in turn, as far as it may beat what was
-//! found. Of several ways of the same length from one node to another, the first is taken for all.
+//! Nodes are made in the order of their distance from the start, so that the first end is the
+//! nearest. Coming back to the words of a node on the way gives a first loop; then the nearest loop
+//! is looked for from each node in turn, as far as it may beat what was found. Of several ways of
+//! the same length from one node to another, the first is taken for all.
 //!
-//! Cost: as breadth-first search with equal zones for the same; for loops in the worst case its square.
+//! Cost: as breadth-first search with equal zones for the same; for loops in the worst case its
+//! square.
 
 use std::collections::HashMap;
 
@@ -44,7 +47,8 @@ pub struct Wanted<'p> {
 /// How a search ended.
 #[derive(Debug)]
 pub enum Outcome {
-    /// A run with the fewest moves, with the way to it, and the index of the state in which it opens.
+    /// A run with the fewest moves, with the way to it, and the index of the state in which it
+    /// opens.
     Found(Run, usize),
     /// There is none.
     Exhausted,

@@ -1,16 +1,20 @@
-//! A search without short cuts, least costs first: for shortest and fastest traces, and for the reached set of a certificate.
+//! A search without short cuts, least costs first: for shortest and fastest traces, and for the
+//! reached set of a certificate.
 //!
-//! Every state is stored, those with committed locations too, and one is left out only if a stored one with the same words contains
-//! its zone. So the stored zones, extrapolated as they are, contain the successors of each of them: they are closed under all
-//! moves and delays, which is what a certificate claims. And since what contains a new state was met at no greater cost, nothing
-//! of least cost is lost.
+//! Every state is stored, those with committed locations too, and one is left out only if a stored
+//! one with the same words contains its zone. So the stored zones, extrapolated as they are,
+//! contain the successors of each of them: they are closed under all moves and delays, which is
+//! what a certificate claims. And since what contains a new state was met at no greater cost,
+//! nothing of least cost is lost.
 //!
-//! *Moves* as costs make it a breadth-first search. *Time* as cost is the lower bound of a clock that is never set: the caller adds
-//! it to the network. Its upper bounds are forgotten in every state, as if any more time might have passed before: then
-//! states that differ in how much time may be wasted are the same, and those with bounded cost are finitely many.
+//! *Moves* as costs make it a breadth-first search. *Time* as cost is the lower bound of a clock
+//! that is never set: the caller adds it to the network. Its upper bounds are forgotten in every
+//! state, as if any more time might have passed before: then states that differ in how much time
+//! may be wasted are the same, and those with bounded cost are finitely many.
 //!
-//! Source: G. Behrmann, A. Fehnker, T. Hune, K. G. Larsen, P. Pettersson, J. Romijn, F. Vaandrager, "Efficient Guiding Towards
-//! Cost-Optimality in UPPAAL", TACAS 2001 (least time by a clock of its own, best first).
+//! Source: G. Behrmann, A. Fehnker, T. Hune, K. G. Larsen, P. Pettersson, J. Romijn, F. Vaandrager,
+//! "Efficient Guiding Towards Cost-Optimality in UPPAAL", TACAS 2001 (least time by a clock of its
+//! own, best first).
 //!
 //! Cost: as a search with inclusion, times the states that short cuts would save.
 
@@ -211,7 +215,8 @@ impl<'s, 'a> Search<'s, 'a> {
         Ok(None)
     }
 
-    /// Stores the zones of a state that was come to, unless a stored one contains them, and looks for the goal in them.
+    /// Stores the zones of a state that was come to, unless a stored one contains them, and looks
+    /// for the goal in them.
     fn enter(
         &mut self,
         words: &mut [i32],
@@ -224,7 +229,8 @@ impl<'s, 'a> Search<'s, 'a> {
                 forget_upper_bounds(zone, clock);
             }
         }
-        // The goal is looked for before extrapolation; where it holds, nothing is explored any more.
+        // The goal is looked for before extrapolation; where it holds, nothing is explored any
+        // more.
         for zone in &*zones {
             if let Some(cost) = self.goal_cost(words, zone, parent)? {
                 let goal = self.push(words, zone.clone(), parent, step, cost);
@@ -245,7 +251,8 @@ impl<'s, 'a> Search<'s, 'a> {
             {
                 continue;
             }
-            // What the new zone contains was met before, at no greater cost: it stays for the ways through it, but not in the list.
+            // What the new zone contains was met before, at no greater cost: it stays for the ways
+            // through it, but not in the list.
             list.retain(|&one| !dbm::is_subset(bounds_of(one), zone.bounds()));
             let cost = match self.measure {
                 Measure::Moves => self.moves_after(parent),
@@ -322,7 +329,8 @@ impl<'s, 'a> Search<'s, 'a> {
         reached
     }
 
-    /// The first `most` states in the order in which they were met, also those that a later one contains.
+    /// The first `most` states in the order in which they were met, also those that a later one
+    /// contains.
     pub fn into_met(self, most: usize) -> Result<Vec<Met>, Failure> {
         let initial = &self.symbolic.stepper.network().initial;
         let mut moves = Moves::default();

@@ -1,19 +1,25 @@
-//! `sup`, `inf` and `bounds`: the least and greatest values of integers and clocks over the reachable states of a predicate.
+//! `sup`, `inf` and `bounds`: the least and greatest values of integers and clocks over the
+//! reachable states of a predicate.
 //!
-//! Integers are read off every state. A clock is read off the zones, which extrapolation must leave exact where it matters: up to a
-//! *ceiling* the search keeps what comparisons of the clock could tell, from below for a supremum and from above for an infimum. A
-//! result within the ceiling is exact, since its being reached and not exceeded are such comparisons; otherwise the ceiling
+//! Integers are read off every state. A clock is read off the zones, which extrapolation must leave
+//! exact where it matters: up to a *ceiling* the search keeps what comparisons of the clock could
+//! tell, from below for a supremum and from above for an infimum. A result within the ceiling is
+//! exact, since its being reached and not exceeded are such comparisons; otherwise the ceiling
 //! grows twofold and the search begins anew.
 //!
-//! A supremum beyond the ceiling may be infinite. It is if time can pass without limit on the way to the state, or if the way holds
-//! a *pump*: two states of it with the same words, such that the later zone contains the earlier one with some clocks moved up by the
-//! same number. These clocks are above every constant of the model, and each has at the end of the pump the value of one of them, with
-//! what was added: they are not set, or copied among each other. Above all constants nothing depends on how far they are, and their
-//! differences do not change; so the way from the one state to the other can be taken again and again. If the clock that is measured
-//! grows without limit, the zones without such clocks are finitely many, and so the ways that exceed great ceilings have a pump.
+//! A supremum beyond the ceiling may be infinite. It is if time can pass without limit on the way
+//! to the state, or if the way holds a *pump*: two states of it with the same words, such that the
+//! later zone contains the earlier one with some clocks moved up by the same number. These clocks
+//! are above every constant of the model, and each has at the end of the pump the value of one of
+//! them, with what was added: they are not set, or copied among each other. Above all constants
+//! nothing depends on how far they are, and their differences do not change; so the way from the
+//! one state to the other can be taken again and again. If the clock that is measured grows without
+//! limit, the zones without such clocks are finitely many, and so the ways that exceed great
+//! ceilings have a pump.
 //!
-//! Source of the exactness of a ceiling: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and upper bounds in zone-based
-//! abstractions of timed automata", STTT 8, 2006; the pump is derived here.
+//! Source of the exactness of a ceiling: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower
+//! and upper bounds in zone-based abstractions of timed automata", STTT 8, 2006; the pump is
+//! derived here.
 
 use crate::analysis::clock_differences;
 use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockRange, Measure, Network, Predicate};
@@ -84,7 +90,8 @@ pub struct Report {
     pub is_approximate: bool,
 }
 
-/// Searches for the values. `symbolic` makes the zones of the network for given comparisons that must be kept.
+/// Searches for the values. `symbolic` makes the zones of the network for given comparisons that
+/// must be kept.
 pub fn search<'a>(
     question: Question<'_>,
     network: &Network,
@@ -112,7 +119,8 @@ pub fn search<'a>(
             Ok(search::Outcome::Found(trace)) => {
                 let mut zones = symbolic(&measuring.atoms_without_ceiling());
                 if zones.splits() {
-                    // Cut zones forget both bounds of a clock by the same ceiling, and without one a pump would not show.
+                    // Cut zones forget both bounds of a clock by the same ceiling, and without one
+                    // a pump would not show.
                     zones = symbolic(&measuring.atoms(false));
                 }
                 match measuring.exceeded(&mut zones, &trace) {
@@ -161,7 +169,8 @@ struct Item {
     greatest: Option<Measured>,
 }
 
-/// States of a way that are tried as the start of a pump, evenly over it: a way that exceeds a great ceiling has many.
+/// States of a way that are tried as the start of a pump, evenly over it: a way that exceeds a
+/// great ceiling has many.
 const MOST_STARTS: usize = 64;
 
 /// A value, and whether it is reached.
@@ -233,8 +242,8 @@ impl<'q> Measuring<'q> {
         atoms
     }
 
-    /// The same for the greatest values, but without limit for the clock that exceeded its ceiling: no zone forgets how far it
-    /// has come.
+    /// The same for the greatest values, but without limit for the clock that exceeded its ceiling:
+    /// no zone forgets how far it has come.
     fn atoms_without_ceiling(&self) -> Vec<ClockAtom> {
         let mut items = self.items.clone();
         if let Some(index) = self.exceeding {
@@ -493,7 +502,8 @@ impl Pump<'_> {
                 assign(moved, &assignments, false);
             }
             if &words == first_words {
-                // What the start was cut to may take a round to wear off, so that each round is compared with the one before.
+                // What the start was cut to may take a round to wear off, so that each round is
+                // compared with the one before.
                 for moved in self.movable(&before, &since) {
                     if self.grows(symbolic, &words, (&before, &zone), &moved) {
                         pumped.push(moved);
@@ -519,7 +529,8 @@ impl Pump<'_> {
         Bound::strict(-self.above).unwrap_or(Bound::LT_ZERO)
     }
 
-    /// Sets of clocks that may have moved together since a zone: all of which nothing depends on, and the one that is measured.
+    /// Sets of clocks that may have moved together since a zone: all of which nothing depends on,
+    /// and the one that is measured.
     fn movable(&self, before: &Zone, since: &Origins) -> Vec<Vec<bool>> {
         let is_beyond = |clock: usize| clock > 0 && before.bound(0, clock) <= self.beyond();
         let all: Vec<bool> = (0..since.len()).map(is_beyond).collect();
@@ -530,8 +541,8 @@ impl Pump<'_> {
         sets.into_iter().flatten().collect()
     }
 
-    /// Whether the later zone contains the earlier one with these clocks moved up: by one, or by as much as a bound of the clock that is
-    /// measured did.
+    /// Whether the later zone contains the earlier one with these clocks moved up: by one, or by as
+    /// much as a bound of the clock that is measured did.
     fn grows(
         &self,
         symbolic: &mut Symbolic<'_>,
@@ -585,7 +596,8 @@ fn take(
     Ok(next.map(|zone| (zone, effect.assignments)))
 }
 
-/// Moves what is known of each clock along with its value; what becomes less, or comes from a constant, is `lost`.
+/// Moves what is known of each clock along with its value; what becomes less, or comes from a
+/// constant, is `lost`.
 fn assign<T: Copy>(known: &mut [T], assignments: &[Assignment], lost: T) {
     for assignment in assignments {
         match *assignment {
@@ -599,7 +611,8 @@ fn assign<T: Copy>(known: &mut [T], assignments: &[Assignment], lost: T) {
     }
 }
 
-/// The greatest part of a set of clocks of which each has its value from one of them; `None` if it is empty, or another clock has too.
+/// The greatest part of a set of clocks of which each has its value from one of them; `None` if it
+/// is empty, or another clock has too.
 fn carried(mut set: Vec<bool>, origins: &Origins) -> Option<Vec<bool>> {
     loop {
         let has_origin = |origin: &Option<usize>| origin.is_some_and(|origin| set[origin]);
@@ -616,7 +629,8 @@ fn carried(mut set: Vec<bool>, origins: &Origins) -> Option<Vec<bool>> {
 /// What became of the search for a pump from a state.
 enum Attempt {
     Pump,
-    /// The clock has its value from a constant that is met later on the way: no pump begins here or earlier.
+    /// The clock has its value from a constant that is met later on the way: no pump begins here or
+    /// earlier.
     IsSet,
     Nothing,
 }

@@ -1,4 +1,5 @@
-//! Which state has a value that was found: the search behind the traces of `sup`, `inf` and `bounds`.
+//! Which state has a value that was found: the search behind the traces of `sup`, `inf` and
+//! `bounds`.
 
 use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockRange, Measure, Predicate};
 use crate::network::{Failure, Symbolic};
@@ -50,7 +51,8 @@ impl Taking<'_> {
         ]
     }
 
-    /// What the value asks of the clocks in a state with these words; `None` if no valuation has it.
+    /// What the value asks of the clocks in a state with these words; `None` if no valuation has
+    /// it.
     pub fn constraints(
         &self,
         symbolic: &mut Symbolic<'_>,

@@ -1,17 +1,21 @@
-//! One state for all that differ only in which member of a scalar set is which, and the way back from it.
+//! One state for all that differ only in which member of a scalar set is which, and the way back
+//! from it.
 //!
-//! A search that stores representatives takes moves of them, which are not those of the state that was reached. So the
-//! exchanges that led to a representative stand in the way to it, after the moves; with them a trace is led back, from the
-//! initial state on, to the moves of the states that it is about.
+//! A search that stores representatives takes moves of them, which are not those of the state that
+//! was reached. So the exchanges that led to a representative stand in the way to it, after the
+//! moves; with them a trace is led back, from the initial state on, to the moves of the states that
+//! it is about.
 //!
-//! Cost: eight bytes for some ten exchanges on the way to a stored state, and what [`Symmetry::normalise`] costs.
+//! Cost: eight bytes for some ten exchanges on the way to a stored state, and what
+//! [`Symmetry::normalise`] costs.
 
 use crate::network::{Permutation, Symmetry};
 use crate::zones::Bound;
 
 use super::retrace::Step;
 
-/// Marks a step that stands for exchanges; the bits below hold their numbers, each one more than it is.
+/// Marks a step that stands for exchanges; the bits below hold their numbers, each one more than it
+/// is.
 const EXCHANGES: Step = 1 << 62;
 
 /// Buffers for a representative.
@@ -55,7 +59,8 @@ fn bits_of_exchange(symmetry: &Symmetry) -> u32 {
     (symmetry.exchanges() as Step + 1).ilog2() + 1
 }
 
-/// The moves of a way, each with what the members of the state that it is taken in were exchanged by before.
+/// The moves of a way, each with what the members of the state that it is taken in were exchanged
+/// by before.
 pub(super) fn unfold(symmetry: &Symmetry, way: &[Step]) -> Vec<(Step, Permutation)> {
     let bits = bits_of_exchange(symmetry);
     let mut permutation = symmetry.identity();

@@ -1,9 +1,10 @@
 //! The successors of a stored state, and of all committed ones below it.
 //!
-//! States with a committed location are explored where they arise, and stored only if they have a choice, so that choices one
-//! after the other do not multiply. The others are links of a chain; those that were explored last are remembered
-//! ([`RecentStates`]) and not explored again. Chains that are not short ([`LONGEST_CHAIN`], [`MOST_AT_ONCE`]) are stored after
-//! all, so that loops of them end.
+//! States with a committed location are explored where they arise, and stored only if they have a
+//! choice, so that choices one after the other do not multiply. The others are links of a chain;
+//! those that were explored last are remembered ([`RecentStates`]) and not explored again. Chains
+//! that are not short ([`LONGEST_CHAIN`], [`MOST_AT_ONCE`]) are stored after all, so that loops of
+//! them end.
 //!
 //! Where states are stored, and when they are explored, the [`Sink`] decides.
 
@@ -25,14 +26,15 @@ const LONGEST_CHAIN: usize = 64;
 /// Committed states that are explored below one stored state without waiting.
 const MOST_AT_ONCE: u64 = 4096;
 
-/// Takes the states that exploration comes to, with what is to be stored of their zones (see [`Symbolic::to_stored`]). Ways begin
-/// at the state that is being explored.
+/// Takes the states that exploration comes to, with what is to be stored of their zones (see
+/// [`Symbolic::to_stored`]). Ways begin at the state that is being explored.
 pub(super) trait Sink {
-    /// Stores a state and lets it wait, unless a stored one contains it. Returns whether it is known to wait now.
+    /// Stores a state and lets it wait, unless a stored one contains it. Returns whether it is
+    /// known to wait now.
     fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool;
 
-    /// Stores a committed state that has a choice; returns whether it is to be explored at once, and not if a stored state
-    /// contains it.
+    /// Stores a committed state that has a choice; returns whether it is to be explored at once,
+    /// and not if a stored state contains it.
     fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool;
 
     /// The bytes of a state's words that decide identity.
@@ -122,7 +124,8 @@ pub(super) struct Explorer {
     has_committed: bool,
     /// Finds moves that are enough.
     stubborn: Option<StubbornSets>,
-    /// Whether the move at hand is possible in the whole zone and leads to states that are still to be explored.
+    /// Whether the move at hand is possible in the whole zone and leads to states that are still to
+    /// be explored.
     leads_on: bool,
     explored: u64,
     /// The value of `explored` when the exploration of the stored state began.
@@ -248,7 +251,8 @@ impl Explorer {
         Ok(Visit::Paused)
     }
 
-    /// Leaves the moves that do not belong to the stubborn set, if the move at hand makes that enough.
+    /// Leaves the moves that do not belong to the stubborn set, if the move at hand makes that
+    /// enough.
     fn close(&mut self, frame: &mut Frame) {
         if self.leads_on {
             self.leads_on = false;
@@ -270,7 +274,8 @@ impl Explorer {
         is_new
     }
 
-    /// Takes the next move of `source`; a committed target is left in `target` to be explored at once.
+    /// Takes the next move of `source`; a committed target is left in `target` to be explored at
+    /// once.
     fn take_next<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
@@ -332,7 +337,8 @@ impl Explorer {
         taken
     }
 
-    /// Looks at the target of a move, whose words and zone with time passed are in `target`, and stores it or leaves it there.
+    /// Looks at the target of a move, whose words and zone with time passed are in `target`, and
+    /// stores it or leaves it there.
     fn enter_whole<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
@@ -381,7 +387,8 @@ impl Explorer {
         Ok(taken)
     }
 
-    /// As [`Explorer::enter_whole`], for the zones on entry before time passes, of which there may be several.
+    /// As [`Explorer::enter_whole`], for the zones on entry before time passes, of which there may
+    /// be several.
     fn enter<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
@@ -416,8 +423,9 @@ impl Explorer {
         Ok(Taken::Nothing)
     }
 
-    /// Hands a state to the sink, or the one that stands for it. The zone, which is overwritten, must have been extrapolated
-    /// unless it is stored reduced, and if states may be exchanged, so that it is the same for as many of them as possible.
+    /// Hands a state to the sink, or the one that stands for it. The zone, which is overwritten,
+    /// must have been extrapolated unless it is stored reduced, and if states may be exchanged, so
+    /// that it is the same for as many of them as possible.
     fn store<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,

@@ -45,7 +45,8 @@ pub trait Goal {
         Ok(if holds { Look::Found } else { Look::Continue })
     }
 
-    /// Whether a state in which the search ended, computed again without extrapolation, is what was looked for.
+    /// Whether a state in which the search ended, computed again without extrapolation, is what was
+    /// looked for.
     fn confirms(
         &mut self,
         symbolic: &mut Symbolic<'_>,
@@ -64,8 +65,8 @@ pub trait Goal {
     }
 }
 
-/// A goal that several threads look for, each by its own copy. Looking at a state never takes so long that the limits must be
-/// looked at meanwhile.
+/// A goal that several threads look for, each by its own copy. Looking at a state never takes so
+/// long that the limits must be looked at meanwhile.
 pub trait SharedGoal: Goal + Send + Sized {
     /// A copy that has seen nothing.
     #[must_use]

@@ -1,21 +1,24 @@
 //! Reachability by several threads.
 //!
-//! Stored states are divided into as many *shards* as there are threads ([`super::shard`]), and each has a *worker*, which explores
-//! the states of its shard, level by level, breadth first. The search goes in rounds: in a round every worker takes in what the others
-//! have sent it, explores some of its states, and collects what it sends. Workers share nothing, and a round depends only on the
-//! one before it.
+//! Stored states are divided into as many *shards* as there are threads ([`super::shard`]), and
+//! each has a *worker*, which explores the states of its shard, level by level, breadth first. The
+//! search goes in rounds: in a round every worker takes in what the others have sent it, explores
+//! some of its states, and collects what it sends. Workers share nothing, and a round depends only
+//! on the one before it.
 //!
 //! Invariants:
-//! * With the same number of threads everything is the same whenever a query is asked: verdict, counters, trace. Only a stop
-//!   by time or by the user comes when it comes.
-//! * A level begins when all states of the one before were explored, so traces are shortest in stored states, as with one thread.
-//! * A search ends after the first round in which something was found. A failure in this round goes before a state that was found;
-//!   of two of a kind the one of the first shard counts.
-//! * Whether the workers of a round run at the same time makes no difference. While little waits, one thread runs them all.
+//! * With the same number of threads everything is the same whenever a query is asked: verdict,
+//!   counters, trace. Only a stop by time or by the user comes when it comes.
+//! * A level begins when all states of the one before were explored, so traces are shortest in
+//!   stored states, as with one thread.
+//! * A search ends after the first round in which something was found. A failure in this round goes
+//!   before a state that was found; of two of a kind the one of the first shard counts.
+//! * Whether the workers of a round run at the same time makes no difference. While little waits,
+//!   one thread runs them all.
 //! * A worker that panics ends the search with its panic.
 //!
-//! Cost: between rounds threads wait for the slowest; rounds are long enough that this is little, and short enough that mail takes
-//! little memory.
+//! Cost: between rounds threads wait for the slowest; rounds are long enough that this is little,
+//! and short enough that mail takes little memory.
 
 use std::panic;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -46,7 +49,8 @@ const FEWEST_MOVES: u64 = 1 << 10;
 const MOST_MOVES: u64 = 1 << 15;
 /// The zones of the states that a worker comes to in a round have so many bounds at most.
 const MOST_BOUNDS: u64 = 1 << 22;
-/// A worker that has collected so many bytes for others ends its round: what they then look through should still be in a cache.
+/// A worker that has collected so many bytes for others ends its round: what they then look through
+/// should still be in a cache.
 const MOST_MAIL_BYTES: usize = 1 << 18;
 
 /// States of a round for each worker from which on threads are worth waking.
@@ -55,7 +59,8 @@ const WORTH_WAKING: usize = 48;
 /// The stack of a thread: as much as that of the first thread of a program.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Searches for a state that `goal` finds, breadth first, with so many threads, of which the caller's is one.
+/// Searches for a state that `goal` finds, breadth first, with so many threads, of which the
+/// caller's is one.
 ///
 /// # Panics
 /// If there are no threads or more than [`tree::MOST_SHARDS`], or if a worker does.
@@ -330,7 +335,8 @@ impl<'s, 'a, G: SharedGoal> Search<'s, 'a, '_, G> {
         }
     }
 
-    /// What the workers are to do, and how many states wait for them, about; `None` if there is nothing.
+    /// What the workers are to do, and how many states wait for them, about; `None` if there is
+    /// nothing.
     fn task(&self, explored: u64) -> Option<(Task, usize)> {
         let (mut now, mut next, mut sent, mut is_level_over) = (0, 0, 0, true);
         for worker in self.workers.iter().flatten() {
@@ -387,7 +393,8 @@ impl<'s, 'a, G: SharedGoal> Search<'s, 'a, '_, G> {
     }
 }
 
-/// The threads beside the caller's. Each is started when it is first needed, and ends with this value.
+/// The threads beside the caller's. Each is started when it is first needed, and ends with this
+/// value.
 struct Crew<'t, 'e, 's, 'a, G> {
     scope: &'t Scope<'t, 'e>,
     /// Tells all threads to end their rounds.

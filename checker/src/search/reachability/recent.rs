@@ -1,10 +1,13 @@
-//! The committed states that were explored last, so that a state to which several ways lead is explored once.
+//! The committed states that were explored last, so that a state to which several ways lead is
+//! explored once.
 //!
 //! Committed states are not stored; this is a cache of bounded size.
 //!
 //! Invariants:
-//! * What is found in it was entered before, word by word and bound by bound. What is not found may have been entered before as well.
-//! * It takes at most [`MOST_BYTES`], however large states are: where there are thousands of clocks it has few places, or none.
+//! * What is found in it was entered before, word by word and bound by bound. What is not found may
+//!   have been entered before as well.
+//! * It takes at most [`MOST_BYTES`], however large states are: where there are thousands of clocks
+//!   it has few places, or none.
 //!
 //! Cost: one hash and one comparison for each state.
 
@@ -44,8 +47,8 @@ impl RecentStates {
         self.words.len() + self.zones.len() * size_of::<Bound>()
     }
 
-    /// Enters a state, packed words and a zone; returns whether it was there already. With the number of stored states the
-    /// cache grows, and forgets everything then.
+    /// Enters a state, packed words and a zone; returns whether it was there already. With the
+    /// number of stored states the cache grows, and forgets everything then.
     pub(super) fn enter(&mut self, words: &[u8], zone: &[Bound], stored: usize) -> bool {
         let place_bytes = words.len() + size_of_val(zone);
         let Some(most) = (MOST_BYTES / place_bytes).min(MOST_PLACES).checked_ilog2() else {

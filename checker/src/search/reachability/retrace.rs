@@ -10,15 +10,17 @@ use super::search::Trace;
 /// A move of a state: its rank.
 pub(in crate::search) type Step = u64;
 
-/// A step, and by what the members of the state that it is a step of differ from those of the state of the trace, if they do.
+/// A step, and by what the members of the state that it is a step of differ from those of the state
+/// of the trace, if they do.
 type Taken = (Step, Option<Permutation>);
 
 /// The words of a state that was entered, and its zones.
 type Entered = (Vec<i32>, Vec<Zone>);
 
-/// Takes the steps from the initial state. Where a state has several zones, the first is taken from which the rest of the way
-/// is possible, up to a state that the goal confirms if there is one. What cannot be computed again is the failure that the trace
-/// leads to, and is left out. Moves of representatives are led back to those that they stand for.
+/// Takes the steps from the initial state. Where a state has several zones, the first is taken from
+/// which the rest of the way is possible, up to a state that the goal confirms if there is one.
+/// What cannot be computed again is the failure that the trace leads to, and is left out. Moves of
+/// representatives are led back to those that they stand for.
 pub(in crate::search) fn retrace(
     symbolic: &mut Symbolic<'_>,
     steps: &[Step],
@@ -76,7 +78,8 @@ fn take_all(
     Ok(())
 }
 
-/// Takes one step: the parts of the move, the words after it, and the zones that it leads to, last first.
+/// Takes one step: the parts of the move, the words after it, and the zones that it leads to, last
+/// first.
 fn take(
     symbolic: &mut Symbolic<'_>,
     (step, exchanged): &Taken,
@@ -85,7 +88,8 @@ fn take(
 ) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
     let mut moves = Moves::default();
     symbolic.moves_within(&mut words, zone.bounds(), &mut moves)?;
-    // The zone is within the one of the search, where extrapolation let moves look possible that are not.
+    // The zone is within the one of the search, where extrapolation let moves look possible that
+    // are not.
     let one = match exchanged {
         None => moves.with_rank(*step),
         Some(exchanged) => original(symbolic, (*step, exchanged), (&words, zone), &moves)?

@@ -1,10 +1,12 @@
-//! Reachability: is there a state that a [`Goal`] finds, for example one in which a predicate holds?
+//! Reachability: is there a state that a [`Goal`] finds, for example one in which a predicate
+//! holds?
 //!
-//! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one with the same words contains
-//! its zone, and stored ones that a new one contains are dropped from the waiting list. Which committed states are stored
-//! is told in [`super::expand`].
+//! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one
+//! with the same words contains its zone, and stored ones that a new one contains are dropped from
+//! the waiting list. Which committed states are stored is told in [`super::expand`].
 //!
-//! Each stored state remembers its parent and the moves from it, so that a trace is found by taking the moves again.
+//! Each stored state remembers its parent and the moves from it, so that a trace is found by taking
+//! the moves again.
 //!
 //! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 3.
 
@@ -45,7 +47,8 @@ pub enum Order {
 pub struct Manner {
     /// In which order states are explored.
     pub order: Order,
-    /// How many threads share the work, from 1 to [`MOST_THREADS`]. Only breadth first is there more than one.
+    /// How many threads share the work, from 1 to [`MOST_THREADS`]. Only breadth first is there
+    /// more than one.
     pub threads: usize,
 }
 
@@ -99,7 +102,8 @@ pub fn search(
     }
 }
 
-/// As [`search`], by several threads if they are wanted and the order is breadth first: see [`super::parallel`].
+/// As [`search`], by several threads if they are wanted and the order is breadth first: see
+/// [`super::parallel`].
 pub fn search_shared<G: SharedGoal>(
     symbolic: &mut Symbolic<'_>,
     goal: &mut G,
@@ -294,8 +298,8 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    /// The way to the state at hand: the parents of the current node, then the moves below it. The states are computed anew;
-    /// what fails on the way is left out.
+    /// The way to the state at hand: the parents of the current node, then the moves below it. The
+    /// states are computed anew; what fails on the way is left out.
     fn trace(&mut self, is_found: bool) -> Trace {
         let Store { tree, current, .. } = &self.store;
         let steps = tree::way(&[tree], *current, self.explorer.way());

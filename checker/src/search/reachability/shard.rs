@@ -1,8 +1,8 @@
 //! A shard of the stored states, and the mail between shards.
 //!
-//! The hash of its words decides to which shard a state belongs, so that states with the same words meet in one: what contains
-//! what is decided there, and shards share nothing. States for other shards are collected in [`Mail`], packed words and
-//! zones one after the other.
+//! The hash of its words decides to which shard a state belongs, so that states with the same words
+//! meet in one: what contains what is decided there, and shards share nothing. States for other
+//! shards are collected in [`Mail`], packed words and zones one after the other.
 //!
 //! Cost: a state for another shard is copied twice.
 
@@ -176,7 +176,8 @@ impl Shard {
             + self.outgoing.iter().map(Mail::bytes).sum::<usize>()
     }
 
-    /// Stores a state that belongs here unless a stored one contains it, and gives it back; puts any other aside.
+    /// Stores a state that belongs here unless a stored one contains it, and gives it back; puts
+    /// any other aside.
     fn store_or_send(
         &mut self,
         words: &[i32],

@@ -1,9 +1,11 @@
-//! The tree of a search: stored states, each with the one that it was reached from and the moves from there.
+//! The tree of a search: stored states, each with the one that it was reached from and the moves
+//! from there.
 //!
-//! Several trees make one where the states of a search are divided: each is a *shard* of the whole, and a state may have been
-//! reached from one of another shard.
+//! Several trees make one where the states of a search are divided: each is a *shard* of the whole,
+//! and a state may have been reached from one of another shard.
 //!
-//! Cost: eight bytes a state; the moves of a way of more than one take four bytes each and four more.
+//! Cost: eight bytes a state; the moves of a way of more than one take four bytes each and four
+//! more.
 
 use crate::ir::Network;
 
@@ -45,8 +47,9 @@ impl Origin {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     parent: u32,
-    /// The only move from the parent with the parent's shard; or, with [`MANY_STEPS`], where in `paths` the number of moves stands
-    /// with the shard, and then they, packed (see [`paths`]): the number is that of their words.
+    /// The only move from the parent with the parent's shard; or, with [`MANY_STEPS`], where in
+    /// `paths` the number of moves stands with the shard, and then they, packed (see [`paths`]):
+    /// the number is that of their words.
     path: u32,
 }
 

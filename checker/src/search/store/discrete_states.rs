@@ -1,16 +1,18 @@
 //! Discrete states, each stored once.
 //!
 //! Invariants:
-//! * Two states get the same [`DiscreteId`] exactly if their identity words are equal; no hash stands in for a state.
-//! * Words that no update ever writes are not stored: they have their initial value in every state. `meta` words are stored
-//!   with the first state of an identity, and not compared.
+//! * Two states get the same [`DiscreteId`] exactly if their identity words are equal; no hash
+//!   stands in for a state.
+//! * Words that no update ever writes are not stored: they have their initial value in every state.
+//!   `meta` words are stored with the first state of an identity, and not compared.
 //! * Ids count from 0 in the order of first insertion.
 //!
-//! A word takes one, two or four bytes, as the range of its variable or the number of locations needs; that a value lies in
-//! its range is checked where it is assigned, and once more where it is packed.
+//! A word takes one, two or four bytes, as the range of its variable or the number of locations
+//! needs; that a value lies in its range is checked where it is assigned, and once more where it is
+//! packed.
 //!
-//! Cost: a state takes its written words; records lie in blocks that are never moved. A look-up hashes the bytes once and
-//! compares them once, on a match of 32 bits of the hash.
+//! Cost: a state takes its written words; records lie in blocks that are never moved. A look-up
+//! hashes the bytes once and compares them once, on a match of 32 bits of the hash.
 
 use crate::ir::{Network, Shape};
 
@@ -20,7 +22,8 @@ use super::segmented_table::PiecedTable;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DiscreteId(pub u32);
 
-/// An entry of the table: the state and a part of its hash, from which the table is rebuilt when it grows.
+/// An entry of the table: the state and a part of its hash, from which the table is rebuilt when it
+/// grows.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     id: u32,
@@ -213,8 +216,8 @@ impl StateStore {
         self.intern_proposed(hash)
     }
 
-    /// Packs a state, to be interned by [`StateStore::intern_proposed`] or handed to another store of the same network; returns
-    /// its hash, which only its identity decides.
+    /// Packs a state, to be interned by [`StateStore::intern_proposed`] or handed to another store
+    /// of the same network; returns its hash, which only its identity decides.
     pub(super) fn propose(&mut self, words: &[i32]) -> u32 {
         hash_bytes(self.pack(words))
     }
@@ -229,7 +232,8 @@ impl StateStore {
         self.scratch.copy_from_slice(record);
     }
 
-    /// The id of the state that was packed or taken over last, which has this hash, and whether it is new.
+    /// The id of the state that was packed or taken over last, which has this hash, and whether it
+    /// is new.
     pub(super) fn intern_proposed(&mut self, hash: u32) -> (DiscreteId, bool) {
         let (blocks, stride, bits, identity) =
             (&self.blocks, self.stride, self.block_bits, self.identity);

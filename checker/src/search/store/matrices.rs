@@ -57,7 +57,8 @@ impl Matrices {
         id
     }
 
-    /// Gives entries twice as many bytes, block by block, so that the old and the new ones never stand side by side.
+    /// Gives entries twice as many bytes, block by block, so that the old and the new ones never
+    /// stand side by side.
     pub(super) fn widen(&mut self, widened: impl Fn(&[u8], &mut Vec<u8>)) {
         cancellation::ask_for(self.bytes());
         self.size *= 2;

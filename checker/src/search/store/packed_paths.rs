@@ -1,5 +1,5 @@
-//! Moves one after the other, packed into words: a step takes one word if it is small, else two, of which the first, the upper half,
-//! is marked.
+//! Moves one after the other, packed into words: a step takes one word if it is small, else two, of
+//! which the first, the upper half, is marked.
 
 use crate::search::reachability::retrace::Step;
 

@@ -1,10 +1,11 @@
-//! Zones, each stored once, in as few bytes a bound as the widest one needs; reduced (see [`simulation`]), if zones are compared by
-//! what comparisons can tell.
+//! Zones, each stored once, in as few bytes a bound as the widest one needs; reduced (see
+//! [`simulation`]), if zones are compared by what comparisons can tell.
 //!
 //! Invariants:
 //! * Two zones get the same [`ZoneId`] exactly if their matrices are equal.
-//! * All matrices have entries of the same width: one byte until a bound does not fit, then two, then four. The order of
-//!   bounds is that of the entries, so inclusion is decided on the packed form.
+//! * All matrices have entries of the same width: one byte until a bound does not fit, then two,
+//!   then four. The order of bounds is that of the entries, so inclusion is decided on the packed
+//!   form.
 //! * A zone counts how often it is in use; after the last use its place is used again.
 //!
 //! Cost: packing and comparing touch each bound once, a vector of them at a time.
@@ -32,8 +33,8 @@ enum Width {
 pub(in crate::search) struct Kept<'r> {
     /// Its closed matrix, or its reduced form if there are limits.
     pub(in crate::search) matrix: &'r [Bound],
-    /// The limits of its ceilings if zones count as contained in what simulates them. Whether there are any is the same for all
-    /// zones, and they are the same for zones that are compared.
+    /// The limits of its ceilings if zones count as contained in what simulates them. Whether there
+    /// are any is the same for all zones, and they are the same for zones that are compared.
     pub(in crate::search) limits: &'r [Bound],
     /// By what it is known, if it is.
     pub(in crate::search) known: Option<KeptZone>,
@@ -219,7 +220,8 @@ pub(super) struct PackedZones {
 }
 
 impl PackedZones {
-    /// An empty table of zones of this dimension, most of whose constants are at most `greatest`; signatures are best then.
+    /// An empty table of zones of this dimension, most of whose constants are at most `greatest`;
+    /// signatures are best then.
     pub(super) fn new(dimension: usize, greatest: i32) -> PackedZones {
         PackedZones {
             dimension,
@@ -308,7 +310,8 @@ impl PackedZones {
         }
     }
 
-    /// Whether the second of two packed zones contains the first, of which only infinite entries exceed their counterparts.
+    /// Whether the second of two packed zones contains the first, of which only infinite entries
+    /// exceed their counterparts.
     fn is_within(&mut self, of: impl Fn(&PackedZones) -> [&[u8]; 2], limits: &[Bound]) -> bool {
         if limits.is_empty() {
             return false;
@@ -541,7 +544,8 @@ mod tests {
     fn zones_stay_the_same_when_bounds_outgrow_their_width() {
         let mut packed = PackedZones::new(4, 9);
         let mut kept = Vec::new();
-        // Encoded, 63 is the greatest constant for one byte, 64 the first for two; 16383 and 16384 likewise.
+        // Encoded, 63 is the greatest constant for one byte, 64 the first for two; 16383 and 16384
+        // likewise.
         for scale in [
             9,
             62 * 7 / 6,

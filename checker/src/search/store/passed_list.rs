@@ -1,16 +1,16 @@
 //! The passed list: stored symbolic states, none of which contains another.
 //!
 //! Invariants:
-//! * Of two stored states with the same words neither zone contains the other, as a set or, where zones are stored reduced, by
-//!   what simulates what (see [`crate::zones::simulation`]). A state that a new one contains is forgotten, and its node is
-//!   covered from then on.
+//! * Of two stored states with the same words neither zone contains the other, as a set or, where
+//!   zones are stored reduced, by what simulates what (see [`crate::zones::simulation`]). A state
+//!   that a new one contains is forgotten, and its node is covered from then on.
 //! * Nodes are numbered in the order in which they were stored; a number is never used again.
 //!
-//! Source: G. Behrmann, J. Bengtsson, A. David, K. G. Larsen, P. Pettersson, W. Yi, "UPPAAL Implementation Secrets", 2002
-//! (one list for passed and waiting states, by discrete state).
+//! Source: G. Behrmann, J. Bengtsson, A. David, K. G. Larsen, P. Pettersson, W. Yi, "UPPAAL
+//! Implementation Secrets", 2002 (one list for passed and waiting states, by discrete state).
 //!
-//! Cost: one look-up of the words, one or two comparisons of zones for each zone stored with the same words, and a look-up
-//! of the zone if it is to be stored.
+//! Cost: one look-up of the words, one or two comparisons of zones for each zone stored with the
+//! same words, and a look-up of the zone if it is to be stored.
 
 use crate::ir::Network;
 use crate::zones::Bound;
@@ -45,7 +45,8 @@ pub(in crate::search) struct PassedList {
 }
 
 impl PassedList {
-    /// An empty list for the states of a network, with zones of this dimension, most of whose constants are at most `greatest`.
+    /// An empty list for the states of a network, with zones of this dimension, most of whose
+    /// constants are at most `greatest`.
     pub(in crate::search) fn new(network: &Network, dimension: usize, greatest: i32) -> PassedList {
         PassedList {
             store: StateStore::new(network),
@@ -77,7 +78,8 @@ impl PassedList {
             .is_some_and(|bits| bits >> (node % 64) & 1 == 1)
     }
 
-    /// Writes a stored state that is not covered, its zone as it is stored, over another state of the same network.
+    /// Writes a stored state that is not covered, its zone as it is stored, over another state of
+    /// the same network.
     pub(in crate::search) fn load(&self, stored: Stored, words: &mut [i32], zone: &mut [Bound]) {
         self.store.load(stored.discrete, words);
         if self.has_clocks {
@@ -96,7 +98,8 @@ impl PassedList {
         self.add_proposed(hash, zone)
     }
 
-    /// Packs the words of a state, to be stored by [`PassedList::add_proposed`] or sent to another list; returns their hash.
+    /// Packs the words of a state, to be stored by [`PassedList::add_proposed`] or sent to another
+    /// list; returns their hash.
     pub(in crate::search) fn propose(&mut self, words: &[i32]) -> u32 {
         self.store.propose(words)
     }
@@ -122,7 +125,8 @@ impl PassedList {
         }
         let signature = self.zones.propose(zone);
         if !is_new {
-            // None of the stored ones lies within another, so that what one contains contains none of them.
+            // None of the stored ones lies within another, so that what one contains contains none
+            // of them.
             let zones = &mut self.zones;
             let contains = |other| zones.contains_candidate(other, zone.limits);
             if self.lists.any_above(discrete, signature, contains) {

@@ -1,7 +1,9 @@
-//! A hash table that grows piece by piece, so that an old and a new copy of the whole of it never stand side by side.
+//! A hash table that grows piece by piece, so that an old and a new copy of the whole of it never
+//! stand side by side.
 //!
-//! The hash of an entry decides to which of the pieces it belongs, each of which is a table that grows for itself. So what a search
-//! takes while a table grows is hardly more than what it takes afterwards, which is what the limit of memory is about.
+//! The hash of an entry decides to which of the pieces it belongs, each of which is a table that
+//! grows for itself. So what a search takes while a table grows is hardly more than what it takes
+//! afterwards, which is what the limit of memory is about.
 //!
 //! Invariant: `bytes` is what the pieces have allocated.
 //!

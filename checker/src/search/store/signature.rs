@@ -1,19 +1,22 @@
-//! Signatures of zones: digests that grow with a zone, so that most zones are told apart without comparing them.
+//! Signatures of zones: digests that grow with a zone, so that most zones are told apart without
+//! comparing them.
 
 use crate::zones::Bound;
 
 /// Sums of bytes with at most such a sum of weights are below 2^15.
 const NARROW: i32 = 255;
 
-/// Where zones have fewer clocks than this, with the reference clock, hardly more than one bound counts for each number of a signature,
-/// whichever way they are shared out.
+/// Where zones have fewer clocks than this, with the reference clock, hardly more than one bound
+/// counts for each number of a signature, whichever way they are shared out.
 const FEW_CLOCKS: usize = 6;
 
-/// How many bounds lie side by side before the numbers of a signature begin anew with the first one, and whether bounds have weights.
+/// How many bounds lie side by side before the numbers of a signature begin anew with the first
+/// one, and whether bounds have weights.
 ///
-/// Where a clock was reset a little later, the bounds of its column are greater and those of its row smaller, or the other way round.
-/// So a number is the sum of columns: those of one clock show it in one direction, all others in the other one. In sums that mix rows and
-/// columns it would cancel out.
+/// Where a clock was reset a little later, the bounds of its column are greater and those of its
+/// row smaller, or the other way round. So a number is the sum of columns: those of one clock show
+/// it in one direction, all others in the other one. In sums that mix rows and columns it would
+/// cancel out.
 fn period(dimension: usize) -> (usize, bool) {
     if dimension < FEW_CLOCKS {
         (dimension * dimension, true)
@@ -24,7 +27,8 @@ fn period(dimension: usize) -> (usize, bool) {
 
 /// The factor of the bounds of a block of eight in the sums of a signature.
 ///
-/// Bounds on a difference and on its negative often lie in the same lane, and would cancel out where a difference is exact.
+/// Bounds on a difference and on its negative often lie in the same lane, and would cancel out
+/// where a difference is exact.
 fn weight(block: usize, is_weighted: bool) -> i32 {
     if is_weighted {
         1 + (block & 3) as i32
@@ -33,7 +37,8 @@ fn weight(block: usize, is_weighted: bool) -> i32 {
     }
 }
 
-/// The weighted sums of every eighth bound of a period. A bound counts from the negated greatest one on, and up to one more than that.
+/// The weighted sums of every eighth bound of a period. A bound counts from the negated greatest
+/// one on, and up to one more than that.
 fn sums(matrix: &[Bound], greatest: i32, (period, is_weighted): (usize, bool)) -> [i32; 8] {
     let mut sums = [0; 8];
     let mut add = |bounds: &[Bound], index| {
@@ -70,7 +75,8 @@ fn narrow_sums(matrix: &[i16], greatest: i16, (period, is_weighted): (usize, boo
     sums.map(i32::from)
 }
 
-/// The entries of a matrix packed into bytes, or its demands if there are limits, as far as [`narrow_sums`] tells them apart.
+/// The entries of a matrix packed into bytes, or its demands if there are limits, as far as
+/// [`narrow_sums`] tells them apart.
 pub(super) fn widen_narrow(matrix: &[u8], limits: &[Bound], dimension: usize, target: &mut [i16]) {
     const NONE: i16 = -1 << 14;
     for (entry, byte) in target.iter_mut().zip(matrix) {
@@ -96,7 +102,8 @@ pub(super) fn widen_narrow(matrix: &[u8], limits: &[Bound], dimension: usize, ta
 /// How the signatures of zones of one dimension are made.
 #[derive(Debug)]
 pub(super) struct Signatures {
-    /// How many bounds lie side by side before the numbers begin anew with the first one, and whether bounds have weights.
+    /// How many bounds lie side by side before the numbers begin anew with the first one, and
+    /// whether bounds have weights.
     period: (usize, bool),
     /// The greatest encoded bound that signatures tell from greater ones.
     greatest: i32,
@@ -150,7 +157,8 @@ impl Signatures {
     }
 }
 
-/// A digest of a zone, or of its demands if it is reduced, that grows with it: eight numbers of fifteen bits.
+/// A digest of a zone, or of its demands if it is reduced, that grows with it: eight numbers of
+/// fifteen bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Signature([u32; 4]);
 
@@ -158,7 +166,8 @@ impl Signature {
     /// Whether a zone with this signature may be a subset of one with the other; false is certain.
     #[inline]
     pub(super) fn may_be_within(self, other: Signature) -> bool {
-        // No number borrows from its neighbour, and the sixteenth bit is left where it is not greater.
+        // No number borrows from its neighbour, and the sixteenth bit is left where it is not
+        // greater.
         const SIXTEENTH_BITS: u64 = 0x8000_8000_8000_8000;
         let left = |half: usize| (other.half(half) | SIXTEENTH_BITS) - self.half(half);
         left(0) & left(1) & SIXTEENTH_BITS == SIXTEENTH_BITS

@@ -1,13 +1,14 @@
 //! The zones of each discrete state, with their signatures.
 //!
-//! Short lists lie side by side and are gone through whole. A long one is split by its mean signature: a zone that lies in another one is
-//! in no number of its signature greater, so that the numbers which are at least the mean's tell in which parts a larger or smaller zone
-//! may lie. Parts that grow long are split again.
+//! Short lists lie side by side and are gone through whole. A long one is split by its mean
+//! signature: a zone that lies in another one is in no number of its signature greater, so that the
+//! numbers which are at least the mean's tell in which parts a larger or smaller zone may lie.
+//! Parts that grow long are split again.
 //!
 //! Nothing that a caller sees depends on the order in a list.
 //!
-//! Cost: a list of n entries that is not split is gone through in less than a nanosecond an entry; of one that is, about
-//! (3/4)^8 of the parts are, if the eight numbers are independent.
+//! Cost: a list of n entries that is not split is gone through in less than a nanosecond an entry;
+//! of one that is, about (3/4)^8 of the parts are, if the eight numbers are independent.
 
 use crate::zones::zone_table::ZoneId;
 
@@ -22,7 +23,8 @@ pub(super) struct Entry {
     pub(super) node: u32,
 }
 
-/// A list: so many entries from `first` on, in a place for as many as the next power of two; or [`SPLIT`], and the number of the split.
+/// A list: so many entries from `first` on, in a place for as many as the next power of two; or
+/// [`SPLIT`], and the number of the split.
 #[derive(Clone, Copy, Debug)]
 struct List {
     first: u32,

@@ -1,7 +1,8 @@
-//! Times of the events of a run, from bounds on their distances or on the durations of waits; what alternatives there are, and which of
-//! them is tried, [`super::schedule`] says.
+//! Times of the events of a run, from bounds on their distances or on the durations of waits; what
+//! alternatives there are, and which of them is tried, [`super::schedule`] says.
 //!
-//! Invariant: without bounds on durations times are the least that satisfy all bounds so far, or the bounds contradict each other.
+//! Invariant: without bounds on durations times are the least that satisfy all bounds so far, or
+//! the bounds contradict each other.
 
 use std::collections::VecDeque;
 
@@ -97,8 +98,8 @@ impl Solver {
         Ok(true)
     }
 
-    /// The times of the events in ticks, and how many make a unit. They satisfy what was required, and of the alternatives those that the
-    /// times at hand do.
+    /// The times of the events in ticks, and how many make a unit. They satisfy what was required,
+    /// and of the alternatives those that the times at hand do.
     pub(super) fn in_ticks(
         &self,
         alternatives: &[Alternatives],
@@ -129,7 +130,8 @@ impl Solver {
     }
 }
 
-/// A bound on times as one on durations: the wait with this number leads from the event with this number to the next.
+/// A bound on times as one on durations: the wait with this number leads from the event with this
+/// number to the next.
 pub(super) fn linear(limit: &Limit) -> LinearBound {
     match limit {
         Limit::Linear(bound) => bound.clone(),
@@ -206,7 +208,8 @@ impl Times {
         self.least[one.later] >= sum(self.least[one.earlier], one.apart)
     }
 
-    /// Adds a distance and moves the events after it; returns false if it contradicts the others, and then the times mean nothing.
+    /// Adds a distance and moves the events after it; returns false if it contradicts the others,
+    /// and then the times mean nothing.
     pub(super) fn require(&mut self, one: Distance) -> bool {
         if one.earlier == one.later {
             return one.apart <= (0, 0);
@@ -219,7 +222,8 @@ impl Times {
         self.queue.clear();
         self.queue.push_back(one.later);
         while let Some(event) = self.queue.pop_front() {
-            // The start never moves; and what moves because of the event that the new distance begins at moves for ever.
+            // The start never moves; and what moves because of the event that the new distance
+            // begins at moves for ever.
             if event == 0 || event == one.earlier {
                 return false;
             }

@@ -1,27 +1,32 @@
 //! When the moves of a symbolic run can happen: exact times for a given sequence of moves.
 //!
-//! Along a known sequence of moves a clock's value is the time since the move that set it last, plus what it was set to. So
-//! guards, invariants and predicates become bounds on differences of the times of events (moves, and moments that are looked at),
-//! and the earliest times that satisfy them are longest paths. Two things have alternatives: where something must not
-//! hold at a moment (a receiver that abstains, a move of higher priority), one of its comparisons must fail; and where a wait
-//! must not pass through a zone, it must end before the zone begins, start after it has ended, or run beside it. They are tried one
-//! after the other, and only where the earliest times violate them.
+//! Along a known sequence of moves a clock's value is the time since the move that set it last,
+//! plus what it was set to. So guards, invariants and predicates become bounds on differences of
+//! the times of events (moves, and moments that are looked at), and the earliest times that satisfy
+//! them are longest paths. Two things have alternatives: where something must not hold at a moment
+//! (a receiver that abstains, a move of higher priority), one of its comparisons must fail; and
+//! where a wait must not pass through a zone, it must end before the zone begins, start after it
+//! has ended, or run beside it. They are tried one after the other, and only where the earliest
+//! times violate them.
 //!
-//! A strict bound is a weak one with an infinitesimal distance: times are pairs of an integer and a count of infinitesimals. In the
-//! end the infinitesimal becomes `1 / (n + 1)`, where n is the greatest count: a bound that is not met exactly then has at
-//! least one whole unit of room, which n of them do not fill.
+//! A strict bound is a weak one with an infinitesimal distance: times are pairs of an integer and a
+//! count of infinitesimals. In the end the infinitesimal becomes `1 / (n + 1)`, where n is the
+//! greatest count: a bound that is not met exactly then has at least one whole unit of room, which
+//! n of them do not fill.
 //!
-//! Where clocks stand still at times, a clock's value is the sum of the waits in which it ran, and bounds become linear in durations
-//! ([`super::simplex`]), with the same alternatives.
+//! Where clocks stand still at times, a clock's value is the sum of the waits in which it ran, and
+//! bounds become linear in durations ([`super::simplex`]), with the same alternatives.
 //!
-//! Invariant: without such clocks times are the least that satisfy all bounds so far, or the bounds contradict each other.
+//! Invariant: without such clocks times are the least that satisfy all bounds so far, or the bounds
+//! contradict each other.
 //!
-//! Source: R. Dechter, I. Meiri, J. Pearl, "Temporal constraint networks", Artificial Intelligence 49, 1991 (times as shortest
-//! paths, alternatives by backtracking); A. Armando, C. Castellini, E. Giunchiglia, "SAT-based procedures for temporal reasoning",
-//! ECP 1999 (alternatives only where they are violated).
+//! Source: R. Dechter, I. Meiri, J. Pearl, "Temporal constraint networks", Artificial Intelligence
+//! 49, 1991 (times as shortest paths, alternatives by backtracking); A. Armando, C. Castellini, E.
+//! Giunchiglia, "SAT-based procedures for temporal reasoning", ECP 1999 (alternatives only where
+//! they are violated).
 //!
-//! Cost: a bound that moves n times costs up to n times the bounds among them; alternatives are exponential in the worst case,
-//! and given up after [`MOST_ATTEMPTS`].
+//! Cost: a bound that moves n times costs up to n times the bounds among them; alternatives are
+//! exponential in the worst case, and given up after [`MOST_ATTEMPTS`].
 
 use crate::ir::Predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
@@ -69,7 +74,8 @@ pub struct Wanted<'t> {
     pub finish: Finish<'t>,
     /// When it ends at the latest; with 1, before one unit has passed since then.
     pub deadline: Option<(i32, u32)>,
-    /// On entry of which state all clocks have the values that they have on entry of the last, if it goes back there.
+    /// On entry of which state all clocks have the values that they have on entry of the last, if
+    /// it goes back there.
     pub closing: Option<Closing>,
 }
 
@@ -352,7 +358,8 @@ impl<'s, 'a> Plan<'s, 'a> {
         self.require_all(end, &invariant.unwrap_or_default())?;
         let barriers = self.symbolic.barriers(&mut self.words, whole.bounds())?;
         let mut stops = barriers.stops;
-        // Inside an open part time may run; that it does not run out of it, the times need not show.
+        // Inside an open part time may run; that it does not run out of it, the times need not
+        // show.
         barriers.open.iter().for_each(|part| stops.subtract(part));
         for barrier in stops.zones() {
             self.avoid((start, end), barrier, true);
@@ -470,10 +477,12 @@ impl<'s, 'a> Plan<'s, 'a> {
         }
     }
 
-    /// The wait between two events does not pass through the zone; with `may_meet` it may end in the zone's first moment.
+    /// The wait between two events does not pass through the zone; with `may_meet` it may end in
+    /// the zone's first moment.
     ///
-    /// All bounds of the closed zone count, not only the minimal ones: that a lower bound is met after an upper one has failed shows
-    /// in the bound on their difference that follows from the two.
+    /// All bounds of the closed zone count, not only the minimal ones: that a lower bound is met
+    /// after an upper one has failed shows in the bound on their difference that follows from the
+    /// two.
     fn avoid(&mut self, (start, end): (usize, usize), zone: &[Bound], may_meet: bool) {
         let dimension = self.symbolic.dimension();
         let mut alternatives = Alternatives::new();
@@ -494,8 +503,9 @@ impl<'s, 'a> Plan<'s, 'a> {
                 let one = Constraint { left, right, bound };
                 one.negated()
             };
-            // A lower bound fails up to the end, and an upper one from the start on; one on a difference fails all the time if it
-            // does so at both, for it changes in one direction where one of the clocks stands still, and else not at all.
+            // A lower bound fails up to the end, and an upper one from the start on; one on a
+            // difference fails all the time if it does so at both, for it changes in one direction
+            // where one of the clocks stands still, and else not at all.
             let events = match (left, right) {
                 (0, _) => vec![end],
                 (_, 0) => vec![start],
@@ -516,7 +526,8 @@ impl<'s, 'a> Plan<'s, 'a> {
         self.alternatives.push(alternatives);
     }
 
-    /// A constraint on the clock values at an event as one on times or durations; `None` for one that says nothing.
+    /// A constraint on the clock values at an event as one on times or durations; `None` for one
+    /// that says nothing.
     fn limit(&self, event: usize, one: Constraint) -> Option<Limit> {
         if one.bound.is_infinite() {
             return None;

@@ -1,19 +1,21 @@
 //! Durations of waits under linear bounds, exactly: for runs in which clocks stand still at times.
 //!
-//! A clock's value is the sum of the durations of the waits in which it ran since it was set, so that bounds on clocks are linear in
-//! durations, with coefficients -1, 0 and 1. Numbers are fractions beside a multiple of an infinitesimal, which makes strict bounds weak
-//! ones; in the end the infinitesimal becomes small enough for all of them.
+//! A clock's value is the sum of the durations of the waits in which it ran since it was set, so
+//! that bounds on clocks are linear in durations, with coefficients -1, 0 and 1. Numbers are
+//! fractions beside a multiple of an infinitesimal, which makes strict bounds weak ones; in the end
+//! the infinitesimal becomes small enough for all of them.
 //!
 //! Invariants:
-//! * Every row is a basic variable as a sum of multiples of the others, which are not basic and at or above their least values;
-//!   `value` satisfies all rows.
+//! * Every row is a basic variable as a sum of multiples of the others, which are not basic and at
+//!   or above their least values; `value` satisfies all rows.
 //! * A row holds the coefficients that are not 0, by ascending variable.
 //!
-//! Source: B. Dutertre, L. de Moura, "A Fast Linear-Arithmetic Solver for DPLL(T)", CAV 2006 (the tableau, bounds that come and
-//! go, and infinitesimals); R. G. Bland, "New finite pivoting rules for the simplex method", 1977 (why it ends).
+//! Source: B. Dutertre, L. de Moura, "A Fast Linear-Arithmetic Solver for DPLL(T)", CAV 2006 (the
+//! tableau, bounds that come and go, and infinitesimals); R. G. Bland, "New finite pivoting rules
+//! for the simplex method", 1977 (why it ends).
 //!
-//! Cost: a step takes at most rows times columns, and hardly more than the coefficients that are not 0, of which rows have few; numbers
-//! that outgrow 128 bits end it.
+//! Cost: a step takes at most rows times columns, and hardly more than the coefficients that are
+//! not 0, of which rows have few; numbers that outgrow 128 bits end it.
 
 use crate::cancellation;
 
@@ -135,8 +137,8 @@ impl Amount {
     }
 }
 
-/// A sum of durations that is at least so much: waits that count once, those that count negatively, and the least value with how
-/// many infinitesimals more.
+/// A sum of durations that is at least so much: waits that count once, those that count negatively,
+/// and the least value with how many infinitesimals more.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct LinearBound {
     pub(super) plus: Vec<usize>,
@@ -150,7 +152,8 @@ type Row = Vec<(usize, Fraction)>;
 /// Durations under bounds, with a way back.
 #[derive(Debug, Default)]
 pub(super) struct Durations {
-    /// By variable: its value, and the least one that it may have. Those of waits come as they were added.
+    /// By variable: its value, and the least one that it may have. Those of waits come as they were
+    /// added.
     value: Vec<Amount>,
     least: Vec<Option<Amount>>,
     /// The variables of the waits.
@@ -210,7 +213,8 @@ impl Durations {
         Ok(sum)
     }
 
-    /// Adds a bound and finds durations that satisfy all; returns false if there are none, and then they mean nothing until it is undone.
+    /// Adds a bound and finds durations that satisfy all; returns false if there are none, and then
+    /// they mean nothing until it is undone.
     pub(super) fn require(&mut self, bound: &LinearBound) -> Result<bool, TooHard> {
         let cells = self.rows.iter().map(|(_, row)| row.len()).sum::<usize>();
         if cells > MOST_CELLS {
@@ -296,7 +300,8 @@ impl Durations {
         Ok(None)
     }
 
-    /// Makes the basic variable of a row its least value, by changing another one, which becomes basic.
+    /// Makes the basic variable of a row its least value, by changing another one, which becomes
+    /// basic.
     fn pivot(&mut self, row: usize, helper: usize) -> Result<(), TooHard> {
         let basic = self.rows[row].0;
         let (Some(least), Some(place)) = (self.least[basic], place_in(&self.rows[row].1, helper))
@@ -328,8 +333,8 @@ impl Durations {
         Ok(())
     }
 
-    /// The durations as whole numbers of ticks, and how many ticks make a unit. They satisfy what was required, and of the other bounds
-    /// those that the durations at hand do.
+    /// The durations as whole numbers of ticks, and how many ticks make a unit. They satisfy what
+    /// was required, and of the other bounds those that the durations at hand do.
     pub(super) fn in_ticks(&self, others: &[LinearBound]) -> Result<(Vec<i64>, i64), TooHard> {
         let epsilon = self.epsilon(others)?;
         let mut durations = Vec::new();
@@ -358,7 +363,8 @@ impl Durations {
         Ok((ticks, i64::try_from(ticks_per_unit).map_err(|_| TooHard)?))
     }
 
-    /// A number for the infinitesimal that keeps every variable at or above its least value, and the sums of other bounds above theirs.
+    /// A number for the infinitesimal that keeps every variable at or above its least value, and
+    /// the sums of other bounds above theirs.
     fn epsilon(&self, others: &[LinearBound]) -> Result<Fraction, TooHard> {
         let mut epsilon = Fraction::ONE;
         let variables = self.value.iter().zip(&self.least);
@@ -461,7 +467,8 @@ mod tests {
                     break;
                 }
             }
-            // A bound of each wait keeps the walk small; fourths are fine enough for three variables with strict bounds.
+            // A bound of each wait keeps the walk small; fourths are fine enough for three
+            // variables with strict bounds.
             let is_met = |values: [i64; 3], per_unit: i64| {
                 bounds.iter().all(|one| {
                     let sum = |waits: &[usize]| waits.iter().map(|&wait| values[wait]).sum::<i64>();

@@ -17,8 +17,8 @@ const REFERENCE_RANGE: ClockRange = ClockRange {
     count: 1,
 };
 
-/// The comparisons `left - right ≺ bound` that a clock comparison stands for: whether the clocks are swapped, whether the
-/// bound is negated, whether it is strict.
+/// The comparisons `left - right ≺ bound` that a clock comparison stands for: whether the clocks
+/// are swapped, whether the bound is negated, whether it is strict.
 pub(in crate::semantics) fn comparisons(
     relation: ClockRelation,
     negated: bool,
@@ -41,8 +41,9 @@ pub(in crate::semantics) fn bound_range((low, high): (i32, i32), negated: bool) 
 }
 
 impl Builder<'_> {
-    /// Emits the clock constraints of a condition; goes to `fail` if its data part is false. Static analysis hears nothing
-    /// of comparisons that cannot matter, since the condition holds or fails without them.
+    /// Emits the clock constraints of a condition; goes to `fail` if its data part is false. Static
+    /// analysis hears nothing of comparisons that cannot matter, since the condition holds or fails
+    /// without them.
     pub(super) fn constrain(&mut self, expr: &Expr, fail: BlockId) {
         let before = self.effects.atoms.len();
         self.emit_constraints(expr, fail);
@@ -147,7 +148,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Emits an assignment to a clock; returns the clock, for an assignment may stand where a clock does.
+    /// Emits an assignment to a clock; returns the clock, for an assignment may stand where a clock
+    /// does.
     pub(super) fn assign_clock(
         &mut self,
         expr: &Expr,

@@ -458,7 +458,8 @@ impl Builder<'_> {
         value
     }
 
-    /// The address of an array, struct or scalar whose parts are checked against the ranges of the type that it is given to.
+    /// The address of an array, struct or scalar whose parts are checked against the ranges of the
+    /// type that it is given to.
     pub(super) fn checked_address(&mut self, expr: &Expr, ty: &Type) -> Address {
         let address = self.address(expr);
         self.check_parts(address, ty, &expr.ty, expr.span);

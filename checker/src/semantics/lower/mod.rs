@@ -2,12 +2,15 @@
 //!
 //! Invariants:
 //! * Nothing here fails: every tree that reaches it was checked and holds no error.
-//! * Operands are evaluated from left to right; a local's register that a later operand may change is copied first.
+//! * Operands are evaluated from left to right; a local's register that a later operand may change
+//!   is copied first.
 //! * A check is emitted only where the interval of the value does not prove it away.
-//! * Local scalars live in registers unless something refers to them; arrays and structs live in the frame.
-//! * Parameters of a function in order: a scalar by value is a register of its type; an array or struct by value and
-//!   words by reference are an address; clocks by reference are the index of the first clock. A returned array or
-//!   struct is written to an address that comes as last parameter.
+//! * Local scalars live in registers unless something refers to them; arrays and structs live in
+//!   the frame.
+//! * Parameters of a function in order: a scalar by value is a register of its type; an array or
+//!   struct by value and words by reference are an address; clocks by reference are the index of
+//!   the first clock. A returned array or struct is written to an address that comes as last
+//!   parameter.
 
 mod clocks;
 mod expressions;
@@ -107,7 +110,8 @@ impl<'n> Builder<'n> {
         }
     }
 
-    /// Adds the parameters of a function of the model, whose first locals they are, and what it returns.
+    /// Adds the parameters of a function of the model, whose first locals they are, and what it
+    /// returns.
     pub(super) fn signature(&mut self, parameters: &[super::typed::Parameter], result: &Type) {
         let mut copies = Vec::new();
         for (i, parameter) in parameters.iter().enumerate() {
@@ -144,7 +148,8 @@ impl<'n> Builder<'n> {
         }
     }
 
-    /// Moves a parameter that was passed by value into the frame, so that it can be changed and referred to.
+    /// Moves a parameter that was passed by value into the frame, so that it can be changed and
+    /// referred to.
     fn copy_parameter(&mut self, local: LocalId, register: Register) {
         let ty = self.locals[local.0 as usize].ty.clone();
         let target = self.frame(ty.size().words);
@@ -168,7 +173,8 @@ impl<'n> Builder<'n> {
             .result
             .is_register()
             .then(|| register_type(&self.result));
-        // Checking has shown that the end of the body is not reached where a value is to be returned.
+        // Checking has shown that the end of the body is not reached where a value is to be
+        // returned.
         let end = result.map(|ty| self.zero(ty));
         self.terminate(Terminator::Return(end));
         self.finish(name, result)
@@ -182,7 +188,8 @@ impl<'n> Builder<'n> {
         self.finish(name, Some(result))
     }
 
-    /// A function that writes the words of an expression to the start of the state, which it does not read.
+    /// A function that writes the words of an expression to the start of the state, which it does
+    /// not read.
     pub(super) fn words(mut self, name: String, expr: &Expr) -> FunctionId {
         let target = at(Base::State, 0);
         if expr.ty.is_aggregate() {
@@ -239,7 +246,8 @@ impl<'n> Builder<'n> {
         self.finish(name, Some(RegisterType::Integer))
     }
 
-    /// The first clock or channel that a place may be, how many it may be, and the computed offset from the first.
+    /// The first clock or channel that a place may be, how many it may be, and the computed offset
+    /// from the first.
     pub(super) fn offset(&mut self, expr: &Expr, memory: Memory) -> (u32, u32, Option<Register>) {
         let path = self.path(expr, memory);
         debug_assert!(path.start == places::Start::Fixed, "it is no local");

@@ -123,7 +123,8 @@ impl Builder<'_> {
             site,
         });
         if length == 0 {
-            // Any index is an error, so nothing is touched; what comes after must lie somewhere all the same.
+            // Any index is an error, so nothing is touched; what comes after must lie somewhere all
+            // the same.
             return address_path(self.frame(stride));
         }
         path.reach += (length - 1) * stride;

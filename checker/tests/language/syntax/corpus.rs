@@ -1,5 +1,5 @@
-//! Every file of `tests/corpus/syntax`: those in `ok` are read without errors, those in `err` are not, and each says in
-//! comments what the readers find in it.
+//! Every file of `tests/corpus/syntax`: those in `ok` are read without errors, those in `err` are
+//! not, and each says in comments what the readers find in it.
 //!
 //! Directives stand in lines of their own, `// word: …` or `<!-- word: … -->`:
 //! * `expect: CODE at LINE:COLUMN "message"`: a diagnostic; all of them must be listed.

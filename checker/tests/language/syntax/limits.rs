@@ -1,4 +1,5 @@
-//! Hostile input: whatever is too deep, too long or no text at all ends in a diagnostic and not in a crash.
+//! Hostile input: whatever is too deep, too long or no text at all ends in a diagnostic and not in
+//! a crash.
 
 use crate::syntax::support::{mistakes, query, with_guard};
 

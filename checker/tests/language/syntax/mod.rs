@@ -1,4 +1,5 @@
-//! The readers: corpus files, trees of expressions and queries, XML positions, and properties over generated texts.
+//! The readers: corpus files, trees of expressions and queries, XML positions, and properties over
+//! generated texts.
 
 mod corpus;
 mod expressions;

@@ -287,7 +287,8 @@ impl Translator<'_> {
             .map(|&register| self.get(register))
             .collect();
         let ins = self.builder.ins();
-        // These are exact in IEEE arithmetic, so that the processor's instruction gives what the library gives.
+        // These are exact in IEEE arithmetic, so that the processor's instruction gives what the
+        // library gives.
         match function {
             MathFunction::Fabs => return ins.fabs(arguments[0]),
             MathFunction::Sqrt => return ins.sqrt(arguments[0]),

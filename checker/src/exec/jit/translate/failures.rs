@@ -138,7 +138,8 @@ impl Translator<'_> {
     /// The cold block that returns this error.
     pub(super) fn failure(&mut self, kind: RunTimeErrorKind, site: SiteId) -> NativeBlock {
         let status = failure_status(kind, site);
-        // The checks of one instruction follow each other, so that the block is mostly among the last.
+        // The checks of one instruction follow each other, so that the block is mostly among the
+        // last.
         let known = self
             .failures
             .iter()
@@ -153,7 +154,8 @@ impl Translator<'_> {
         block
     }
 
-    /// Does what is to be done where a result of integer arithmetic does not fit: notes it and goes on, or fails.
+    /// Does what is to be done where a result of integer arithmetic does not fit: notes it and goes
+    /// on, or fails.
     pub(super) fn overflow_if(&mut self, condition: Value, site: SiteId) {
         if self.overflow == Overflow::Error {
             self.fail_if(condition, RunTimeErrorKind::Overflow, site);

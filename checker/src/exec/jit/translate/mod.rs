@@ -1,13 +1,16 @@
 //! From code to Cranelift's intermediate representation, one function at a time.
 //!
 //! Invariants
-//! * A compiled function takes the [`runtime::NativeContext`], the state's words, its frame, and its own arguments in native types;
-//!   it returns the status (see [`super::runtime`]) and, for a double or an address, the value beside it.
-//! * A check that fails jumps to a cold block that returns the status of its kind and site; nothing is trapped by signals.
+//! * A compiled function takes the [`runtime::NativeContext`], the state's words, its frame, and
+//!   its own arguments in native types; it returns the status (see [`super::runtime`]) and, for a
+//!   double or an address, the value beside it.
+//! * A check that fails jumps to a cold block that returns the status of its kind and site; nothing
+//!   is trapped by signals.
 //! * An address is a pointer. The frame of a callee begins where the frame of its caller ends.
 //!
 //! Memory is accessed without checks of bounds: the code was produced with every index checked by a
-//! [`Instruction::ScaleIndex`], and the caller hands over as many words of state and frame as the functions need.
+//! [`Instruction::ScaleIndex`], and the caller hands over as many words of state and frame as the
+//! functions need.
 
 mod arithmetic;
 mod failures;
@@ -61,7 +64,8 @@ pub(super) fn native_signature(function: &Function, convention: CallConv) -> Sig
     signature
 }
 
-/// The signature of an entry: as of a function without parameters, with the address of the arguments at the end.
+/// The signature of an entry: as of a function without parameters, with the address of the
+/// arguments at the end.
 pub(super) fn entry_signature(convention: CallConv) -> Signature {
     let mut signature = Signature::new(convention);
     signature.params = vec![AbiParam::new(I64); 4];
@@ -92,7 +96,8 @@ pub(super) fn translate_entry(
     builder.finalize(config);
 }
 
-/// Writes a function. `import` gives the reference by which the function under construction calls another.
+/// Writes a function. `import` gives the reference by which the function under construction calls
+/// another.
 pub(super) fn translate(
     mut builder: FunctionBuilder<'_>,
     function: &Function,
@@ -156,7 +161,8 @@ struct Translator<'a> {
     frame: Value,
     /// The cold blocks that return an error, by status.
     failures: Vec<(i64, NativeBlock)>,
-    /// The cold blocks that note that a result wrapped round: the site, the block, and where it goes on.
+    /// The cold blocks that note that a result wrapped round: the site, the block, and where it
+    /// goes on.
     wraps: Vec<(SiteId, NativeBlock, NativeBlock)>,
     /// The cold block that hands on the error of a callee.
     failed_call: Option<NativeBlock>,

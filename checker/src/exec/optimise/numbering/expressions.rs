@@ -31,8 +31,8 @@ pub(super) enum Expression {
     AddIndices(Register, Register),
 }
 
-/// The expression that an instruction computes, if computing it again gives the same; operands of commutative operators
-/// are sorted.
+/// The expression that an instruction computes, if computing it again gives the same; operands of
+/// commutative operators are sorted.
 pub(super) fn expression_of(instruction: &Instruction) -> Option<Expression> {
     let sorted = |left: Register, right: Register| (left.min(right), left.max(right));
     Some(match instruction {

@@ -1,6 +1,7 @@
 //! What is known of words of memory.
 //!
-//! Invariant: a word is forgotten with every write that may concern it, so that what is remembered holds.
+//! Invariant: a word is forgotten with every write that may concern it, so that what is remembered
+//! holds.
 
 use crate::exec::arithmetic;
 use crate::ir::{Address, Base, Instruction, Register, RegisterType};
@@ -160,7 +161,8 @@ impl Numbering<'_> {
     ) -> bool {
         let is_register = |base| matches!(base, Base::Register(_));
         if left.base != right.base {
-            // Constants are never written; an address in a register may lie in the state or in any frame.
+            // Constants are never written; an address in a register may lie in the state or in any
+            // frame.
             return left.base == Base::Constants
                 || right.base == Base::Constants
                 || !(is_register(left.base) || is_register(right.base));
@@ -171,7 +173,8 @@ impl Numbering<'_> {
             || right_last + u64::from(right_words) <= left_first
     }
 
-    /// The least and the greatest offset that an address may have, leaving out the index if it does not matter.
+    /// The least and the greatest offset that an address may have, leaving out the index if it does
+    /// not matter.
     fn extent(&self, address: Address, with_index: bool) -> (u64, u64) {
         let offset = u64::from(address.offset);
         match address.index.filter(|_| with_index) {

@@ -1,18 +1,22 @@
-//! Value numbering along the dominator tree: constants are folded, copies followed, and what was computed, read or checked
-//! before is not computed, read or checked again.
+//! Value numbering along the dominator tree: constants are folded, copies followed, and what was
+//! computed, read or checked before is not computed, read or checked again.
 //!
 //! Conventions
-//! * A register that the function writes once is its own value. Every write of another register goes to a new register
-//!   instead; the old one is only kept as the place that carries the value over edges to blocks with several
-//!   predecessors: it is written at the end of such an edge and copied to a new register where it is read behind it. So
-//!   all values are immutable, and what is known of them holds wherever their definition dominates.
-//! * What is known of memory is forgotten in blocks with several predecessors, at calls, and at writes that may concern it.
-//! * No instruction moves in front of another one, and an instruction that can fail goes only if it cannot: the first error
-//!   of a run stays the first. Checking the same values again cannot fail, for the call has ended if it did. What may wrap round is
-//!   computed at every place where it stands, since it is noted there.
+//! * A register that the function writes once is its own value. Every write of another register
+//!   goes to a new register instead; the old one is only kept as the place that carries the value
+//!   over edges to blocks with several predecessors: it is written at the end of such an edge and
+//!   copied to a new register where it is read behind it. So all values are immutable, and what is
+//!   known of them holds wherever their definition dominates.
+//! * What is known of memory is forgotten in blocks with several predecessors, at calls, and at
+//!   writes that may concern it.
+//! * No instruction moves in front of another one, and an instruction that can fail goes only if it
+//!   cannot: the first error of a run stays the first. Checking the same values again cannot fail,
+//!   for the call has ended if it did. What may wrap round is computed at every place where it
+//!   stands, since it is noted there.
 //!
-//! Method: dominator-based value numbering after Briggs, Cooper and Simpson, "Value Numbering" (1997). Cost: linear in the
-//! code but for copying what is known at branches, which is given up in very large functions.
+//! Method: dominator-based value numbering after Briggs, Cooper and Simpson, "Value Numbering"
+//! (1997). Cost: linear in the code but for copying what is known at branches, which is given up in
+//! very large functions.
 
 mod expressions;
 mod memory;
@@ -36,8 +40,8 @@ use memory::MAX_WORDS_TO_EXPAND;
 
 /// In larger functions nothing is handed on to blocks with several predecessors.
 const MAX_BLOCKS_TO_HAND_ON: usize = 500;
-/// Numbers the values of a [`super::graph::clean`] function over the given constant memory. Says whether branches fell
-/// away, so that cleaning up and numbering once more may find more.
+/// Numbers the values of a [`super::graph::clean`] function over the given constant memory. Says
+/// whether branches fell away, so that cleaning up and numbering once more may find more.
 pub(super) fn number_values(function: &mut Function, constants: &[i32]) -> bool {
     let predecessors = predecessors(function);
     let dominators = dominators(function, &predecessors);
@@ -73,7 +77,8 @@ fn count_writes(function: &Function) -> Vec<u32> {
 /// What is known at a place of the function.
 #[derive(Clone, Debug, Default)]
 struct Known {
-    /// The value that a register which is written several times holds, and whether that is not yet in the register itself.
+    /// The value that a register which is written several times holds, and whether that is not yet
+    /// in the register itself.
     current: FxHashMap<Register, (Register, bool)>,
     expressions: FxHashMap<Expression, Register>,
     /// The range of an integer value.
