@@ -1,13 +1,12 @@
 """The command line: one module a command, and the only place that prints or exits.
 
 A command is ``ntagen/cli/NAME.py`` with a click command called ``command``. Its module is imported
-when it is run, not before, so that ``ntagen --help`` does not wait for libraries. What a command
-returns is the exit code (nothing means 0); what it raises is turned into one message here.
+only when the command runs, so that ``ntagen --help`` does not wait for libraries. A command returns
+its exit code (nothing means 0). If it raises an error, this module prints one message.
 
 Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied (`verify`: the
-evidence does not hold), 2 the input or the
-command line is wrong, 3 stopped by a limit, 4 run-time error in the model, 5 device fault,
-70 internal error, 130 interrupted, 143 ended by SIGTERM.
+evidence does not hold), 2 the input or the command line is wrong, 3 stopped by a limit, 4 run-time
+error in the model, 5 device fault, 70 internal error, 130 interrupted, 143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -32,26 +31,26 @@ __all__ = ["main"]
 COMMANDS: Final = {
     "compile": "Turn an environment into a UPPAAL model and its queries.",
     "check": "Answer the queries of a model or an environment.",
-    "verify": "Check a trace or a certificate independently.",
+    "verify": "Check a trace, certificate or strategy independently.",
     "play": "Play a timed game against a strategy.",
     "info": "Show what is in a model or an environment.",
-    "explain": "Explain a diagnostic: what it means and how to mend it.",
+    "explain": "Explain a diagnostic: what it means and how to fix it.",
     "plot": "Draw a scene, its plans or a run.",
     "drive": "Steer a needle to the target and log the run.",
-    "replay": "Run the decisions of a logged run again.",
+    "replay": "Repeat the decisions of a logged run and compare them.",
     "fmt": "Format environment files.",
 }
-"""The commands in the order of the help, with what the help says of them."""
+"""The commands in the order of the help, each with its line there."""
 
 INTERNAL_ERROR: Final = 70
 INTERRUPTED: Final = 130
 
 DEBUG_VARIABLE: Final = "NTAGEN_DEBUG"
-"""Set to anything but 0, it lets an error print where in the program it came from."""
+"""If it is set to anything but 0, an error also prints where in the program it came from."""
 
 
 class _CommandTable(click.Group):
-    """The commands of `COMMANDS`, each imported when it is asked for."""
+    """The commands of `COMMANDS`. Each is imported when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return [name for name in COMMANDS if importlib.util.find_spec(_module(name))]
@@ -94,7 +93,9 @@ def _show_version(ctx: click.Context, _option: click.Parameter, wanted: bool) ->
     help="Show the version and exit.",
 )
 def _ntagen() -> None:
-    """From the description of a needle-steering task to a verified strategy, and to the needle.
+    """Turn a needle-steering task into a verified strategy, and steer the needle with it.
+
+    The engine behind it also answers the queries of any UPPAAL model.
 
     \b
     Examples:
@@ -104,15 +105,15 @@ def _ntagen() -> None:
       ntagen info model.xml
       ntagen drive examples/paper.nsl --log run.mcap
 
-    `ntagen COMMAND --help` tells more about a command.
+    `ntagen COMMAND --help` describes a command and its options.
     """  # noqa: D301  click wants the control character
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a command line and reports what went wrong, if anything, on standard error.
+    """Runs a command line. Prints errors to standard error.
 
     Args:
-        arguments: The words after the program's name; by default those it was started with.
+        arguments: The words after the program's name; by default those of this process.
 
     Returns:
         The exit code.
@@ -129,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    """Runs a command line; returns its exit code and lets errors pass."""
+    """Runs a command line; returns its exit code. Errors are not caught."""
     completion = os.environ.get("_NTAGEN_COMPLETE")
     if completion:
         from click.shell_completion import shell_complete
@@ -165,7 +166,7 @@ def _report(error: BaseException) -> int:
             return INTERRUPTED
         case BrokenPipeError():
             _abandon_output()
-            _say("error: the reader of the output has gone away")
+            _say("error: the program that reads the output has ended")
             return InputError.exit_code
         case OSError():
             _abandon_output()
@@ -180,37 +181,37 @@ def _report(error: BaseException) -> int:
 
 
 def _with_severity(message: str) -> str:
-    """A message that says that it is an error, unless its first line says so already."""
+    """Puts "error: " before a message, unless its first line has the word already."""
     first_line = message.partition("\n")[0]
     return message if re.search(r"\berror\b", first_line) else f"error: {message}"
 
 
 def _describe(error: OSError) -> str:
-    """What the operating system said, and about which file."""
+    """The message of the operating system, after the name of the file if there is one."""
     reason = (error.strerror or str(error) or type(error).__name__).lower()
-    # An error about something that is open has its number for a name.
+    # For a file that is already open, the name is a number.
     named = isinstance(error.filename, str | bytes | os.PathLike) and error.filename
     return f"{os.fsdecode(named)}: {reason}" if named else reason
 
 
 def _internal(error: BaseException) -> str:
-    """The message about a mistake of our own."""
+    """The message about a bug of ntagen."""
     name = type(error).__name__
     said = " ".join(str(error).split())
     return (
         f"internal error: {name}: {said}\n"
-        "This is a mistake in ntagen, not in your input. Please report it together with the\n"
+        "This is a bug in ntagen, not a mistake in your input. Please report it together with the\n"
         f"command line, the input and what is printed when you set {DEBUG_VARIABLE}=1."
     )
 
 
 def _say(message: str) -> None:
-    """Prints to standard error, if there is still somebody to read it."""
+    """Prints to standard error, unless it is closed."""
     with contextlib.suppress(OSError):
         echo(message, err=True)
 
 
 def _abandon_output() -> None:
-    """Lets the rest of the standard output go nowhere, so that the interpreter's exit is quiet."""
+    """Discards the rest of the standard output, so that Python exits without a message."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

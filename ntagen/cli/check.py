@@ -48,7 +48,7 @@ _MARK: Final = {
 
 
 REJECTED_MARK: Final = ("refused", "red")
-"""Of a query that is rejected, while others are answered."""
+"""The mark of a query that is rejected while others are answered."""
 
 
 class _Threads(click.ParamType[int]):
@@ -64,7 +64,9 @@ class _Threads(click.ParamType[int]):
         if text == "all":
             return 0
         if not re.fullmatch(r"[0-9]{1,6}", text) or int(text) > self.most:
-            self.fail(f"{value!r} is no number of threads up to {self.most}, or all", param, ctx)
+            self.fail(
+                f"{value!r} is not a number of threads; write 1 to {self.most}, or all", param, ctx
+            )
         return int(text)
 
 
@@ -80,7 +82,7 @@ class _Asked:
 
 @dataclass(frozen=True, slots=True)
 class _Outputs:
-    """Where evidence goes; ``None`` is nowhere."""
+    """Where evidence is written; ``None`` is nowhere."""
 
     trace: str | None
     certificate: Path | None
@@ -92,7 +94,7 @@ class _Outputs:
     """The options whose output has been written."""
 
     def wanted(self) -> dict[str, str | Path | None]:
-        """By option: where its output goes."""
+        """Where the output of each option is written."""
         return {
             "--trace": self.trace,
             "--certificate": self.certificate,
@@ -105,10 +107,9 @@ class _Outputs:
 @click.command(
     "check",
     epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected "
-    "(of several queries those that are not are answered), "
-    "3 stopped by a limit or maybe, 4 run-time error in the model, 70 internal error "
-    "(a strategy or trace that fails its check is one), 130 interrupted, with the counters so far, "
-    "143 ended by SIGTERM.",
+    "(the other queries are still answered), 3 stopped by a limit, or the verdict is maybe, "
+    "4 run-time error in the model, 70 internal error (also if a strategy or trace fails its "
+    "check), 130 interrupted (the counters so far are printed), 143 ended by SIGTERM.",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("second_path", metavar="[FILE.q]", required=False, type=click.Path(path_type=Path))
@@ -117,61 +118,75 @@ class _Outputs:
     "asked",
     metavar="TEXT|NAME",
     multiple=True,
-    help="A query, or the name of one of the model's; may be given again.  [default: all]",
+    help="A query, or the name of a query of the model. You can give this option several times.  "
+    "[default: all queries of the model]",
 )
 @click.option(
     "--queries",
     "query_file",
     metavar="FILE.q",
     type=click.Path(path_type=Path),
-    help="A file of queries, answered instead of the model's own; may also stand after MODEL.",
+    help="A file of queries; they are answered instead of the model's own. You can also write the "
+    "file after MODEL, without --queries.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a line, nothing else.")
-@click.option("--trace", metavar="FILE|-", help="Write witnesses and counterexamples; - is stdout.")
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print one line for each query, a JSON object, and nothing else.",
+)
+@click.option(
+    "--trace",
+    metavar="FILE|-",
+    help="Write the trace that shows why: a witness or a counterexample. - is standard output. "
+    "With several queries, FILE has the trace of the last query that has one.",
+)
 @click.option(
     "--shortest",
     "wanted_trace",
     flag_value="shortest",
-    help="Write the traces with the fewest transitions; of a run that never ends, with those of "
-    "its loop once.",
+    help="Write the trace with the fewest transitions. If a run never ends, its loop counts once.",
 )
 @click.option(
     "--fastest",
     "wanted_trace",
     flag_value="fastest",
-    help="Write the traces that take the least time; not of E[], A<> and -->, whose runs do not "
+    help="Write the trace that takes the least time. Not for E[], A<> and -->: their runs do not "
     "end.",
 )
 @click.option(
     "--certificate",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="Write the reached set of the (last) E<> that is not satisfied or A[] that is, for "
-    "`ntagen verify`.",
+    help="Write the set of all reached states, for `ntagen verify`. Only an E<> that is not "
+    "satisfied and an A[] that is satisfied have one. With several of them, FILE has that of the "
+    "last.",
 )
 @click.option(
     "--strategy",
     metavar="FILE|-",
-    help="Write the winner's strategy of the (last) control query: the controller's, or how the "
-    "environment prevents it. A FILE.json is for tools, any other gets TIGA's text; - is stdout.",
+    help="Write the winner's strategy of a control query: how the controller wins, or how the "
+    "environment prevents it. FILE.json is JSON for tools; any other FILE is text as UPPAAL TIGA "
+    "prints it; - is standard output. With several control queries, FILE has the last strategy.",
 )
 @click.option(
     "--controller",
     metavar="FILE.c",
     type=click.Path(path_type=Path),
-    help="Write the same strategy as a compact controller in C99, which depends on nothing.",
+    help="Write the same strategy as a controller in C99, in one file without dependencies.",
 )
 @click.option(
     "--verify",
     is_flag=True,
-    help="Check strategies against every move of the opponent, and replay traces at exact "
-    "times, independently of the solver.",
+    help="Check each strategy against every move of the opponent, and replay each trace with its "
+    "exact times. The check does not use the solver's code.",
 )
 @click.option(
     "--plans",
     metavar="FILE.json",
     type=click.Path(path_type=Path),
-    help="Write all plans of the (last) control query: of an environment, ranked and certified.",
+    help="Write all plans of a control query; with several, FILE has those of the last. Plans of "
+    "an environment are also ranked and certified.",
 )
 @click.option(
     "--rank",
@@ -179,7 +194,8 @@ class _Outputs:
     metavar="CRITERIA",
     default="clearance,rolls,length",
     show_default=True,
-    help="How plans of an environment are ranked.",
+    help="How plans of an environment are ranked, the most important criterion first: clearance, "
+    "rolls, length, target.",
 )
 @click.option(
     "--max-plans",
@@ -187,19 +203,30 @@ class _Outputs:
     type=click.IntRange(min=1),
     default=1_000_000,
     show_default=True,
-    help="List at most N. 1 is any one, found without looking for the others.",
+    help="Write at most N plans. With 1, the search stops at the first plan.",
 )
-@click.option("--search", type=click.Choice(["bfs", "dfs", "random"]), default="bfs")
+@click.option(
+    "--search",
+    type=click.Choice(["bfs", "dfs", "random"]),
+    default="bfs",
+    help="The order of the search: breadth first, depth first or random. Verdicts do not depend "
+    "on it.  [default: bfs]",
+)
 @click.option(
     "--threads",
     metavar="N",
     type=_Threads(),
     default="1",
-    help="Share the work among so many threads, or `all` cores: of E<>, A[], sup, inf and bounds, "
-    "breadth first, and of what is computed with zones in games. Liveness, partial observation, "
-    "--shortest, --fastest and --certificate take one. Default 1.",
+    help="The number of threads, or `all` for one per core. Threads share the breadth-first search "
+    "of E<>, A[], sup, inf and bounds, and the computation with zones in games. Liveness, partial "
+    "observation, --shortest, --fastest and --certificate use one thread.  [default: 1]",
 )
-@click.option("--seed", type=int, default=0, help="For --search random.")
+@click.option(
+    "--seed",
+    type=int,
+    default=0,
+    help="For --search random: the same seed gives the same search.  [default: 0]",
+)
 @click.option(
     "--symmetry",
     type=click.Choice(["on", "off"]),
@@ -224,19 +251,25 @@ class _Outputs:
 )
 @forced_rule()
 @priority_rule(
-    "Whether priorities of channels and processes count in games and under strategies. TIGA "
-    "ignores them; in all other queries they count."
+    "Whether priorities of channels and processes count in games and in queries under a strategy. "
+    "In all other queries they count.  [default: ignore, as TIGA does]"
 )
 @overflow_rule()
-@click.option("--engine", type=click.Choice(["jit", "interpreter"]), default="jit")
+@click.option(
+    "--engine",
+    type=click.Choice(["jit", "interpreter"]),
+    default="jit",
+    help="How the code of the model runs: compiled to machine code (jit), or interpreted, which is "
+    "slower. Answers do not depend on it.  [default: jit]",
+)
 @limit_options()
 @click.option(
     "--allow-write",
     metavar="DIR",
     multiple=True,
     type=click.Path(path_type=Path),
-    help="Let saveStrategy in queries write below this folder too, not only below the current one; "
-    "may be given again. Other files than strategies are never replaced.",
+    help="Allow saveStrategy in queries to write below this folder too, not only below the current "
+    "one. You can give this option several times. saveStrategy replaces no files but strategies.",
 )
 @include_option()
 def command(
@@ -290,17 +323,20 @@ def command(
 
     \b
     A trace has two parts: symbolic states as UPPAAL prints them, and a run with exact times, which
-    an independent replay has checked. A file that ends in .json has both as JSON.
+    an independent replay has checked. A file that ends in .json has both parts as JSON.
 
     \b
-    The value of sup and inf is a number, or "inf" for a clock without limit; of bounds it is the
-    pair of both; of several items the list of their values. It is null if no state counts. The
-    message says where a clock comes near the value without reaching it.
+    The value of sup and inf is a number, or "inf" if the clock has no limit. The value of bounds is
+    the pair of both. For several items it is the list of their values. It is null if no reachable
+    state satisfies the condition. If a clock comes near the value but never reaches it, the message
+    says so.
     """  # noqa: D301  click wants the control character
     if as_json and strategy == "-":
-        raise click.UsageError("--json and --strategy - both write on standard output")
+        raise click.UsageError(
+            "--json and --strategy - both write to standard output; give --strategy a FILE"
+        )
     if second_path and query_file:
-        raise click.UsageError(f"two files of queries: {query_file} and {second_path}")
+        raise click.UsageError(f"two files of queries: {query_file} and {second_path}; give one")
     _check_ranking(ranking)
     outputs = _Outputs(trace, certificate, strategy, controller, plans, ranking)
     query_path = query_file or second_path
@@ -345,7 +381,7 @@ def command(
             except InputError as error:
                 if len(todo) == 1:
                     raise
-                # The others may be all right, and their answers are wanted.
+                # The other queries may be right, and the user wants their answers.
                 echo(str(error) if as_json else with_pointer(str(error)), err=True)
                 if not as_json:
                     _line(REJECTED_MARK, query)
@@ -373,13 +409,13 @@ def _check_ranking(text: str) -> None:
 
 
 def _say_idle_options(queries: Sequence[str], *, is_environment: bool) -> None:
-    """Says which options of the command line make no difference."""
+    """Says which options of the command line have no effect."""
     values = click.get_current_context().params
     say(idle_options(given_options(), values, queries, ranks=is_environment))
 
 
 _SEVERITIES: Final = (0, 1, STOPPED, MODEL_ERROR, InputError.exit_code)
-"""Exit codes of single answers; the last in this order decides."""
+"""Exit codes of single answers; the one that is last in this order decides."""
 
 
 def _severity(answer: Answer) -> int:
@@ -392,12 +428,12 @@ def _queries(model: Model, asked: Sequence[str], file: Path | None) -> list[_Ask
     known = [_asked(query) for query in model.queries]
     from_file = [_asked(one, file.parent) for one in model.read_queries(file)] if file else []
     if file and not from_file:
-        raise InputError(f"{file} holds no query")
+        raise InputError(f"{file} has no queries")
     if asked:
         named = {query.name: query for query in [*known, *from_file] if query.name}
         return [_find(text, named) for text in asked]
     if not (from_file or known):
-        raise InputError("the model holds no query\nhint: give one with --query or --queries")
+        raise InputError("the model has no queries\nhint: give one with --query or --queries")
     return from_file or known
 
 
@@ -420,14 +456,14 @@ def _asked(query: Query, folder: Path | None = None) -> _Asked:
 
 
 def _find(text: str, named: dict[str, _Asked]) -> _Asked:
-    """The query that a text names or is."""
+    """The query with this name, or the text itself as a query."""
     stripped = text.strip()
     if stripped in named:
         return named[stripped]
     if re.fullmatch(r"[A-Za-z_]\w*", stripped):
         names = ", ".join(sorted(named)) or "none"
         raise InputError(
-            f"there is no query with the name {stripped}\nhint: the model's named queries: {names}"
+            f"there is no query with the name {stripped}\nhint: queries with a name: {names}"
         )
     return _Asked(None, stripped)
 
@@ -456,7 +492,7 @@ def _header(path: Path, model: Model) -> None:
 
 
 def _line(mark: tuple[str, str], query: _Asked) -> None:
-    """The first line of a query's row: what came of it, with its colour, and what was asked."""
+    """Prints the first line of a query's row: the verdict in its colour, and the query."""
     label = f"{query.name}: {query.text}" if query.name else query.text
     echo("  ", Styled(f"{mark[0]:<8}", fg=mark[1], bold=True), label)
 
@@ -486,7 +522,7 @@ def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_writte
 
 
 MOVES_SHOWN: Final = 12
-"""Transitions of the way to a failure that are shown; all of them with ``--trace``."""
+"""The last transitions before a run-time error that are shown; ``--trace`` shows all."""
 
 
 def _way_to_failure(answer: Answer) -> list[str]:
@@ -528,7 +564,7 @@ def _edge(edge: dict[str, Any]) -> str:
 def _write_evidence(
     answer: Answer, query: _Asked, outputs: _Outputs, scene: Scene | None
 ) -> list[str]:
-    """Writes what was asked for; returns a line for each thing that the user should hear of."""
+    """Writes what was asked for; returns a line for the user about each output."""
     notes: list[str] = []
     if outputs.trace and (text := answer.trace_text()) is not None:
         outputs.written.add("--trace")
@@ -564,7 +600,7 @@ def _write_trace(answer: Answer, query: _Asked, target: str, text: str) -> list[
 
 
 def _strategy_text(answer: Answer, query: _Asked, target: str) -> str | None:
-    """The strategy as it is written there, in that form alone: large ones take seconds."""
+    """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
     is_json = Path(target).suffix == ".json"
     text = answer.strategy_json() if is_json else answer.strategy_text()
     if text is None or target == "-":

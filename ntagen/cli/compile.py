@@ -1,4 +1,4 @@
-"""`ntagen compile`: an environment file to a UPPAAL model and its queries."""
+"""`ntagen compile`: turns an environment into a UPPAAL model and its queries."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from ntagen.files import write_files
     metavar="DIR",
     default=".",
     type=click.Path(path_type=Path),
-    help="Where to write; made if it is not there.  [default: the current folder]",
+    help="The folder to write to; it is made if it does not exist.  [default: the current folder]",
 )
 @include_option()
 def command(environment: Path, folder: Path, include: tuple[Path, ...]) -> None:
     """Turn an environment into a UPPAAL model and its queries.
 
-    Writes DIR/ENV.xml, which UPPAAL 4.1 and 5 open, and DIR/ENV.q with the same queries. Both are
-    written completely or not at all.
+    Writes DIR/ENV.xml, which UPPAAL 4.1 and 5 open, and DIR/ENV.q with the same queries. If
+    something is wrong, neither file is written.
 
     \b
     Example:

@@ -1,4 +1,4 @@
-"""`ntagen drive`: steer a needle to the target, and log the run."""
+"""`ntagen drive`: steers a needle to the target, and logs the run."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def _seconds(_ctx: click.Context, _option: click.Parameter, text: str) -> float:
     factor = S_PER.get(match[2] or "s") if match else None
     seconds = float(match[1]) * factor if match and factor else 0.0
     if not 0.0 < seconds < math.inf:
-        raise click.BadParameter(f"'{text}' is no time; write for example 120s or 2min")
+        raise click.BadParameter(f"'{text}' is not a time; write for example 120s or 2min")
     return seconds
 
 
 def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float:
     """A finite number that is not negative."""
     if not 0.0 <= number < math.inf:
-        raise click.BadParameter(f"{number:g} is not a number from 0 on")
+        raise click.BadParameter(f"{number:g} is not a number of 0 or more")
     return number
 
 
@@ -61,10 +61,14 @@ def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float
     "--needle",
     default="virtual",
     show_default=True,
-    help="The needle; so far only the virtual one, which moves in simulated time.",
+    help="Which needle to steer. The only one until now is virtual: a simulation.",
 )
 @click.option(
-    "--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the errors."
+    "--seed",
+    default=0,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="For --noise and --roll-error: the same seed gives the same errors.",
 )
 @click.option(
     "--noise",
@@ -72,7 +76,7 @@ def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float
     metavar="MM",
     default=0.0,
     callback=_size,
-    help="Standard deviation of each measured coordinate.  [default: 0]",
+    help="Standard deviation of each measured coordinate, in mm.  [default: 0]",
 )
 @click.option(
     "--roll-error",
@@ -80,14 +84,14 @@ def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float
     metavar="DEG",
     default=0.0,
     callback=_size,
-    help="Standard deviation of each roll.  [default: 0]",
+    help="Standard deviation of the angle of each roll, in degrees.  [default: 0]",
 )
 @click.option(
     "--known",
     metavar="all|none|NAME,…",
     default="all",
     show_default=True,
-    help="Critical regions that the driver is told about; the others it must feel.",
+    help="The critical regions that the driver knows at the start. It must feel the others.",
 )
 @click.option(
     "--rank",
@@ -95,7 +99,8 @@ def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float
     metavar="CRITERION,…",
     default="clearance,rolls,length",
     show_default=True,
-    help="What the best plan is: clearance, rolls, length, target.",
+    help="How plans are ranked, the most important criterion first: clearance, rolls, length, "
+    "target.",
 )
 @click.option(
     "--timeout",
@@ -103,17 +108,18 @@ def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float
     default="120s",
     show_default=True,
     callback=_seconds,
-    help="Of the run, on the needle's clock.",
+    help="Stop the run after this time on the needle's clock; a number without a unit is in "
+    "seconds.",
 )
 @click.option(
     "--log",
     "log_path",
     metavar="RUN.mcap",
     type=click.Path(path_type=Path),
-    help="Where to log the run; an existing file is replaced.",
+    help="The file to write the log of the run to; an existing file is replaced.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
-@click.option("--quiet", is_flag=True, help="Print only how it ended.")
+@click.option("--quiet", is_flag=True, help="Print only how the run ended.")
 @include_option()
 def command(
     environment: Path,
@@ -131,10 +137,12 @@ def command(
 ) -> int:
     """Steer a needle to the target and log the run.
 
-    Pushes a little, estimates where the needle is and how it bends, finds a safe strategy, and
-    drives its best plan while measuring. If the needle deviates or the force rises, it stops,
-    pulls back, and looks for a new strategy with what it has learned. Ctrl-C and SIGTERM stop the
-    needle and complete the log; Ctrl-C a second time ends at once. Only one run writes a log.
+    The driver pushes a little, estimates where the needle is and how it bends, finds a safe
+    strategy, and follows its best plan while it measures. If the needle deviates or the force
+    rises, the driver stops, pulls back, and looks for a new strategy with what it has learned.
+
+    Ctrl-C and SIGTERM stop the needle and complete the log; a second Ctrl-C ends the program at
+    once. Two runs cannot write the same log at the same time.
 
     \b
     Examples:
@@ -150,7 +158,7 @@ def command(
 
     _require_virtual(needle)
     if not (noise_mm or roll_error_deg):
-        say_idle({"seed": "--seed"}, "without --noise or --roll-error: it is that of the errors")
+        say_idle({"seed": "--seed"}, "without --noise or --roll-error")
     if as_json:
         say_idle({"quiet": "--quiet"}, "with --json")
     scene, warnings = load_with_warnings(environment, include=include)
@@ -181,20 +189,20 @@ class _Signalled(Operator):
         self.was_terminated = False
 
     def interrupt(self, _number: int, _frame: FrameType | None) -> None:
-        """Ctrl-C: the first time the run ends in order, the second time at once."""
+        """Ctrl-C: the first one ends the run in an orderly way, the second one at once."""
         if self.wants_end:
             raise KeyboardInterrupt
         self.end("interrupted by the operator")
 
     def terminate(self, _number: int, _frame: FrameType | None) -> None:
-        """SIGTERM: the run ends in order."""
+        """SIGTERM: ends the run in an orderly way."""
         self.was_terminated = True
         self.end("ended by the system (SIGTERM)")
 
 
 @contextlib.contextmanager
 def _operator() -> Iterator[_Signalled]:
-    """The operator, while signals are his."""
+    """The operator, who gets the signals until the end of the block."""
     operator = _Signalled()
     with handled({signal.SIGINT: operator.interrupt, signal.SIGTERM: operator.terminate}):
         yield operator
@@ -204,7 +212,7 @@ def _require_virtual(needle: str) -> None:
     from ntagen.errors import InputError
 
     if needle != "virtual":
-        raise InputError(f"no needle '{needle}'\nhint: only `--needle virtual` can be driven")
+        raise InputError(f"there is no needle '{needle}'\nhint: the only one is `--needle virtual`")
 
 
 def _drive(
@@ -257,7 +265,7 @@ def _log(
     from ntagen.drive.scene_json import scene_to_json
     from ntagen.nsl.source import MAX_SOURCE_BYTES
 
-    # What is wrong with the command line must be found before an earlier log is replaced.
+    # Mistakes on the command line must be found before an earlier log is replaced.
     told(scene, known)
     require_apart({"--log": path}, {"environment": environment})
     metadata = {
@@ -270,7 +278,7 @@ def _log(
         "settings": settings.to_json(),
     }
     attachments = {ACTUAL: scene_to_json(scene).encode()}
-    # A pipe can be read once only.
+    # A pipe can be read only once.
     if environment.is_file():
         attachments[SOURCE] = read_file(environment, MAX_SOURCE_BYTES)
     with Log(path, metadata_of(metadata), attachments) as log:
@@ -287,13 +295,13 @@ def _version() -> str:
 
 
 class _Lines:
-    """Tells the run line by line; on a terminal also what happens right now."""
+    """Prints the run line by line; on a terminal also what happens at the moment."""
 
     def __init__(self, status: Any = None) -> None:  # noqa: ANN401  rich is imported late
         self._status = status
 
     def record(self, record: Record) -> None:
-        """Prints what is worth a line, and refreshes the status."""
+        """Prints the line of a record, if it has one, and refreshes the status."""
         from ntagen.drive.records import Measured, Transition
         from ntagen.drive.story import tell
 
@@ -311,19 +319,19 @@ class _Lines:
             )
 
     def started(self, scene: Scene) -> None:
-        """Says what is driven, and what the driver knows."""
+        """Prints what is steered, and what the driver knows."""
         echo(
             f"{scene.name}: {len(scene.targets)} target(s), "
             f"{len(scene.criticals)} critical region(s) known"
         )
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """The line comes with the record."""
+        """Does nothing: the record of the synthesis has the line."""
 
 
 @contextlib.contextmanager
 def _terminal() -> Iterator[list[Journal]]:
-    """The journal that prints; it draws a moving line only where somebody can see it move."""
+    """The journal that prints; only a terminal gets a status line that moves."""
     import sys
 
     if not sys.stdout.isatty():
@@ -369,9 +377,9 @@ def _report(result: Result, scene: Scene, log_path: Path | None, *, short: bool)
         return
     clearance_mm, target_mm = result.clearance_mm, result.target_distance_mm
     where = "inside" if target_mm <= 0.0 else "outside of"
-    echo(f"truly, the tip is {abs(target_mm):.2f} mm {where} {scene.targets[-1].name}", nl=False)
+    echo(f"in truth, the tip is {abs(target_mm):.2f} mm {where} {scene.targets[-1].name}", nl=False)
     if math.isfinite(clearance_mm):
-        echo(f", and all that was pierced is {clearance_mm:.2f} mm from critical regions")
+        echo(f", and the needle's path is {clearance_mm:.2f} mm or more from critical regions")
     else:
         echo("")
     count = f"{ended.syntheses} syntheses, {ended.adjustments} adjustments"

@@ -1,4 +1,4 @@
-"""What commands were told in vain: idle options, and files that nobody wrote."""
+"""Notes about options without effect, and about outputs that were not written."""
 
 from __future__ import annotations
 
@@ -18,24 +18,25 @@ _SYMBOLIC_ONLY: Final = {
     "wanted_trace": "--shortest and --fastest have no effect here: they choose among the runs of "
     "symbolic queries",
 }
-"""By parameter: what is said if all queries are games."""
+"""For each parameter, the note if all queries are games."""
 
 _GAMES_ONLY: Final = {
-    "forced": "--forced has no effect here: it is a rule of games, and no query is one",
+    "forced": "--forced has no effect here: it is a rule of games, and no query is a game",
     "priorities": "--priorities has no effect here: only games and queries under a strategy may "
-    "ignore priorities; in others they count",
+    "ignore priorities; in other queries they always count",
 }
-"""By parameter: what is said if no query is a game or under a strategy."""
+"""For each parameter, the note if no query is a game or under a strategy."""
 
 _NOTHING_WRITTEN: Final = {
     "--trace": "no answer has a trace",
-    "--certificate": "only an E<> that is not satisfied and an A[] that is have a certificate",
+    "--certificate": "only an E<> that is not satisfied and an A[] that is satisfied have a "
+    "certificate",
     "--strategy": "no answer has a strategy",
     "--controller": "no answer has a strategy",
     "--plans": "plans are listed for control: A<> and A[ U ] without `under`, if the environment "
     "has no choices",
 }
-"""By option: why there may be nothing to write."""
+"""For each option, why there may be nothing to write."""
 
 
 def is_game(query: str) -> bool:
@@ -46,13 +47,13 @@ def is_game(query: str) -> bool:
 def idle_options(
     given: Collection[str], values: Mapping[str, object], queries: Sequence[str], *, ranks: bool
 ) -> list[str]:
-    """A line for each option on the command line that makes no difference.
+    """A note for each option on the command line that has no effect.
 
     Args:
         given: The names of the parameters that stand on the command line.
         values: All parameters by name.
         queries: The queries that are answered.
-        ranks: Whether plans would be ranked: those of environments are.
+        ranks: Whether plans are ranked, as those of environments are.
     """
     notes = []
     if all(is_game(query) and not query.lstrip().startswith("E") for query in queries):
@@ -63,7 +64,7 @@ def idle_options(
         notes += [note for name, note in _GAMES_ONLY.items() if name in given]
     if "threads" in given and not any(_takes_threads(query, values) for query in queries):
         notes.append(
-            "--threads has no effect here: games under partial observation take one thread, and so "
+            "--threads has no effect here: games under partial observation use one thread, and so "
             "do E[], A<> and -->, and searches that are not breadth first"
         )
     keeps_values = any(values[name] for name in ("strategy", "controller", "plans", "verify"))
@@ -101,33 +102,33 @@ def given_options() -> list[str]:
 
 
 def say_idle(options: Mapping[str, str], why: str) -> None:
-    """Says of those of some options that stand on the command line that they have no effect.
+    """Prints a note for each of these options that stands on the command line.
 
     Args:
-        options: By parameter: the option.
-        why: Why, after the words "has no effect".
+        options: The options, by the name of their parameters.
+        why: The reason, which follows the words "has no effect".
     """
     given = given_options()
     say([f"{option} has no effect {why}" for name, option in options.items() if name in given])
 
 
 def say(notes: Sequence[str]) -> None:
-    """Says something about the command line, on standard error."""
+    """Prints notes about the command line to standard error."""
     for note in notes:
         echo(f"note: {note}", err=True)
 
 
 def unwritten(wanted: Mapping[str, str | Path | None], written: Collection[str]) -> list[str]:
-    """A line for each output that was wanted and that no answer gave.
+    """A note for each output that was asked for but that no answer gave.
 
     Args:
-        wanted: By option: where its output goes.
+        wanted: Where the output of each option should be written.
         written: The options whose output was written.
     """
     notes = []
     for option, target in wanted.items():
         if target is None or option in written:
             continue
-        old = "" if str(target) == "-" or not Path(target).exists() else f", {target} is as it was"
+        old = "" if str(target) == "-" or not Path(target).exists() else f", {target} is unchanged"
         notes.append(f"{option}: nothing was written{old}: {_NOTHING_WRITTEN[option]}")
     return notes

@@ -1,4 +1,4 @@
-"""`ntagen explain`: what a diagnostic means, with an example and the way out."""
+"""`ntagen explain`: what a diagnostic means, with an example and how to fix it."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import click
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
 
-_CAPTIONS: Final = {"model": "The model:", "wrong": "Wrong:", "right": "Mended:"}
+_CAPTIONS: Final = {"model": "The model:", "wrong": "Wrong:", "right": "Right:"}
 _LONGEST_LINE: Final = 400
-"""Longer lines of examples are cut: they show that something is too long."""
+"""Longer lines of examples are shortened: these examples show that something is too long."""
 
 
 @click.command("explain", epilog="Exit codes: 0 done, 2 there is no such code.")
 @click.argument("code", required=False)
 def command(code: str | None) -> None:
-    """Explain a diagnostic: what it means, an example of the mistake, and how to mend it.
+    """Explain a diagnostic: what it means, an example of the mistake, and how to fix it.
 
-    CODE stands in brackets in the diagnostic. Without CODE, all codes are listed.
+    A diagnostic shows its CODE in brackets, as in error[E0201]. Without CODE, all codes are listed.
 
     \b
     Examples:
@@ -42,7 +42,7 @@ def command(code: str | None) -> None:
         close = difflib.get_close_matches(wanted.upper(), pages, 1)
         close += difflib.get_close_matches(wanted.lower(), by_name, 1)
         hint = f"did you mean {close[0]}?" if close else "`ntagen explain` lists all codes"
-        raise InputError(f"there is no diagnostic {wanted}\nhint: {hint}")
+        raise InputError(f"there is no diagnostic with the code {wanted}\nhint: {hint}")
     echo(Styled(f"{found.severity}[{found.code}]: {found.name}", bold=True))
     echo("")
     echo(_shown(found.page))

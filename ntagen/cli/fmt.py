@@ -1,4 +1,4 @@
-"""``ntagen fmt``: brings environment files into the canonical layout."""
+"""`ntagen fmt`: brings environment files into the standard layout."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ _STDIN = "-"
 @click.option("--check", is_flag=True, help="Change nothing; exit with 1 if a file would change.")
 @click.pass_context
 def command(ctx: click.Context, files: tuple[str, ...], check: bool) -> None:
-    """Lay out environment files canonically, in place.
+    """Bring environment files into the standard layout, in place.
 
-    Comments stay and the meaning does not change. A file with mistakes of form is left as it is,
-    and each is written completely or not at all. A single - reads standard input and writes to
-    standard output.
+    Comments stay, and the meaning does not change. A file with syntax errors is left unchanged. A
+    single - reads standard input and writes to standard output.
 
     \b
     Example:
@@ -58,7 +57,7 @@ def _formatted(name: str) -> tuple[str, str]:
     """The text of a file before and after.
 
     Raises:
-        SourceError: The file cannot be read, or has mistakes of form.
+        SourceError: The file cannot be read, or has syntax errors.
     """
     from ntagen.nsl import SourceError, format_text
     from ntagen.nsl.diagnostics import Reporter

@@ -1,4 +1,4 @@
-"""`ntagen info`: what is in a model or an environment."""
+"""`ntagen info`: shows what is in a model or an environment."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from ntagen.checker.facts import Channel, Clock, Process, Template, Variable
 
 ROWS_SHOWN: Final = 40
-"""Rows of a table at most; the JSON object has all."""
+"""A table shows at most this many rows; the JSON object has all."""
 
 _UNBOUNDED_WIDTH: Final = 10_000
 
 
 @click.command("info", epilog="Exit codes: 0 done, 2 the input is wrong.")
 @click.argument("path", metavar="MODEL", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="One JSON object with everything.")
+@click.option("--json", "as_json", is_flag=True, help="Print everything as one JSON object.")
 @click.option(
     "--svg",
     "folder",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Write a picture of each template; DIR is made if it is not there.",
+    help="Write a picture of each template to this folder; it is made if it does not exist.",
 )
 @include_option()
 def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path, ...]) -> None:
@@ -84,7 +84,7 @@ def _pictures(templates: Sequence[Template], folder: Path) -> dict[Path, str]:
 def _show(path: Path, model: Model) -> None:
     from rich.console import Console
 
-    # Without a terminal there is no width to fit into, and a folded cell cannot be searched.
+    # A pipe or file has no width, and text that is folded over two lines is hard to search.
     width = None if sys.stdout.isatty() else _UNBOUNDED_WIDTH
     console = Console(highlight=False, markup=False, width=width)
 
@@ -139,7 +139,7 @@ def _table(first: str, rows: Iterable[Sequence[str]], *columns: str) -> Table:
 
     shown = list(rows)
     headings = [first, *columns]
-    # A column that is empty everywhere says nothing.
+    # Columns without any entry are left out.
     used = [i for i in range(len(headings)) if i == 0 or any(row[i] for row in shown)]
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
     for i in used:
@@ -210,7 +210,7 @@ def _channel_rows(channels: Sequence[Channel]) -> Iterable[list[str]]:
 
 
 def _family(name: str) -> str:
-    """What the names of the members of a process set, or the parts of an array, have in common."""
+    """The name without its indexes: the same for all members of a process set or an array."""
     return re.sub(r"\([^)]*\)|\[[^\]]*\]", "…", name)
 
 

@@ -12,7 +12,7 @@ from ntagen.cli.rules import Decorator
 
 
 class Limits(TypedDict):
-    """When a search is to stop, as the engine is told; ``None`` is never."""
+    """The limits of a search as the engine takes them; ``None`` is no limit."""
 
     states: int | None
     memory_bytes: int | None
@@ -22,12 +22,14 @@ class Limits(TypedDict):
 def limit_options(of: str = "") -> Decorator:
     """The options ``--states``, ``--memory`` and ``--timeout``; `of` is what they are limits of."""
     about = {
-        "--states": "Stop after so many stored states.",
-        "--memory": "Such as 4GiB.",
-        "--timeout": "Such as 60s.",
+        "--states": "Stop a search after this many stored states.  [default: no limit]",
+        "--memory": "Stop a search that takes this much memory, for example 4GiB; a number without "
+        "a unit is in bytes.  [default: no limit]",
+        "--timeout": "Stop a search after this time, for example 60s or 2min; a number without a "
+        "unit is in seconds.  [default: no limit]",
     }
     if of:
-        about = {name: f"Of {of}: {text[0].lower()}{text[1:]}" for name, text in about.items()}
+        about = {name: f"For {of}: {text[0].lower()}{text[1:]}" for name, text in about.items()}
     options = (
         click.option("--states", type=click.IntRange(1), help=about["--states"]),
         click.option("--memory", metavar="SIZE", type=SIZE, help=about["--memory"]),
@@ -43,7 +45,7 @@ def limit_options(of: str = "") -> Decorator:
 
 
 def limits(states: int | None, memory: float | None, timeout: float | None) -> Limits:
-    """What the options mean."""
+    """The values of the options as limits."""
     return Limits(
         states=states,
         memory_bytes=None if memory is None else int(memory),

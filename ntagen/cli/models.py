@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ntagen.loading import Loaded
 
 WARNINGS_SHOWN: Final = 10
-"""Warnings that are printed at most; a model of many templates may have the same in each."""
+"""At most this many warnings are printed: a model may have the same one in many templates."""
 
 
 def include_option() -> Decorator:
@@ -30,18 +30,18 @@ def include_option() -> Decorator:
         metavar="DIR",
         multiple=True,
         type=click.Path(path_type=Path),
-        help="Let an environment include files below this folder too, not only below its own; may "
-        "be given again.",
+        help="Allow an environment to include files below this folder too, not only below its own. "
+        "You can give this option several times.",
     )
 
 
 def load_model(path: Path, include: Sequence[Path], overflow: OverflowRule = "wrap") -> Loaded:
-    """The model of a file; warnings go to standard error.
+    """Loads the model of a file. Prints warnings to standard error.
 
     Args:
         path: The file.
-        include: Below which folders an environment may include files.
-        overflow: What happens where results of integer arithmetic do not fit.
+        include: The folders below which an environment may include files, besides its own.
+        overflow: What happens if a result of integer arithmetic does not fit into 32 bits.
 
     Raises:
         InputError: The file is wrong.
@@ -68,7 +68,7 @@ def show_warnings(warnings: Sequence[str]) -> None:
 
 @contextlib.contextmanager
 def pointing_to_explanations(wanted: bool) -> Iterator[None]:
-    """Adds to a rejection which command explains its first diagnostic, if that is wanted."""
+    """Adds to a rejection the command that explains its first diagnostic, if `wanted`."""
     try:
         yield
     except InputError as error:
@@ -80,5 +80,5 @@ def pointing_to_explanations(wanted: bool) -> Iterator[None]:
 def with_pointer(rejection: str) -> str:
     """A rejection with the command that explains its first diagnostic, if it has one."""
     code = re.search(r"\berror\[([A-Z]\d+)\]", rejection)
-    pointer = f"\nfor an example and the way out: ntagen explain {code[1]}" if code else ""
+    pointer = f"\nfor an example and how to fix it: ntagen explain {code[1]}" if code else ""
     return rejection + pointer

@@ -32,13 +32,13 @@ DEFEATED: Final = 1
 """Exit code where the strategy did not keep its promise."""
 
 VALUES_SHOWN: Final = 24
-"""Variables that are shown without being asked for; of more only those that changed."""
+"""With more variables than this, only those that changed are shown; ``s`` shows all."""
 
 CHOICES_SHOWN: Final = 40
-"""Moves that are listed without being asked for."""
+"""At most this many moves are listed; ``m`` lists all."""
 
 SILENT_MOVES: Final = 100
-"""Moves of the strategy in a row, without a choice for the user, after which the user is asked."""
+"""After this many moves of the strategy in a row without a choice for the user, play pauses."""
 
 HELP: Final = """\
   2          make move 2, as soon as it is possible
@@ -57,7 +57,7 @@ HELP: Final = """\
 
 @click.command(
     "play",
-    epilog="Exit codes: 0 done, 1 the strategy lost or did not say how to go on, 2 the input is "
+    epilog="Exit codes: 0 done, 1 the strategy lost or has no next move, 2 the input is "
     "rejected, 3 stopped by a limit, 4 run-time error in the model.",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
@@ -72,19 +72,29 @@ HELP: Final = """\
     "--query",
     "asked",
     metavar="TEXT|NAME",
-    help="A control query, or the name of one of the model's; the winner's strategy is synthesised "
-    "first.  [default: the model's only control query]",
+    help="A control query, or the name of a query of the model. The winner's strategy is "
+    "synthesised first.  [default: the model's only control query]",
 )
-@click.option("--auto", "steps", type=click.IntRange(1), help="Let chance play so many steps.")
-@click.option("--seed", type=int, default=0, help="For --auto: the same seed gives the same play.")
+@click.option(
+    "--auto",
+    "steps",
+    type=click.IntRange(1),
+    help="Choose your moves at random, for at most this many steps.",
+)
+@click.option(
+    "--seed",
+    type=int,
+    default=0,
+    help="For --auto: the same seed gives the same play.  [default: 0]",
+)
 @click.option(
     "--log",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="Write the play at the end as a trace, which `ntagen verify MODEL FILE` checks.",
+    help="When the play ends, write it as a trace; `ntagen verify MODEL FILE` checks it.",
 )
 @forced_rule()
-@priority_rule("Whether priorities of channels and processes count.")
+@priority_rule("Whether priorities of channels and processes count.  [default: ignore]")
 @overflow_rule()
 @limit_options("--query")
 @include_option()
@@ -105,9 +115,9 @@ def command(
 ) -> int:
     """Play a timed game against a strategy.
 
-    MODEL is an environment (.nsl) or a UPPAAL model (.xml, .xta). The strategy plays the side of
-    its owner, you play the other one: against a winning strategy of the controller you are the
-    environment, and where the controller cannot win you are the controller.
+    MODEL is an environment (.nsl) or a UPPAAL model (.xml, .xta). The strategy plays for its owner,
+    and you play the other side: if the controller can win, you are the environment; if it cannot,
+    you are the controller.
 
     \b
     Examples:
@@ -117,8 +127,8 @@ def command(
       ntagen play game.xta --strategy open.json --auto 1000 --seed 7
 
     \b
-    In each state the moves are listed with the delays after which they are possible. The strategy
-    acts by itself, at the first moment at which it does not wait; at the same instant the
+    Each state lists your moves with the delays after which they are possible. The strategy acts by
+    itself, as soon as it no longer waits. If both sides can move at the same instant, the
     environment is first. Type:
       2          make move 2, as soon as it is possible
       2 3/2      make move 2 after a delay of 3/2
@@ -135,7 +145,7 @@ def command(
         say_idle({"seed": "--seed"}, "without --auto")
     if strategy_path:
         idle = {"states": "--states", "memory": "--memory", "timeout": "--timeout"}
-        say_idle(idle, "with --strategy: nothing is synthesised")
+        say_idle(idle, "with --strategy: there is no search")
     inputs = {"model": model_path} | ({"strategy": strategy_path} if strategy_path else {})
     require_apart({"--log": log}, inputs)
     with pointing_to_explanations(True):
@@ -167,7 +177,7 @@ def command(
 
 
 def _query(model: Model, asked: str | None) -> str:
-    """The query that is meant."""
+    """The query with the name `asked`, `asked` itself as a query, or the model's only game."""
     games = [query for query in model.queries if re.search(r"\bcontrol\b", query.text)]
     if asked is None:
         if len(games) == 1:
@@ -175,7 +185,7 @@ def _query(model: Model, asked: str | None) -> str:
         shown = "".join(f"\n  {query.text}" for query in games)
         raise InputError(
             f"the model has {len(games) or 'no'} control queries{':' if games else ''}{shown}\n"
-            "hint: choose a game with --query, or a file with --strategy"
+            "hint: choose a query with --query, or a strategy file with --strategy"
         )
     for query in games:
         name = query.comment.strip().partition("\n")[0].strip()
@@ -186,7 +196,7 @@ def _query(model: Model, asked: str | None) -> str:
 
 
 def _reader() -> Callable[[], str | None]:
-    """Gives the lines that the user types, and ``None`` at their end."""
+    """A function that gives the next line of the user, or ``None`` at the end of the input."""
 
     def typed() -> str | None:
         try:
@@ -198,7 +208,7 @@ def _reader() -> Callable[[], str | None]:
     def piped() -> str | None:
         line = sys.stdin.readline()
         if line:
-            # Shown, so that the output can be read on its own.
+            # Printed, so that the output can be read without the input.
             echo(f"> {line.rstrip()}")
         return line.rstrip() if line else None
 
@@ -207,7 +217,7 @@ def _reader() -> Callable[[], str | None]:
 
 @dataclass(frozen=True, slots=True)
 class _Mark:
-    """A place that can be gone back to."""
+    """A moment of the play to which the user can go back."""
 
     length: int
     time: Fraction
@@ -233,7 +243,7 @@ class _Session:
         )
 
     def converse(self, read: Callable[[], str | None]) -> None:
-        """Plays with the user until the end of the input or of their patience."""
+        """Plays with the user until they quit or the input ends."""
         echo("Type ? for help.")
         while True:
             situation = self._play.situation()
@@ -248,7 +258,7 @@ class _Session:
                 return
 
     def play_at_random(self, steps: int, chance: Chance) -> None:
-        """Lets chance play the side of the user."""
+        """Plays with random moves for the side of the user."""
         for _ in range(steps):
             situation = self._play.situation()
             if self._is_over(situation):
@@ -263,18 +273,18 @@ class _Session:
                 break
         self._is_over(self._play.situation())
         self._show_state()
-        echo(self._ending or f"{steps} steps are played; nothing is decided.")
+        echo(self._ending or f"{steps} steps are played; nobody has won yet.")
 
     def write(self, path: Path) -> None:
         """Writes the play as a trace."""
         text = self._play.trace_json()
         if text is None:
-            raise InputError("the times of this play are too fine for a trace")
+            raise InputError("a trace cannot express the times of this play: they are too fine")
         write_files({path: f"{text}\n"})
         echo(f"play written to {path}")
 
     def _is_over(self, situation: Situation) -> bool:
-        """Whether play has ended; notes how."""
+        """Whether play has ended; if so, remembers how."""
         if self._ending is None:
             then = situation.next
             if situation.winner is not None:
@@ -296,7 +306,7 @@ class _Session:
 
     def _fail(self, why: str) -> None:
         self.is_defeated = True
-        self._ending = f"The strategy does not say how to go on: {why}."
+        self._ending = f"The strategy has no next move: {why}."
 
     def _goes_on_silently(self, situation: Situation) -> bool:
         """Whether the strategy acts at once and the user has no choice."""
@@ -334,16 +344,16 @@ class _Session:
         self._shown = state
 
     def _forecast(self, situation: Situation) -> str:
-        """What happens if the user only waits."""
+        """Says what happens if the user only waits."""
         then, owner = situation.next, self._strategy.owner
         when = "at once" if then.delay == 0 else f"after {then.delay}"
         if then.kind == "acts":
             waits = "" if then.delay == 0 else "waits, and "
             return f"the {owner} {waits}{when} takes {_move(then.edges)}"
         if then.kind == "must":
-            return f"the {owner} waits; time cannot pass on, and you must move"
+            return f"the {owner} waits; time cannot pass any more, and you must move"
         if then.kind == "fails":
-            return f"{when} the strategy does not say how to go on: {then.why}"
+            return f"{when} the strategy has no next move: {then.why}"
         outcome = {
             "goal": f"{when} the goal holds, and the {then.winner} wins",
             "broken": f"{when} what must be kept does not hold, and the {then.winner} wins",
@@ -355,7 +365,7 @@ class _Session:
     def _show_moves(self, situation: Situation, most: int | None) -> None:
         self._list(situation.replies, "", most)
         if not situation.replies:
-            echo("  you have no move; Enter goes on")
+            echo("  you have no move; press Enter to go on")
         if situation.allowed:
             echo(f"  the {self._strategy.owner} may also")
             self._list(situation.allowed, "+", most)
@@ -372,7 +382,7 @@ class _Session:
             echo(f"  … {len(moves) - most} more: m shows all")
 
     def _obey(self, read: Callable[[], str | None], situation: Situation) -> bool:
-        """Reads commands until one changes the play; false at the end."""
+        """Reads commands until one changes the play; false if the user quits."""
         while True:
             line = read()
             if line is None:
@@ -394,22 +404,22 @@ class _Session:
                     self._back(everything=name == "r")
                     return True
                 case _ if self._ending is not None:
-                    echo("play is over: u undo, r restart, q quit")
+                    echo("the play is over: u undo, r restart, q quit")
                 case _:
                     if _said(self._step, situation, words):
                         return True
 
     def _step(self, situation: Situation, words: Sequence[str]) -> None:
-        """Makes the move, or the wait, that was typed."""
+        """Makes the move, or waits, as the user typed."""
         if len(words) > 2:
-            raise InputError(f"{' '.join(words)} is no command; type ? for help")
+            raise InputError(f"{' '.join(words)} is not a command; type ? for help")
         delay = _delay(words[1]) if len(words) == 2 else None
         mark = _Mark(len(self._play), self._time)
         if not words or words[0] == "w":
             if delay is None:
                 self._wait(situation)
             elif delay not in situation.waits:
-                raise InputError(f"something happens before: {self._forecast(situation)}")
+                raise InputError(f"you cannot wait so long: {self._forecast(situation)}")
             else:
                 self._pass(delay)
         else:
@@ -447,7 +457,7 @@ class _Session:
             only = situation.replies[0]
             self._make(situation, only, only.windows[-1].soon())
         elif then.kind == "must":
-            raise InputError("time cannot pass on, and you must move")
+            raise InputError("time cannot pass any more, and you must move")
         else:
             self._pass(then.delay or Fraction(0))
             if then.kind == "fails":
@@ -478,7 +488,7 @@ _P = ParamSpec("_P")
 
 
 def _said(action: Callable[_P, None], *given: _P.args, **named: _P.kwargs) -> bool:
-    """Whether something could be done; what was wrong is said."""
+    """Whether an action succeeded; if not, prints the error."""
     try:
         action(*given, **named)
     except NtagenError as error:
@@ -488,11 +498,11 @@ def _said(action: Callable[_P, None], *given: _P.args, **named: _P.kwargs) -> bo
 
 
 def _meant(situation: Situation, word: str) -> Reply:
-    """The move that a number means."""
+    """The move with the number that the user typed."""
     moves = situation.allowed if word.startswith("+") else situation.replies
     number = word.removeprefix("+")
     if not number.isdecimal():
-        raise InputError(f"{word} is no command; type ? for help")
+        raise InputError(f"{word} is not a command; type ? for help")
     if not 1 <= int(number) <= len(moves):
         raise InputError(f"there is no move {word}")
     return moves[int(number) - 1]
@@ -509,14 +519,14 @@ def _delay(text: str) -> Fraction:
     try:
         delay = Fraction(text)
     except (ValueError, ZeroDivisionError):
-        raise InputError(f"{text} is no delay: write a number such as 2, 3/2 or 1.5") from None
+        raise InputError(f"{text} is not a delay: write a number such as 2, 3/2 or 1.5") from None
     if delay < 0:
-        raise InputError("a delay is not negative")
+        raise InputError("a delay cannot be negative")
     return delay
 
 
 def _changed(every: list[str], changed: list[str], before: State | None) -> list[str]:
-    """What is shown of a long list."""
+    """The entries of a long list that are shown."""
     if before is None:
         return [f"{len(every)} values (s shows them)"]
     rest = len(changed) - VALUES_SHOWN
@@ -540,6 +550,6 @@ def _edge(edge: Edge) -> str:
 
 
 def _labels(edges: Sequence[Edge]) -> str:
-    """What tells moves apart that look the same otherwise."""
+    """Guards and updates, to tell moves apart that look the same otherwise."""
     labels = "; ".join(label for edge in edges for label in (edge.guard, edge.update) if label)
     return f" {{ {labels} }}" if labels else ""

@@ -1,4 +1,4 @@
-"""`ntagen plot`: a picture of a scene with its plans, or of a run."""
+"""`ntagen plot`: draws a scene with its plans, or a run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     "--output",
     metavar="FILE.png|pdf|svg",
     type=click.Path(path_type=Path),
-    help="Where to draw to.  [default: the source's name with .png, in the current folder]",
+    help="The picture to write.  [default: the source's name with .png, in the current folder]",
 )
 @click.option(
     "--plans",
@@ -39,7 +39,7 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     default=60,
     show_default=True,
     type=click.IntRange(min=0),
-    help="Draw at most so many plans; 0 draws the scene alone and asks the engine nothing.",
+    help="Draw at most this many plans. 0 draws the scene alone, without a search for plans.",
 )
 @click.option(
     "--rank",
@@ -47,7 +47,8 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     metavar="CRITERION,…",
     default="clearance,rolls,length",
     show_default=True,
-    help="What the best plan is: clearance, rolls, length, target.",
+    help="How plans are ranked, the most important criterion first: clearance, rolls, length, "
+    "target.",
 )
 @include_option()
 def command(
@@ -55,9 +56,9 @@ def command(
 ) -> None:
     """Draw a scene with its plans, or a run from its log.
 
-    Two projections and a view in space: target green, critical regions red, detection regions
-    dashed orange, the best plan blue, others faint; of a run also the true path, the measurements
-    and what was learned.
+    The picture shows two projections and a view in space. Targets are green, critical regions red,
+    detection regions dashed orange. The best plan is blue, the others are faint. For a run, the
+    picture also shows the true path, the measurements and what the driver learned.
 
     \b
     Examples:
@@ -69,8 +70,8 @@ def command(
 
     criteria = parse_ranking(ranking)
     if _is_log(source):
-        say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked when it was driven")
-        say_idle({"include": "--include"}, "here: a run has its scene in its log")
+        say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
+        say_idle({"include": "--include"}, "here: the log of a run contains its scene")
     elif shown == 0:
         say_idle({"ranking": "--rank"}, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
@@ -79,7 +80,7 @@ def command(
     picture = (
         _of_run(source, shown) if _is_log(source) else _of_scene(source, shown, criteria, include)
     )
-    # Matplotlib takes half a second: it is asked for when everything else is right.
+    # Importing Matplotlib takes half a second: it waits until everything else is right.
     from ntagen.plot.picture import draw
 
     save(draw(picture), path)
@@ -90,7 +91,7 @@ def _is_log(source: Path) -> bool:
     """Whether a file is a log, by its name or its first bytes."""
     if source.suffix == ".mcap":
         return True
-    # What a pipe holds can be read once only: its name decides.
+    # A pipe can be read only once, so its name decides.
     if not source.is_file():
         return False
     with open_file(source, sys.maxsize) as file:

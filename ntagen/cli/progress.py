@@ -1,4 +1,4 @@
-"""What is said while a query takes long, and when the user interrupts it."""
+"""The counters that are shown while a query takes long, and when the user interrupts it."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class Counters:
 
 @contextmanager
 def shown_progress(query: str, quiet: bool) -> Iterator[Callable[[int, int, int, int], None]]:
-    """Gives what the engine reports its counters to.
+    """Gives the function to which the engine reports its counters.
 
-    On a terminal they stand in a line that is overwritten. If the user interrupts, the last ones
+    A terminal shows them in one line that is overwritten. If the user interrupts, the last counters
     are printed to standard error.
 
     Args:
         query: The query that is being answered.
-        quiet: Whether nothing is shown while it goes on.
+        quiet: Whether nothing is shown before an interruption.
     """
     start = time.monotonic()
     last: Counters | None = None

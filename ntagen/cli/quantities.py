@@ -35,7 +35,9 @@ class _Quantity(click.ParamType[float]):
         units = {unit.lower(): size for unit, size in self._units.items()}
         if not match or match[2].lower() not in units:
             known = ", ".join(unit for unit in self._units if unit)
-            self.fail(f"{value!r} is no {self.name}; write a number and one of {known}", param, ctx)
+            self.fail(
+                f"{value!r} is not a {self.name}; write a number and one of {known}", param, ctx
+            )
         return float(match[1]) * units[match[2].lower()]
 
 

@@ -1,4 +1,4 @@
-"""`ntagen replay`: tell a logged run, and run its decisions again."""
+"""`ntagen replay`: tells a logged run, and repeats its decisions."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 @click.argument("log", metavar="RUN.mcap", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def command(log: Path, as_json: bool) -> int:
-    """Run the decisions of a logged run again.
+    """Repeat the decisions of a logged run and compare them.
 
-    Tells what happened, then lets the driver decide again from the logged measurements and
-    compares every decision: states, commands, estimates, syntheses, learned regions. A log that
-    was torn by a crash is read up to the tear.
+    Prints what happened in the run. Then the driver decides again from the logged measurements, and
+    every decision is compared: states, commands, estimates, syntheses, learned regions. A log that
+    was cut off by a crash is read up to that place.
 
     \b
     Example:
@@ -64,15 +64,15 @@ def _tell(run: RunLog, log: Path) -> None:
     if run.torn_at_byte is not None:
         last_s = run.records[-1].time_s if run.records else 0.0
         echo(
-            f"{log} is torn: it can be read up to byte {run.torn_at_byte}, "
+            f"{log} is cut off: it can be read up to byte {run.torn_at_byte}, "
             f"{len(run.records)} records, {last_s:.2f} s"
         )
 
 
 def _report(comparison: Comparison) -> None:
     if comparison.is_same:
-        extent = "all" if comparison.complete else "all that were logged"
-        echo(f"the same decisions again: {extent}, {comparison.compared} of them")
+        extent = "all" if comparison.complete else "all logged"
+        echo(f"the same decisions again: {extent} {comparison.compared} are equal")
         return
     echo(f"a different decision, after {comparison.compared} equal ones")
     echo(f"  logged: {_shown(comparison.logged)}")

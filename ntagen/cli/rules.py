@@ -9,9 +9,11 @@ Decorator: TypeAlias = Callable[[Callable[..., int | None]], Callable[..., int |
 
 
 def forced_rule(
-    about: str = "When the environment must move because time cannot pass.",
+    about: str = "When the environment must move at a moment at which time cannot pass. tiga: if "
+    "the process that stops time has no controllable move; product: if no process has one; "
+    "neutral: always.  [default: tiga]",
 ) -> Decorator:
-    """The option ``--forced``; ``about`` is its line in ``--help``."""
+    """The option ``--forced``; ``about`` is its text in ``--help``."""
     rules = click.Choice(["tiga", "product", "neutral"])
     return click.option("--forced", type=rules, default="tiga", help=about)
 
@@ -22,12 +24,12 @@ def overflow_rule() -> Decorator:
         "--overflow",
         type=click.Choice(["wrap", "error"]),
         default="wrap",
-        help="Where the result of integer arithmetic does not fit into 32 bits: it wraps round, as "
-        "UPPAAL's does, or it is a run-time error.",
+        help="What happens if a result of integer arithmetic does not fit into 32 bits: it wraps "
+        "round, as in UPPAAL, or it is a run-time error.  [default: wrap]",
     )
 
 
 def priority_rule(about: str) -> Decorator:
-    """The option ``--priorities``; ``about`` is its line in ``--help``."""
+    """The option ``--priorities``; ``about`` is its text in ``--help``."""
     rules = click.Choice(["ignore", "keep"])
     return click.option("--priorities", type=rules, default="ignore", help=about)

@@ -1,6 +1,6 @@
-"""Ctrl-C and SIGTERM: both end a command in order, and what it was writing is whole or not there.
+"""Ctrl-C and SIGTERM: both end a command in an orderly way; no file is left half written.
 
-By itself SIGTERM ends a process on the spot. Here it does what Ctrl-C does, so that temporary files
+By default SIGTERM ends a process at once. Here it does what Ctrl-C does, so that temporary files
 are removed, and a run that drives a needle stops it and completes its log. The exit code tells
 which of the two it was.
 """
@@ -25,7 +25,7 @@ class Terminated(KeyboardInterrupt):
 
 
 class Termination:
-    """Whether SIGTERM came; code that turns all interruptions into one forgets which it was."""
+    """Remembers whether SIGTERM came: the exception alone may be turned into another one."""
 
     def __init__(self) -> None:
         self.came = False
@@ -38,7 +38,7 @@ class Termination:
 
 @contextlib.contextmanager
 def termination() -> Iterator[Termination]:
-    """Turns SIGTERM into an interruption, where that can be done."""
+    """Turns SIGTERM into an interruption, if this thread can handle signals."""
     found = Termination()
     with handled({signal.SIGTERM: found.handle}):
         yield found
@@ -46,7 +46,7 @@ def termination() -> Iterator[Termination]:
 
 @contextlib.contextmanager
 def handled(handlers: dict[signal.Signals, Handler]) -> Iterator[None]:
-    """Handles signals so; only the main thread can, and a signal that is ignored stays so."""
+    """Installs handlers of signals. Does nothing outside the main thread, or to ignored signals."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""`ntagen verify`: does a trace, a certificate or a strategy do what it is said to?"""
+"""`ntagen verify`: checks a trace, a certificate or a strategy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NOT_COVERED: Final = 3
 """Exit code where the check does not cover the model or the query."""
 
 _WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certificate)"')
-"""How a file begins whose check does not hang on the rules of games."""
+"""How a file begins whose check does not depend on the rules of games."""
 
 
 @click.command(
@@ -32,8 +32,14 @@ _WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certi
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
-@forced_rule("For strategies: when the environment must move because time cannot pass.")
-@priority_rule("For strategies: whether priorities of channels and processes count.")
+@forced_rule(
+    "For strategies: when the environment must move at a moment at which time cannot pass. Give "
+    "the rule that the strategy was made with.  [default: tiga]"
+)
+@priority_rule(
+    "For strategies: whether priorities of channels and processes count. Give the rule that the "
+    "strategy was made with.  [default: ignore]"
+)
 @include_option()
 @overflow_rule()
 def command(
@@ -44,18 +50,23 @@ def command(
     include: tuple[Path, ...],
     overflow: Any,  # noqa: ANN401
 ) -> int:
-    """Check a trace, certificate or strategy, independently of the search that found it.
+    """Check a trace, certificate or strategy independently of the search that found it.
 
-    FILE is what `ntagen check` wrote for MODEL with --certificate FILE, --trace FILE.json or
-    --strategy FILE.json, or `ntagen play` with --log FILE. A trace is replayed with its exact
-    times, and must show what its query asks about; the states, edges and zones that it shows must
-    be those of the run. A play must end as it says. A certificate is a
-    set of states for E<> (not satisfied) or A[] (satisfied): it must contain the initial state, no
-    move and no delay may lead out of it, and it must not meet what is to be avoided; states that
-    differ in meta variables alone count as different, so that it holds whichever of them are kept.
-    A strategy is played against every move of its opponent, at every moment, and its owner must
-    win. What is not checked of a file is said; names that the format or the model does not have
-    are refused.
+    `ntagen check` writes FILE for MODEL, with --trace FILE.json, --certificate FILE or --strategy
+    FILE.json; so does `ntagen play` with --log FILE.
+
+    A trace is replayed with its exact times. The states, edges and zones in the file must be those
+    of the run, and the run must show what the query asks. A play must end as the file says.
+
+    A certificate is a set of states for an E<> that is not satisfied or an A[] that is. It must
+    contain the initial state; no move and no delay may lead out of it; and it must not contain a
+    state that E<> looks for or A[] forbids. States that differ only in meta variables count as
+    different.
+
+    A strategy is played against every move of its opponent, at every moment. Its owner must win.
+
+    The output also says which parts of a file are not checked. Names that the format or the model
+    does not have are refused.
 
     \b
     Examples:
@@ -71,7 +82,7 @@ def command(
     kind = _WITHOUT_RULES.match(text)
     if kind:
         idle = {"forced": "--forced", "priorities": "--priorities"}
-        say_idle(idle, f"here: it is a rule for strategies, and this is a {kind[1]}")
+        say_idle(idle, f"here: it is a rule for strategies, and the file is a {kind[1]}")
     for line in checked.lines:
         echo(line)
     return {True: 0, False: VIOLATED, None: NOT_COVERED}[checked.holds]
@@ -81,4 +92,4 @@ def _read(file: Path) -> str:
     try:
         return read_file(file, EVIDENCE_BYTES).decode()
     except UnicodeDecodeError as error:
-        raise InputError(f"{file}: it is no text: {error.reason}") from None
+        raise InputError(f"{file}: this is not text in UTF-8: {error.reason}") from None

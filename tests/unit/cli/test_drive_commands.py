@@ -70,10 +70,10 @@ def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -
         ("no needle 'phantom'", [PAPER, "--needle", "phantom"]),
         ("unknown critical region 'C9'", [PAPER, "--known", "C9"]),
         ("unknown ranking criterion 'beauty'", [PAPER, "--rank", "beauty"]),
-        ("is no time", [PAPER, "--timeout", "soon"]),
-        ("is no time", [PAPER, "--timeout", "0"]),
-        ("not a number from 0", [PAPER, "--noise", "-1"]),
-        ("not a number from 0", [PAPER, "--roll-error", "nan"]),
+        ("is not a time", [PAPER, "--timeout", "soon"]),
+        ("is not a time", [PAPER, "--timeout", "0"]),
+        ("not a number of 0 or more", [PAPER, "--noise", "-1"]),
+        ("not a number of 0 or more", [PAPER, "--roll-error", "nan"]),
         ("--seed", [PAPER, "--seed", "-1"]),
         ("it is a folder", [PAPER, "--log", "."]),
         ("would replace", [PAPER, "--log", PAPER]),
@@ -98,7 +98,7 @@ def test_replay_reads_a_torn_log(
     torn = tmp_path / "torn.mcap"
     torn.write_bytes(run.read_bytes()[: run.stat().st_size // 2])
     assert main(["replay", str(torn)]) == 0
-    assert "is torn: it can be read up to byte" in capsys.readouterr().out
+    assert "is cut off: it can be read up to byte" in capsys.readouterr().out
     assert main(["replay", str(torn), "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert summary["same"]

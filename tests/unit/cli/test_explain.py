@@ -1,4 +1,4 @@
-"""`ntagen explain`, and that every page shows its mistake and the way out.
+"""`ntagen explain`, and that every page shows its mistake and how to fix it.
 
 The examples of the engine's pages are tried in ``checker/tests/language/explanations.rs``.
 """
@@ -65,7 +65,7 @@ def test_a_page_is_found_by_code_and_name(capsys: pytest.CaptureFixture[str], na
     out = capsys.readouterr().out
     assert out.startswith("error[E0201]: name-unknown\n\nA name is used that nothing declares")
     assert "\nWrong:\n\n    int length;\n" in out
-    assert "\nMended:\n\n    const int length = 3;\n" in out
+    assert "\nRight:\n\n    const int length = 3;\n" in out
     assert "```" not in out
 
 
@@ -89,5 +89,5 @@ def test_every_page_can_be_shown(capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_unknown_code_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "E0021"]) == 2
     err = capsys.readouterr().err
-    assert "there is no diagnostic E0021" in err
+    assert "there is no diagnostic with the code E0021" in err
     assert "hint: did you mean E0" in err

@@ -96,7 +96,7 @@ def test_controller_plays_against_a_counter_strategy(tmp_path: Path, player: Pla
     model.write_text(RACE)
     out = player(model, "--query", "control: A<> P.G", "--log", log, lines="1\n\n")
     assert "you are the controller. The controller cannot win: see why." in out
-    assert "you have no move; Enter goes on" in out
+    assert "you have no move; press Enter to go on" in out
     assert "there is no move 1" in out
     assert "  · after 1 the environment takes P.L -> Bad" in out
     assert "the environment has won after 1; the strategy has won." in out
@@ -110,7 +110,7 @@ def test_enter_makes_the_only_move_that_must_be_made(tmp_path: Path, player: Pla
         "system P;"
     )
     out = player(model, "--query", "control: A<> P.G", lines="w 3\n\n")
-    assert "the controller waits; time cannot pass on, and you must move" in out
+    assert "the controller waits; time cannot pass any more, and you must move" in out
     assert "  · you take P.I -> G" in out
     assert "The goal holds: the controller has won after 3; the strategy has won." in out
 
@@ -139,11 +139,11 @@ def test_undo_goes_back_to_the_last_choice(machine: Path, player: Player) -> Non
         ("9", "there is no move 9"),
         ("+7", "there is no move +7"),
         ("0", "there is no move 0"),
-        ("go", "go is no command; type ? for help"),
-        ("1 2 3", "1 2 3 is no command; type ? for help"),
-        ("1 soon", "soon is no delay: write a number such as 2, 3/2 or 1.5"),
-        ("1 1/0", "1/0 is no delay"),
-        ("1 -1", "a delay is not negative"),
+        ("go", "go is not a command; type ? for help"),
+        ("1 2 3", "1 2 3 is not a command; type ? for help"),
+        ("1 soon", "soon is not a delay: write a number such as 2, 3/2 or 1.5"),
+        ("1 1/0", "1/0 is not a delay"),
+        ("1 -1", "a delay cannot be negative"),
         ("1 1", "this move is possible before 1"),
         ("1 1e-40", "too fine a fraction"),
         ("1 1/3000000000", "cannot be waited"),
@@ -176,7 +176,7 @@ def test_options_without_an_effect_are_named(
     assert main(["play", str(machine), "--strategy", strategy, "--seed", "3", "--states", "9"]) == 0
     err = capsys.readouterr().err
     assert "note: --seed has no effect without --auto\n" in err
-    assert "note: --states has no effect with --strategy: nothing is synthesised\n" in err
+    assert "note: --states has no effect with --strategy: there is no search\n" in err
 
 
 def test_wrong_strategy_is_defeated(machine: Path, tmp_path: Path, player: Player) -> None:
@@ -192,7 +192,7 @@ def test_wrong_strategy_is_defeated(machine: Path, tmp_path: Path, player: Playe
     changed["states"] = changed["states"][:1]
     strategy.write_text(json.dumps(changed))
     out = player(machine, "--strategy", strategy, lines="+1 1\n\n", code=1)
-    assert "The strategy does not say how to go on: it has no decision here." in out
+    assert "The strategy has no next move: it has no decision here." in out
 
 
 def test_synthesis_has_limits(tmp_path: Path, player: Player) -> None:

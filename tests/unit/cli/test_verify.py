@@ -278,5 +278,5 @@ def test_rules_without_an_effect_are_named(
     for file, kind in ((trace, "trace"), (certificate, "certificate"), (strategy, None)):
         check_exit(0, "verify", lamp, file, "--forced", "tiga")
         err = capsys.readouterr().err
-        note = f"--forced has no effect here: it is a rule for strategies, and this is a {kind}"
+        note = f"--forced has no effect here: it is a rule for strategies, and the file is a {kind}"
         assert err == (f"note: {note}\n" if kind else "")
