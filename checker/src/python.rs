@@ -30,7 +30,7 @@ use crate::game::{Forced, Nodes, Priorities};
 use crate::ir::Overflow;
 use crate::search::limits::StopReason;
 use crate::search::optimum::best_first::Met;
-use crate::search::reachability::search::Order;
+use crate::search::reachability::report::Order;
 
 use walks::{ExactWalk, Simulation};
 

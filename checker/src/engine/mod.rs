@@ -37,8 +37,8 @@ pub use query::answer::{Answer, Evidence, Verdict};
 use crate::game::strategy::attractor::Under;
 use crate::game::strategy::closed_loop::ClosedLoop;
 use crate::game::{Forced, Nodes, Player, Priorities};
-pub use crate::search::reachability::search::MOST_THREADS;
-use crate::search::reachability::search::{Manner, Order};
+pub use crate::search::reachability::report::MOST_THREADS;
+use crate::search::reachability::report::{Manner, Order};
 
 /// Codes of what the engine refuses to answer although the model is right.
 pub mod codes {

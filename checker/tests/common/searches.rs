@@ -2,7 +2,7 @@
 
 use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options};
-use checker::search::reachability::search::Order;
+use checker::search::reachability::report::Order;
 
 /// The answer to a query, found in this order by so many threads, with the options that `adjust`
 /// leaves; `is_shown` says whether what an independent replay makes of a trace is all right.

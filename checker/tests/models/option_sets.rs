@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, TraceWanted, Verdict};
 use checker::game::Nodes;
-use checker::search::reachability::search::Order;
+use checker::search::reachability::report::Order;
 
 use crate::random::{Random, networks};
 

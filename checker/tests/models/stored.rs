@@ -15,8 +15,8 @@ use checker::exec::Interpreter;
 use checker::ir::Predicate;
 use checker::network::{Stepper, Symbolic};
 use checker::search::limits::{Counters, StopReason, Watch};
+use checker::search::reachability::report::Order;
 use checker::search::reachability::search;
-use checker::search::reachability::search::Order;
 
 fn load(text: &str) -> LoadedModel {
     LoadedModel::load("model.xta", text.as_bytes())
@@ -63,7 +63,7 @@ fn stored_by(abstraction: Abstraction, text: &str) -> Option<u64> {
     let mut symbolic = Symbolic::new(Stepper::new(network, &interpreter), bounds);
     let goal = Predicate::Constant(false);
     let report = search::search(&mut symbolic, &mut &goal, Order::BreadthFirst, &mut Few);
-    let is_whole = matches!(report.outcome, Ok(search::Outcome::Exhausted));
+    let is_whole = matches!(report.outcome, Ok(checker::search::Outcome::Exhausted));
     is_whole.then_some(report.counters.stored)
 }
 

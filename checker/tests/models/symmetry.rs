@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 
 use checker::engine::evidence::timed_run::Proof;
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
-use checker::search::reachability::search::Order;
+use checker::search::reachability::report::Order;
 
 use crate::random::{Random, networks};
 

@@ -18,8 +18,8 @@ use checker::network::{Failure, Stepper, Symbolic};
 use checker::search::StopReason;
 use checker::search::limits::Unlimited;
 use checker::search::reachability::goal::{Goal, SharedGoal};
+use checker::search::reachability::report::{Manner, Order};
 use checker::search::reachability::search;
-use checker::search::reachability::search::{Manner, Order};
 use checker::zones::Zone;
 
 const THREADS: [usize; 4] = [1, 2, 3, 4];

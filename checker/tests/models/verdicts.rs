@@ -15,7 +15,7 @@ use checker::engine::query::answer::Values;
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
 use checker::game::{Forced, Priorities};
 use checker::search::optimum::extremum::Extreme;
-use checker::search::reachability::search::Order;
+use checker::search::reachability::report::Order;
 
 type Rules = (Forced, Priorities);
 

@@ -5,10 +5,11 @@ use checker::analysis::{Abstraction, ClockBounds};
 use checker::engine::LoadedModel;
 use checker::exec::Interpreter;
 use checker::network::{Failure, MemoLimits, Stepper, Symbolic};
+use checker::search::Outcome;
 use checker::search::limits::Unlimited;
 use checker::search::reachability::goal::{Goal, SharedGoal};
+use checker::search::reachability::report::{Manner, Order};
 use checker::search::reachability::search;
-use checker::search::reachability::search::{Manner, Order, Outcome};
 use checker::zones::{Bound, Zone};
 
 /// Workers who take turns at a machine, some with flags that updates set and guards ask for.

@@ -1,7 +1,7 @@
 //! `E<>` and `A[]`, with clocks and `deadlock`, in every search order.
 
 use checker::engine::Options;
-use checker::search::reachability::search::Order;
+use checker::search::reachability::report::Order;
 use proptest::collection::vec;
 use proptest::test_runner::TestCaseError;
 

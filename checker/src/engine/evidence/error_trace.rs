@@ -9,8 +9,10 @@
 use crate::analysis::Abstraction;
 use crate::ir::{Objective, Predicate, Query, QueryKind};
 use crate::network::{Extent, Failure, Part, Symbolic};
+use crate::search::Trace;
 use crate::search::reachability::goal::Goal;
-use crate::search::reachability::search::{self, Order, Trace};
+use crate::search::reachability::report::Order;
+use crate::search::reachability::search;
 use crate::zones::Zone;
 
 use super::timed_run::{self, Kind, Shows, Witness};

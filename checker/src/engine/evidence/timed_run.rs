@@ -10,8 +10,8 @@
 
 use crate::ir::{Measure, Network, Predicate};
 use crate::network::{Failure, Part, Symbolic};
+use crate::search::Trace;
 use crate::search::liveness::ending::RunEnding;
-use crate::search::reachability::search::Trace;
 use crate::search::timed_trace::schedule::{
     self, Closing, Finish, Schedule, Stays, Unscheduled, Wanted,
 };

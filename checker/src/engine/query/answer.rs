@@ -14,10 +14,10 @@ use crate::game::strategy::plans::Plan;
 use crate::ir::{ClockAtom, FunctionId, Network, Predicate, Query, QueryKind, SiteId};
 use crate::network::symbolic::predicate;
 use crate::network::{Failure, Restriction, Stepper, Symbolic, Symmetry};
+use crate::search::Trace;
 use crate::search::limits::{Counters, StopReason};
 use crate::search::liveness::ending::RunEnding;
 use crate::search::optimum::extremum::{Extremes, Question};
-use crate::search::reachability::search::Trace;
 use crate::verify::strategy::Outcome as StrategyCheck;
 use crate::zones::Bound;
 

@@ -9,8 +9,9 @@ use crate::game::strategy::co_buchi;
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
 use crate::search::limits::{StopReason, Watch};
-use crate::search::reachability::search::{self, Outcome, Trace};
+use crate::search::reachability::search;
 use crate::search::timed_trace::schedule::Finish;
+use crate::search::{Outcome, Trace};
 use crate::verify::replay::{End, Run};
 use crate::zones::minimal;
 

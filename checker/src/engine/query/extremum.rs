@@ -7,9 +7,10 @@ use crate::cancellation;
 use crate::ir::{ClockAtom, Measure};
 use crate::network::symbolic::predicate;
 use crate::network::{Symbolic, Symmetry};
+use crate::search::Outcome;
 use crate::search::optimum::extremum::{self, Extreme, Extremes, Question};
 use crate::search::optimum::value_goal::Taking;
-use crate::search::reachability::search::{self, Outcome};
+use crate::search::reachability::search;
 use crate::verify::replay::Shown;
 
 use super::answer::{
@@ -51,7 +52,7 @@ pub(super) fn extremum(
     let mut evidence = Evidence::default();
     let mut values = None;
     let mut verdict = match report.outcome {
-        Ok(extremum::Outcome::Found(items)) => {
+        Ok(extremum::Values::Found(items)) => {
             values = Some(Values {
                 least: question.least,
                 greatest: question.greatest,
@@ -59,7 +60,7 @@ pub(super) fn extremum(
             });
             Verdict::Satisfied
         }
-        Ok(extremum::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
+        Ok(extremum::Values::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, trace)) => {
             evidence
                 .witnesses

@@ -7,12 +7,13 @@
 use crate::analysis::Abstraction;
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
-use crate::search::liveness::emptiness::{self, Liveness};
+use crate::search::liveness::emptiness::Liveness;
 use crate::search::liveness::ending::RunEnding;
 use crate::search::liveness::leads_to::{self, Unanswered};
 use crate::search::liveness::shortest_lasso::{self, Wanted};
-use crate::search::reachability::search::{self, Outcome, Trace};
+use crate::search::reachability::{report, search};
 use crate::search::timed_trace::schedule::Stays;
+use crate::search::{Outcome, Trace};
 
 use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, negated, new_answer, symbolic};
 use super::optimal_trace::not_the_best;
@@ -49,13 +50,12 @@ pub(super) fn always<'a>(
         let outcome = search.from_start(&mut symbolic, watch);
         (symbolic, search, outcome)
     };
-    let is_found =
-        |(.., outcome): &(_, _, Result<_, _>)| matches!(outcome, Ok(emptiness::Outcome::Found(_)));
+    let is_found = |(.., outcome): &(_, _, Result<_, _>)| matches!(outcome, Ok(Outcome::Found(_)));
     let (mut symbolic, search, outcome) = settle(subject, &[keep], search, is_found);
     let mut witnesses = Witnesses::new(&mut symbolic, options).doubting(search.is_coarse());
     let mut message = None;
     let verdict = match outcome {
-        Ok(emptiness::Outcome::Found(run)) => {
+        Ok(Outcome::Found(run)) => {
             let wanted = Wanted { open: None, keep };
             let any = (run.trace, run.ending, 0);
             let best = best(&mut witnesses, wanted, options, watch);
@@ -63,8 +63,8 @@ pub(super) fn always<'a>(
             let shows = Shows::Stays(Stays { from: None, keep });
             witnesses.add(trace, Some(ending), shows)
         }
-        Ok(emptiness::Outcome::Exhausted) => Verdict::NotSatisfied,
-        Ok(emptiness::Outcome::Stopped(reason)) => Verdict::Unknown(reason),
+        Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
+        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err((failure, trace)) => {
             witnesses.add(trace, None, Shows::Possible);
             Verdict::Error(failure)
@@ -88,7 +88,7 @@ pub(super) fn leads_to<'a>(
         (symbolic, goal, report)
     };
     let is_found =
-        |(.., report): &(_, _, search::Report)| matches!(report.outcome, Ok(Outcome::Found(_)));
+        |(.., report): &(_, _, report::Report)| matches!(report.outcome, Ok(Outcome::Found(_)));
     let (mut symbolic, mut goal, report) = settle(subject, &[open, keep], search, is_found);
     let mut witnesses = Witnesses::new(&mut symbolic, options).doubting(goal.is_coarse());
     let mut message = None;
@@ -164,9 +164,9 @@ fn best(
     }
     let search = shortest_lasso::Search::new(witnesses.symbolic, wanted);
     match cut_as_interrupted(|| search.run(watch)) {
-        Ok(shortest_lasso::Outcome::Found(run, start)) => Ok(Some((run.trace, run.ending, start))),
-        Ok(shortest_lasso::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
-        Ok(shortest_lasso::Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
+        Ok(Outcome::Found((run, start))) => Ok(Some((run.trace, run.ending, start))),
+        Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
+        Ok(Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
         Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
         // The search for any run did not come to the state that fails.
         Err(_) => Err("the model fails in a state beside it".to_owned()),

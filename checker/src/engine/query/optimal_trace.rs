@@ -6,7 +6,7 @@ use crate::network::{Failure, Symbolic};
 use crate::search::limits::Counters;
 use crate::search::optimum::best_first;
 use crate::search::reachability::goal::Target;
-use crate::search::reachability::search::Trace;
+use crate::search::{Outcome, Trace};
 use crate::zones::Bound;
 
 use super::answer::{Subject, symbolic};
@@ -68,12 +68,12 @@ pub(super) fn best(
         }
     };
     match way {
-        Ok(best_first::Outcome::Found(way)) => {
+        Ok(Outcome::Found(way)) => {
             let deadline = (options.trace == TraceWanted::Fastest).then_some(way.cost);
             Ok(Some((way.trace(zones, target), deadline)))
         }
-        Ok(best_first::Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
-        Ok(best_first::Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
+        Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
+        Ok(Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
         Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
         // The search for any trace did not come to the state that fails.
         Err(_) => Err("the model fails in a state beside it".to_owned()),

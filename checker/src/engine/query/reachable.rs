@@ -7,7 +7,9 @@ use crate::analysis::Abstraction;
 use crate::ir::Predicate;
 use crate::network::symbolic::predicate;
 use crate::network::{PartialOrder, Symbolic, Symmetry};
-use crate::search::reachability::search::{self, Outcome, Report, Trace};
+use crate::search::reachability::report::Report;
+use crate::search::reachability::search;
+use crate::search::{Outcome, Trace};
 
 use super::answer::Evidence;
 use super::answer::{

@@ -30,8 +30,8 @@ use crate::zones::zone_table::{ZoneId, ZoneTable};
 
 use super::delay_inside::Inside;
 use super::ending::RunEnding;
-use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
-use crate::search::reachability::search::Trace;
+use crate::search::limits::{Counters, Watch, states_between_looks};
+use crate::search::outcome::{Outcome, Trace};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
 /// States between two looks at the limits, at most.
@@ -47,17 +47,6 @@ pub struct Run {
     pub trace: Trace,
     /// Why it never leaves.
     pub ending: RunEnding,
-}
-
-/// What a search found.
-#[derive(Debug)]
-pub enum Outcome {
-    /// A run.
-    Found(Run),
-    /// There is none.
-    Exhausted,
-    /// A limit came first.
-    Stopped(StopReason),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -140,7 +129,7 @@ impl<'p> Liveness<'p> {
         &mut self,
         symbolic: &mut Symbolic<'_>,
         watch: &mut dyn Watch,
-    ) -> Result<Outcome, (Failure, Trace)> {
+    ) -> Result<Outcome<Run>, (Failure, Trace)> {
         let start = symbolic.start();
         let (words, zone, _) = start.map_err(|failure| (failure, Trace::default()))?;
         self.from_entry(symbolic, (&words, &zone), false, Counters::default(), watch)
@@ -156,7 +145,7 @@ impl<'p> Liveness<'p> {
         is_running: bool,
         before: Counters,
         watch: &mut dyn Watch,
-    ) -> Result<Outcome, (Failure, Trace)> {
+    ) -> Result<Outcome<Run>, (Failure, Trace)> {
         let mut words = words.to_vec();
         let entry = (zone, is_running);
         let outcome = self.run(symbolic, &mut words, entry, before, watch);
@@ -172,7 +161,7 @@ impl<'p> Liveness<'p> {
         (zone, is_running): (&Zone, bool),
         before: Counters,
         watch: &mut dyn Watch,
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<Outcome<Run>, Failure> {
         let Some(invariant) = symbolic.invariant(words)? else {
             return Ok(Outcome::Exhausted);
         };

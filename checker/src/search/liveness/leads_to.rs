@@ -9,10 +9,10 @@ use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
 use crate::zones::Zone;
 
-use super::emptiness::{Liveness, Outcome, Run};
+use super::emptiness::{Liveness, Run};
 use crate::search::limits::Counters;
+use crate::search::outcome::{Outcome, Trace};
 use crate::search::reachability::goal::{Goal, Look, Visited};
-use crate::search::reachability::search::Trace;
 
 /// Looks for a state from which q may never come.
 pub struct Unanswered<'p> {

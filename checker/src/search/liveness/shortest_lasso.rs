@@ -26,7 +26,7 @@ use super::delay_inside::Inside;
 use super::emptiness::{Run, push_state};
 use super::ending::RunEnding;
 use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
-use crate::search::reachability::search::Trace;
+use crate::search::outcome::{Outcome, Trace};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
 /// Steps between two looks at the limits, at most.
@@ -42,18 +42,6 @@ pub struct Wanted<'p> {
     pub open: Option<&'p Predicate>,
     /// What stays.
     pub keep: &'p Predicate,
-}
-
-/// How a search ended.
-#[derive(Debug)]
-pub enum Outcome {
-    /// A run with the fewest moves, with the way to it, and the index of the state in which it
-    /// opens.
-    Found(Run, usize),
-    /// There is none.
-    Exhausted,
-    /// A limit came first.
-    Stopped(StopReason),
 }
 
 /// Where a node or an end comes from.
@@ -119,8 +107,9 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    /// Searches.
-    pub fn run(mut self, watch: &mut dyn Watch) -> Result<Outcome, Failure> {
+    /// Searches for a run with the fewest moves; returns it with the way to it, and the index of
+    /// the state in which it opens.
+    pub fn run(mut self, watch: &mut dyn Watch) -> Result<Outcome<(Run, usize)>, Failure> {
         let (mut words, zone, invariant) = self.symbolic.start()?;
         self.enter(None, &mut words, vec![zone], &invariant)?;
         let mut index = 0;
@@ -143,10 +132,7 @@ impl<'s, 'a> Search<'s, 'a> {
         }
         Ok(match self.found.take() {
             None => Outcome::Exhausted,
-            Some((_, stay)) => {
-                let (run, opening) = self.traced(stay);
-                Outcome::Found(run, opening)
-            }
+            Some((_, stay)) => Outcome::Found(self.traced(stay)),
         })
     }
 

@@ -27,9 +27,10 @@ use crate::zones::{Bound, Zone, dbm};
 use crate::search::limits::{
     Counters, StopReason, Watch, moves_between_looks, states_between_looks,
 };
+use crate::search::outcome::Step;
+use crate::search::outcome::{Outcome, Trace};
 use crate::search::reachability::goal::{Goal, Target};
-use crate::search::reachability::retrace::{self, Step};
-use crate::search::reachability::search::Trace;
+use crate::search::reachability::retrace;
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
 /// States between two looks at the limits, at most.
@@ -63,17 +64,6 @@ impl Way {
     pub fn trace(&self, symbolic: &mut Symbolic<'_>, goal: &mut dyn Goal) -> Trace {
         retrace::retrace(symbolic, &self.steps, Some(goal))
     }
-}
-
-/// How a search ended.
-#[derive(Debug)]
-pub enum Outcome {
-    /// A way of least cost to a state that was looked for.
-    Found(Way),
-    /// There is none.
-    Exhausted,
-    /// A limit came first.
-    Stopped(StopReason),
 }
 
 /// The stored states: words with their zones.
@@ -151,7 +141,7 @@ impl<'s, 'a> Search<'s, 'a> {
     }
 
     /// Searches.
-    pub fn run(&mut self, watch: &mut dyn Watch) -> Result<Outcome, Failure> {
+    pub fn run(&mut self, watch: &mut dyn Watch) -> Result<Outcome<Way>, Failure> {
         let (mut words, zone, invariant) = self.symbolic.start()?;
         let mut zones = vec![zone];
         self.symbolic

@@ -29,8 +29,10 @@ use crate::zones::clocks::Assignment;
 use crate::zones::{Bound, Zone, clocks, dbm};
 
 use crate::search::limits::{Counters, StopReason, Watch};
+use crate::search::outcome::{Outcome, Trace};
 use crate::search::reachability::goal::{Goal, Look, SharedGoal, Target, Visited};
-use crate::search::reachability::search::{self, Manner, Trace};
+use crate::search::reachability::report::Manner;
+use crate::search::reachability::search;
 
 /// A least or greatest value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +74,7 @@ pub struct Extremes {
 
 /// How the search for values ended.
 #[derive(Debug)]
-pub enum Outcome {
+pub enum Values {
     /// The values of the items, in order.
     Found(Vec<Extremes>),
     /// A limit came first.
@@ -83,7 +85,7 @@ pub enum Outcome {
 #[derive(Debug)]
 pub struct Report {
     /// The values, or the failure and the way to the state whose exploration failed.
-    pub outcome: Result<Outcome, (Failure, Trace)>,
+    pub outcome: Result<Values, (Failure, Trace)>,
     /// What was done, in all rounds; the stored states are those of the last.
     pub counters: Counters,
     /// Whether some zone may contain more than what is reachable.
@@ -108,15 +110,15 @@ pub fn search<'a>(
         let report = search::search_shared(&mut zones, &mut measuring, manner, watch);
         explored += report.counters.explored;
         let outcome = match report.outcome {
-            Ok(search::Outcome::Stopped(reason)) => Ok(Outcome::Stopped(reason)),
-            Ok(search::Outcome::Exhausted) if measuring.is_settled() => {
-                Ok(Outcome::Found(measuring.values()))
+            Ok(Outcome::Stopped(reason)) => Ok(Values::Stopped(reason)),
+            Ok(Outcome::Exhausted) if measuring.is_settled() => {
+                Ok(Values::Found(measuring.values()))
             }
-            Ok(search::Outcome::Exhausted) => match measuring.raise_low() {
+            Ok(Outcome::Exhausted) => match measuring.raise_low() {
                 Ok(()) => continue,
                 Err(failure) => Err((failure, Trace::default())),
             },
-            Ok(search::Outcome::Found(trace)) => {
+            Ok(Outcome::Found(trace)) => {
                 let mut zones = symbolic(&measuring.atoms_without_ceiling());
                 if zones.splits() {
                     // Cut zones forget both bounds of a clock by the same ceiling, and without one

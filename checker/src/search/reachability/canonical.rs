@@ -12,7 +12,7 @@
 use crate::network::{Permutation, Symmetry};
 use crate::zones::Bound;
 
-use super::retrace::Step;
+use crate::search::outcome::Step;
 
 /// Marks a step that stands for exchanges; the bits below hold their numbers, each one more than it
 /// is.

@@ -16,8 +16,8 @@ use crate::zones::{Bound, Zone};
 use super::canonical::Representative;
 use super::goal::{Goal, Look, Visited};
 use super::recent::RecentStates;
-use super::retrace::Step;
 use crate::search::limits::{Counters, StopReason, Watch};
+use crate::search::outcome::Step;
 use crate::search::store::packed_zones::Kept;
 
 /// Committed states that are explored one below the other without waiting.

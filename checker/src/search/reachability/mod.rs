@@ -5,6 +5,7 @@ pub(super) mod expand;
 pub mod goal;
 pub(super) mod parallel;
 pub(super) mod recent;
+pub mod report;
 pub(super) mod retrace;
 pub mod search;
 pub(super) mod shard;

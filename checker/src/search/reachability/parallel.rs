@@ -32,11 +32,12 @@ use crate::zones::Bound;
 
 use super::expand::{self, Explorer, Scene, Visit};
 use super::goal::{Goal, Look, SharedGoal};
+use super::report::Report;
 use super::retrace;
-use super::search::{Outcome, Report, Trace};
 use super::shard::{Mail, Shard};
 use super::tree::{self, Origin};
 use crate::search::limits::{Counters, Unlimited, Watch, moves_between_looks};
+use crate::search::outcome::{Outcome, Trace};
 
 /// Moves of a worker between two looks at the time.
 const PULSE_MOVES: u64 = 1 << 10;
@@ -275,7 +276,7 @@ impl<'s, 'a, G: SharedGoal> Search<'s, 'a, '_, G> {
     fn rounds<'t, 'e>(
         &mut self,
         crew: &mut Crew<'t, 'e, 's, 'a, G>,
-    ) -> Result<Outcome, (Failure, Trace)>
+    ) -> Result<Outcome<Trace>, (Failure, Trace)>
     where
         's: 'e,
         'a: 'e,
@@ -361,7 +362,7 @@ impl<'s, 'a, G: SharedGoal> Search<'s, 'a, '_, G> {
     }
 
     /// What the round has come to, if it is an end.
-    fn outcome(&mut self) -> Option<Result<Outcome, (Failure, Trace)>> {
+    fn outcome(&mut self) -> Option<Result<Outcome<Trace>, (Failure, Trace)>> {
         let endings = self.workers.iter().flatten().map(|worker| worker.ending);
         let endings: Vec<Option<Ending>> = endings.collect();
         for (index, ending) in endings.iter().enumerate() {

@@ -5,10 +5,7 @@ use crate::zones::Zone;
 
 use super::canonical::unfold;
 use super::goal::Goal;
-use super::search::Trace;
-
-/// A move of a state: its rank.
-pub(in crate::search) type Step = u64;
+use crate::search::outcome::{Step, Trace};
 
 /// A step, and by what the members of the state that it is a step of differ from those of the state
 /// of the trace, if they do.

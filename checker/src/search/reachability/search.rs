@@ -12,17 +12,17 @@
 
 use std::collections::VecDeque;
 
-use crate::network::{Failure, Part, Symbolic};
-use crate::zones::{Bound, Zone};
+use crate::network::{Failure, Symbolic};
+use crate::zones::Bound;
 
 use super::expand::{self, Explorer, Scene, Sink, Visit};
 use super::goal::{Goal, Look, SharedGoal};
 use super::parallel;
-use super::retrace::{self, Step};
-use super::tree::{self, MOST_SHARDS, Origin, Tree};
-use crate::search::limits::{
-    Counters, StopReason, Watch, moves_between_looks, states_between_looks,
-};
+use super::report::{Manner, Order, Report};
+use super::retrace;
+use super::tree::{self, Origin, Tree};
+use crate::search::limits::{Counters, Watch, moves_between_looks, states_between_looks};
+use crate::search::outcome::{Outcome, Step, Trace};
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::Stored;
 
@@ -30,59 +30,6 @@ use crate::search::store::passed_list::Stored;
 const LOOK_EVERY: u64 = 256;
 /// Moves between two looks at the limits, at most.
 const LOOK_EVERY_MOVES: u64 = 1 << 12;
-
-/// In which order states are explored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// Breadth first: traces are shortest in stored states.
-    BreadthFirst,
-    /// Depth first.
-    DepthFirst,
-    /// Depth first among the successors of a state in random order, from this seed.
-    Random(u64),
-}
-
-/// How to search.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Manner {
-    /// In which order states are explored.
-    pub order: Order,
-    /// How many threads share the work, from 1 to [`MOST_THREADS`]. Only breadth first is there
-    /// more than one.
-    pub threads: usize,
-}
-
-/// The most threads of a search.
-pub const MOST_THREADS: usize = MOST_SHARDS;
-
-/// What a search found.
-#[derive(Debug)]
-pub enum Outcome {
-    /// A state in which the predicate holds; the way to it.
-    Found(Trace),
-    /// There is none.
-    Exhausted,
-    /// A limit came first.
-    Stopped(StopReason),
-}
-
-/// The end of a search.
-#[derive(Debug)]
-pub struct Report {
-    /// What was found, or the failure and the way to the state whose exploration failed.
-    pub outcome: Result<Outcome, (Failure, Trace)>,
-    /// What was done.
-    pub counters: Counters,
-}
-
-/// A symbolic run: states, and the moves between them (one less).
-#[derive(Clone, Debug, Default)]
-pub struct Trace {
-    /// Words and zone of each state.
-    pub states: Vec<(Vec<i32>, Zone)>,
-    /// The parts of each move.
-    pub moves: Vec<Vec<Part>>,
-}
 
 /// Searches for a state that `goal` finds.
 pub fn search(
@@ -199,7 +146,7 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    fn run(&mut self) -> Result<Outcome, Failure> {
+    fn run(&mut self) -> Result<Outcome<Trace>, Failure> {
         let counters = self.own_counters();
         match expand::start(&mut self.scene(counters))? {
             Look::Continue => {}

@@ -12,8 +12,8 @@ use crate::ir::Network;
 use crate::zones::Bound;
 
 use super::expand::Sink;
-use super::retrace::Step;
 use super::tree::{Origin, Tree};
+use crate::search::outcome::Step;
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::Stored;
 

@@ -9,7 +9,7 @@
 
 use crate::ir::Network;
 
-use super::retrace::Step;
+use crate::search::outcome::Step;
 use crate::search::store::packed_paths;
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::{PassedList, Stored};

@@ -1,7 +1,7 @@
 //! Moves one after the other, packed into words: a step takes one word if it is small, else two, of
 //! which the first, the upper half, is marked.
 
-use crate::search::reachability::retrace::Step;
+use crate::search::outcome::Step;
 
 /// Marks the first of two words.
 const MARK: u32 = 1 << 31;
