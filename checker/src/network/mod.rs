@@ -20,13 +20,14 @@ pub use failure::Failure;
 pub use symbolic::constant_effect::FixedMove;
 
 pub use discrete::stepper::Stepper;
-pub use discrete::transition::{MoveRef, Moves, Part, is_same_entry};
-pub use discrete::transition_cache::{OfferId, VectorId};
+pub use discrete::transition::{MoveRef, Moves, OfferId, Part, is_same_entry};
+pub use discrete::transition_cache::VectorId;
 pub use reduction::scalar_swaps::Obstacle;
 pub use reduction::stubborn_sets::PartialOrder;
 pub(crate) use reduction::stubborn_sets::{Agenda, StubbornSets};
 pub use reduction::symmetry::{Permutation, Symmetry};
+pub use symbolic::clock_effect::ClockEffect;
 pub use symbolic::predicate::Extent;
 pub use symbolic::restriction::{Allowed, Restriction};
 pub use symbolic::successor_cache::{KeptZone, KnownZone, MemoLimits};
-pub use symbolic::zone_graph::{ClockEffect, Symbolic};
+pub use symbolic::zone_graph::Symbolic;

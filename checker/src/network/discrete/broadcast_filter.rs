@@ -11,7 +11,7 @@ use crate::exec::EmittedConstraint;
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::{Bound, Federation};
 
-use crate::network::symbolic::zone_graph::add_constraints;
+use crate::network::symbolic::clock_effect::add_constraints;
 use crate::network::{Failure, Part};
 
 /// Which moves are wanted; only combinations of a broadcast are left out.

@@ -25,8 +25,8 @@ use super::listening::Listening;
 use super::pairing::{Pair, Partners, partners};
 use super::select_cache::Instances;
 use super::selects::select_values;
-use super::transition::{MoveRef, Moves, Part};
-use super::transition_cache::{Next, OfferId, Offers, Record, VectorId};
+use super::transition::{MoveRef, Moves, OfferId, Part};
+use super::transition_cache::{Next, Offers, Record, VectorId};
 use crate::network::failure::Failure;
 
 /// Computes moves and their effects. Holds the buffers, so one per thread.

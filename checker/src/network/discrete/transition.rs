@@ -5,7 +5,9 @@ use crate::exec::EmittedConstraint;
 use crate::ir::ChannelId;
 use crate::zones::federation::block_bytes;
 
-use super::transition_cache::OfferId;
+/// The index of remembered moves. Each belongs to one location vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct OfferId(pub(super) u32);
 
 /// One process's share in a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -22,7 +22,7 @@ use rustc_hash::FxHasher;
 use crate::ir::FunctionId;
 use crate::zones::federation::block_bytes;
 
-use crate::network::Moves;
+use super::transition::{Moves, OfferId};
 
 /// What is remembered takes at most about so many bytes.
 const MOST_BYTES: usize = 24 << 20;
@@ -46,10 +46,6 @@ const LONGEST_PAUSE: u32 = 256 * TRIAL;
 /// The index of a remembered location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct VectorId(u32);
-
-/// The index of remembered moves. Each belongs to one location vector.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct OfferId(u32);
 
 /// A function that is evaluated, with its arguments.
 #[derive(Clone, Debug)]

@@ -38,7 +38,7 @@ use crate::analysis::dependence::{Ground, Still, greatest_values};
 use crate::analysis::visibility::Watched;
 use crate::analysis::zero_time_cycles::recurrent_edges;
 use crate::network::discrete::transition::{MoveRef, Moves, Part};
-use crate::network::symbolic::zone_graph::to_constraint;
+use crate::network::symbolic::clock_effect::to_constraint;
 use crate::network::{Failure, Symbolic};
 
 /// Networks with more locations are not reduced: what is remembered grows with the square.

@@ -17,7 +17,7 @@ use crate::ir::{Location, Network, Urgency};
 use crate::zones::{Bound, Zone};
 
 use crate::analysis::dependence::Still;
-use crate::network::symbolic::zone_graph::to_constraint;
+use crate::network::symbolic::clock_effect::to_constraint;
 use crate::network::{Failure, Moves, Symbolic};
 
 /// A weak upper bound of some of consecutive clocks, at least `low`.

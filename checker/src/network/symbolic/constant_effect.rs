@@ -7,7 +7,7 @@
 use crate::exec::{EmittedConstraint, RunTimeError};
 use crate::ir::{FunctionId, Update};
 
-use super::zone_graph::to_constraints;
+use super::clock_effect::to_constraints;
 use crate::network::discrete::selects::select_values;
 use crate::network::{ClockEffect, MoveRef, Stepper, Symbolic};
 use crate::zones::clocks::Assignment;

@@ -16,8 +16,8 @@ use crate::zones::dbm::Constraint;
 use crate::zones::future::{self, Barriers};
 use crate::zones::{Bound, Federation, Zone};
 
+use super::clock_effect::add_constraints;
 use super::predicate::Extent;
-use super::zone_graph::add_constraints;
 use crate::network::{ClockEffect, Failure, Moves, Symbolic};
 
 /// Buffers for looks at deadlocks, which are used again.

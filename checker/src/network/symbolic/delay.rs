@@ -9,14 +9,12 @@
 //! it. A restriction ([`super::restriction`]) has its barriers too: where it does not allow
 //! waiting.
 
-use crate::exec::EmittedConstraint;
-use crate::ir::ClockId;
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::future::{self, Barriers};
-use crate::zones::{Bound, Federation, Zone, minimal};
+use crate::zones::{Bound, Federation, Zone};
 
+use super::clock_effect::{conjunctions, to_constraints};
 use super::restriction;
-use super::zone_graph::to_constraints;
 use crate::network::discrete::broadcast_filter::Scope;
 use crate::network::{Failure, MoveRef, Moves, Part, Symbolic};
 
@@ -271,21 +269,4 @@ fn guarded_part(one: MoveRef<'_>, zone: &[Bound], dimension: usize) -> Result<Fe
         }
     }
     Ok(part)
-}
-
-/// The zones of a federation as conjunctions of constraints.
-pub(super) fn conjunctions(federation: &Federation) -> Vec<Vec<EmittedConstraint>> {
-    let conjunction = |zone: &[Bound]| {
-        let mut constraints = Vec::new();
-        minimal::for_each_minimal(zone, federation.dimension(), |one| {
-            constraints.push(EmittedConstraint {
-                left: ClockId(one.left as u32),
-                right: ClockId(one.right as u32),
-                bound: one.bound.value(),
-                strict: one.bound.is_strict(),
-            });
-        });
-        constraints
-    };
-    federation.zones().map(conjunction).collect()
 }

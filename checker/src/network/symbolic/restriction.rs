@@ -19,6 +19,7 @@ use crate::ir::ClockAtom;
 use crate::zones::Federation;
 use crate::zones::future::Barriers;
 
+use super::clock_effect::conjunctions;
 use crate::network::{MoveRef, Moves, Part, is_same_entry};
 
 /// What is allowed in the states with the same words.
@@ -79,10 +80,10 @@ pub(super) fn apply(restriction: &dyn Restriction, words: &[i32], moves: &mut Mo
     let mut rest = Moves::default();
     for one in moves.iter() {
         let forbidden: Vec<Vec<EmittedConstraint>> = if is_own(&one) {
-            super::delay::conjunctions(allowed.forbidden(&one))
+            conjunctions(allowed.forbidden(&one))
         } else {
             let others = allowed.picked_otherwise(&one);
-            others.flat_map(super::delay::conjunctions).collect()
+            others.flat_map(conjunctions).collect()
         };
         // A conjunction of nothing holds always.
         if !forbidden.iter().any(Vec::is_empty) {

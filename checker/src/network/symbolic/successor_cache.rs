@@ -27,7 +27,7 @@ use crate::zones::clocks;
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, dbm, simulation};
 
-use super::zone_graph::{add_constraints, check_limit, to_assignment};
+use super::clock_effect::{add_constraints, check_limit, to_assignment};
 use crate::network::{Failure, FixedMove, MoveRef, OfferId, Symbolic};
 
 /// How much is remembered, and for how long though it does not pay.

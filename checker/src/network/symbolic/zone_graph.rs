@@ -12,14 +12,15 @@
 use std::sync::Arc;
 
 use crate::cancellation;
-use crate::exec::{EmittedAssignment, EmittedConstraint};
-use crate::ir::ClockId;
+use crate::exec::EmittedConstraint;
 use crate::zones::clocks::{self, Assignment};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::extrapolate::Ceilings;
-use crate::zones::federation::block_bytes;
 use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
 
+use super::clock_effect::{
+    ClockEffect, add_constraints, check_limit, to_assignment, to_constraint, to_constraints,
+};
 use super::deadlock::Lookout;
 use super::successor_cache::ZoneMemo;
 use crate::analysis::LiveVariables;
@@ -56,19 +57,6 @@ pub struct Symbolic<'a> {
     pub(super) lookout: Lookout,
     /// The invariants of the state that [`Symbolic::take`] entered last.
     pub(super) invariant: Vec<Constraint>,
-}
-
-/// What a move does to clocks, from the source's zone to the zone on entry.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub struct ClockEffect {
-    /// The guard.
-    pub guard: Vec<Constraint>,
-    /// Conjunctions that must not hold.
-    pub excluded: Vec<Vec<Constraint>>,
-    /// The assignments.
-    pub assignments: Vec<Assignment>,
-    /// The invariants of the target.
-    pub invariant: Vec<Constraint>,
 }
 
 /// Constants up to this cannot make bounds too great between two extrapolations, of which there are
@@ -562,165 +550,4 @@ impl<'a> Symbolic<'a> {
         }
         Ok(bounds)
     }
-}
-
-impl ClockEffect {
-    /// The bytes that it takes beside the value itself.
-    pub fn heap_bytes(&self) -> usize {
-        let excluded = self.excluded.iter();
-        block_bytes(size_of_val(&*self.guard))
-            + block_bytes(size_of_val(&*self.assignments))
-            + block_bytes(size_of_val(&*self.invariant))
-            + block_bytes(size_of_val(&*self.excluded))
-            + excluded
-                .map(|one| block_bytes(size_of_val(&**one)))
-                .sum::<usize>()
-    }
-
-    /// Whether the move is possible everywhere and leaves every zone as it is.
-    pub fn is_trivial(&self) -> bool {
-        self.guard.is_empty()
-            && self.excluded.is_empty()
-            && self.assignments.is_empty()
-            && self.invariant.is_empty()
-    }
-
-    /// Whether the move is possible at all valuations of a zone; of one that copies clocks that is
-    /// not known.
-    pub fn keeps_all_of(&self, zone: &Zone) -> bool {
-        let dimension = zone.dimension();
-        let mut after = zone.clone();
-        let holds = |zone: &Zone, one: &Constraint| {
-            zone.bounds()[one.left * dimension + one.right] <= one.bound
-        };
-        let only_sets = |one: &Assignment| matches!(one, Assignment::Value { .. });
-        self.excluded.is_empty()
-            && self.assignments.iter().all(only_sets)
-            && self.guard.iter().all(|one| holds(zone, one))
-            && after.assign(&self.assignments)
-            && self.invariant.iter().all(|one| holds(&after, one))
-    }
-
-    /// The zones on entry of the target: the source's zone within the guard, after the assignments,
-    /// within the invariant. More than one only if some clock-guarded receiver abstains.
-    pub fn entry_zones(&self, zone: &[Bound], dimension: usize, out: &mut Vec<Zone>) {
-        out.clear();
-        let mut within = Zone::from_bounds(dimension, zone);
-        if self.excluded.is_empty() {
-            if self.enter(&mut within) {
-                out.push(within);
-            }
-            return;
-        }
-        if within.constrain_all(&self.guard) {
-            let mut rest = Federation::of_zone(dimension, within.bounds());
-            self.subtract_excluded(&mut rest);
-            let pieces = rest.zones();
-            out.extend(pieces.map(|bounds| Zone::from_bounds(dimension, bounds)));
-            out.retain_mut(|piece| self.enter(piece));
-        }
-    }
-
-    /// Carries a zone of the source over to the target, if no receiver abstains; returns whether
-    /// something is left.
-    pub fn enter(&self, zone: &mut Zone) -> bool {
-        zone.constrain_all(&self.guard)
-            && zone.assign(&self.assignments)
-            && zone.constrain_all(&self.invariant)
-    }
-
-    /// The valuations from which the move leads into the federation, as far as guard and
-    /// assignments say.
-    pub fn preimage(&self, federation: &mut Federation) {
-        if self.is_trivial() {
-            return;
-        }
-        federation.constrain_all(&self.invariant);
-        federation.preimage(&self.guard, &self.assignments);
-        self.subtract_excluded(federation);
-    }
-
-    /// The part of a zone in which the move is possible.
-    pub fn enabled_part(&self, zone: &[Bound], dimension: usize) -> Federation {
-        let mut enabled = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
-        enabled.constrain_all(&self.invariant);
-        enabled.preimage(&self.guard, &self.assignments);
-        enabled.intersect_zone(zone);
-        // What must not hold is cut out last: outside of the zone it would make zones without
-        // number.
-        self.subtract_excluded(&mut enabled);
-        enabled
-    }
-
-    fn subtract_excluded(&self, federation: &mut Federation) {
-        for conjunction in &self.excluded {
-            federation.subtract_conjunction(conjunction);
-        }
-    }
-}
-
-pub(super) fn check_limit(value: i32) -> Result<(), Failure> {
-    if Bound::is_allowed(value) {
-        Ok(())
-    } else {
-        Err(Failure::ClockLimit(value))
-    }
-}
-
-/// Emitted constraints as constraints on zones; `None` if one of them never holds (a clock compared
-/// with itself).
-pub(super) fn to_constraints(
-    emitted: &[EmittedConstraint],
-) -> Result<Option<Vec<Constraint>>, Failure> {
-    let mut constraints = Vec::new();
-    Ok(add_constraints(emitted, &mut constraints)?.then_some(constraints))
-}
-
-/// An emitted constraint as one on zones, which may compare a clock with itself.
-pub(in crate::network) fn to_constraint(
-    emitted: &EmittedConstraint,
-) -> Result<Constraint, Failure> {
-    let bound = if emitted.strict {
-        Bound::strict(emitted.bound)
-    } else {
-        Bound::weak(emitted.bound)
-    };
-    Ok(Constraint {
-        left: emitted.left.0 as usize,
-        right: emitted.right.0 as usize,
-        bound: bound.ok_or(Failure::ClockLimit(emitted.bound))?,
-    })
-}
-
-/// Replaces `constraints` by the emitted ones; returns false if one of them never holds.
-pub(in crate::network) fn add_constraints(
-    emitted: &[EmittedConstraint],
-    constraints: &mut Vec<Constraint>,
-) -> Result<bool, Failure> {
-    constraints.clear();
-    for one in emitted {
-        let constraint = to_constraint(one)?;
-        if constraint.left != constraint.right {
-            constraints.push(constraint);
-        } else if constraint.bound < Bound::LE_ZERO {
-            return Ok(false);
-        }
-    }
-    Ok(true)
-}
-
-pub(super) fn to_assignment(one: &EmittedAssignment) -> Result<Assignment, Failure> {
-    check_limit(one.value)?;
-    let clock = one.target.0 as usize;
-    if one.source == ClockId(0) {
-        return Ok(Assignment::Value {
-            clock,
-            value: one.value,
-        });
-    }
-    Ok(Assignment::Copy {
-        clock,
-        source: one.source.0 as usize,
-        increment: one.value,
-    })
 }
