@@ -112,12 +112,15 @@ pub(crate) struct Ground<'n> {
     pub(crate) network: &'n Network,
     pub(crate) watched: &'n Watched,
     pub(crate) greatest: &'n [i32],
+    /// Why time stands still.
+    pub(crate) still: Still,
 }
 
-/// What moment a footprint is taken for.
+/// Where a process begins when a footprint is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Moment {
-    pub(crate) still: Still,
+pub(crate) struct Start {
+    pub(crate) process: usize,
+    pub(crate) location: LocationId,
     /// Whether all edges that may sleep do.
     pub(crate) is_asleep: bool,
 }
@@ -148,18 +151,13 @@ pub(crate) struct Footprints {
 impl Footprints {
     /// That of the edges that leave a location, and of what the process hears once it has taken
     /// one: a broadcast that left it behind would take it along then.
-    pub(crate) fn now(
-        &mut self,
-        ground: Ground<'_>,
-        (process, location): (usize, LocationId),
-        moment: Moment,
-    ) -> Footprint {
+    pub(crate) fn now(&mut self, ground: Ground<'_>, start: Start) -> Footprint {
         let mut all = Footprint::default();
-        let leaving = self.add_leaving(ground, (process, location), moment, &mut all);
+        let leaving = self.add_leaving(ground, start, &mut all);
         for branch in leaving.iter().flat_map(|edge| &edge.branches) {
-            let definition = &ground.network.processes[process];
+            let definition = &ground.network.processes[start.process];
             for &index in &definition.locations[branch.target.0 as usize].edges {
-                let there = &self.edge(ground, process, index.0 as usize).offers;
+                let there = &self.edge(ground, start.process, index.0 as usize).offers;
                 let heard = there.iter().filter(|one| one.is_broadcast && !one.sends);
                 all.offers.extend(heard);
             }
@@ -169,19 +167,15 @@ impl Footprints {
     }
 
     /// That of all edges that the process may take from a location on while time stands still.
-    pub(crate) fn future(
-        &mut self,
-        ground: Ground<'_>,
-        (process, location): (usize, LocationId),
-        moment: Moment,
-    ) -> Footprint {
-        let definition = &ground.network.processes[process];
+    pub(crate) fn future(&mut self, ground: Ground<'_>, start: Start) -> Footprint {
+        let definition = &ground.network.processes[start.process];
         let mut all = Footprint::default();
         let mut is_met = vec![false; definition.locations.len()];
-        is_met[location.0 as usize] = true;
-        let mut open = vec![location];
+        is_met[start.location.0 as usize] = true;
+        let mut open = vec![start.location];
         while let Some(location) = open.pop() {
-            for edge in self.add_leaving(ground, (process, location), moment, &mut all) {
+            let from = Start { location, ..start };
+            for edge in self.add_leaving(ground, from, &mut all) {
                 for branch in &edge.branches {
                     if !std::mem::replace(&mut is_met[branch.target.0 as usize], true) {
                         open.push(branch.target);
@@ -198,10 +192,14 @@ impl Footprints {
     fn add_leaving<'n>(
         &mut self,
         ground: Ground<'n>,
-        (process, location): (usize, LocationId),
-        Moment { still, is_asleep }: Moment,
+        Start {
+            process,
+            location,
+            is_asleep,
+        }: Start,
         all: &mut Footprint,
     ) -> Vec<&'n Edge> {
+        let still = ground.still;
         let definition = &ground.network.processes[process];
         let numbers = CellNumbers::new(ground.network);
         numbers.add_invariant(process, location, &mut all.reads);
@@ -247,6 +245,7 @@ fn of_edge(
         network,
         watched,
         greatest,
+        ..
     }: Ground<'_>,
     process: usize,
     index: usize,

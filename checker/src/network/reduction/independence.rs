@@ -7,7 +7,7 @@
 use crate::ir::{LocationId, Network};
 use crate::zones::{Zone, dbm};
 
-use crate::analysis::dependence::{Footprint, Footprints, Ground, Moment, Sleeper, Still};
+use crate::analysis::dependence::{Footprint, Footprints, Ground, Sleeper, Start, Still};
 
 /// A situation: twice the number of the location among all, and one more if edges sleep.
 pub(super) type Situation = u32;
@@ -85,23 +85,24 @@ impl Interference {
     pub(super) fn situations(
         &mut self,
         ground: Ground<'_>,
-        (words, zone): (&[i32], &Zone),
-        still: Still,
+        words: &[i32],
+        zone: &Zone,
         out: &mut Vec<Situation>,
     ) {
         out.clear();
         for (process, &location) in words[..self.first.len()].iter().enumerate() {
             let number = self.first[process] + location as u32;
             let sleeps = |one: &Sleeper| !dbm::satisfies(zone.bounds(), zone.dimension(), one);
-            let sleepers = self.sleepers(ground, number, still);
+            let sleepers = self.sleepers(ground, number);
             let are_asleep = !sleepers.is_empty() && sleepers.iter().all(sleeps);
             out.push(2 * number + u32::from(are_asleep));
         }
     }
 
-    fn sleepers(&mut self, ground: Ground<'_>, location: u32, still: Still) -> &[Sleeper] {
+    fn sleepers(&mut self, ground: Ground<'_>, location: u32) -> &[Sleeper] {
+        let still = ground.still;
         if self.tables.of(still).sleepers[location as usize].is_none() {
-            let found = self.future(ground, 2 * location, still).sleepers.clone();
+            let found = self.future(ground, 2 * location).sleepers.clone();
             self.tables.of(still).sleepers[location as usize] = Some(found);
         }
         self.tables.of(still).sleepers[location as usize]
@@ -115,25 +116,21 @@ impl Interference {
     pub(super) fn meets(
         &mut self,
         ground: Ground<'_>,
-        (member, other): (Situation, Situation),
-        still: Still,
+        member: Situation,
+        other: Situation,
     ) -> bool {
-        let row = &self.tables.of(still).meets[member as usize];
+        let row = &self.tables.of(ground.still).meets[member as usize];
         match row.get(other as usize) {
             Some(&Some(known)) => known,
-            _ => self.learn(ground, (member, other), still),
+            _ => self.learn(ground, member, other),
         }
     }
 
     #[cold]
-    fn learn(
-        &mut self,
-        ground: Ground<'_>,
-        (member, other): (Situation, Situation),
-        still: Still,
-    ) -> bool {
-        self.now(ground, member, still);
-        self.future(ground, other, still);
+    fn learn(&mut self, ground: Ground<'_>, member: Situation, other: Situation) -> bool {
+        let still = ground.still;
+        self.now(ground, member);
+        self.future(ground, other);
         let situations = 2 * self.owners.len();
         let table = self.tables.of(still);
         let now = &table.now[member as usize];
@@ -149,39 +146,28 @@ impl Interference {
     }
 
     /// What a process in the situation can do now.
-    pub(super) fn now(
-        &mut self,
-        ground: Ground<'_>,
-        situation: Situation,
-        still: Still,
-    ) -> &Footprint {
-        let (place, moment) = self.place(situation, still);
+    pub(super) fn now(&mut self, ground: Ground<'_>, situation: Situation) -> &Footprint {
+        let start = self.start(situation);
         let footprints = &mut self.footprints;
-        self.tables.of(still).now[situation as usize]
-            .get_or_insert_with(|| Box::new(footprints.now(ground, place, moment)))
+        self.tables.of(ground.still).now[situation as usize]
+            .get_or_insert_with(|| Box::new(footprints.now(ground, start)))
     }
 
     /// What a process in the situation may do while time stands still.
-    pub(super) fn future(
-        &mut self,
-        ground: Ground<'_>,
-        situation: Situation,
-        still: Still,
-    ) -> &Footprint {
-        let (place, moment) = self.place(situation, still);
+    pub(super) fn future(&mut self, ground: Ground<'_>, situation: Situation) -> &Footprint {
+        let start = self.start(situation);
         let footprints = &mut self.footprints;
-        self.tables.of(still).future[situation as usize]
-            .get_or_insert_with(|| Box::new(footprints.future(ground, place, moment)))
+        self.tables.of(ground.still).future[situation as usize]
+            .get_or_insert_with(|| Box::new(footprints.future(ground, start)))
     }
 
-    fn place(&self, situation: Situation, still: Still) -> ((usize, LocationId), Moment) {
+    fn start(&self, situation: Situation) -> Start {
         let number = situation / 2;
         let process = self.owners[number as usize] as usize;
-        let location = LocationId(number - self.first[process]);
-        let moment = Moment {
-            still,
+        Start {
+            process,
+            location: LocationId(number - self.first[process]),
             is_asleep: situation % 2 == 1,
-        };
-        ((process, location), moment)
+        }
     }
 }

@@ -29,20 +29,16 @@
 
 use std::sync::Arc;
 
-use crate::ir::{Network, Predicate, Urgency};
+use crate::ir::Network;
 use crate::zones::{Zone, dbm};
 
 use super::independence::{Interference, Situation};
-use super::time_stoppers::Holders;
-use crate::analysis::dependence::{Ground, Still, greatest_values};
-use crate::analysis::visibility::Watched;
-use crate::analysis::zero_time_cycles::recurrent_edges;
+use super::partial_order::PartialOrder;
+use crate::analysis::dependence::Ground;
+use crate::network::Failure;
+use crate::network::discrete::stepper::Stepper;
 use crate::network::discrete::transition::{MoveRef, Moves, Part};
 use crate::network::symbolic::clock_effect::to_constraint;
-use crate::network::{Failure, Symbolic};
-
-/// Networks with more locations are not reduced: what is remembered grows with the square.
-const MOST_LOCATIONS: usize = 2048;
 
 /// Sets that are tried in a state, at most.
 const MOST_SETS: u32 = 8;
@@ -51,52 +47,6 @@ const MOST_SETS: u32 = 8;
 const TRIAL: u32 = 1024;
 /// unless one in so many was enough.
 const LEAST_SHARE: u32 = 16;
-
-/// What a search may reduce by, shared by its threads.
-#[derive(Debug)]
-pub struct PartialOrder {
-    watched: Watched,
-    /// By clock: the greatest value that it is set to.
-    greatest: Vec<i32>,
-    /// By process and edge: whether it may be taken again and again while time stands still.
-    recurrent: Vec<Vec<bool>>,
-    holders: Holders,
-}
-
-impl PartialOrder {
-    /// What a search for a state with the predicate may reduce by; `None` if nothing can be gained,
-    /// or that is not known to be sound.
-    pub fn new(network: &Network, goal: &Predicate) -> Option<Arc<PartialOrder>> {
-        let locations: usize = network
-            .processes
-            .iter()
-            .map(|process| process.locations.len())
-            .sum();
-        let holders = Holders::new(network);
-        let may_commit = network.processes.iter().filter(|process| {
-            let mut locations = process.locations.iter();
-            locations.any(|location| location.urgency == Urgency::Committed)
-        });
-        // In a committed state every move needs a committed process.
-        let may_gain =
-            network.processes.len() > 1 && (holders.are_possible() || may_commit.count() > 1);
-        let is_known = !network.features.priorities
-            && network.before_update.is_none()
-            && network.after_update.is_none()
-            && locations <= MOST_LOCATIONS;
-        if !may_gain || !is_known {
-            return None;
-        }
-        let watched = Watched::new(network, goal)?;
-        let greatest = greatest_values(network);
-        Some(Arc::new(PartialOrder {
-            watched,
-            recurrent: recurrent_edges(network, &greatest),
-            greatest,
-            holders,
-        }))
-    }
-}
 
 /// Which of the moves of a state are taken first, and whether these are enough.
 #[derive(Clone, Debug, Default)]
@@ -187,8 +137,9 @@ impl StubbornSets {
     /// one with fewer than all.
     pub(crate) fn choose(
         &mut self,
-        symbolic: &mut Symbolic<'_>,
-        (words, zone): (&mut [i32], &Zone),
+        stepper: &mut Stepper<'_>,
+        words: &mut [i32],
+        zone: &Zone,
         moves: &Moves,
         agenda: &mut Agenda,
     ) -> Result<(), Failure> {
@@ -197,8 +148,8 @@ impl StubbornSets {
             return Ok(());
         }
         let order = Arc::clone(&self.order);
-        let (holders, state) = (&order.holders, (&mut *words, zone));
-        let Some(still) = holders.find(symbolic, state, moves, &mut self.holds)? else {
+        let holders = &order.holders;
+        let Some(still) = holders.find(stepper, words, zone, moves, &mut self.holds)? else {
             return Ok(());
         };
         self.possible.clear();
@@ -216,14 +167,15 @@ impl StubbornSets {
             (self.states, self.gains) = (0, 0);
         }
         let ground = Ground {
-            network: symbolic.stepper.network(),
+            network: stepper.network(),
             watched: &order.watched,
             greatest: &order.greatest,
+            still,
         };
         let situations = &mut self.situations;
         self.interference
-            .situations(ground, (words, zone), still, situations);
-        if !self.find_best(ground, still, (moves, zone)) {
+            .situations(ground, words, zone, situations);
+        if !self.find_best(ground, moves, zone) {
             return Ok(());
         }
         let is_first = |index: u32| self.best[moves.get(index as usize).parts[0].process as usize];
@@ -252,12 +204,7 @@ impl StubbornSets {
 
     /// Looks for the stubborn set with the fewest possible moves, which is left in `best`; returns
     /// whether there is one with fewer than all.
-    fn find_best(
-        &mut self,
-        ground: Ground<'_>,
-        still: Still,
-        (moves, zone): (&Moves, &Zone),
-    ) -> bool {
+    fn find_best(&mut self, ground: Ground<'_>, moves: &Moves, zone: &Zone) -> bool {
         let all = self.possible.len();
         let mut fewest = all;
         let mut tried = 0;
@@ -274,8 +221,8 @@ impl StubbornSets {
                 continue;
             };
             tried += 1;
-            self.close(ground, still, holder.process);
-            if let Some(count) = self.moves_of_set(ground, still, (moves, zone))
+            self.close(ground, holder.process);
+            if let Some(count) = self.moves_of_set(ground, moves, zone)
                 && count < fewest
             {
                 fewest = count;
@@ -286,7 +233,7 @@ impl StubbornSets {
     }
 
     /// Makes the least stubborn set with a process.
-    fn close(&mut self, ground: Ground<'_>, still: Still, process: u32) {
+    fn close(&mut self, ground: Ground<'_>, process: u32) {
         self.is_member.clear();
         self.is_member.resize(self.situations.len(), false);
         self.members.clear();
@@ -297,8 +244,7 @@ impl StubbornSets {
             next += 1;
             let member = self.situations[member as usize];
             for (other, &situation) in self.situations.iter().enumerate() {
-                let pair = (member, situation);
-                if !self.is_member[other] && self.interference.meets(ground, pair, still) {
+                if !self.is_member[other] && self.interference.meets(ground, member, situation) {
                     self.is_member[other] = true;
                     self.members.push(other as u32);
                 }
@@ -307,12 +253,7 @@ impl StubbornSets {
     }
 
     /// How many possible moves the set at hand has; `None` if they cannot be enough.
-    fn moves_of_set(
-        &mut self,
-        ground: Ground<'_>,
-        still: Still,
-        (moves, zone): (&Moves, &Zone),
-    ) -> Option<usize> {
+    fn moves_of_set(&mut self, ground: Ground<'_>, moves: &Moves, zone: &Zone) -> Option<usize> {
         let mut count = 0;
         let mut has_sure_one = false;
         for &index in &self.possible {
@@ -326,11 +267,11 @@ impl StubbornSets {
             return None;
         }
         let interference = &mut self.interference;
-        let mut spoils = |situation| interference.now(ground, situation, still).may_spoil;
+        let mut spoils = |situation| interference.now(ground, situation).may_spoil;
         let processes = || self.situations.iter().zip(&self.is_member);
         let is_spoilt = processes().any(|(&situation, &is_in)| is_in && spoils(situation));
         let mut fulfils = |situation| {
-            let future = self.interference.future(ground, situation, still);
+            let future = self.interference.future(ground, situation);
             future.may_fulfil
         };
         let is_enough =

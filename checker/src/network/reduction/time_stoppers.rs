@@ -17,8 +17,10 @@ use crate::ir::{Location, Network, Urgency};
 use crate::zones::{Bound, Zone};
 
 use crate::analysis::dependence::Still;
+use crate::network::Failure;
+use crate::network::discrete::stepper::Stepper;
+use crate::network::discrete::transition::{MoveRef, Moves};
 use crate::network::symbolic::clock_effect::to_constraint;
-use crate::network::{Failure, Moves, Symbolic};
 
 /// A weak upper bound of some of consecutive clocks, at least `low`.
 #[derive(Clone, Copy, Debug)]
@@ -86,8 +88,9 @@ impl Holders {
     /// counts.
     pub(super) fn find(
         &self,
-        symbolic: &mut Symbolic<'_>,
-        (words, zone): (&mut [i32], &Zone),
+        stepper: &mut Stepper<'_>,
+        words: &mut [i32],
+        zone: &Zone,
         moves: &Moves,
         holds: &mut Vec<bool>,
     ) -> Result<Option<Still>, Failure> {
@@ -116,17 +119,15 @@ impl Holders {
         for (process, limits) in self.limits.iter().enumerate() {
             let limits = &limits[words[process] as usize];
             if limits.iter().any(|limit| limit.may_be_reached(zone))
-                && has_reached_limit(symbolic, process, words, zone)?
+                && has_reached_limit(stepper, process, words, zone)?
             {
                 still = Some(Still::Urgent);
                 holds[process] = true;
             }
         }
         if self.has_urgent_channels {
-            let stepper = &symbolic.stepper;
-            let is_urgent = |one: &crate::network::MoveRef<'_>| {
-                one.is_unconditional() && stepper.is_urgent_move(*one)
-            };
+            let is_urgent =
+                |one: &MoveRef<'_>| one.is_unconditional() && stepper.is_urgent_move(*one);
             for part in moves.iter().filter(is_urgent).flat_map(|one| one.parts) {
                 still = Some(Still::Urgent);
                 holds[part.process as usize] = true;
@@ -165,12 +166,12 @@ fn is_at_least(zone: &Zone, clock: usize, value: i32) -> bool {
 /// Whether all valuations of the zone have come to an upper bound that the invariant of a process
 /// has now.
 fn has_reached_limit(
-    symbolic: &mut Symbolic<'_>,
+    stepper: &mut Stepper<'_>,
     process: usize,
     words: &mut [i32],
     zone: &Zone,
 ) -> Result<bool, Failure> {
-    let Some(emitted) = symbolic.stepper.invariant_of(process, words)? else {
+    let Some(emitted) = stepper.invariant_of(process, words)? else {
         return Ok(false);
     };
     for one in emitted {

@@ -526,7 +526,7 @@ fn open(
     }
     symbolic.moves_within(words, zone.bounds(), moves)?;
     if let Some(stubborn) = stubborn {
-        stubborn.choose(symbolic, (words, zone), moves, agenda)?;
+        stubborn.choose(&mut symbolic.stepper, words, zone, moves, agenda)?;
     }
     Ok(())
 }

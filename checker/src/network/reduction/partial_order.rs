@@ -1,0 +1,60 @@
+//! What is known of a network before a search that uses partial-order reduction; see
+//! [`super::stubborn_sets`].
+
+use std::sync::Arc;
+
+use crate::analysis::dependence::greatest_values;
+use crate::analysis::visibility::Watched;
+use crate::analysis::zero_time_cycles::recurrent_edges;
+use crate::ir::{Network, Predicate, Urgency};
+
+use super::time_stoppers::Holders;
+
+/// Networks with more locations are not reduced: what is remembered grows with the square.
+const MOST_LOCATIONS: usize = 2048;
+
+/// What a search may reduce by, shared by its threads.
+#[derive(Debug)]
+pub struct PartialOrder {
+    pub(super) watched: Watched,
+    /// By clock: the greatest value that it is set to.
+    pub(super) greatest: Vec<i32>,
+    /// By process and edge: whether it may be taken again and again while time stands still.
+    pub(super) recurrent: Vec<Vec<bool>>,
+    pub(super) holders: Holders,
+}
+
+impl PartialOrder {
+    /// What a search for a state with the predicate may reduce by; `None` if nothing can be gained,
+    /// or that is not known to be sound.
+    pub fn new(network: &Network, goal: &Predicate) -> Option<Arc<PartialOrder>> {
+        let locations: usize = network
+            .processes
+            .iter()
+            .map(|process| process.locations.len())
+            .sum();
+        let holders = Holders::new(network);
+        let may_commit = network.processes.iter().filter(|process| {
+            let mut locations = process.locations.iter();
+            locations.any(|location| location.urgency == Urgency::Committed)
+        });
+        // In a committed state every move needs a committed process.
+        let may_gain =
+            network.processes.len() > 1 && (holders.are_possible() || may_commit.count() > 1);
+        let is_known = !network.features.priorities
+            && network.before_update.is_none()
+            && network.after_update.is_none()
+            && locations <= MOST_LOCATIONS;
+        if !may_gain || !is_known {
+            return None;
+        }
+        let watched = Watched::new(network, goal)?;
+        let greatest = greatest_values(network);
+        Some(Arc::new(PartialOrder {
+            watched,
+            recurrent: recurrent_edges(network, &greatest),
+            greatest,
+            holders,
+        }))
+    }
+}
