@@ -1,6 +1,6 @@
 """From the description of a needle-steering task to a verified strategy and a steered needle.
 
-The face for scripts and notebooks::
+These are the names for scripts and notebooks::
 
     import ntagen
 
@@ -44,8 +44,8 @@ _HOMES = {
     "load": "ntagen.loading",
     "load_strategy": "ntagen.loading",
 }
-"""Where the public names are from. They are imported on first use: the command line imports this
-package for every command, and `ntagen --help` does not wait for the engine."""
+"""The modules of the public names. A name is imported on first use: the command line imports this
+package for every command, and `ntagen --help` must not wait for the engine."""
 
 
 def __getattr__(name: str) -> object:

@@ -1,6 +1,6 @@
-"""Where things are kept that are worked out once and hold until the program changes.
+"""The cache on disk: results that stay valid until the program changes.
 
-Everything kept there can be deleted at any time: it is worked out anew.
+Everything in it can be deleted at any time; it is computed again.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from pathlib import Path
 
 
 def cache_folder() -> Path | None:
-    """The folder of ntagen in the user's cache, made if need be; None if there can be none.
+    """The folder of ntagen in the user's cache, made if necessary. None if that is impossible.
 
-    A folder that all users share will not do: whoever can write there could have code run here.
+    A folder that all users share is not safe: whoever can write to it could run code here.
     """
     root = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
     if not root.is_absolute():

@@ -1,15 +1,15 @@
-"""What can go wrong, as exceptions; the command line turns each into one message and an exit code.
+"""The exceptions of ntagen; the command line turns each into one message and an exit code.
 
 ::
 
     NtagenError                exit code 70 unless a subclass says otherwise
     ├── InputError             2: what the user gave is wrong: a file, a model, a query, an option
-    │   └── UndecidedError     a strategy is asked about a state of which it says nothing
+    │   └── UndecidedError     a strategy has no decision for a state
     ├── LimitError             3: a limit of time, memory or states was reached before an answer
     ├── ModelError             4: the model ran into a run-time error (range, index, overflow, …)
-    └── DeviceError            5: a device or sensor failed or answered what it must not
+    └── DeviceError            5: a device or sensor failed or gave a wrong answer
 
-Every message is one or more complete lines for the user: what is wrong, where, and what to do.
+Every message is one or more complete lines for the user: what is wrong, where, and how to fix it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import ClassVar
 
 
 class NtagenError(Exception):
-    """Anything that ntagen reports to its user; `exit_code` is what the command line ends with."""
+    """Any error that ntagen reports to its user; `exit_code` is the command line's exit code."""
 
     exit_code: ClassVar[int] = 70
 
@@ -30,9 +30,9 @@ class InputError(NtagenError):
 
 
 class UndecidedError(InputError, LookupError):
-    """A strategy is asked about a state of which it says nothing.
+    """A strategy is asked about a state for which it has no decision.
 
-    Play under the strategy does not get there, or its owner does not win from there.
+    Play under the strategy never reaches the state, or its owner does not win from it.
     """
 
 
@@ -49,6 +49,6 @@ class ModelError(NtagenError):
 
 
 class DeviceError(NtagenError):
-    """A device or sensor failed, fell silent or answered what it must not."""
+    """A device or sensor failed, did not answer, or gave a wrong answer."""
 
     exit_code: ClassVar[int] = 5

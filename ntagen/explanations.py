@@ -10,15 +10,15 @@ from ntagen.nsl.diagnostics import KINDS, page_of
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """What is to be said of a kind of diagnostic.
+    """The explanation of one kind of diagnostic.
 
     Attributes:
         code: ``E0201``.
         name: ``name-unknown``.
         severity: ``error`` or ``warning``.
-        page: What it means, an example, how to mend it, and the example mended, in Markdown. The
-            word behind the language of an example says what it is: ``wrong``, ``right``, or
-            ``model`` for what the queries of the page are about.
+        page: What it means, an example, how to fix it, and the fixed example, in Markdown. The word
+            after the language of an example says what it is: ``wrong``, ``right``, or ``model`` for
+            the model that the queries of the page are about.
     """
 
     code: str

@@ -1,14 +1,14 @@
-"""Files that the user names: written whole or not at all, read without surprises.
+"""Reading and writing of the files that the user names: a file is written whole or not at all.
 
-Everything that the program writes goes through `write_files`, but for the log of a run, which grows
-(`GrowingFile`), and strategies that queries save, which the engine writes by the same rules.
+The program writes everything with `write_files`, with two exceptions: the log of a run grows
+(`GrowingFile`), and the engine writes strategies that queries save, by the same rules.
 
 Writing:
 
-* A file is written beside its place under a temporary name, brought to the disk, and then renamed.
-  An error (a full disk, say) or an interruption leaves the old file, and nothing else.
-* What is no plain file is written through and never replaced: a pipe, a device, ``/dev/stdout``.
-* A symbolic link stays one: the file that it leads to is written.
+* A file is written under a temporary name in the same folder, flushed to the disk, and renamed.
+  After an error (for example a full disk) or an interruption, only the old file is there.
+* A pipe, a device and ``/dev/stdout`` are written directly and never replaced.
+* A symbolic link stays a link: the file that it leads to is written.
 * An existing file keeps its mode, and its owner where that is allowed; new files obey the umask.
 
 Reading: folders, devices, pipes without a writer and files that are too large are refused at once.
@@ -43,9 +43,9 @@ _OWN_DESCRIPTORS: Final = re.compile(r"/dev/fd|/proc/(\d+)(/task/\d+)?/fd")
 
 
 def write_files(contents: Mapping[Path, str | bytes]) -> None:
-    """Writes files, each of them completely or not at all; folders are made if need be.
+    """Writes files, each of them completely or not at all; missing folders are made.
 
-    Nothing is renamed before everything is written, so that an error leaves all files as they were.
+    Files are renamed only when all are written, so that an error leaves all files unchanged.
 
     Args:
         contents: What to write, by path; texts are written in UTF-8. Existing files are replaced.
@@ -88,8 +88,8 @@ def require_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str,
     """Refuses an output that would replace an input, or another output.
 
     Args:
-        outputs: By the option that names it: a file to be written, if any; ``-`` is none.
-        inputs: By what it is: a file that is read.
+        outputs: The files that are written, by the option that names them; ``-`` is not a file.
+        inputs: The files that are read, by what they hold.
 
     Raises:
         InputError: Two of them are the same plain file.
@@ -106,17 +106,17 @@ def require_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str,
 
 
 class GrowingFile:
-    """A file that grows while something happens; an existing one is emptied.
+    """A file that grows during a run; an existing file is emptied.
 
-    What is written is kept back until it is acknowledged, and an error takes back what was written
-    in part: the file always ends with something whole. It is locked until it is closed or this
-    process ends, however it ends. What is no plain file is not locked, and nothing is taken back.
+    Data stays in memory until it is acknowledged, and an error removes data that was written in
+    part: the file always ends with a whole entry. The file is locked until it is closed or this
+    process ends. A pipe or device is not locked, and data in it cannot be removed.
 
     Args:
-        path: Where it is.
+        path: The file.
 
     Raises:
-        InputError: The file cannot be written, or somebody else is writing it.
+        InputError: The file cannot be written, or another process is writing to it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -150,20 +150,20 @@ class GrowingFile:
         return len(data)
 
     def flush(self) -> None:
-        """Nothing: only what is whole is written, by `acknowledge`."""
+        """Does nothing: `acknowledge` writes, when an entry is whole."""
 
     def tell(self) -> int:
         """How many bytes were taken."""
         return self._length + len(self._waiting)
 
     def acknowledge(self, *, to_disk: bool) -> None:
-        """Hands all that was taken to the system: the death of this process cannot lose it.
+        """Gives all data to the operating system: if this process dies, the data is not lost.
 
         Args:
-            to_disk: Whether also the loss of power must not lose it.
+            to_disk: Whether the data must also survive a loss of power.
 
         Raises:
-            InputError: It cannot be written; then the file is closed.
+            InputError: The data cannot be written; then the file is closed.
         """
         try:
             with _naming(self._path):
@@ -179,7 +179,7 @@ class GrowingFile:
         self._waiting.clear()
 
     def close(self) -> None:
-        """Closes the file as it was when something was last acknowledged."""
+        """Closes the file as it was at the last acknowledgement."""
         if self.closed:
             return
         self.closed = True
@@ -193,19 +193,19 @@ def read_file(path: str | Path, limit_bytes: int) -> bytes:
     """The bytes of a file.
 
     Raises:
-        OSError: It cannot be read, or is larger; `errno.EFBIG` says the latter.
+        OSError: The file cannot be read, or is too large (`errno.EFBIG`).
     """
     with open_file(path, limit_bytes) as file:
         return _read_all(file, path, limit_bytes)
 
 
 def open_file(path: str | Path, limit_bytes: int) -> BinaryIO:
-    """Opens a file for reading: a plain file, or what a pipe or a terminal gives, which is read.
+    """Opens a plain file, a pipe or a terminal for reading; the last two are read to the end.
 
     Raises:
-        OSError: It is something else, cannot be read, or is larger; `errno.EFBIG` says the latter.
+        OSError: It is something else, cannot be read, or is too large (`errno.EFBIG`).
     """
-    # To open a pipe in the usual way waits for a writer, perhaps for ever.
+    # Opening a pipe in the usual way waits for a writer, perhaps for ever.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
     try:
         kind = _readable_kind(descriptor, path, limit_bytes)
@@ -226,10 +226,10 @@ def open_file(path: str | Path, limit_bytes: int) -> BinaryIO:
 def _readable_kind(
     descriptor: int, path: str | Path, limit_bytes: int
 ) -> Literal["file", "pipe", "terminal"]:
-    """What is open.
+    """The kind of an open file: ``file``, ``pipe`` or ``terminal``.
 
     Raises:
-        OSError: Something that is not read, or a file that is too large.
+        OSError: It is a folder or a device, or a file that is too large.
     """
     found = os.fstat(descriptor)
     if stat.S_ISREG(found.st_mode):
@@ -246,7 +246,7 @@ def _readable_kind(
 
 
 def _read_all(file: IO[bytes], path: str | Path, limit_bytes: int, first: bytes = b"") -> bytes:
-    """What has been read and the rest, in pieces: how long a pipe is nobody knows."""
+    """The bytes in `first` and all that follow, read in pieces: a pipe does not tell its length."""
     pieces, length = [first], len(first)
     while length <= limit_bytes and (piece := file.read(_PIECE_BYTES)):
         pieces.append(piece)
@@ -262,14 +262,14 @@ def _too_large(path: str | Path, limit_bytes: int) -> OSError:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Where a file goes.
+    """The place that a file is written to.
 
     Attributes:
-        path: What the user named.
-        final: The file that is meant, links followed.
-        part: The temporary file; `None` for what is written through.
+        path: The path as the user wrote it.
+        final: The file itself, with links followed.
+        part: The temporary file; `None` if `final` is written directly.
         found: What is there now.
-        descriptor: What is meant is open in this process already, as ``/dev/stdout`` is.
+        descriptor: The descriptor, if this process has the file open, such as ``/dev/stdout``.
     """
 
     path: Path
@@ -280,10 +280,10 @@ class _Target:
 
 
 def _target(path: Path) -> _Target:
-    """Looks at what a path leads to.
+    """Finds out what a path leads to.
 
     Raises:
-        OSError: It cannot be looked at, or must not be written.
+        OSError: That cannot be found out, or the file must not be written.
         InputError: It is a folder.
     """
     final, descriptor = _followed(path)
@@ -303,10 +303,10 @@ def _target(path: Path) -> _Target:
 
 
 def _followed(path: Path) -> tuple[Path, int | None]:
-    """The file that a path leads to, and its descriptor if it is one of this process.
+    """The file that a path leads to, and its descriptor if this process has it open.
 
-    ``/dev/stdout`` is a link to such a one. To open it once more would begin at the start of the
-    file that the output was sent to.
+    ``/dev/stdout`` is a link to such a file. Opening it once more would write from the start of the
+    file to which the output is redirected.
     """
     for _ in range(_LINKS_FOLLOWED):
         folder = Path(os.path.realpath(path.parent))
@@ -337,28 +337,28 @@ def _write_part(target: _Target, part: Path, content: str | bytes) -> None:
 
 
 def _write_through(target: _Target, content: str | bytes) -> None:
-    """Writes to what is no plain file."""
+    """Writes to a pipe or device."""
     with os.fdopen(_descriptor(target), "wb") as file:
         _write(file, content)
 
 
 def _descriptor(target: _Target) -> int:
-    """A descriptor of its own for what is no plain file."""
+    """A new descriptor for a pipe or device."""
     if target.descriptor is not None:
         return os.dup(target.descriptor)
     return os.open(target.final, os.O_WRONLY | os.O_CLOEXEC | os.O_NOCTTY)
 
 
 def _write(file: BinaryIO, content: str | bytes) -> None:
-    """Writes in pieces, so that a long text is not held twice."""
+    """Writes in pieces, so that a long text is not in memory twice."""
     for start in range(0, len(content), _PIECE_BYTES):
         piece = content[start : start + _PIECE_BYTES]
-        # The name of a file may hold bytes that are no text, and stand in one.
+        # The text may contain a file name with bytes that are not UTF-8.
         file.write(piece.encode(errors="backslashreplace") if isinstance(piece, str) else piece)
 
 
 def _make_folders(folder: Path, made: list[Path]) -> None:
-    """Makes a folder and those that it lies in, and adds them to those that were made."""
+    """Makes a folder and its parents, and adds those that are new to `made`."""
     missing = []
     while not folder.exists():
         missing.append(folder)
@@ -372,22 +372,22 @@ def _lock(descriptor: int, path: Path) -> None:
     """Locks an open file for as long as it is open.
 
     Raises:
-        InputError: It is locked by somebody else.
+        InputError: Another process has locked it.
     """
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise InputError(
-            f"cannot write {path}: another run is being written into it\n"
-            "hint: wait until it has ended, or choose another file"
+            f"cannot write {path}: another run is writing to it\n"
+            "hint: wait until that run has ended, or choose another file"
         ) from None
     except OSError:
-        # Some network file systems know no locks; without one the user has to take care.
+        # Some network file systems have no locks; then nothing prevents two writers.
         return
 
 
 def _is_special(path: Path) -> bool:
-    """Whether something is written through."""
+    """Whether this is a pipe or device, which is written directly."""
     try:
         return _target(path).part is None
     except (OSError, InputError):
@@ -395,7 +395,7 @@ def _is_special(path: Path) -> bool:
 
 
 def _identity(path: Path) -> object:
-    """What is equal for two paths of one file."""
+    """A value that is equal for two paths to the same file."""
     with contextlib.suppress(OSError):
         found = path.stat()
         return found.st_dev, found.st_ino
@@ -404,7 +404,7 @@ def _identity(path: Path) -> object:
 
 @contextlib.contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """Turns an error of the operating system into one that names the file that was wanted."""
+    """Turns an error of the operating system into one that names the user's file."""
     try:
         yield
     except OSError as error:

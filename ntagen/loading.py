@@ -1,6 +1,6 @@
-"""From a file or a text to a model that the engine has accepted, whatever language it is in.
+"""Loads a model from a file or a text.
 
-Environments (``.nsl``) become models on the way; UPPAAL's XML and XTA go to the engine as they are.
+An environment (``.nsl``) is turned into a UPPAAL model first; the engine reads XML and XTA itself.
 """
 
 from __future__ import annotations
@@ -17,13 +17,12 @@ from ntagen.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A model with what it was made of.
+    """A model, and the scene from which it was made.
 
     Attributes:
         model: The model.
-        scene: What an environment describes; ``None`` for a UPPAAL model.
-        warnings: What the user should know about the environment, one text a warning; the
-            model's own are `Model.warnings`.
+        scene: The scene that an environment describes; ``None`` for a UPPAAL model.
+        warnings: The warnings about the environment; those about the model are `Model.warnings`.
     """
 
     model: Model
@@ -42,15 +41,15 @@ def load(
     Args:
         source: A path to a file (UPPAAL XML or XTA, or an environment ``.nsl``), or the text of a
             UPPAAL model. A string is a text if it holds a line break, a ``;`` or a ``<``.
-        include: Folders below which the files may lie that an environment includes, beside its own.
-        overflow: What happens where the result of integer arithmetic does not fit into 32 bits:
+        include: Folders below which an environment may include files, besides its own folder.
+        overflow: What happens if a result of integer arithmetic does not fit into 32 bits; see
             `Model.overflow`.
 
     Returns:
-        The model: `Model.check` answers queries, its attributes say what is in it.
+        The model: `Model.check` answers queries, and its attributes describe the model.
 
     Raises:
-        InputError: The file or text is wrong; for UPPAAL models it is a
+        InputError: The file or text is wrong. For a UPPAAL model the error is a
             `ntagen.checker.RejectedError`, which has the diagnostics.
         OSError: The file cannot be read.
     """
@@ -66,14 +65,14 @@ def load_strategy(path: str | Path, model: Model) -> Strategy:
     """Reads a strategy that was saved for this model: see `Model.load_strategy`.
 
     Raises:
-        InputError: It is no strategy, or does not fit the model.
+        InputError: The file is not a strategy, or does not fit the model.
         OSError: The file cannot be read.
     """
     return model.load_strategy(path)
 
 
 def load_file(path: Path, *, include: Sequence[str | Path] = ()) -> Loaded:
-    """Loads the model of a file, and the scene if it is an environment; `include` as of `load`.
+    """Loads the model of a file, and the scene if it is an environment; `include` as in `load`.
 
     Raises:
         InputError: The file is wrong.

@@ -1,9 +1,9 @@
-"""The rules that the values of a scene obey, wherever the scene comes from.
+"""The rules for the values of a scene, wherever the scene comes from.
 
-A scene made in Python obeys them when it is made (`ntagen.scene`); one that is written in a file is
-told all that is wrong with it, with the places (`ntagen.nsl.build`). Each rule is a function that
-gives what is wrong, or None. What concerns the places of regions to each other is not here: a
-driver that learns may well find itself in a critical region.
+A scene that is made in Python is checked when it is made (`ntagen.scene`). For a scene in a file,
+all mistakes are reported with their places (`ntagen.nsl.build`). Each rule is a function that
+returns what is wrong, or None. Rules about the positions of regions are not here: a driver that
+learns may find that it is inside a critical region.
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from typing import Final
 from ntagen.units import deg_from_rad
 
 LARGEST_UNITS: Final = 2**28
-"""The largest magnitude of a number that a scene may put into the model, in units. The model adds
-and subtracts such numbers in 32 bits (a centre is a tip minus a radius, a distance is a
-difference); this leaves three bits of head room."""
+"""The largest absolute value that a scene may put into the model, in units. The model adds and
+subtracts such numbers in 32 bits (a centre is a tip minus a radius, a distance is a difference), so
+three bits are kept free."""
 
 MAX_ROLLS: Final = 100
-"""Rolls that a plan may hold at most."""
+"""A plan has at most this many rolls."""
 
 PAPER_QUERIES: Final = {
     "PathExists": "E<> Checker.Final_TR_Reached",
     "ReachFinalTR": "control: A<> Checker.Final_TR_Reached",
 }
-"""The queries of section 2 of the paper, which every model has; the second one carries its name,
-the first one got one here."""
+"""The queries of section 2 of the paper, which every model has. The paper names only the second;
+the name of the first is ours."""
 
 UNIT_TOLERANCE: Final = 1e-6
-"""How far the length of a direction may be from 1, and the cosine of a right angle from 0: what
-rounding of written decimals makes."""
+"""How far the length of a direction may be from 1, and the cosine of a right angle from 0; decimals
+in a file are rounded."""
 
 WHOLE_TOLERANCE: Final = 1e-9
-"""How far a number that went through floating point may lie from the whole one that was meant."""
+"""How far a computed number may be from a whole number to count as whole."""
 
 
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """What is wrong with a value.
+    """A value breaks a rule.
 
     Attributes:
-        rule: The rule by its name, which is that of a diagnostic.
+        rule: The name of the rule, which is also the name of a diagnostic.
         message: What is wrong: one line, lower case, no full stop.
-        hint: What to do about it.
+        hint: How to fix it.
     """
 
     rule: str
@@ -56,10 +56,10 @@ class Breach:
 
 
 def finite(values: Iterable[float], what: str) -> Breach | None:
-    """All are numbers, and neither infinite nor nan."""
+    """All values are finite numbers."""
     for value in values:
         if not isinstance(value, int | float) or not math.isfinite(value):
-            return Breach("not-a-number", f"{what} is {value}, which is no finite number")
+            return Breach("not-a-number", f"{what} is {value}, which is not a finite number")
     return None
 
 
@@ -117,7 +117,7 @@ def roll(angle_rad: float) -> Breach | None:
 
 
 def roll_count(count: int) -> Breach | None:
-    """A plan holds from 0 to 100 rolls."""
+    """A plan has from 0 to 100 rolls."""
     if isinstance(count, int) and 0 <= count <= MAX_ROLLS:
         return None
     return Breach(
@@ -152,7 +152,8 @@ def fits(length_mm: float, per_mm: int, what: str) -> Breach | None:
         return None
     return Breach(
         "value-out-of-range",
-        f"{what} does not fit: at {per_mm} per mm the model reaches {largest_mm:.6g} mm",
+        f"{what} does not fit: at {per_mm} per mm the model can represent at most "
+        f"{largest_mm:.6g} mm",
         "make it smaller, or the resolution coarser",
     )
 
@@ -163,7 +164,7 @@ def visible(length_mm: float, per_mm: int, what: str) -> Breach | None:
         return None
     return Breach(
         "value-too-small",
-        f"{what} is {length_mm:g} mm, which is nothing at a resolution of {per_mm} per mm",
+        f"{what} is {length_mm:g} mm, which is rounded to 0 at a resolution of {per_mm} per mm",
         "make it larger, or the resolution finer",
     )
 
@@ -171,10 +172,10 @@ def visible(length_mm: float, per_mm: int, what: str) -> Breach | None:
 def motion(
     step_s: float, speed_mm_per_s: float, radius_mm: float, per_mm: int, *, swept: bool
 ) -> Breach | None:
-    """One push turns the tip, by at least one unit of the model; swept, by less than half a turn.
+    """One push turns the tip by at least one unit of the model; if swept, by less than half a turn.
 
-    If nothing were left of the turn, the tip would stand still while the needle is inserted for
-    ever. The radius is visible, and a push fits.
+    If the turn were rounded to 0, the tip would stand still while the needle is inserted for ever.
+    The radius and the length of a push are at least one unit, as other rules ensure.
     """
     dt, velocity_mm, _ = time_units(step_s, speed_mm_per_s)
     insertion = dt * units_of(velocity_mm, per_mm)
@@ -182,22 +183,24 @@ def motion(
     if insertion * per_mm < circle:
         return Breach(
             "step-too-short",
-            f"a push of {speed_mm_per_s * step_s:g} mm vanishes at a resolution of {per_mm} per mm",
+            f"a push of {speed_mm_per_s * step_s:g} mm does not bend the needle at a resolution of "
+            f"{per_mm} per mm",
             "make the step longer or the resolution finer",
         )
     if swept and insertion >= math.pi * circle:
         return Breach(
             "step-around-circle",
-            "a push goes half around the motion circle or farther, which `safety swept` cannot see",
+            "a push goes half around the motion circle or farther, which `safety swept` cannot "
+            "check",
             "make the step shorter",
         )
     return None
 
 
 def query(name: str, text: str) -> Breach | None:
-    """A query is a text, and has not the name of one of the paper's, unless it is that one."""
+    """A query has a text, and not the name of one of the paper's queries, unless it is that one."""
     if re.search(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
-        return Breach("query-malformed", f"`{name}` holds a character that no model can hold")
+        return Breach("query-malformed", f"`{name}` has a character that a model cannot contain")
     text = " ".join(text.split())
     if PAPER_QUERIES.get(name, text) == text:
         return None
@@ -220,5 +223,5 @@ def time_units(step_s: float, speed_mm_per_s: float) -> tuple[int, float, float]
 
 
 def units_of(value: float, per_mm: int) -> int:
-    """The number of units of the model that is nearest to a finite value (ties to the even one)."""
+    """The number of units nearest to a finite value (ties go to the even number)."""
     return round(Fraction(value) * per_mm)

@@ -1,4 +1,4 @@
-"""The scene: what is known of a steering task, as immutable values in mm, rad and s.
+"""The scene: all that is known about a steering task, as immutable values in mm, rad and s.
 
 A scene is made by the environment language (`ntagen.nsl`), turned into a model by `ntagen.render`,
 and replaced by a new one whenever the driver learns something (a pose, a radius, a region).
@@ -13,7 +13,7 @@ Conventions (paper, section 2 and appendix; the code of the appendix wins over i
 * `Scene.axis` is the direction in which insertion makes progress: the heading written in the file.
   It stays the same when the tip's pose is measured anew. The model calls this direction -y.
 
-Each value obeys the rules of `ntagen.rules` from the moment it is made: one that does not raises
+Each value is checked by the rules of `ntagen.rules` when it is made; a wrong one raises
 `InputError`.
 """
 
@@ -30,8 +30,8 @@ Vector = tuple[float, float, float]
 """Three numbers along the axes x, y, z."""
 
 DEFAULT_LENGTH_MM = 200.0
-"""The length of a needle that does not say otherwise: that of long biopsy needles. The longest path
-of the paper's instance takes 190 mm, so that its model is that of the paper."""
+"""The default length of a needle: that of long biopsy needles. The longest path of the paper's
+instance takes 190 mm, so this limit does not change its model."""
 
 _KINDS = ("target", "critical", "detection")
 
@@ -40,12 +40,12 @@ RegionKind = Literal["target", "critical", "detection"]
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A sphere with a meaning.
+    """A sphere with a name and a kind.
 
     Attributes:
         name: The name in the file, or one that the driver gave (``learned 1``).
         kind: ``target`` (to be reached), ``critical`` (never to be touched) or ``detection``
-            (the shell in which nearness to a critical region is sensed; critical while planning).
+            (the shell in which the needle senses a near critical region; plans avoid it too).
         center_mm: The centre.
         radius_mm: The radius, greater than 0.
         around: For a detection region that was written as ``around C1 margin …``, the name of C1.
@@ -66,14 +66,16 @@ class Region:
             rules.finite([self.radius_mm], what) or rules.positive(self.radius_mm, what),
         )
         if self.around is not None and self.kind != "detection":
-            raise InputError(f"`{self.name}` is a {self.kind} region, and lies around nothing")
+            raise InputError(
+                f"`{self.name}` is a {self.kind} region, and only a detection region has `around`"
+            )
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where the tip is and how it lies; see the module's conventions.
+    """The position and the orientation of the tip; see the module's conventions.
 
-    Paths make thousands of poses: the rules are looked at where one becomes that of a needle.
+    A path has thousands of poses, so the rules are checked only when a pose is given to a needle.
     """
 
     position_mm: Vector
@@ -89,8 +91,8 @@ class Needle:
         tip: The pose of its tip.
         radius_mm: The radius of its motion circle.
         speed_mm_per_s: Its insertion speed.
-        length_mm: How much of it can still be inserted. It bounds every plan: without it, a
-            needle that turned sideways could circle for ever.
+        length_mm: How much of it can still be inserted. This limits every plan: a needle that has
+            turned sideways could otherwise circle for ever.
     """
 
     tip: Pose
@@ -110,7 +112,7 @@ class Needle:
             rules.finite([self.radius_mm], radius) or rules.positive(self.radius_mm, radius),
             rules.finite([self.speed_mm_per_s], speed)
             or rules.positive(self.speed_mm_per_s, speed, "speed-not-positive"),
-            # All of a needle may have been inserted.
+            # The length is 0 if the whole needle is inserted.
             rules.finite([self.length_mm], length)
             or rules.not_negative(self.length_mm, length, "length-not-positive"),
         )
@@ -124,8 +126,8 @@ class Limits:
     Attributes:
         step_s: Duration of one model step (`dt`).
         roll_angles_rad: The rolls that may be chosen, as whole degrees in the model.
-        max_rolls: How many rolls one plan may hold (`MAX_ROT_COUNT`).
-        min_roll_distance_mm: Insertion between two rolls, at least (`MIN_PROG_BETWEEN_ROTS`).
+        max_rolls: The maximum number of rolls in a plan (`MAX_ROT_COUNT`).
+        min_roll_distance_mm: The minimum insertion between two rolls (`MIN_PROG_BETWEEN_ROTS`).
     """
 
     step_s: float
@@ -176,7 +178,7 @@ class Scene:
         resolution_per_mm: Fixed-point units in one mm (`_SI_` of the model).
         safety: ``sampled`` checks regions at the ends of model steps as the paper does;
             ``swept`` also on the arc between them.
-        queries: Named queries beside the two of the paper.
+        queries: Named queries besides the two of the paper.
     """
 
     name: str
@@ -198,7 +200,7 @@ class Scene:
             or rules.resolution(self.resolution_per_mm),
         )
         if self.safety not in ("sampled", "swept"):
-            raise InputError(f"there is no safety `{self.safety}`\nhint: sampled or swept")
+            raise InputError(f"there is no safety `{self.safety}`\nhint: write sampled or swept")
         for kind, regions in zip(
             _KINDS, (self.targets, self.criticals, self.detections), strict=True
         ):
@@ -242,7 +244,7 @@ def _require(*breaches: rules.Breach | None) -> None:
     """Refuses a value that breaks a rule.
 
     Raises:
-        InputError: It breaks one; the message names all of them.
+        InputError: It breaks at least one rule; the message names all of them.
     """
     found = [breach for breach in breaches if breach is not None]
     if found:

@@ -1,9 +1,9 @@
-"""The typed face of the engine: verdicts, traces, strategies and plans of UPPAAL models.
+"""The engine with Python types: verdicts, traces, strategies and plans of UPPAAL models.
 
 The engine is the Rust crate in ``checker/``; this package only gives its answers Python types. It
-serves any model and knows nothing of needles: a model is loaded (`ntagen.checker.model`), what is
-in it is looked at (`facts`, `picture`, `states`), and queries get answers (`answer`) with runs
-(`runs`), strategies (`strategy`, `machine`) and plays against them (`play`).
+works for any model and knows nothing of needles. `model` loads a model; `facts`, `picture` and
+`states` show what is in it. Queries have answers (`answer`) with runs (`runs`), strategies
+(`strategy`, `machine`) and plays against them (`play`).
 """
 
 from ntagen.checker.answer import Answer, Extreme, Place, Value, Verdict

@@ -20,8 +20,8 @@ Extreme = int | Literal["inf"] | None
 """A least or greatest value: ``"inf"`` if there is no greatest, ``None`` if no state counts."""
 
 Value = Extreme | list[Extreme] | list[list[Extreme] | None]
-"""What ``sup`` and ``inf`` found: of one item an `Extreme`, for ``bounds`` the pair of the least
-and the greatest; of several items a list of these."""
+"""The value of ``sup`` or ``inf`` is an `Extreme`, that of ``bounds`` the pair of the least and the
+greatest. Several items have a list of these."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Place:
     """An expression of a model.
 
     Attributes:
-        place: ``file:line:column``, from 1; of an XML file also which text of it the line is in.
+        place: ``file:line:column``, from 1; for an XML file also the text that has the line.
         text: The expression.
     """
 
@@ -48,23 +48,23 @@ class Answer:
         verdict: ``satisfied``, ``not satisfied``, ``maybe`` (an over-approximation could not
             decide), ``unknown`` (a limit came first: see `stop`) or ``error`` (the model failed:
             see `message`).
-        value: What a query with ``sup``, ``inf`` or ``bounds`` found; ``None`` for other queries,
-            and if no state counts. Whether a clock reaches the value is in `message`.
+        value: The value of ``sup``, ``inf`` or ``bounds``; ``None`` for other queries, and if no
+            state counts. `message` says whether a clock reaches the value.
         message: A remark for the user, or what went wrong in the model.
         wrapped: The first place, in the order of the model, where a result of integer arithmetic
-            did not fit into 32 bits and wrapped round: `Model.overflow` makes it an error.
-        warnings: What the user should know about the query, one text a warning.
+            did not fit into 32 bits and wrapped round. `Model.overflow` can make it an error.
+        warnings: The warnings about the query, one text each.
         stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
-        explored: States whose successors were computed.
-        stored: States that are stored at the end; one that a larger zone took the place of does
-            not count.
-        seconds: Seconds of the search alone.
-        load_seconds: Seconds of loading the model and compiling its code.
+        explored: The number of states whose successors were computed.
+        stored: The number of states that are stored at the end; a state that was replaced by one
+            with a larger zone does not count.
+        seconds: The seconds of the search alone.
+        load_seconds: The seconds of loading the model and compiling its code.
         peak_bytes: The greatest number of bytes that states and tables took.
         plan_count: How many plans were found; ``None`` if none were asked for, or if the
-            environment has choices, so that a strategy is no list of plans.
+            environment has choices, so that a strategy is not a list of plans.
         verified: Whether the strategy and the exact runs of the traces passed their independent
-            checks; ``None`` if there was none, or one came to no end.
+            checks; ``None`` if there was no check, or one did not finish.
         verification: What these checks covered, or what is wrong, line by line.
     """
 
@@ -111,10 +111,10 @@ class Answer:
 
     @property
     def runs(self) -> tuple[Run, ...]:
-        """The runs with exact times that the traces show: one, or for values one a value.
+        """The runs with exact times of the traces: one run, or one for each value.
 
-        Empty without a trace, with ``trace=False``, and where no exact times were found (the end
-        of `trace_text` says why).
+        Empty without a trace, with ``trace=False``, and if no exact times were found (the end of
+        `trace_text` says why).
         """
         traces = self.trace_json()
         return () if traces is None else runs_of(json.loads(traces))
@@ -125,10 +125,10 @@ class Answer:
         return next(iter(self.runs), None)
 
     def trace_text(self) -> str | None:
-        """The witness, counterexample or way to the failure as UPPAAL prints it, if any.
+        """The witness, counterexample or trace to the failure as UPPAAL prints it, if any.
 
-        Below it stands the run with exact times: each state with its clock values, how long it is
-        waited there, and the edges that are taken then.
+        After it comes the run with exact times: each state with its clock values, the delay in it,
+        and the edges that are taken then.
         """
         return self._raw.trace_text()
 
@@ -137,7 +137,7 @@ class Answer:
         return self._raw.trace_json()
 
     def certificate_text(self) -> str | None:
-        """The certificate as text of its file; ``None`` if none was asked for or there is none."""
+        """The certificate as the text of a file; ``None`` if none was asked for or found."""
         return self._raw.certificate_text()
 
     @property
@@ -169,8 +169,7 @@ class Answer:
     def controller_c(self) -> str | None:
         """The strategy as a controller in C99; ``None`` if none was asked for or found.
 
-        The file depends on nothing but two standard headers; the comment at its start says how to
-        call it.
+        The file needs only two standard headers; the comment at its start says how to call it.
 
         Raises:
             RejectedError: The model has stopwatches.

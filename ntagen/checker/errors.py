@@ -1,4 +1,4 @@
-"""What the engine refuses, and models that fail, as errors of ours."""
+"""Turns the engine's errors into those of `ntagen.errors`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class RejectedError(InputError):
 
 @contextlib.contextmanager
 def rejecting() -> Iterator[None]:
-    """Turns the engine's error about something that it does not accept into ours."""
+    """Turns the engine's rejection of an input into a `RejectedError`."""
     try:
         yield
     except _checker.RejectedError as error:
@@ -28,7 +28,7 @@ def rejecting() -> Iterator[None]:
 
 @contextlib.contextmanager
 def failing() -> Iterator[None]:
-    """Turns the engine's error about a failing model into ours."""
+    """Turns the engine's error about a failing model into a `ModelError`."""
     try:
         yield
     except _checker.FailedError as error:

@@ -1,8 +1,8 @@
 """The parts of a UPPAAL model as frozen values.
 
-They are made of the engine's object ``ntagen-model`` (see ``checker/src/engine/facts.rs``, and
-``ntagen info --json``), one class a kind of part. Templates are as written; processes, variables,
-clocks and channels are those of the network that is left when all templates are instantiated.
+They are made from the engine's object ``ntagen-model`` (see ``ntagen info --json``), with one class
+for each kind of part. Templates are as written in the file. Processes, variables, clocks and
+channels are those of the network after all templates have been instantiated.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ class Template(Diagram):
     def svg(self) -> str:
         """The template drawn as in UPPAAL's editor.
 
-        Places come from the file. A template without them, as in XTA, is laid out in layers.
+        Positions come from the file. A template without them, as in XTA, is laid out in layers.
 
         Returns:
             An SVG document.
         """
-        # Imported here: few commands draw, and the libraries of XML take time to load.
+        # Imported here: few commands draw, and the XML libraries take time to load.
         from ntagen.checker.picture.svg import draw
 
         return draw(self)
@@ -46,7 +46,7 @@ class Process:
         template: The name of its template.
         priority: Its level in the system line; greater is more urgent.
         location_count: How many locations it has.
-        edge_count: How many edges it has; the legs of a branch point are one.
+        edge_count: How many edges it has; all legs of a branch point count as one.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Variable:
         process: The process it is local to; ``None`` if it is global.
         type: The type of its parts, such as ``int[0,5]``.
         dimensions: The sizes of an array; empty for a single value.
-        meta: Whether it is ``meta``, and so does not tell states apart.
+        meta: Whether it is ``meta``, so that states that differ only in it are the same.
         words: How many 32-bit words it takes in a state.
     """
 
@@ -114,10 +114,10 @@ class StateSize:
     """The size of the discrete part of a state, in 32-bit words.
 
     Attributes:
-        words: All.
-        location_words: One for each process.
-        variable_words: Those of variables that tell states apart.
-        meta_words: Those of ``meta`` variables.
+        words: All words.
+        location_words: The words of locations, one for each process.
+        variable_words: The words of variables that are not ``meta``.
+        meta_words: The words of ``meta`` variables.
     """
 
     words: int
@@ -148,10 +148,10 @@ class ScalarSet:
 
     Attributes:
         size: How many members it has.
-        reduced: Whether states that differ only by exchanged members are one for symmetry
-            reduction.
-        obstacle: Why not, or ``None``.
-        place: Where what tells its members apart stands, as ``file:line:column``, or ``None``.
+        reduced: Whether symmetry reduction treats states that differ only by exchanged members as
+            one.
+        obstacle: Why it does not, or ``None``.
+        place: The place that distinguishes the members, as ``file:line:column``, or ``None``.
         at: The text there, or ``None``.
     """
 
@@ -167,7 +167,7 @@ class Facts:
     """All that is in a model.
 
     Attributes:
-        templates: As written, those that no process uses included.
+        templates: As written, including those that no process uses.
         processes: In the order of the system line.
         variables: In the order of their words.
         clocks: Without the reference clock.
@@ -190,7 +190,7 @@ class Facts:
 
     @classmethod
     def from_object(cls, found: dict[str, Any]) -> Facts:
-        """Makes the values of the engine's object ``ntagen-model``."""
+        """Makes the values from the engine's object ``ntagen-model``."""
         return cls(
             templates=tuple(_template(entry) for entry in found["templates"]),
             processes=tuple(

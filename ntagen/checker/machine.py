@@ -1,4 +1,4 @@
-"""Strategies of games under partial observation as values: machines that go by what is observed.
+"""Strategies of games under partial observation: machines that react to observations.
 
 A machine begins in its state 0. In each state it proposes an action; when the observation changes,
 it goes to another state.
@@ -21,7 +21,7 @@ Observation = tuple[bool, ...]
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """Where play may be when a state of the machine is entered: one discrete state."""
+    """A discrete state in which play may be when the machine enters one of its states."""
 
     locations: dict[str, str]
     variables: dict[str, int | float]
@@ -39,9 +39,9 @@ class MachineState:
     edge: dict[str, Any] | None
     """The edge without a channel that is proposed; with neither, the machine waits."""
     next: dict[Observation, int]
-    """The index of the next state, by what is observed next."""
+    """The index of the next state, by the next observation."""
     beliefs: tuple[Belief, ...]
-    """The states from which the machine goes on so, among them all that play may be in on entry."""
+    """The states from which the machine wins on entry, among them all in which play may be."""
 
     def __str__(self) -> str:
         if self.channel is not None:
@@ -56,7 +56,7 @@ class MachineState:
 class Machine:
     """How the controller wins a game in which it sees only some predicates.
 
-    ``machine[0]`` is the state in which it begins; without states, play is won before it begins.
+    ``machine[0]`` is its first state. It has no states if play is won before it begins.
     """
 
     query: str
@@ -84,14 +84,14 @@ class Machine:
         return self.states[index]
 
     def after(self, state: int, observation: Sequence[bool]) -> int:
-        """The index of the state in which the machine is when it observes this.
+        """The index of the state in which the machine is after an observation.
 
         Args:
-            state: The index of the state in which it was.
+            state: The index of its state before.
             observation: The values of the predicates, in the order of `observations`.
 
         Raises:
-            UndecidedError: This is never observed there before the game is won.
+            UndecidedError: The machine never observes this in `state` before the game is won.
         """
         seen = tuple(bool(value) for value in observation)
         if seen == self.states[state].observation:
@@ -99,7 +99,7 @@ class Machine:
         found = self.states[state].next.get(seen)
         if found is None:
             shown = ", ".join(str(value).lower() for value in seen)
-            raise UndecidedError(f"the machine has no state after {state} for ({shown})")
+            raise UndecidedError(f"the machine has no next state after {state} for ({shown})")
         return found
 
 

@@ -1,4 +1,4 @@
-"""Models that the engine has accepted, and what they can be asked."""
+"""Models that the engine has loaded: what is in them, queries, runs and states."""
 
 from __future__ import annotations
 
@@ -38,24 +38,24 @@ OverflowRule = Literal["wrap", "error"]
 TraceWanted = Literal["any", "shortest", "fastest"]
 
 Progress = Callable[[int, int, int, int], object]
-"""Is shown explored, stored and waiting states, and bytes."""
+"""Is called with the numbers of explored, stored and waiting states, and of bytes."""
 
 MAX_PLANS = 1_000_000
-"""Plans that are listed at most, unless the caller says otherwise."""
+"""The default maximum of plans that are listed."""
 
 _GAME = re.compile(r"\s*(strategy\s+\w+\s*=\s*)?(\{[^{}]*\}\s*)?(E\s*<>\s*)?control(_t\*|\b)")
-"""How a query begins that asks for a strategy."""
+"""The start of a query that asks for a strategy."""
 
 _PROCESSES_SHOWN = 5
-"""Processes that the short text of a model names."""
+"""The short text of a model names at most this many processes."""
 
 
 class Model:
     """A model that the engine has accepted.
 
-    What is in it are its attributes; `check` answers queries, `synthesize` solves games, `simulate`
-    makes random runs, `states` lists the reachable symbolic states, and `walk` goes through them by
-    hand.
+    The attributes describe the model. `check` answers queries, `synthesize` solves games,
+    `simulate` makes random runs, `states` lists the reachable symbolic states, and `walk` goes
+    through them step by step.
     """
 
     def __init__(self, raw: _checker.Model) -> None:
@@ -65,10 +65,10 @@ class Model:
 
     @property
     def overflow(self) -> OverflowRule:
-        """What happens where the result of integer arithmetic does not fit into 32 bits.
+        """What happens if a result of integer arithmetic does not fit into 32 bits.
 
-        It can be set. ``wrap``: it wraps round, as UPPAAL's does, and `Answer.wrapped` says where
-        it did; ``error``: it is a run-time error.
+        You can set it. ``wrap``: the result wraps round, as in UPPAAL, and `Answer.wrapped` says
+        where it did; ``error``: it is a run-time error.
         """
         return self._raw.overflow
 
@@ -82,12 +82,12 @@ class Model:
         return f"<Model of {len(self.processes)} processes: {names}{more}>"
 
     def facts_json(self) -> str:
-        """All that is in the model as one JSON object, as ``ntagen info --json`` prints it."""
+        """The description of the model as one JSON object, as ``ntagen info --json`` prints it."""
         return self._raw.facts_json()
 
     @property
     def facts(self) -> Facts:
-        """All that is in the model as one value."""
+        """The description of the model as one value."""
         if self._facts is None:
             self._facts = Facts.from_object(json.loads(self.facts_json()))
         return self._facts
@@ -116,7 +116,7 @@ class Model:
 
     @property
     def variables(self) -> tuple[Variable, ...]:
-        """The variables, in the order of their words; constants are none."""
+        """The variables without constants, in the order of their words."""
         return self.facts.variables
 
     @property
@@ -152,24 +152,24 @@ class Model:
     @property
     def queries(self) -> tuple[Query, ...]:
         """The queries of the file, in order."""
-        # Not by `facts`: of a large model these take a while to put together.
+        # This does not use `facts`: for a large model they take a while to collect.
         return queries_from(json.loads(self._raw.queries_json()))
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know about the model and files of queries, one text a warning."""
+        """The warnings about the model and files of queries, one text each."""
         return tuple(self._raw.warnings)
 
     @property
     def load_seconds(self) -> float:
-        """Seconds of loading, and of compiling the code once a query was checked."""
+        """The seconds that loading took, and compiling the code once a query was checked."""
         return self._raw.load_seconds
 
     def read_queries(self, path: Path) -> tuple[Query, ...]:
         """Reads a ``.q`` file.
 
         Raises:
-            RejectedError: The file is no list of queries.
+            RejectedError: The file is not a list of queries.
             OSError: The file cannot be read.
         """
         with rejecting():
@@ -314,7 +314,7 @@ class Model:
     ) -> Strategy:
         """Solves a game and gives the strategy of the player who wins.
 
-        If the controller cannot win, that is the environment's: `Strategy.winning` says which.
+        If the controller cannot win, it is the environment's strategy; `Strategy.winning` tells.
 
         Args:
             query: A control query, such as ``control: A<> Gate.Open``.
@@ -331,15 +331,15 @@ class Model:
 
         Raises:
             RejectedError: The query is wrong or of a kind that is not supported.
-            InputError: It is no game, or of a kind that has no strategy.
-            LimitError: A limit was reached before there was an answer, or there is none because
-                stopped clocks allow only an approximation.
+            InputError: The query is not a game, or its kind has no strategy.
+            LimitError: A limit was reached before there was an answer, or there is no answer
+                because stopped clocks allow only an approximation.
             ModelError: The model fails.
             KeyboardInterrupt: The user interrupted.
         """
         if not _GAME.match(query):
             raise InputError(
-                f"{query.strip()} asks for no strategy\n"
+                f"{query.strip()} is not a control query, so it has no strategy\n"
                 "hint: begin the query with control: — control: A<> p, control: A[] p, …"
             )
         answer = self.check(
@@ -359,22 +359,22 @@ class Model:
         if answer.verified is False:
             raise NtagenError("\n".join(answer.verification))
         if answer.verdict == "error":
-            raise ModelError(answer.message or "the model fails")
+            raise ModelError(answer.message or "the model has a run-time error")
         if answer.verdict == "unknown":
             raise LimitError(f"the synthesis was stopped by the limit of {answer.stop}")
         if answer.verdict == "maybe":
-            raise LimitError("the engine could not decide who wins, since the model stops clocks")
+            raise LimitError("the engine could not decide who wins, because the model stops clocks")
         strategy = answer.strategy
         if strategy is None:
             if answer.strategy_json() is not None:
                 raise InputError(
-                    f"{answer.query.strip()} gives a machine that goes by observations, and no "
-                    "strategy over states\nhint: check(query, strategy=True).machine is it; "
-                    "on the command line, check --strategy FILE writes it"
+                    f"{answer.query.strip()} has a machine over observations, not a strategy "
+                    "over states\nhint: check(query, strategy=True).machine gives it; on the "
+                    "command line, check --strategy FILE writes it"
                 )
             remark = f": {answer.message}" if answer.message else ""
             raise InputError(
-                f"{answer.query.strip()} is {answer.verdict}, but this kind of query gives no "
+                f"{answer.query.strip()} is {answer.verdict}, and this kind of query has no "
                 f"strategy then{remark}"
             )
         return strategy
@@ -387,15 +387,15 @@ class Model:
     ) -> Strategy:
         """Reads a strategy that was saved for this model.
 
-        Whether it wins is not checked: `Strategy.verify` does that.
+        This does not check whether the strategy wins; `Strategy.verify` does.
 
         Args:
             path: A file as `Strategy.save` and ``ntagen check --strategy`` write it.
-            forced: The rule for forced moves that the strategy was made by.
+            forced: The rule for forced moves with which the strategy was made.
             priorities: Whether priorities counted when it was made.
 
         Raises:
-            RejectedError: It is no strategy, or does not fit the model.
+            RejectedError: The file is not a strategy, or does not fit the model.
             OSError: The file cannot be read.
         """
         data = read_file(os.fspath(path), EVIDENCE_BYTES)
@@ -416,12 +416,12 @@ class Model:
         Args:
             text: The file, as `Answer.trace_json`, `Answer.certificate_text` and
                 `Answer.strategy_json` give it.
-            path: What to call it in messages.
+            path: The name of the file in messages.
             forced: For strategies: when the environment must move because time cannot pass.
             priorities: For strategies: whether priorities of channels and processes count.
 
         Raises:
-            RejectedError: It is none of them, or does not belong to this model.
+            RejectedError: The text is none of these, or does not belong to this model.
         """
         with rejecting():
             holds, lines = self._raw.verify(path or "evidence", text, forced, priorities)
@@ -430,20 +430,19 @@ class Model:
     def simulate(self, steps: int = 100, seed: int = 0, choose: Choose | None = None) -> Run:
         """Makes a run with exact times from the initial state.
 
-        Without `choose`, each transition that is possible now or later is as likely as any other,
-        and so is each moment at which it is possible (of those without a last one, the first few
-        units).
+        Without `choose`, each transition that is possible now or later is equally likely, and so is
+        each moment at which it is possible. If there is no last moment, the first few units count.
 
         Args:
-            steps: The run ends after so many transitions, or where none is possible any more.
+            steps: The run ends after this many transitions, or earlier if none is possible.
             seed: The same seed gives the same run.
-            choose: Is given each state and what can happen; says which choice is taken, with the
-                delay or without (then a random one), or ``None`` to end the run.
+            choose: Gets each state and its choices. Returns the index of a choice, with a delay or
+                without (then the delay is random), or ``None`` to end the run.
 
         Raises:
-            ValueError: `choose` gives a delay that is too fine a fraction of the unit.
-            IndexError: `choose` gives what is not possible.
-            ModelError: The model fails on the way.
+            ValueError: `choose` returns a delay that is too fine a fraction of the unit.
+            IndexError: `choose` returns a choice that is not possible.
+            ModelError: The model has a run-time error.
         """
         with failing():
             return simulated(self._raw.walk_exactly(), steps, seed, choose)
@@ -458,15 +457,15 @@ class Model:
     ) -> Iterator[SymbolicState]:
         """The reachable symbolic states, those with the fewest transitions first.
 
-        They are all computed before the first is given. One that an earlier one contains is left
-        out. Zones are extrapolated by the constants of the model, so that they are finitely many:
-        beyond these constants, and where stopwatches stand, a zone may contain clock values that
-        are not reachable.
+        All states are computed before the first one is returned. A state that an earlier one
+        contains is left out. Zones are extrapolated by the constants of the model, so that their
+        number is finite: beyond these constants, and where stopwatches stand, a zone may contain
+        clock values that are not reachable.
 
         Args:
-            limit: At most so many; there may be more.
-            timeout_s: The search gives up after this time.
-            memory_bytes: The search gives up when its states take this much.
+            limit: At most this many states are returned; there may be more.
+            timeout_s: The search gives up after this time, in seconds.
+            memory_bytes: The search gives up when its states take this many bytes.
             engine: What runs the code of the model; states do not depend on it.
 
         Raises:
@@ -484,7 +483,7 @@ class Model:
         if stop in ("memory", "time"):
             raise LimitError(
                 f"the search was stopped by the limit of {stop}; "
-                "raise it, or ask for fewer states with `limit`"
+                "raise that limit, or ask for fewer states with `limit`"
             )
         return symbolic_states(found, self._edge_table())
 
@@ -512,7 +511,7 @@ def load(text: str, path: str = "") -> Model:
 
     Args:
         text: The whole file.
-        path: What to call it in diagnostics.
+        path: The name of the file in diagnostics.
 
     Raises:
         RejectedError: The engine does not accept it.
@@ -531,7 +530,7 @@ def load_file(path: Path) -> Model:
 
 
 def diagnostic_pages() -> list[tuple[str, str, str, str]]:
-    """Of every diagnostic of models and queries: code, name, severity, and its page in Markdown."""
+    """The diagnostics of models and queries: code, name, severity, and the page in Markdown."""
     return _checker.explanations()
 
 

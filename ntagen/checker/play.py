@@ -1,9 +1,8 @@
-"""Playing against a strategy: what can happen in a state, and the moves of both sides.
+"""Plays against a strategy: what can happen in a state, and the moves of both sides.
 
 The strategy acts by itself at the first moment at which it does not wait; its opponent may move
-before.
-At the same instant the environment is first. What is possible is computed by the engine's
-independent check, not by the solver that found the strategy.
+before. If both can move at the same instant, the environment is first. The engine's independent
+check computes the possible moves, not the solver that found the strategy.
 """
 
 from __future__ import annotations
@@ -24,21 +23,21 @@ from ntagen.errors import InputError, ModelError
 __all__ = ["Chance", "Next", "Play", "Reply", "Situation", "Window"]
 
 _OPEN_UNITS = 5
-"""How far a random delay reaches into a window without end, in units of time."""
+"""In a window without end, a random delay is within this many units of its start."""
 
 _FINEST = 2**20
-"""The finest parts of a unit that random delays are multiples of."""
+"""The greatest denominator of a random delay."""
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Delays after which something is possible.
+    """An interval of delays, in units of the model's time.
 
     Attributes:
-        first: Where it begins, in units of the model's time.
-        after_first: Whether it begins only after that.
-        last: Where it ends; ``None`` without an end.
-        before_last: Whether it ends before that.
+        first: The start of the interval.
+        after_first: Whether the start itself is excluded.
+        last: The end of the interval; ``None`` without an end.
+        before_last: Whether the end itself is excluded.
     """
 
     first: Fraction
@@ -53,13 +52,13 @@ class Window:
         return is_in and (delay < self.last if self.before_last else delay <= self.last)
 
     def soon(self) -> Fraction:
-        """The first delay in it; if there is no first one, one that is soon."""
+        """The first delay in it; if there is no first one, a delay soon after the start."""
         if not self.after_first:
             return self.first
         return self.first + (Fraction(1) if self.last is None else (self.last - self.first) / 2)
 
     def chosen(self, chance: random.Random) -> Fraction:
-        """A random delay in it, in coarse parts of a unit; a short one if there is no end."""
+        """A random delay in it, a coarse fraction of a unit; a short one if there is no end."""
         end = self.first + _OPEN_UNITS if self.last is None else self.last
         parts = chance.choice((1, 2, 4))
         while parts <= _FINEST:
@@ -89,7 +88,7 @@ class Reply:
 
     Attributes:
         edges: The edges that are taken together, the sender's first.
-        windows: When it is possible, in ascending order.
+        windows: The delays after which it is possible, in ascending order.
     """
 
     edges: tuple[Edge, ...]
@@ -102,14 +101,14 @@ class Next:
 
     Attributes:
         kind: ``acts``: the strategy takes `edges`. ``won``: play is over, and `winner` has won.
-            ``must``: the opponent has to move before. ``fails``: the strategy does not say how to
-            go on (`why`), so that nothing of what it promises holds.
-        delay: After how long; ``None`` if time passes for ever.
-        edges: What the strategy takes.
+            ``must``: the opponent has to move before. ``fails``: the strategy has no next move
+            (`why`), so that it does not keep its promise.
+        delay: The time until then; ``None`` if time passes for ever.
+        edges: The edges that the strategy takes.
         winner: Who has won.
-        why: Why play is over: ``goal`` (the goal holds), ``broken`` (what must be kept does not
-            hold), ``stopped`` (time cannot pass and nobody has to move) or ``endless`` (time passes
-            for ever); or what the strategy lacks.
+        why: Why play is over: ``goal`` (the goal holds), ``broken`` (a condition that must be kept
+            does not hold), ``stopped`` (time cannot pass and nobody has to move) or ``endless``
+            (time passes for ever); or what the strategy lacks.
     """
 
     kind: Literal["acts", "won", "must", "fails"]
@@ -126,8 +125,8 @@ class Situation:
     Attributes:
         replies: The moves of the strategy's opponent.
         allowed: The moves that a permissive strategy allows its owner.
-        waits: For how long it need not do anything.
-        next: What happens if it does not.
+        waits: The delays for which the opponent can only wait before something happens.
+        next: What happens if the opponent does not move.
         goal: Whether the goal of the query holds now.
     """
 
@@ -139,7 +138,7 @@ class Situation:
 
     @property
     def winner(self) -> Literal["controller", "environment"] | None:
-        """Who has won, if play is over now: decided, or without any move left."""
+        """The winner, if play is over now: it is decided, or there are no moves left."""
         if self.next.kind != "won":
             return None
         is_decided = self.next.why in ("goal", "broken") and self.next.delay == 0
@@ -148,23 +147,23 @@ class Situation:
 
 
 class Chance:
-    """Plays the side of a strategy's opponent at random; the same seed plays the same."""
+    """Plays the opponent's side at random; the same seed makes the same choices."""
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)
 
     def choose(self, situation: Situation) -> tuple[Reply, Fraction] | None:
-        """A move, also of those that a permissive strategy allows, and its delay.
+        """A random move and its delay; it may be a move that a permissive strategy allows.
 
         Returns:
-            ``None`` for only waiting.
+            ``None`` to only wait.
         """
         options = [
             (one, window)
             for one in (*situation.replies, *situation.allowed)
             for window in one.windows
         ]
-        # What would end play is the last resort.
+        # A choice that ends play is taken only if there is no other.
         must_move = situation.next.kind == "must" or situation.next.why in ("stopped", "endless")
         if not options or not (must_move or self._random.randrange(len(options) + 1)):
             return None
@@ -176,7 +175,7 @@ class Play:
     """A play against a strategy; it begins in the initial state.
 
     The caller is the opponent of the strategy: `reply` and `wait` are its steps, `follow` lets the
-    strategy act. A permissive strategy waits as long as it may, unless `allow` lets it move. Where
+    strategy act. A permissive strategy waits as long as it may, unless `allow` makes it move. If
     the controller's strategy takes an edge to a branch point, its legs are among the replies.
     """
 
@@ -184,7 +183,7 @@ class Play:
         self._raw = raw
 
     def __len__(self) -> int:
-        """How many steps were made: moves, and waits without one."""
+        """The number of steps: moves, and waits without a move."""
         return self._raw.length
 
     @property
@@ -221,7 +220,7 @@ class Play:
         """Waits, and then makes the reply with this index.
 
         Raises:
-            IndexError: It is not possible, or not then.
+            IndexError: It is not possible at all, or not after this delay.
             InputError: The delay is too fine a fraction.
             ModelError: The model fails in it.
         """
@@ -231,7 +230,7 @@ class Play:
         """Waits, and then lets a permissive strategy make the allowed move with this index.
 
         Raises:
-            IndexError: It is not allowed, or not then.
+            IndexError: It is not allowed at all, or not after this delay.
             InputError: The delay is too fine a fraction.
             ModelError: The model fails in it.
         """
@@ -241,14 +240,14 @@ class Play:
         """Only waits.
 
         Raises:
-            IndexError: Something happens before.
+            IndexError: Something else happens during this delay.
             InputError: The delay is too fine a fraction.
             ModelError: The model fails in it.
         """
         self._step(delay)
 
     def follow(self) -> None:
-        """Lets time pass until the strategy acts, and lets it act, by the first possible leg.
+        """Waits until the strategy acts, and lets it act; at a branch point on the first leg.
 
         Raises:
             IndexError: It does not act next.
@@ -258,13 +257,13 @@ class Play:
             self._raw.follow()
 
     def undo(self, length: int) -> None:
-        """Takes the last steps back, until only so many are left."""
+        """Takes back the last steps, until only this many are left."""
         self._raw.undo(max(length, 0))
 
     def trace_json(self) -> str | None:
         """The play so far as a trace that ``ntagen verify`` checks.
 
-        ``None`` if its times have no common resolution that is coarse enough.
+        ``None`` if a common time unit of all delays would be too fine.
         """
         with _refusing():
             return self._raw.trace_json()

@@ -1,7 +1,7 @@
-"""Runs with exact times: what the traces of answers show, and simulated runs.
+"""Runs with exact times: those in the traces of answers, and simulated runs.
 
-Times are fractions of the model's unit of time. A run is a list of states and, between them, how
-long it waits and which edges are taken; it may end in a loop, or by waiting for ever.
+Times are fractions of the model's unit of time. A run is a list of states. Between two states it
+waits for a delay and takes edges. It may end in a loop, or wait for ever.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ class Choice:
 
     Attributes:
         edges: The edges, the sender's first.
-        windows: When: pairs of the least and the greatest delay, in ascending order; without a
-            greatest one, ``None``.
+        windows: When it can happen: pairs of the least and the greatest delay, in ascending order;
+            the greatest is ``None`` if there is no limit.
     """
 
     edges: tuple[Edge, ...]
@@ -103,7 +103,7 @@ class Choice:
 
 
 Choose = Callable[[State, tuple[Choice, ...]], "int | tuple[int, Fraction] | None"]
-"""Is given a state and what can happen; says which, or which after what delay; ``None`` stops."""
+"""Gets a state and its choices; returns an index, or an index and a delay; ``None`` stops."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,13 +111,13 @@ class Run:
     """A run with exact times.
 
     Attributes:
-        states: The states, each when it is entered; the first is the initial one.
-        steps: What happens between them, one less.
+        states: The states at the moment of entry; the first is the initial one.
+        steps: The steps between them, one fewer than states.
         end: How it ends: ``after`` the last delay; in a ``loop``; it ``waits`` for ever; or it is
             ``stuck``: nothing is possible any more.
-        loop: The index of the state that the last one leads back to, if it ends in a loop.
+        loop: The index of the state to which the last one leads back, if the run ends in a loop.
         delay: How long it waits in the last state; ``end`` is about the moment after that.
-        title: What it shows, if an answer has several.
+        title: What the run shows, if an answer has several runs.
     """
 
     states: tuple[State, ...]
@@ -172,19 +172,19 @@ def _run(raw: dict[str, Any], title: str | None) -> Run:
 
 
 def state_of(raw: dict[str, Any], unit: int) -> State:
-    """A state as the engine writes it, with so many ticks in a unit of time."""
+    """A state from the engine's JSON; `unit` ticks make one unit of time."""
     clocks = {name: Fraction(ticks, unit) for name, ticks in raw["clocks"].items()}
     return State(raw["locations"], raw["variables"], clocks)
 
 
 def edge_of(raw: dict[str, Any]) -> Edge:
-    """An edge as the engine writes it."""
+    """An edge from the engine's JSON."""
     names = ("process", "source", "target", "sync", "guard", "update", "select")
     return Edge(*(raw[name] for name in names))
 
 
 OPEN_WINDOW_UNITS = 5
-"""How far a random delay reaches into a window without end, in units of time."""
+"""In a window without end, a random delay is within this many units of its start."""
 
 
 _FINEST = 2**30
@@ -199,20 +199,20 @@ class Walk(Protocol):
         """How many ticks make one unit of the model's time."""
 
     def refine(self, denominator: int) -> bool:
-        """Makes ticks as short as this part of a unit needs; false if that is too short."""
+        """Makes ticks fit this fraction of a unit; false if they would be too short."""
 
     def state_json(self) -> str:
         """The state."""
 
     def choices_json(self) -> tuple[str, int | None]:
-        """What can happen, and for how long time can pass; ``None`` for ever."""
+        """The choices, and how long time can pass; ``None`` is for ever."""
 
     def take(self, index: int, wait: int) -> None:
         """Waits, and takes the choice with this index."""
 
 
 def simulated(walk: Walk, steps: int, seed: int, choose: Choose | None) -> Run:
-    """A run of at most so many steps; see `ntagen.checker.Model.simulate`."""
+    """A run of at most `steps` steps; see `ntagen.checker.Model.simulate`."""
     chance = random.Random(seed)
     states = [state_of(json.loads(walk.state_json()), walk.ticks_per_unit)]
     taken: list[Step] = []
@@ -251,7 +251,7 @@ def _decision(
     choose: Choose | None,
     chance: random.Random,
 ) -> tuple[int | None, Fraction | None]:
-    """Which choice is taken, and after which delay, as far as that is decided."""
+    """The choice that is taken, and its delay; ``None`` where that is not decided."""
     if choose is None:
         return chance.randrange(len(choices)), None
     chosen = choose(state, choices)

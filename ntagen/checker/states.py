@@ -1,4 +1,4 @@
-"""Symbolic states: all that can be reached, and one after the other along a walk."""
+"""Symbolic states: all that are reachable, or one after the other in a walk."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ class SymbolicState:
     """A reachable symbolic state: discrete values, and a convex set of clock values.
 
     Attributes:
-        index: Its place among the states, from 0.
+        index: Its position in the list of states, from 0.
         locations: The location of each process.
         variables: The value of each variable; parts of arrays and structs by names such as
             ``a[2].x``.
         zone: The fewest constraints on the clocks, such as ``x-y == 2`` and ``x <= 3``, in units
-            of the model's time; the equalities first. That clocks are not negative is left out.
-        predecessor: The index of the state that was left for it; ``None`` for the initial one.
-        step: The transition that was taken there; ``None`` for the initial one.
+            of the model's time; equalities first. "Clocks are not negative" is left out.
+        predecessor: The index of the state before it; ``None`` for the initial one.
+        step: The transition from the state before it; ``None`` for the initial one.
     """
 
     index: int
@@ -46,9 +46,10 @@ class SymbolicState:
         """The zone as a closed difference bound matrix.
 
         Returns:
-            Rows; the entry in row i and column j is ``(bound, strict)``: clock i minus clock j is
-            at most `bound`, or less if `strict`; ``None`` without a bound. Bounds are in units
-            of the model's time. Clock 0 is the number 0, clock i is ``model.clocks[i - 1]``.
+            Rows. The entry in row i and column j is ``(bound, strict)``: clock i minus clock j is
+            at most `bound`, or less than `bound` if `strict`. ``None`` is no bound. Bounds are in
+            units of the model's time. Clock 0 is the number 0, clock i is
+            ``model.clocks[i - 1]``.
         """
         return self._bounds
 
@@ -56,7 +57,7 @@ class SymbolicState:
 def symbolic_states(
     found: list[ReachedEntry], edges: list[list[EdgeEntry]]
 ) -> Iterator[SymbolicState]:
-    """The states that the engine has reached; `edges` are those of the model, by process."""
+    """The states that the engine has reached; `edges` are the model's edges, by process."""
     for index, (discrete, zone, bounds, origin) in enumerate(found):
         raw = json.loads(discrete)
         yield SymbolicState(
@@ -115,10 +116,10 @@ class Simulation:
             self._raw.take(index)
 
     def settle(self) -> None:
-        """Follows moves as long as time cannot pass and there is exactly one.
+        """Takes moves as long as time cannot pass and there is exactly one.
 
         Raises:
-            ModelError: The model fails on the way.
+            ModelError: The model has a run-time error.
         """
         with failing():
             self._raw.settle()

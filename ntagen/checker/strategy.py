@@ -1,7 +1,8 @@
-"""Strategies of timed games as values: what to do in a state, state by state, and as files.
+"""Strategies of timed games: what to do in a state, a list of all decisions, and files.
 
-A strategy is of the player who wins: of the controller, or of the environment, which shows why the
-controller cannot win. Clock values and waits are exact fractions of the model's unit of time.
+The owner of a strategy is the player who wins: the controller, or the environment, whose strategy
+shows why the controller cannot win. Clock values and waits are exact fractions of the model's unit
+of time.
 """
 
 from __future__ import annotations
@@ -31,17 +32,17 @@ ForcedRule = Literal["tiga", "product", "neutral"]
 PriorityRule = Literal["ignore", "keep"]
 
 ExactNumber = int | Fraction | Decimal | str
-"""A clock value; texts are such as ``"3/2"`` and ``"1.5"``."""
+"""A clock value; a text looks like ``"3/2"`` or ``"1.5"``."""
 
 _TIME = "#time"
-"""The clock of strategies with a limit of time: the time since the start."""
+"""The clock of strategies with a time limit: the time since the start."""
 
 _DECISIONS_SHOWN = 5
-"""Decisions that a message lists."""
+"""A message lists at most this many decisions."""
 
 
 class Discrete(Protocol):
-    """What has locations and variables: a state of a run, a symbolic state, a walk."""
+    """Anything with locations and variables: a state of a run, a symbolic state, a walk."""
 
     @property
     def locations(self) -> dict[str, str]:
@@ -61,15 +62,16 @@ class Advice:
     """What a strategy does, or allows, in a state with exact clock values.
 
     Attributes:
-        kind: ``act``: it takes `edges` now. ``wait``: it lets time pass, and the opponent move.
-            ``done``: play has ended here, won.
+        kind: ``act``: it takes `edges` now. ``wait``: it waits; the opponent may move. ``done``:
+            play has ended here, won.
         edges: The edges that are taken together, the sender's first; empty unless it acts.
-        delay: Of waiting: after how long it acts, if the opponent has not moved before. Where
-            acting has no first moment (``x > 1``), one is chosen that is soon. ``None`` if it
-            waits as long as time passes.
-        then: What it takes after `delay`; of a permissive strategy the first of what is allowed.
-        rank: Along a play it never grows; 0 where what is sought is reached, and everywhere in
-            strategies that only avoid something.
+        delay: If it waits, the time until it acts, unless the opponent moves before. If acting has
+            no first moment (``x > 1``), a moment soon after is chosen. ``None`` if it waits as
+            long as time passes.
+        then: The edges that it takes after `delay`; a permissive strategy takes the first move
+            that it allows.
+        rank: It never grows during a play. It is 0 at the goal, and everywhere in a strategy that
+            only avoids something.
     """
 
     kind: Literal["act", "wait", "done"]
@@ -92,11 +94,12 @@ class Decision:
     """What a strategy does in some zones of a state.
 
     Attributes:
-        zones: Where it applies: in one of these, each a list of constraints that all hold, such as
-            ``x <= 3``; the empty list always holds.
-        edges: The edges that are taken together, the sender's first; empty is to wait. Of an edge
-            of the controller to a branch point this is one leg, and the environment picks any.
-        rank: As of `Advice`.
+        zones: It applies in each of these zones. A zone is a list of constraints, such as
+            ``x <= 3``, that all hold; the empty list always holds.
+        edges: The edges that are taken together, the sender's first; empty means to wait. If an
+            edge of the controller leads to a branch point, this is one leg; the environment picks
+            any.
+        rank: As in `Advice`.
     """
 
     zones: tuple[tuple[str, ...], ...]
@@ -110,16 +113,16 @@ class Decision:
 
 @dataclass(frozen=True, slots=True)
 class StrategyState:
-    """What a strategy says of some locations and variables.
+    """The decisions of a strategy for some locations and variables.
 
     Attributes:
         locations: The location of each process.
         variables: The value of each variable.
-        is_goal: Whether play has ended here, won, whatever the clocks say.
-        decisions: What to do. The first that applies counts; of a permissive strategy each is
-            allowed.
-        legs: The legs of the controller's moves that the environment picks, if it is its strategy:
-            of those of the same edges the first that applies.
+        is_goal: Whether play has ended here, won, for all clock values.
+        decisions: What to do. The first decision that applies counts; in a permissive strategy
+            each one that applies is allowed.
+        legs: In a strategy of the environment, the legs that it picks for moves of the controller:
+            for each move the first that applies.
     """
 
     locations: dict[str, str] = field(hash=False)
@@ -131,12 +134,12 @@ class StrategyState:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """What an independent check came to.
+    """The result of an independent check.
 
     Attributes:
-        holds: Whether the evidence shows what it is said to; ``None`` if the check does not cover
-            the model or the query.
-        lines: What was looked at, or what is wrong.
+        holds: Whether the evidence is right; ``None`` if the check does not cover the model or the
+            query.
+        lines: What was checked, or what is wrong.
     """
 
     holds: bool | None
@@ -148,13 +151,13 @@ class Strategy:
 
     Attributes:
         query: The query that it answers.
-        owner: Whose it is: the ``controller``'s, or the ``environment``'s against the query.
-        winning: Whether the controller wins: whether it is the controller's strategy.
+        owner: ``controller``, or ``environment`` if the strategy shows that the controller loses.
+        winning: Whether the controller wins, so that this is the controller's strategy.
         is_permissive: Whether every decision that applies is allowed, and not only the first. Such
-            strategies keep something, and are the most permissive ones.
-        time_limit: Of ``control_t*``: the time within which the controller gets to the goal, or for
-            as long as the environment keeps it from there. The strategy looks at the clock
-            ``#time`` then, the time since the start. ``None`` without a limit.
+            a strategy keeps a condition, and allows as much as possible.
+        time_limit: For ``control_t*``: the time within which the controller reaches the goal, or
+            during which the environment prevents it. The strategy then reads the clock ``#time``,
+            the time since the start. ``None`` without a limit.
         forced: The rule for forced moves of the game.
         priorities: Whether priorities count in the game.
     """
@@ -186,44 +189,45 @@ class Strategy:
 
     @property
     def under(self) -> Strategy | None:
-        """The strategy of the controller that the game is ``under``; ``None`` if it is under none.
+        """The strategy that the game is ``under``; ``None`` if it is under none.
 
-        The controller makes no move that this one forbids, and waits only where it may.
+        The controller makes only moves that this strategy allows, and waits only where it allows
+        waiting.
         """
         raw = self._raw.under()
         return None if raw is None else Strategy(raw, self.forced, self.priorities)
 
     @property
     def start(self) -> Literal["initial", "anywhere"] | Run:
-        """Where play by it begins.
+        """Where play by the strategy begins: usually ``initial``, the initial state.
 
-        In the initial state; or, of ``E<> control:``, where both players together get to by a run,
-        if the controller wins; and ``anywhere`` that can be reached if the environment does.
+        For ``E<> control:`` play begins after a run of both players together, if the controller
+        wins; if the environment wins, it begins ``anywhere`` that is reachable.
 
         Raises:
             InputError: The run is not possible in the model.
-            ModelError: The model fails on the way.
+            ModelError: The model has a run-time error.
         """
         with _rejecting():
             start: Literal["initial", "anywhere"] | dict[str, Any] | None
             start = json.loads(self._raw.start_json(self.priorities))
         if start is None:
-            raise InputError("the way to where the strategy begins is not possible in the model")
+            raise InputError("the run to the start of the strategy is not possible in the model")
         return runs_of(start)[0] if isinstance(start, dict) else start
 
     def at(self, state: StateLike | Discrete) -> StrategyState:
-        """What it says of the locations and variables of a state; clocks are not looked at.
+        """The decisions for the locations and variables of a state; its clocks are ignored.
 
         Raises:
-            UndecidedError: It has no such state.
-            InputError: It is no state of the model.
+            UndecidedError: The strategy does not have this state.
+            InputError: The model does not have this state.
         """
         return _state(json.loads(self._at(self._given(state))))
 
     def action(self, state: StateLike, *, time: ExactNumber | None = None) -> Advice:
-        """What it does in a state.
+        """What the strategy does in a state.
 
-        A permissive strategy waits as long as it may, and then takes the first of what it allows.
+        A permissive strategy waits as long as it may, and then takes the first move that it allows.
 
         Args:
             state: The state.
@@ -239,11 +243,11 @@ class Strategy:
         return next((one for one in allowed if one.kind == "wait"), allowed[0])
 
     def allowed(self, state: StateLike, *, time: ExactNumber | None = None) -> tuple[Advice, ...]:
-        """All that it allows in a state: one thing, unless it is permissive.
+        """All that the strategy allows in a state: one action, unless it is permissive.
 
         Args:
             state: The state.
-            time: As of `action`.
+            time: As in `action`.
 
         Raises:
             UndecidedError: It says nothing of the state.
@@ -253,14 +257,14 @@ class Strategy:
         if not isinstance(state, State | Mapping):
             raise InputError(
                 "a symbolic state has no clock values\n"
-                "hint: ask `at`, which gives the decisions with their zones, or write the values"
+                "hint: use `at`, which gives the decisions with their zones, or give clock values"
             )
         given = self._given(state)
         if time is not None:
             given["clocks"][_TIME] = _pair(_TIME, time)
         if self.time_limit is not None and _TIME not in given["clocks"]:
             raise InputError(
-                "the strategy keeps to a limit of time, and the state does not say how late it is\n"
+                "the strategy has a time limit, and the state does not say how late it is\n"
                 f"hint: give the time since the start: time=…, or {_TIME} among the clocks"
             )
         try:
@@ -280,9 +284,9 @@ class Strategy:
         return self._raw.json()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it to a file, which `ntagen.load_strategy` and ``loadStrategy`` read.
+        """Writes the strategy to a file, which `ntagen.load_strategy` and ``loadStrategy`` read.
 
-        The file is written completely or not at all; a folder that is missing is made.
+        The file is written completely or not at all; a missing folder is made.
 
         Raises:
             InputError: The file cannot be written.
@@ -290,36 +294,36 @@ class Strategy:
         write_files({Path(path): self.json() + "\n"})
 
     def keep(self, name: str) -> None:
-        """Lets later queries of the model be asked under it: ``A<> Gate.Open under S``.
+        """Makes the strategy available to later queries of the model: ``A<> Gate.Open under S``.
 
         Args:
-            name: What such queries call it.
+            name: The name of the strategy in such queries.
         """
         self._raw.keep(name)
 
     def verify(self, states: int | None = None) -> Verification:
-        """Checks that its owner wins, in closed loop, against every move of the opponent.
+        """Checks that the owner wins, in closed loop, against every move of the opponent.
 
-        The check shares nothing with the solver.
+        The check shares no code with the solver.
 
         Args:
-            states: It gives up after so many regions; by default two million.
+            states: The check gives up after this many regions; by default two million.
 
         Returns:
-            Whether it wins; the lines hold the run that shows what is wrong, if anything is.
+            Whether the owner wins; if not, the lines have the run that shows why.
 
         Raises:
-            InputError: Its query is none of the model.
+            InputError: The strategy's query does not fit the model.
         """
         with _rejecting():
             holds, lines = self._raw.verify(self.forced, self.priorities, states)
         return Verification(holds, tuple(lines))
 
     def play(self) -> Play:
-        """Begins a play against it: the opponent's moves are chosen by the caller.
+        """Begins a play against the strategy; the caller chooses the opponent's moves.
 
         Raises:
-            InputError: Its query is none of the model.
+            InputError: The strategy's query does not fit the model.
             ModelError: The initial state cannot be computed.
         """
         with _rejecting():
@@ -350,10 +354,10 @@ class Strategy:
         if isinstance(value, int | float):
             # Truth values are 0 and 1.
             return float(value) if isinstance(value, float) else int(value)
-        # Most likely a clock was meant, by a name that is not its own.
+        # Most likely the user meant a clock, but wrote its name wrong.
         clocks = ", ".join(sorted(self._clocks)) or "none"
         raise InputError(
-            f"the value {value!r} of {name} is no number\n{_STATE_HINT}; the clocks are {clocks}"
+            f"the value {value!r} of {name} is not a number\n{_STATE_HINT}; the clocks are {clocks}"
         )
 
     def _at(self, given: dict[str, Any]) -> str:
@@ -415,7 +419,7 @@ def _pair(name: str, value: object) -> tuple[int, int]:
         else:
             return exact.numerator, exact.denominator
     hint = "write an integer, a Fraction, or a text such as '3/2' or '1.5'"
-    raise InputError(f"the value {value!r} of clock {name} is no exact number\nhint: {hint}")
+    raise InputError(f"the value {value!r} of clock {name} is not an exact number\nhint: {hint}")
 
 
 def _edges(raw: list[dict[str, Any]] | None) -> tuple[Edge, ...]:

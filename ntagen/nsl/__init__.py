@@ -6,12 +6,12 @@
              form            names, units,      rules on
                              loops, includes    the values
 
-No phase stops at the first mistake, and a mistake in one statement hides none in another: `load`
-raises one `SourceError` that holds everything that is wrong. The language is described in this
-folder's README.md; its grammar is ``grammar.lark``.
+No phase stops at the first mistake, and a mistake in one statement does not hide one in another:
+`load` raises one `SourceError` with all mistakes. The README.md of this folder describes the
+language; its grammar is ``grammar.lark``.
 
-Invariants: only `ntagen.nsl.reading` touches the disk; nothing here prints; any text at all gives a
-scene or a `SourceError`, nothing else.
+Invariants: only `ntagen.nsl.reading` touches the disk; nothing here prints; any text gives a scene
+or a `SourceError`, nothing else.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ def load(path: str | Path, *, include: Sequence[str | Path] = ()) -> Scene:
 
     Args:
         path: The file.
-        include: Folders below which included files may lie, beside that of the file.
+        include: Folders below which included files may lie, besides the folder of the file.
 
     Raises:
-        SourceError: The file cannot be read or has mistakes; all of them are in it.
+        SourceError: The file cannot be read, or has mistakes; the error has all of them.
     """
     return load_with_warnings(path, include=include)[0]
 
@@ -50,7 +50,7 @@ def load(path: str | Path, *, include: Sequence[str | Path] = ()) -> Scene:
 def load_with_warnings(
     path: str | Path, *, include: Sequence[str | Path] = ()
 ) -> tuple[Scene, tuple[Diagnostic, ...]]:
-    """The scene that a file describes, and what is doubtful in it; all else as of `load`."""
+    """The scene that a file describes, and the warnings; all else is as in `load`."""
     from ntagen.nsl.reading import read_source
 
     reporter = Reporter()
@@ -61,10 +61,10 @@ def load_with_warnings(
 
 
 def loads(text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()) -> Scene:
-    """The scene that a text describes; `path` is its name and where its includes are looked for.
+    """The scene that a text describes; `path` is its name, and its folder that of its includes.
 
     Raises:
-        SourceError: The text has mistakes; all of them are in it.
+        SourceError: The text has mistakes; the error has all of them.
     """
     return loads_with_warnings(text, path, include=include)[0]
 
@@ -72,15 +72,15 @@ def loads(text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()
 def loads_with_warnings(
     text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()
 ) -> tuple[Scene, tuple[Diagnostic, ...]]:
-    """The scene that a text describes, and what is doubtful in it; as `loads`."""
+    """The scene that a text describes, and the warnings; all else is as in `loads`."""
     return _scene(Source(path, text), Reporter(), include)
 
 
 def format_text(text: str, path: str = "<text>") -> str:
-    """The text in its canonical layout: comments kept, meaning unchanged, a second time the same.
+    """The text in the standard layout. Comments and meaning stay; a second time changes nothing.
 
     Raises:
-        SourceError: The text has mistakes of form.
+        SourceError: The text has syntax errors.
     """
     from ntagen.nsl.format import format_source
 
@@ -90,7 +90,7 @@ def format_text(text: str, path: str = "<text>") -> str:
 def _scene(
     source: Source, reporter: Reporter, include: Sequence[str | Path]
 ) -> tuple[Scene, tuple[Diagnostic, ...]]:
-    """The phases, one after the other."""
+    """Runs the phases, one after the other."""
     from ntagen.nsl.build import build
     from ntagen.nsl.resolve import resolve
 

@@ -1,6 +1,6 @@
-"""The draft to a scene, with every rule that the values must obey (`ntagen.rules`), and its places.
+"""Makes a scene from a draft, and checks all rules on the values (`ntagen.rules`).
 
-Each rule reports and goes on; the scene is made if none of them found an error.
+A rule reports a mistake with its place and goes on. The scene is made if there are no errors.
 
 Sources: the model's declaration (paper, appendix), which computes in 32-bit integers scaled by the
 resolution, checks regions at the ends of steps, and counts touching a region as being in it.
@@ -38,20 +38,20 @@ DEFAULT_ROLLS_DEG: Final = (90.0, 180.0, 270.0)
 DEFAULT_MAX_ROLLS: Final = 2
 DEFAULT_ROLL_DISTANCE_MM: Final = 2.0
 DEFAULT_RESOLUTION_PER_MM: Final = 1000
-"""What holds where the file says nothing: the values of the paper's declaration."""
+"""The defaults: the values of the paper's declaration."""
 
 
 _ABSURD_MM: Final = 1e100
 
 
 def build(draft: Draft, reporter: Reporter) -> Scene | None:
-    """The scene that the draft describes, or None after an error, of which the reporter knows."""
+    """The scene that the draft describes, or None after an error, which is reported."""
     return _Builder(draft, reporter).scene()
 
 
 @dataclass(frozen=True, slots=True)
 class _Sphere:
-    """A region that is known completely, with its places in the file."""
+    """A region without mistakes, with its places in the file."""
 
     region: Region
     draft: DraftRegion
@@ -76,7 +76,7 @@ class _Builder:
             self._obeys(rules.query(name, query.value or ""), query.span)
         resolution = self._resolution()
         spheres = self._spheres()
-        # What follows computes with squares, which are no numbers if values are absurd.
+        # The next rules compute squares, which are infinite for absurdly large values.
         if self._check_range(resolution or 1, tip, needle, limits, spheres):
             if tip is not None:
                 self._check_regions(tip, spheres)
@@ -106,7 +106,7 @@ class _Builder:
         """Every environment has a needle with radius and speed, and a target."""
         draft = self._draft
         if draft.has_gaps and not {"needle", "target"} <= draft.seen.keys():
-            return  # What is missing may be what could not be read.
+            return  # A statement that seems to be missing may be one with a mistake.
         if "needle" not in draft.seen:
             self._report(
                 "needle-missing",
@@ -168,13 +168,13 @@ class _Builder:
         return _unit(placed.value)
 
     def _obeys(self, breach: rules.Breach | None, span: Span) -> bool:
-        """Whether a value obeys a rule; reports it if not."""
+        """Whether a value obeys a rule; if not, reports it."""
         if breach is not None:
             self._report(breach.rule, span, breach.message, hint=breach.hint)
         return breach is None
 
     def _report_skew(self, heading: Vector, bevel: Vector, breach: rules.Breach) -> None:
-        """Reports a bevel that is not at right angles to the heading, with the nearest that is."""
+        """Reports a bevel that is not at right angles to the heading, and proposes the nearest."""
         placed = self._draft.vectors.get("bevel") or self._draft.vectors["heading"]
         rest = _minus(bevel, _times(_dot(heading, bevel), heading))
         if math.hypot(*rest) < 1e-3:
@@ -197,7 +197,7 @@ class _Builder:
         )
 
     def _needle(self, tip: Pose | None) -> Needle | None:
-        """The needle, if all of it is right."""
+        """The needle, or None after a mistake in it."""
         radius = self._positive("radius", "radius-not-positive", "the radius of the motion circle")
         speed = self._positive("speed", "speed-not-positive", "the insertion speed")
         length = (
@@ -210,7 +210,7 @@ class _Builder:
         return Needle(tip, radius, speed, length)
 
     def _limits(self) -> Limits | None:
-        """What the controller may do, if all of it is right."""
+        """What the controller may do, or None after a mistake in it."""
         draft = self._draft
         step = (
             DEFAULT_STEP_S
@@ -278,7 +278,7 @@ class _Builder:
     # ------------------------------------------------------------------------------------ regions
 
     def _spheres(self) -> list[_Sphere]:
-        """All regions of which everything is right, in the order written."""
+        """All regions without mistakes, in the order written."""
         spheres = []
         for draft in self._draft.regions.values():
             region = self._around(draft) if draft.around is not None else self._sphere(draft)
@@ -356,7 +356,7 @@ class _Builder:
     # -------------------------------------------------------------------------------------- rules
 
     def _check_regions(self, tip: Pose, spheres: list[_Sphere]) -> None:
-        """Where regions lie, seen from the tip and from each other."""
+        """Checks the positions of regions relative to the tip and to each other."""
         targets = [sphere for sphere in spheres if sphere.region.kind == "target"]
         others = [sphere for sphere in spheres if sphere.region.kind != "target"]
         for target in targets:
@@ -367,7 +367,7 @@ class _Builder:
             self._check_start(tip, other)
 
     def _check_reachable(self, tip: Pose, target: _Sphere) -> None:
-        """A target must not lie behind the tip, and should not hold it."""
+        """A target must not lie behind the tip, and should not contain it."""
         region, span = target.region, _place_of(target)
         offset = _minus(region.center_mm, tip.position_mm)
         ahead = _dot(offset, tip.heading)
@@ -388,7 +388,7 @@ class _Builder:
     def _check_overlap(self, target: _Sphere, other: _Sphere) -> None:
         """A target must not lie in a critical region, and its centre should not.
 
-        Regions that reach into a target are no mistake: a vessel at the surface of a tumour does.
+        A region may reach into a target, as a vessel at the surface of a tumour does.
         """
         inner, outer = target.region, other.region
         distance = math.dist(inner.center_mm, outer.center_mm)
@@ -427,7 +427,7 @@ class _Builder:
     def _check_step(
         self, needle: Needle, limits: Limits, resolution: int, spheres: list[_Sphere]
     ) -> None:
-        """The model must see all, and one push bend the needle and not jump over a region."""
+        """Lengths must fit the model; a push must bend the needle and not jump over a region."""
         placed = self._draft.numbers.get("step")
         span = self._draft.span if placed is None else placed.span
         advance = needle.speed_mm_per_s * limits.step_s
@@ -449,11 +449,11 @@ class _Builder:
             )
 
     def _is_visible(self, sphere: _Sphere, resolution: int) -> bool:
-        """Whether the model sees a region; reports it if not."""
+        """Whether the model can represent a region; if not, reports it."""
         breach = rules.visible(
             sphere.region.radius_mm, resolution, f"the radius of `{sphere.region.name}`"
         )
-        # The critical region that it lies around is even smaller.
+        # The critical region inside is even smaller.
         if sphere.draft.around is not None:
             return breach is None
         return self._obeys(breach, sphere.draft.radius.span)
@@ -469,7 +469,7 @@ class _Builder:
         """Reports every length that does not fit into the model's numbers.
 
         Returns:
-            Whether the square of each is a number.
+            Whether the square of each length is finite.
         """
         largest_mm = 0.0
         for what, length_mm, span in self._lengths(tip, needle, limits, spheres):
@@ -484,7 +484,7 @@ class _Builder:
         limits: Limits | None,
         spheres: list[_Sphere],
     ) -> Iterator[tuple[str, float, Span]]:
-        """The lengths that the model holds, with what they are and where they come from."""
+        """The lengths in the model, with their names and their places in the file."""
         draft = self._draft
         if tip is not None and "tip" in draft.vectors:
             yield "the tip's position", math.hypot(*tip.position_mm), draft.vectors["tip"].span
@@ -510,7 +510,7 @@ class _Builder:
         start = DEFAULT_TIP_MM if tip is None else tip.position_mm
         for sphere in spheres:
             region = sphere.region
-            # The model also holds the distance from the tip to the centre.
+            # The model also contains the distance from the tip to the centre.
             reach = max(math.dist(start, region.center_mm), math.hypot(*region.center_mm))
             yield f"`{region.name}`", reach + region.radius_mm, _place_of(sphere)
 
@@ -521,7 +521,7 @@ def _of_kind(spheres: list[_Sphere], kind: RegionKind) -> tuple[Region, ...]:
 
 
 def _place_of(sphere: _Sphere) -> Span:
-    """Where a region's place in space is written."""
+    """The place in the file of a region's position."""
     center = sphere.draft.center
     return sphere.draft.name_span if center is None else center.span
 
@@ -552,5 +552,5 @@ def _unit(a: Vector) -> Vector:
 
 
 def _rounded(component: float) -> float:
-    """A component as it is proposed in a hint, without a negative zero."""
+    """A component as a hint shows it, without a negative zero."""
     return round(component, 6) + 0.0

@@ -1,4 +1,4 @@
-"""The trees of lark to ours (`ntagen.nsl.tree`)."""
+"""Converts lark's trees to those of `ntagen.nsl.tree`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class TreeBuilder:
-    """Turns lark's trees into ours."""
+    """Converts lark's trees to those of `ntagen.nsl.tree`."""
 
     def __init__(self, source: Source) -> None:
         self._source = source
@@ -77,7 +77,7 @@ class TreeBuilder:
         )
 
     def _roll(self, parts: Sequence[object], span: Span) -> tree.Roll:
-        """Angles and limits, told apart by their nodes."""
+        """A roll: the kind of a node tells whether it is an angle or a limit."""
         nodes = [cast("lark.Tree[lark.Token]", part) for part in parts]
         limits: dict[str, list[tree.Expression]] = {"at_most": [], "at_least": []}
         angles: list[tree.Expression] = []
@@ -89,7 +89,7 @@ class TreeBuilder:
         return tree.Roll(span, tuple(angles), tuple(limits["at_most"]), tuple(limits["at_least"]))
 
     def expression(self, node: object) -> tree.Expression:
-        """An expression; levels of the grammar that add nothing vanish."""
+        """An expression; levels of the grammar with a single child are skipped."""
         node = cast("lark.Tree[lark.Token]", node)
         children = node.children
         span = self._span(node)

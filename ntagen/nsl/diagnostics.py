@@ -1,11 +1,11 @@
-"""Diagnostics: what is wrong in an environment file, where, why, and what to do about it.
+"""Diagnostics: what is wrong in an environment file, where, why, and how to fix it.
 
-A diagnostic is a value. Nothing here stops at the first one: the phases hand theirs to a
-`Reporter`, and when all have run, everything is shown at once, sorted by place (`SourceError`).
+A diagnostic is a value. The first one does not stop the work: the phases give theirs to a
+`Reporter`, and when all have run, all diagnostics are shown, sorted by place (`SourceError`).
 
-A diagnostic is known by its defect (``unknown-unit``) and by a code that never changes (``N023``);
-`KINDS` is the table of all of them, with one explanation each, and ``pages/`` has an example of
-each and how to mend it. Errors keep the scene from being made, warnings do not.
+A kind of diagnostic has a name (``unknown-unit``) and a code that never changes (``N023``). `KINDS`
+is the table of all kinds, with one explanation each; ``pages/`` has an example of each and how to
+fix it. After an error no scene is made; after a warning it is.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Severity = Literal["error", "warning"]
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of defect: its code, its name, whether it is an error, and what it is about."""
+    """A kind of mistake: its code, its name, its severity, and an explanation."""
 
     code: str
     name: str
@@ -40,9 +40,9 @@ KINDS: Final = _kinds(
     # Reading the file.
     ("N001", "file-missing", "error", "There is no such file."),
     ("N002", "file-unreadable", "error", "It is a folder, or reading it is not permitted."),
-    ("N003", "file-not-text", "error", "The file holds bytes that no text has."),
+    ("N003", "file-not-text", "error", "The file has bytes that do not occur in text."),
     ("N004", "file-not-utf-8", "error", "The file is text, but not encoded in UTF-8."),
-    ("N005", "file-empty", "error", "The file holds nothing, or comments only."),
+    ("N005", "file-empty", "error", "The file is empty, or has only comments."),
     ("N006", "file-too-large", "error", "Files of more than 1 MiB are refused."),
     ("N007", "too-many-mistakes", "error", "After 1,000 mistakes no more are shown."),
     # Form.
@@ -54,120 +54,135 @@ KINDS: Final = _kinds(
     ("N015", "unexpected-word", "error", "Something else must stand at this place."),
     ("N016", "unknown-keyword", "error", "No statement begins with this word."),
     ("N017", "misplaced-statement", "error", "The statement does not belong in these braces."),
-    ("N018", "missing-brace", "error", "The statement needs braces, or has some too many."),
+    ("N018", "missing-brace", "error", "The statement needs braces, or must not have any."),
     ("N019", "nesting-too-deep", "error", "Parentheses, loops or includes are nested too deep."),
     # Names.
-    ("N020", "unknown-name", "error", "Nothing of this name is defined before this place."),
-    ("N021", "duplicate-name", "error", "The name is taken already."),
-    ("N022", "reserved-name", "error", "The word means something in the language itself."),
+    ("N020", "unknown-name", "error", "This name is not defined before this place."),
+    ("N021", "duplicate-name", "error", "The name is already used."),
+    ("N022", "reserved-name", "error", "The word has a meaning in the language itself."),
     ("N023", "unknown-unit", "error", "There is no such unit."),
     ("N024", "unknown-function", "error", "There is no such function."),
-    ("N025", "unknown-choice", "error", "Only a few words may stand here."),
+    ("N025", "unknown-choice", "error", "Only a few words can stand here."),
     ("N026", "name-without-index", "error", "A region in a loop needs an index: Ring[i]."),
-    ("N027", "unknown-region", "error", "There is no region of this name to lie around."),
-    ("N028", "region-not-critical", "error", "Only critical regions have detection around them."),
-    ("N029", "around-misused", "error", "Only a detection region may be written with around."),
+    ("N027", "unknown-region", "error", "There is no critical region with this name."),
+    ("N028", "region-not-critical", "error", "A detection region lies around a critical region."),
+    ("N029", "around-misused", "error", "Only a detection region can be written with around."),
     # Values.
-    ("N030", "wrong-dimension", "error", "The value is of another dimension than is needed."),
-    ("N031", "missing-unit", "error", "A length, angle, time or speed is written with its unit."),
-    ("N032", "dimensions-differ", "error", "Only values of one dimension are added or compared."),
+    ("N030", "wrong-dimension", "error", "This place needs a value of another dimension."),
+    ("N031", "missing-unit", "error", "A length, angle, time or speed needs a unit."),
+    (
+        "N032",
+        "dimensions-differ",
+        "error",
+        "Only values of the same dimension can be added or compared.",
+    ),
     ("N033", "division-by-zero", "error", "The divisor is 0."),
-    ("N034", "not-a-number", "error", "The result is no finite real number."),
+    ("N034", "not-a-number", "error", "The result is not a finite real number."),
     ("N035", "wrong-argument-count", "error", "The function takes another number of arguments."),
     (
         "N036",
         "vector-misused",
         "error",
-        "A vector stands where a single value must, or vice versa.",
+        "There is a vector in the place of a single value, or the other way round.",
     ),
     ("N037", "vector-size", "error", "A vector has three components."),
-    ("N038", "unit-repeated", "error", "The value has a unit already."),
-    ("N039", "not-whole", "error", "A whole number must stand here."),
+    ("N038", "unit-repeated", "error", "The value already has a unit."),
+    ("N039", "not-whole", "error", "This must be a whole number."),
     # Loops, includes, queries.
-    ("N040", "loop-too-long", "error", "All loops together make 10,000 rounds at most."),
-    ("N041", "loop-empty", "warning", "The loop makes no round: it counts upwards only."),
-    ("N042", "include-cycle", "error", "A file includes itself, perhaps by way of others."),
+    ("N040", "loop-too-long", "error", "All loops together can make at most 10,000 rounds."),
+    ("N041", "loop-empty", "warning", "The loop makes no rounds: it only counts upwards."),
+    ("N042", "include-cycle", "error", "A file includes itself, perhaps through other files."),
     ("N043", "query-malformed", "error", "A query has a name, an equals sign and a text."),
-    ("N044", "include-outside", "error", "Files below the folder of the first may be included."),
-    # What must be there, and how often.
+    (
+        "N044",
+        "include-outside",
+        "error",
+        "Only files below the folder of the first file can be included.",
+    ),
+    # Required statements, and how often they may occur.
     ("N050", "environment-missing", "error", "A file describes one environment."),
     ("N051", "environment-repeated", "error", "A file describes one environment."),
     ("N052", "needle-missing", "error", "An environment has a needle."),
     ("N053", "target-missing", "error", "An environment has at least one target."),
     ("N054", "setting-missing", "error", "The needle's radius and speed have no default."),
-    ("N055", "statement-repeated", "error", "The statement may be written once."),
-    ("N056", "too-many-regions", "error", "10,000 regions at most, 100 of them targets."),
+    ("N055", "statement-repeated", "error", "The statement can be written only once."),
+    ("N056", "too-many-regions", "error", "There can be 10,000 regions, 100 of them targets."),
     # Rules on the values.
-    ("N060", "radius-not-positive", "error", "A radius is greater than 0."),
-    ("N061", "speed-not-positive", "error", "The insertion speed is greater than 0."),
-    ("N062", "step-not-positive", "error", "A model step takes some time."),
-    ("N063", "margin-negative", "error", "A detection region holds its critical region."),
-    ("N064", "margin-zero", "warning", "A margin of 0 leaves nothing to detect nearness in."),
-    ("N065", "direction-zero", "error", "A direction has a length."),
-    ("N066", "bevel-not-perpendicular", "error", "Heading and bevel are at right angles."),
+    ("N060", "radius-not-positive", "error", "A radius must be greater than 0."),
+    ("N061", "speed-not-positive", "error", "The insertion speed must be greater than 0."),
+    ("N062", "step-not-positive", "error", "A step of the model must take some time."),
+    ("N063", "margin-negative", "error", "A detection region must contain its critical region."),
+    ("N064", "margin-zero", "warning", "With a margin of 0 there is no space to sense nearness."),
+    ("N065", "direction-zero", "error", "A direction cannot be the zero vector."),
+    ("N066", "bevel-not-perpendicular", "error", "Heading and bevel must be at right angles."),
     ("N067", "roll-not-whole-degrees", "error", "The model rolls by whole degrees."),
     ("N068", "roll-out-of-range", "error", "A roll is more than 0 and less than 360 degrees."),
     ("N069", "roll-repeated", "error", "Each roll is written once."),
     ("N070", "roll-count-out-of-range", "error", "A plan has from 0 to 100 rolls."),
-    ("N071", "distance-negative", "error", "A distance is not negative."),
+    ("N071", "distance-negative", "error", "A distance cannot be negative."),
     (
         "N072",
         "resolution-not-whole",
         "error",
-        "The model counts in whole parts of a mm, 1 or more.",
+        "The number of units per mm must be whole, 1 or more.",
     ),
     (
         "N073",
         "value-out-of-range",
         "error",
-        "The model computes with 32-bit integers, of which a scene may use 28.",
+        "The model computes with 32-bit integers; a scene can use 28 of these bits.",
     ),
     ("N074", "step-too-short", "error", "At this resolution a step would not bend the needle."),
-    ("N075", "step-too-long", "warning", "Regions are checked at the ends of steps only."),
-    ("N076", "target-in-critical", "error", "No point of the target may be reached."),
-    ("N077", "target-overlaps", "warning", "The middle of the target must not be reached."),
+    ("N075", "step-too-long", "warning", "Regions are checked only at the ends of steps."),
+    ("N076", "target-in-critical", "error", "The needle must not reach any point of the target."),
+    ("N077", "target-overlaps", "warning", "The needle must not reach the centre of the target."),
     ("N078", "target-behind-needle", "error", "The needle moves along its heading, never back."),
     ("N079", "tip-in-critical", "error", "The needle would start in a critical region."),
     ("N080", "tip-in-detection", "warning", "Detection counts as critical: there is no plan."),
     ("N081", "tip-in-target", "warning", "The target is reached before the first move."),
-    ("N082", "length-not-positive", "error", "The needle's length is greater than 0."),
-    ("N083", "value-too-small", "error", "At this resolution nothing would be left of the value."),
-    ("N084", "step-around-circle", "error", "Swept, a step goes less than half round the circle."),
+    ("N082", "length-not-positive", "error", "The needle's length must be greater than 0."),
+    ("N083", "value-too-small", "error", "At this resolution the value would be rounded to 0."),
+    (
+        "N084",
+        "step-around-circle",
+        "error",
+        "With `safety swept`, a step goes less than half round the circle.",
+    ),
 )
-"""All kinds of defects by name, in the order of their codes."""
+"""All kinds of mistakes by name, in the order of their codes."""
 
 
 _PAGES: Final = Path(__file__).parent / "pages"
 
 
 def page_of(kind: Kind) -> str:
-    r"""What is to be said of a kind of defect, in Markdown: meaning, example, how to mend it.
+    r"""The page of a kind of mistake, in Markdown: meaning, example, how to fix it.
 
-    Examples are fenced; the word behind the language says whether one is ``wrong`` or ``right``. In
-    them ``\xE9`` stands for the byte of this number.
+    Examples are fenced; the word after the language says whether one is ``wrong`` or ``right``. In
+    an example ``\xE9`` stands for the byte with this number.
     """
     return f"{kind.explanation}\n\n{(_PAGES / f'{kind.code}.md').read_text('utf-8')}"
 
 
 MAX_DIAGNOSTICS: Final = 1000
-"""More are not collected: by then the file is no environment."""
+"""More are not collected: a file with so many mistakes is not an environment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One defect at one place.
+    """One mistake at one place.
 
     Attributes:
         code: The code of its kind, ``N023``.
-        severity: Whether it keeps the scene from being made.
-        path: The file, as the user named it; for an included file as the include leads to it.
-        line: The line, from 1; 0 if the defect is the file itself.
+        severity: ``error`` or ``warning``.
+        path: The file, as the user named it; for an included file the path of the include.
+        line: The line, from 1; 0 if the diagnostic is about the whole file.
         column: The character in the line, from 1.
-        length: How many characters are meant, at least 1, all of them on this line.
+        length: How many characters are marked, at least 1, all of them on this line.
         message: What is wrong: one line, lower case, no full stop.
         source_line: The line of the file.
-        notes: Facts that help to understand it.
-        hint: What to do, if there is something to propose.
+        notes: Facts that help to understand the mistake.
+        hint: How to fix it, if there is a proposal.
     """
 
     code: str
@@ -182,7 +197,7 @@ class Diagnostic:
     hint: str | None = None
 
     def render(self) -> str:
-        """The diagnostic as lines for a terminal: message, source line, caret, notes and hint."""
+        """The lines for a terminal: message, source line, caret, notes and hint."""
         place = f"{self.path}:{self.line}:{self.column}" if self.line else self.path
         lines = [f"{place}: {self.severity}[{self.code}]: {self.message}"]
         gutter = " " * len(str(self.line))
@@ -200,7 +215,7 @@ class Diagnostic:
 
 
 class SourceError(InputError):
-    """An environment file with mistakes; `diagnostics` holds all of them, sorted by place."""
+    """An environment file has mistakes; `diagnostics` has all of them, sorted by place."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
@@ -208,7 +223,7 @@ class SourceError(InputError):
 
 
 class Reporter:
-    """Collects diagnostics; says a thing about a place once, however often a loop comes by."""
+    """Collects diagnostics; reports a mistake at a place once, even if a loop repeats it."""
 
     def __init__(self) -> None:
         self._found: dict[tuple[str, str, int, int], tuple[int, Diagnostic]] = {}
@@ -248,17 +263,15 @@ class Reporter:
         self._add(Diagnostic(kind.code, kind.severity, path, 0, 0, 1, message, "", (), hint))
 
     def enter(self, path: str) -> None:
-        """Gives a file its place in the order in which files are reported."""
+        """Adds a file to the order in which files are reported."""
         self._file_order.setdefault(path, len(self._file_order))
 
     def _add(self, diagnostic: Diagnostic) -> None:
-        """Adds a diagnostic, unless its kind was reported for the place already."""
+        """Adds a diagnostic, unless the same kind has been reported at the same place."""
         order = self._file_order.setdefault(diagnostic.path, len(self._file_order))
         if len(self._found) == MAX_DIAGNOSTICS:
             kind = KINDS["too-many-mistakes"]
-            message = (
-                f"there are more than {MAX_DIAGNOSTICS:,} mistakes, of which these are the first"
-            )
+            message = f"there are more than {MAX_DIAGNOSTICS:,} mistakes; these are the first ones"
             diagnostic = Diagnostic(kind.code, kind.severity, diagnostic.path, 0, 0, 1, message, "")
         elif len(self._found) > MAX_DIAGNOSTICS:
             return
@@ -267,7 +280,7 @@ class Reporter:
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """What was found: file by file in the order of entry, by place in each."""
+        """All diagnostics: by file in the order of `enter`, then by place."""
         found = sorted(
             self._found.values(), key=lambda f: (f[0], f[1].line, f[1].column, f[1].code)
         )
@@ -275,12 +288,12 @@ class Reporter:
 
     @property
     def has_errors(self) -> bool:
-        """Whether anything but warnings was found."""
+        """Whether there is an error, and not only warnings."""
         return any(d.severity == "error" for _, d in self._found.values())
 
 
 def suggest(word: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """The candidate that `word` most likely was meant to be, if one is near enough."""
+    """The candidate most similar to `word`, if one is similar enough."""
     import difflib
 
     lowered = {candidate.lower(): candidate for candidate in candidates}
@@ -289,7 +302,7 @@ def suggest(word: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | 
 
 
 def did_you_mean(word: str, candidates: Iterable[str], cutoff: float = 0.6) -> str | None:
-    """A hint with the nearest candidate, if there is one."""
+    """A hint with the most similar candidate, if there is one."""
     near = suggest(word, candidates, cutoff)
     return None if near is None else f"did you mean `{near}`?"
 
@@ -298,7 +311,7 @@ _CLIP_COLUMNS = 140
 
 
 def _clip(text: str, column: int) -> tuple[str, int]:
-    """A stretch of a very long line around the column, and the column in it."""
+    """A part of a very long line around the column, and the column in that part."""
     if len(text) <= _CLIP_COLUMNS:
         return text, column
     start = max(0, min(column - 1 - _CLIP_COLUMNS // 3, len(text) - _CLIP_COLUMNS))

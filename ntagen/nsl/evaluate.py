@@ -1,8 +1,8 @@
-"""Expressions to values, with names, units and dimensions.
+"""Evaluates expressions, with names, units and dimensions.
 
-An expression with a mistake has no value (None). What is computed from it has none either and is
-not reported again; its siblings are evaluated all the same, so that all their mistakes come out
-too.
+An expression with a mistake has no value (None). An expression that contains it has no value
+either, and no second report. The other operands are still evaluated, so that their mistakes are
+reported too.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ CONSTANTS: Final = {
     "y": Quantity((0.0, 1.0, 0.0), NUMBER),
     "z": Quantity((0.0, 0.0, 1.0), NUMBER),
 }
-"""Names that are always there: pi, and the directions of the axes."""
+"""Names that are always defined: pi, and the directions of the axes."""
 
 FUNCTIONS: Final = ("abs", "cos", "max", "min", "sin", "sqrt")
 """The functions."""
@@ -41,32 +41,32 @@ FUNCTIONS: Final = ("abs", "cos", "max", "min", "sin", "sqrt")
 
 @dataclass
 class Scope:
-    """The names that can be seen at a place: those of its braces and of the braces around."""
+    """The names that are visible at a place: those of its braces and of the braces around."""
 
     outer: Scope | None = None
     values: dict[str, Quantity | None] = field(default_factory=dict)
     spans: dict[str, Span] = field(default_factory=dict)
 
     def find(self, name: str) -> Scope | None:
-        """The scope that defines a name; None if no one does."""
+        """The scope that defines a name; None if there is none."""
         scope: Scope | None = self
         while scope is not None and name not in scope.values:
             scope = scope.outer
         return scope
 
     def names(self) -> list[str]:
-        """All names that can be seen."""
+        """All visible names."""
         outer = [] if self.outer is None else self.outer.names()
         return [*outer, *self.values]
 
     def define(self, name: str, span: Span, value: Quantity | None) -> None:
-        """Adds a name; None as the value says that its definition has a mistake."""
+        """Adds a name; its value is None if its definition has a mistake."""
         self.values[name] = value
         self.spans[name] = span
 
 
 class Evaluator:
-    """Evaluates expressions and says what is wrong with them."""
+    """Evaluates expressions and reports mistakes in them."""
 
     def __init__(self, reporter: Reporter) -> None:
         self._report = reporter.report
@@ -79,9 +79,9 @@ class Evaluator:
         """One number of a dimension, in mm, rad and s.
 
         Args:
-            expression: What is written.
+            expression: The expression.
             scope: The names that it may use.
-            dimension: What the place needs.
+            dimension: The dimension that its place needs.
             role: The place in words, as the subject of a message: ``the radius``.
 
         Returns:
@@ -103,7 +103,7 @@ class Evaluator:
     def vector(
         self, expression: tree.Expression, scope: Scope, dimension: Dimension, role: str
     ) -> tuple[float, float, float] | None:
-        """Three numbers of a dimension, in mm, rad and s; arguments and result as of `number`."""
+        """Three numbers of a dimension, in mm, rad and s; arguments and result as in `number`."""
         value = self.evaluate(expression, scope)
         if value is None:
             return None
@@ -122,12 +122,12 @@ class Evaluator:
         return first, second, third
 
     def whole(self, expression: tree.Expression, scope: Scope, role: str) -> int | None:
-        """A whole number; arguments and result as of `number`."""
+        """A whole number; arguments and result as in `number`."""
         value = self.number(expression, scope, NUMBER, role)
         if value is None:
             return None
         rounded = round(value)
-        # What comes out of a division is whole up to rounding.
+        # The result of a division may differ from a whole number by rounding.
         if abs(value - rounded) > 1e-9 * max(1.0, abs(value)):
             self._report(
                 "not-whole",
@@ -141,7 +141,7 @@ class Evaluator:
     def list_of(
         self, expressions: Sequence[tree.Expression], scope: Scope, dimension: Dimension, role: str
     ) -> list[float | None]:
-        """Numbers of a dimension; those without a unit take that of the last: ``90, 180 deg``."""
+        """Numbers of a dimension; one without a unit takes that of the last: ``90, 180 deg``."""
         last = expressions[-1]
         unit = last.unit if isinstance(last, tree.Measured) else None
         values: list[float | None] = []
@@ -155,7 +155,7 @@ class Evaluator:
     def _has(
         self, value: Quantity, dimension: Dimension, expression: tree.Expression, role: str
     ) -> bool:
-        """Whether a value is of the dimension that its place needs; reports it if not."""
+        """Whether a value has the dimension that its place needs; if not, reports it."""
         if value.dimension == dimension:
             return True
         if value.dimension == NUMBER:
@@ -210,7 +210,7 @@ class Evaluator:
                 value = self.evaluate(operand, scope)
                 if value is None or not is_negative:
                     return value
-                # 0.0 - n instead of -n keeps a minus from the sign of a zero.
+                # 0.0 - n instead of -n avoids a negative zero.
                 return value.map(lambda n: 0.0 - n, value.dimension)
             case tree.Chain():
                 return self._chain(expression, scope)
@@ -255,12 +255,12 @@ class Evaluator:
         return self._vanished(expression.span) if _vanishes(value, result) else result
 
     def _vanished(self, span: Span) -> Quantity | None:
-        """Reports a result that is not 0, but nearer to it than any number."""
+        """Reports a result that is not 0, but too small for a floating-point number."""
         self._report("not-a-number", span, "the result is too small for a number")
         return None
 
     def unit(self, unit: tree.Identifier) -> tuple[float, Dimension] | None:
-        """How many mm, rad or s a unit is, and its dimension; None after a mistake."""
+        """The factor of a unit to mm, rad or s, and its dimension; None after a mistake."""
         factor, dimension = 1.0, NUMBER
         for index, name in enumerate(part.strip() for part in unit.text.split("/")):
             if name not in UNITS:
@@ -297,7 +297,9 @@ class Evaluator:
         for component, value in zip(expression.components, known, strict=True):
             if value.is_vector:
                 self._report(
-                    "vector-misused", component.span, "a component is a single value, no vector"
+                    "vector-misused",
+                    component.span,
+                    "a component must be a single value, not a vector",
                 )
                 return None
             if value.dimension != known[0].dimension:
@@ -345,7 +347,7 @@ class Evaluator:
     def _scale(
         self, left: Quantity, right: Quantity, operator: str, right_span: Span, span: Span
     ) -> Quantity | None:
-        """A product or a quotient; one side of a product may be a vector, and a dividend."""
+        """A product or a quotient; one factor, or the dividend, may be a vector."""
         if right.is_vector and (operator == "/" or left.is_vector):
             what = "divided by a vector" if operator == "/" else "multiplied: both are vectors"
             self._report("vector-misused", right_span, f"these values cannot be {what}")
@@ -389,7 +391,7 @@ class Evaluator:
             return None
         for argument, value in zip(call.arguments, known_values, strict=True):
             if value.is_vector:
-                self._report("vector-misused", argument.span, f"`{name}` takes no vector")
+                self._report("vector-misused", argument.span, f"`{name}` cannot take a vector")
                 return None
         return self._apply(call, name, known_values)
 
@@ -441,13 +443,13 @@ class Evaluator:
 
 
 def _vanishes(before: Quantity, after: Quantity) -> bool:
-    """Whether something that was not 0 has become 0 by a factor that is not 0."""
+    """Whether a product is 0 although neither factor is 0."""
     pairs = zip(before.numbers, after.numbers, strict=True)
     return any(old != 0.0 and new == 0.0 for old, new in pairs)
 
 
 def _example(dimension: Dimension) -> str:
-    """A value of a dimension as one may write it."""
+    """An example of a value of a dimension."""
     return f"2 {USUAL_UNIT[dimension]}" if dimension in USUAL_UNIT else "2"
 
 
@@ -460,5 +462,5 @@ def _unit_hint(left: Dimension, right: Dimension) -> str | None:
 
 
 def _shortened(text: str) -> str:
-    """What is written, if it is short enough for a hint."""
+    """The text of an expression, if it is short enough for a hint."""
     return text if len(text) <= 30 and "\n" not in text else "…"

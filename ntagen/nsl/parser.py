@@ -243,7 +243,7 @@ class _Parser:
             "unknown-keyword",
             token.span,
             f"no statement begins with {quoted(token)}",
-            hint=f"did you mean `{meant}`?" if meant else f"here may stand {words}",
+            hint=f"did you mean `{meant}`?" if meant else f"possible words here: {words}",
         )
         if meant is None or meant == "query":
             return token
@@ -408,7 +408,7 @@ class _Parser:
         self._reporter.report(
             "misplaced-statement",
             word.span,
-            f"`{word.text}` may not stand {where}",
+            f"`{word.text}` cannot stand {where}",
             hint=f"it belongs {place}",
         )
 

@@ -179,7 +179,7 @@ class _Resolver:
         self._reporter.report(
             "misplaced-statement",
             statement.span,
-            f"`{statement.keyword}` may not be included {where}",
+            f"`{statement.keyword}` cannot be included {where}",
             hint="move the include, or the statement",
         )
 
@@ -286,7 +286,7 @@ class _Resolver:
                 span,
                 f"`{path}` includes itself",
                 notes=(" includes ".join([*chain, chain[0]]),),
-                hint="move what both need into a third file",
+                hint="move the parts that both files need into a third file",
             )
             return
         if key in self._included:
@@ -342,7 +342,7 @@ class _Resolver:
                 "loop-too-long",
                 statement.first.span.to(statement.last.span),
                 f"with this loop there are more than {limit} in loops",
-                hint="lay out fewer regions, or larger ones",
+                hint="describe fewer and larger regions",
             )
             if self._draft is not None:
                 self._draft.has_gaps = True
@@ -453,8 +453,8 @@ class _Resolver:
         self._reporter.report(
             "too-many-regions",
             statement.name.span,
-            f"an environment may hold {limit} at most",
-            hint="lay out fewer, larger ones",
+            f"an environment can have at most {limit}",
+            hint="describe fewer and larger ones",
         )
         return True
 

@@ -206,7 +206,7 @@ def test_a_growing_file_is_locked_until_it_is_closed(tmp_path: Path) -> None:
     file = GrowingFile(path)
     file.write(b"whole")
     file.acknowledge(to_disk=False)
-    with pytest.raises(InputError, match="another run is being written into it"):
+    with pytest.raises(InputError, match="another run is writing to it"):
         GrowingFile(path)
     assert path.read_bytes() == b"whole"
     file.close()

@@ -1,1 +1,1 @@
-"""Pictures of templates: what they show, where its parts are placed, and the drawing."""
+"""Pictures of templates: their contents, the layout, and the drawing."""

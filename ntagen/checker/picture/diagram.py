@@ -1,4 +1,4 @@
-"""What a picture of a template shows: its locations, branch points and edges.
+"""The contents of a template's picture: its locations, branch points and edges.
 
 Texts are as written in the model. Positions are in the units of UPPAAL's editor, x to the right and
 y down.
@@ -16,7 +16,7 @@ Point: TypeAlias = tuple[int, int]
 LocationKind = Literal["normal", "urgent", "committed"]
 
 LabelKind = Literal["name", "invariant", "rate", "select", "guard", "sync", "update", "weight"]
-"""What a label says: its attribute of `Location` or `Edge`."""
+"""The kind of a label: an attribute of `Location` or `Edge`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,14 +24,14 @@ class Location:
     """A location of a template.
 
     Attributes:
-        id: What edges refer to it by; in XTA its name.
+        id: The id by which edges refer to it; in XTA its name.
         name: Its name; empty without one.
         kind: ``normal``, ``urgent`` or ``committed``.
         initial: Whether processes start here.
         invariant: As written; empty without one.
         rate: The exponential rate as written; empty without one.
         position: Where it is drawn; ``None`` if the file does not say.
-        labels: Where its name, invariant and rate are drawn, as far as the file says so.
+        labels: Where its name, invariant and rate are drawn, if the file says so.
         color: ``#rrggbb``, or ``None`` for the usual colour.
     """
 
@@ -51,7 +51,7 @@ class BranchPoint:
     """A branch point of a template.
 
     Attributes:
-        id: What edges refer to it by.
+        id: The id by which edges refer to it.
         position: Where it is drawn; ``None`` if the file does not say.
     """
 
@@ -67,13 +67,13 @@ class Edge:
         source: The id of the location or branch point that it leaves.
         target: The id of the location or branch point that it enters.
         controllable: Whether the controller owns it, and not the environment.
-        select: The bindings as written; this and the following are empty where there is nothing.
+        select: The bindings as written. This text and the following ones may be empty.
         guard: As written.
         sync: The synchronisation, such as ``go[i]!``.
         update: As written.
         weight: The weight of a leg as written.
         nails: The bends of the arrow.
-        labels: Where select, guard, sync, update and weight are drawn, as far as the file says so.
+        labels: Where select, guard, sync, update and weight are drawn, if the file says so.
         color: ``#rrggbb``, or ``None`` for the usual colour.
     """
 
@@ -92,7 +92,7 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Diagram:
-    """What a picture of a template shows.
+    """The contents of a template's picture.
 
     Attributes:
         name: The name of the template.
@@ -110,5 +110,5 @@ class Diagram:
 
     @property
     def nodes(self) -> tuple[Location | BranchPoint, ...]:
-        """What edges lead to: the locations, then the branch points."""
+        """All that edges can lead to: the locations, then the branch points."""
         return (*self.locations, *self.branch_points)

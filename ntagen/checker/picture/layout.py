@@ -1,14 +1,14 @@
-"""Places for the parts of a template: those of the file, and others where it has none.
+"""The layout of a template: positions from the file, and computed ones where it has none.
 
 A template whose locations have no places, as in XTA, is laid out in layers from top to bottom,
 after Sugiyama, Tagawa and Toda, "Methods for visual understanding of hierarchical system
-structures" (1981): edges that would close a circle are turned round, the longest path from the
-start decides the layer, and the order within the layers is improved by sweeps over the means of the
-neighbours. Each edge has a place of its own between the layers that it joins, as wide as its label,
-so that labels and parallel edges do not cover each other.
+structures" (1981). Edges that would close a circle are reversed, and the longest path from the
+start decides the layer. Sweeps over the means of the neighbours improve the order in the layers.
+Each edge gets a place of its own between the layers that it joins, as wide as its label, so that
+labels and parallel edges do not cover each other.
 
-Labels without a place are put beside what they belong to. Lengths are in the units of UPPAAL's
-editor; everything is deterministic. Cost: linear in edges times the layers that they span.
+Labels without a position are put beside their location or edge. Lengths are in the units of
+UPPAAL's editor. The layout is deterministic. Cost: linear in edges times the layers that they span.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LOCATION_RADIUS: Final = 11
 BRANCH_POINT_RADIUS: Final = 4
 LINE_HEIGHT: Final = 15
 CHARACTER_WIDTH: Final = 6.7
-"""The mean width of a character of the labels; pictures are made without measuring fonts."""
+"""The mean width of a character of the labels; the layout does not measure fonts."""
 
 LOCATION_LABELS: Final[tuple[LabelKind, ...]] = ("name", "invariant", "rate")
 EDGE_LABELS: Final[tuple[LabelKind, ...]] = ("select", "guard", "sync", "update", "weight")
@@ -34,7 +34,7 @@ _GAP: Final = 28
 """The least distance between neighbours of a layer."""
 
 _LABEL_GAP: Final = 8
-"""Between a location and the labels beside it."""
+"""The distance between a location and the labels beside it."""
 
 _LAYER_GAP: Final = 44
 """The least distance between a location and the labels of the edges above or below it."""
@@ -55,7 +55,7 @@ def text_height(text: str) -> int:
 
 
 def labels_of(part: Location | Edge) -> list[tuple[LabelKind, str]]:
-    """The labels of a part that say something, in the order in which they are stacked."""
+    """The labels of a part that are not empty, from top to bottom."""
     kinds = LOCATION_LABELS if isinstance(part, Location) else EDGE_LABELS
     texts: list[tuple[LabelKind, str]] = [(kind, getattr(part, kind)) for kind in kinds]
     return [(kind, text) for kind, text in texts if text]
@@ -83,12 +83,12 @@ def drawn_labels(diagram: Diagram) -> Iterator[tuple[Point, LabelKind, str]]:
 
 
 def positions_of(diagram: Diagram) -> dict[str, Point]:
-    """Where the locations and branch points of a template are, by id."""
+    """The positions of the locations and branch points of a template, by id."""
     return {node.id: node.position for node in diagram.nodes if node.position is not None}
 
 
 def _with_labels(location: Location) -> Location:
-    """The location with a place for each of its labels: right of it, unless the file says."""
+    """The location with a place for each label: from the file, or else right of the location."""
     if location.position is None:
         return location
     x, y = location.position
@@ -117,7 +117,7 @@ def _squared_length(first: Point, second: Point) -> int:
 
 
 def _stacked(part: _Drawn, stack: list[tuple[LabelKind, str]], corner: Point) -> _Drawn:
-    """The part with these labels below each other, from the upper left corner on."""
+    """The part with these labels below each other; `corner` is the first one's upper left."""
     labels = dict(part.labels)
     x, y = corner
     for kind, text in stack:
@@ -130,7 +130,7 @@ def _stacked(part: _Drawn, stack: list[tuple[LabelKind, str]], corner: Point) ->
 class _Box:
     """A place in a layer: a location with its labels, or a stretch of an edge with its labels.
 
-    `left` and `right` are how far it reaches from its x, `half` up and down from its y.
+    It reaches `left` and `right` from its x, and `half` up and down from its y.
     """
 
     left: float
@@ -171,9 +171,9 @@ def _layered(diagram: Diagram) -> Diagram:
 
 
 def _ranks(count: int, start: int, links: list[tuple[int, int]]) -> list[int]:
-    """The layer of each node: the longest way to it once circles are cut open.
+    """The layer of each node: the longest path to it after circles have been cut open.
 
-    A link that leads back to a node that is still being visited is turned round.
+    A link back to a node that is still being visited is reversed.
     """
     following: list[list[int]] = [[] for _ in range(count)]
     for source, target in links:
@@ -222,7 +222,7 @@ def _location_box(diagram: Diagram, index: int, ends: list[tuple[int, int] | Non
 
 
 _LOOP_REACH: Final = 34
-"""How far to the left of a location its first loop reaches."""
+"""The distance to which the first loop of a location reaches to its left."""
 
 
 def _chain(
@@ -232,13 +232,13 @@ def _chain(
     boxes: list[_Box],
     layers: dict[int, list[int]],
 ) -> list[int]:
-    """Makes the places that an edge takes in the layers between its ends; from its source on."""
+    """Makes the places of an edge in the layers between its ends, from its source to its target."""
     texts = [text for _, text in labels_of(edge)]
     width = max((text_width(text) + 8 for text in texts), default=4.0)
     height = sum(text_height(text) for text in texts)
     upper, lower = sorted(pair, key=lambda node: ranks[node])
     top, bottom = 2 * ranks[upper], 2 * ranks[lower]
-    # Labels lie in the layers between those of the locations, as near to the middle as can be.
+    # Labels lie in the layers between those of the locations, as near to the middle as possible.
     labelled = (top + bottom) // 2 | 1
     chain = []
     before = upper
@@ -268,7 +268,7 @@ def _order(rows: list[list[int]], boxes: list[_Box]) -> None:
 
 
 def _mean_place(box: int, boxes: list[_Box], place: dict[int, int], *, downwards: bool) -> float:
-    """The mean of the places of the neighbours above, or of those below; without any its own."""
+    """The mean position of the neighbours above, or below; without neighbours its own position."""
     near = boxes[box].above if downwards else boxes[box].below
     return sum(place[other] for other in near) / len(near) if near else float(place[box])
 
@@ -293,7 +293,7 @@ def _spread(rows: list[list[int]], boxes: list[_Box]) -> None:
 def _pull(row: list[int], boxes: list[_Box]) -> None:
     """Moves a row as near to the means of all neighbours as its order and its widths allow.
 
-    Boxes that would overlap move together, by the mean of what they want.
+    Boxes that would overlap move together, to the mean of the positions that they want.
     """
     groups: list[tuple[list[int], float, float]] = []  # members, the first one's x, sum of wishes
     for box in row:
@@ -307,7 +307,7 @@ def _pull(row: list[int], boxes: list[_Box]) -> None:
                 break
             groups.pop()
             joined = [*members, *group[0]]
-            # `wishes` are sums of what the first member would want for each of the group.
+            # `wishes` is the sum of the positions that the members want for the first one.
             shift = group[2] - len(group[0]) * offsets[len(members)]
             group = (joined, (wishes + shift) / len(joined), wishes + shift)
         groups.append(group)
@@ -317,7 +317,7 @@ def _pull(row: list[int], boxes: list[_Box]) -> None:
 
 
 def _offsets(members: list[int], boxes: list[_Box]) -> list[float]:
-    """How far each box must lie behind the first one of its group."""
+    """The least distance of each box from the first one of the row."""
     offsets = [0.0]
     for left, right in pairwise(members):
         offsets.append(offsets[-1] + boxes[left].right + _GAP + boxes[right].left)

@@ -1,7 +1,7 @@
-"""A template as an SVG picture in the manner of UPPAAL's editor.
+"""Draws a template as an SVG picture in the style of UPPAAL's editor.
 
-Committed locations hold a C, urgent ones a U, the initial one has a second circle. Edges of the
-environment and legs of branch points are dashed. Each kind of label has its colour.
+A committed location shows a C, an urgent one a U; the initial one has a second circle. Edges of the
+environment and legs of branch points are dashed. Each kind of label has its own colour.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ _ARROW_LENGTH: Final = 9.0
 _ARROW_HALF_WIDTH: Final = 3.6
 _BEND_RADIUS: Final = 9.0
 _INITIAL_GAP: Final = 3.5
-"""Between the two circles of the initial location."""
+"""The distance between the two circles of the initial location."""
 
 _NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that no XML document may hold."""
+"""Characters that an XML document must not contain."""
 
 
 def draw(diagram: Diagram) -> str:
@@ -83,7 +83,7 @@ def _heading(diagram: Diagram) -> str:
 
 
 def _body(diagram: Diagram) -> Iterator[str]:
-    """Edges below, then locations, then labels, each on a light ground so that it can be read."""
+    """Draws edges first, then locations, then labels on a light background."""
     positions = positions_of(diagram)
     radii = {one.id: _radius(one) for one in diagram.locations}
     radii |= {one.id: float(BRANCH_POINT_RADIUS) for one in diagram.branch_points}
@@ -111,7 +111,7 @@ def _radius(location: Location) -> float:
 def _arrow(
     edge: Edge, path: Sequence[Point], source_radius: float, target_radius: float, *, dashed: bool
 ) -> Iterator[str]:
-    """The line of an edge, cut off at the circles of its ends, and its head."""
+    """The line of an edge, cut off at the circles of its ends, and its arrow head."""
     points = [(float(x), float(y)) for x, y in path]
     points[0] = _towards(points[0], points[1], source_radius)
     tip = _towards(points[-1], points[-2], target_radius)
@@ -135,7 +135,7 @@ def _arrow(
 
 
 def _rounded(points: Sequence[tuple[float, float]]) -> str:
-    """The data of a path through the points, with its bends rounded."""
+    """The SVG path through the points, with rounded bends."""
     first, last = points[0], points[-1]
     steps = [f"M{first[0]:.1f},{first[1]:.1f}"]
     for (before, bend), (_, after) in pairwise(pairwise(points)):
@@ -206,7 +206,7 @@ def _safe(text: str) -> str:
 
 
 def _bounds(diagram: Diagram) -> tuple[float, float, float, float]:
-    """The least rectangle that holds a placed template: left, top, right, bottom."""
+    """The smallest rectangle around a placed template: left, top, right, bottom."""
     boxes: list[tuple[float, float, float, float]] = []
     reach = LOCATION_RADIUS + _INITIAL_GAP
     for x, y in positions_of(diagram).values():

@@ -292,7 +292,7 @@ def test_a_second_run_into_the_same_log_is_refused(
         code = main(["drive", str(ROOT / "examples" / "paper.nsl"), "--log", str(path)])
         assert path.read_bytes() == before
     assert code == 2
-    assert "another run is being written into it" in capsys.readouterr().err
+    assert "another run is writing to it" in capsys.readouterr().err
     assert read_log(path).records == (*MANY, ALARM)
 
 

@@ -164,8 +164,8 @@ def test_only_swept_models_hold_the_swept_check() -> None:
     [
         (paper(targets=()), "no target"),
         (with_limits(PAPER, roll_angles_rad=()), "no roll"),
-        (paper(resolution_per_mm=10), "a push of 2 mm vanishes"),
-        (paper(needle=replace(PAPER.needle, radius_mm=0.0001)), "which is nothing"),
+        (paper(resolution_per_mm=10), "a push of 2 mm does not bend the needle"),
+        (paper(needle=replace(PAPER.needle, radius_mm=0.0001)), "which is rounded to 0"),
         (paper(needle=replace(PAPER.needle, radius_mm=3e5)), "the radius of the motion circle"),
         (with_limits(PAPER, step_s=1e6), "a push does not fit"),
         (with_limits(paper(safety="swept"), step_s=100.0), "half around"),
