@@ -95,7 +95,7 @@ impl Symbolic<'_> {
         if barriers.is_empty() && stopped.is_empty() {
             // Moves without guards are the likeliest to be within reach.
             for is_first in [true, false] {
-                if self.is_one_within_reach((words, zone), may_delay, is_first, lookout)? {
+                if self.is_one_within_reach(words, zone, may_delay, is_first, lookout)? {
                     return Ok(Alive::Everywhere);
                 }
             }
@@ -137,7 +137,8 @@ impl Symbolic<'_> {
     /// from all of the zone.
     fn is_one_within_reach(
         &mut self,
-        (words, zone): (&mut [i32], &[Bound]),
+        words: &mut [i32],
+        zone: &[Bound],
         may_delay: bool,
         is_unconditional: bool,
         lookout: &mut Lookout,
@@ -159,9 +160,9 @@ impl Symbolic<'_> {
             if !self.fire_into(one, target, effect)? || !add_needs(effect, needs) {
                 continue;
             }
-            let bounds = (zone, self.dimension());
+            let dimension = self.dimension();
             if !may_delay {
-                if hold_now(needs, bounds) {
+                if hold_now(needs, zone, dimension) {
                     return Ok(true);
                 }
                 continue;
@@ -173,7 +174,7 @@ impl Symbolic<'_> {
                     add_constraints(emitted, invariant)?;
                 }
             }
-            if hold_sometime(needs, bounds, invariant) {
+            if hold_sometime(needs, zone, dimension, invariant) {
                 return Ok(true);
             }
         }
@@ -201,7 +202,7 @@ impl Symbolic<'_> {
 }
 
 /// Whether all valuations of a closed zone meet the needs.
-fn hold_now(needs: &[Constraint], (zone, dimension): (&[Bound], usize)) -> bool {
+fn hold_now(needs: &[Constraint], zone: &[Bound], dimension: usize) -> bool {
     let holds = |one: &Constraint| zone[one.left * dimension + one.right] <= one.bound;
     needs.iter().all(holds)
 }
@@ -210,7 +211,8 @@ fn hold_now(needs: &[Constraint], (zone, dimension): (&[Bound], usize)) -> bool 
 /// needs. The invariant only counts where there are lower bounds among them.
 fn hold_sometime(
     needs: &[Constraint],
-    (zone, dimension): (&[Bound], usize),
+    zone: &[Bound],
+    dimension: usize,
     invariant: &[Constraint],
 ) -> bool {
     let bound = |left: usize, right: usize| zone[left * dimension + right];

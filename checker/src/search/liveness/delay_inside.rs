@@ -23,19 +23,37 @@ pub(super) struct Inside {
     pub(super) is_coarse: bool,
 }
 
+/// How a run comes into a state.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry<'z> {
+    /// The zone before time passes.
+    pub zone: &'z Zone,
+    /// Whether time runs already, where the zone lies in an open part of a barrier.
+    pub is_running: bool,
+}
+
+impl<'z> Entry<'z> {
+    /// The entry by a move, or at the start.
+    pub(super) fn at(zone: &'z Zone) -> Entry<'z> {
+        Entry {
+            zone,
+            is_running: false,
+        }
+    }
+}
+
 impl Inside {
-    /// What a run inside the predicate can reach by delay from a zone on entry of a state. Where
-    /// that lies in an open part of a barrier, `is_running` says whether time runs in it.
+    /// What a run inside the predicate can reach by delay from its entry into a state.
     pub(super) fn of(
         symbolic: &mut Symbolic<'_>,
         keep: &Predicate,
         words: &mut [i32],
-        (entry, is_running): (&Zone, bool),
+        entry: Entry<'_>,
         invariant: &[Constraint],
     ) -> Result<Inside, Failure> {
         let dimension = symbolic.dimension();
         let may_delay = symbolic.may_delay(words)?;
-        let mut whole = entry.clone();
+        let mut whole = entry.zone.clone();
         symbolic.delay(words, may_delay, invariant, whole.bounds_mut())?;
         let outside = match symbolic.extent(keep, words, whole.bounds())? {
             Extent::Nowhere => {
@@ -53,7 +71,7 @@ impl Inside {
             }
         };
         let passage = Passage::new(symbolic, keep, words, whole, outside)?;
-        let mut inside = passage.reached(entry, is_running);
+        let mut inside = passage.reached(entry.zone, entry.is_running);
         inside.reduce();
         let end = passage.end(symbolic, words, &inside)?;
         let (ending, part) = match end {

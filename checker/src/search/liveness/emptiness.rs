@@ -28,7 +28,7 @@ use crate::zones::Zone;
 use crate::zones::dbm;
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 
-use super::delay_inside::Inside;
+use super::delay_inside::{Entry, Inside};
 use super::ending::RunEnding;
 use crate::search::limits::{Counters, Watch, states_between_looks};
 use crate::search::outcome::{Outcome, Trace};
@@ -132,22 +132,21 @@ impl<'p> Liveness<'p> {
     ) -> Result<Outcome<Run>, (Failure, Trace)> {
         let start = symbolic.start();
         let (words, zone, _) = start.map_err(|failure| (failure, Trace::default()))?;
-        self.from_entry(symbolic, (&words, &zone), false, Counters::default(), watch)
+        let entry = Entry::at(&zone);
+        self.from_entry(symbolic, &words, entry, Counters::default(), watch)
     }
 
-    /// Searches for a run that begins with some valuation of a zone. Where that lies in an open
-    /// part of a barrier, `is_running` says whether time runs in it. `before` is what was done
+    /// Searches for a run that begins with some valuation of a zone. `before` is what was done
     /// outside this search, for the limits.
     pub fn from_entry(
         &mut self,
         symbolic: &mut Symbolic<'_>,
-        (words, zone): (&[i32], &Zone),
-        is_running: bool,
+        words: &[i32],
+        entry: Entry<'_>,
         before: Counters,
         watch: &mut dyn Watch,
     ) -> Result<Outcome<Run>, (Failure, Trace)> {
         let mut words = words.to_vec();
-        let entry = (zone, is_running);
         let outcome = self.run(symbolic, &mut words, entry, before, watch);
         let outcome = outcome.map_err(|failure| (failure, self.stack_trace()));
         self.frames.clear();
@@ -158,14 +157,13 @@ impl<'p> Liveness<'p> {
         &mut self,
         symbolic: &mut Symbolic<'_>,
         words: &mut [i32],
-        (zone, is_running): (&Zone, bool),
+        entry: Entry<'_>,
         before: Counters,
         watch: &mut dyn Watch,
     ) -> Result<Outcome<Run>, Failure> {
         let Some(invariant) = symbolic.invariant(words)? else {
             return Ok(Outcome::Exhausted);
         };
-        let entry = (zone, is_running);
         let mut inside = Inside::of(symbolic, self.keep, words, entry, &invariant)?;
         self.is_coarse |= inside.is_coarse;
         if let Some(ending) = inside.ending {
@@ -240,7 +238,7 @@ impl<'p> Liveness<'p> {
         let mut entries = Vec::new();
         effect.entry_zones(frame.zone.bounds(), symbolic.dimension(), &mut entries);
         for entry in &entries {
-            let entry = (entry, false);
+            let entry = Entry::at(entry);
             let target = &mut frame.target;
             let inside = Inside::of(symbolic, self.keep, target, entry, &effect.invariant)?;
             self.is_coarse |= inside.is_coarse;

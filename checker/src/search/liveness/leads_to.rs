@@ -9,6 +9,7 @@ use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
 use crate::zones::Zone;
 
+use super::delay_inside::Entry;
 use super::emptiness::{Liveness, Run};
 use crate::search::limits::Counters;
 use crate::search::outcome::{Outcome, Trace};
@@ -61,14 +62,17 @@ impl Goal for Unanswered<'_> {
         let dimension = symbolic.dimension();
         let extent = symbolic.extent(self.open, words, zone.bounds())?;
         for part in extent.to_federation(zone.bounds(), dimension).zones() {
-            let entry = Zone::from_bounds(dimension, part);
+            let zone_on_entry = Zone::from_bounds(dimension, part);
             // Of a valuation in an open part the zone does not say whether time runs in it.
             let is_open = !symbolic.barriers(words, part)?.open.is_empty();
             for is_running in [false, true].into_iter().take(1 + usize::from(is_open)) {
-                let start = (&*words, &entry);
+                let entry = Entry {
+                    zone: &zone_on_entry,
+                    is_running,
+                };
                 let outcome = self
                     .liveness
-                    .from_entry(symbolic, start, is_running, counters, watch);
+                    .from_entry(symbolic, words, entry, counters, watch);
                 match outcome {
                     Ok(Outcome::Exhausted) => {}
                     Ok(Outcome::Found(run)) => {

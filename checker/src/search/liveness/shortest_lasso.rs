@@ -22,7 +22,7 @@ use crate::zones::dbm::{self, Constraint};
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Zone};
 
-use super::delay_inside::Inside;
+use super::delay_inside::{Entry, Inside};
 use super::emptiness::{Run, push_state};
 use super::ending::RunEnding;
 use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
@@ -271,7 +271,7 @@ impl<'s, 'a> Search<'s, 'a> {
             self.symbolic,
             self.wanted.keep,
             words,
-            (entry, false),
+            Entry::at(entry),
             invariant,
         )?;
         let mut zones = inside.zones;

@@ -256,7 +256,7 @@ impl<'q> Measuring<'q> {
     }
 
     /// Takes a clock's bounds in a zone into account; false if its upper bound exceeds the ceiling.
-    fn take_clock(&mut self, index: usize, (lower, upper): (Bound, Bound)) -> bool {
+    fn take_clock(&mut self, index: usize, lower: Bound, upper: Bound) -> bool {
         let item = &mut self.items[index];
         if self.question.greatest && !item.is_infinite {
             if upper > Bound::weak(item.high_ceiling).unwrap_or(Bound::INFINITY) {
@@ -376,8 +376,8 @@ impl Goal for Measuring<'_> {
                 Measure::Clock(choice) => {
                     let clock = symbolic.chosen_clock(choice, words)?.0 as usize;
                     for part in counting.zones() {
-                        let bounds = dbm::clock_bounds(part, symbolic.dimension(), clock);
-                        if !self.take_clock(index, bounds) {
+                        let (lower, upper) = dbm::clock_bounds(part, symbolic.dimension(), clock);
+                        if !self.take_clock(index, lower, upper) {
                             return Ok(Look::Found);
                         }
                     }
@@ -507,7 +507,7 @@ impl Pump<'_> {
                 // What the start was cut to may take a round to wear off, so that each round is
                 // compared with the one before.
                 for moved in self.movable(&before, &since) {
-                    if self.grows(symbolic, &words, (&before, &zone), &moved) {
+                    if self.grows(symbolic, &words, &before, &zone, &moved) {
                         pumped.push(moved);
                     }
                 }
@@ -549,7 +549,8 @@ impl Pump<'_> {
         &self,
         symbolic: &mut Symbolic<'_>,
         words: &[i32],
-        (before, later): (&Zone, &Zone),
+        before: &Zone,
+        later: &Zone,
         moved: &[bool],
     ) -> bool {
         let dimension = symbolic.dimension();

@@ -32,7 +32,8 @@ impl Representative {
     pub(super) fn of(
         &mut self,
         symmetry: &Symmetry,
-        (words, zone): (&[i32], &[Bound]),
+        words: &[i32],
+        zone: &[Bound],
         way: &[Step],
     ) -> (&[i32], &mut [Bound], &[Step]) {
         self.words.clear();

@@ -437,7 +437,7 @@ impl Explorer {
             None => (words, zone, &*self.way),
             Some(symmetry) => {
                 let representative = &mut self.representative;
-                representative.of(symmetry, (words, zone), &self.way)
+                representative.of(symmetry, words, zone, &self.way)
             }
         };
         let limits = scene.symbolic.to_stored(words, zone);

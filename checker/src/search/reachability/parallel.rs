@@ -35,7 +35,7 @@ use super::goal::{Goal, Look, SharedGoal};
 use super::report::Report;
 use super::retrace;
 use super::shard::{Mail, Shard};
-use super::tree::{self, Origin};
+use super::tree::{self, Origin, Tree};
 use crate::search::limits::{Counters, Unlimited, Watch, moves_between_looks};
 use crate::search::outcome::{Outcome, Trace};
 
@@ -82,7 +82,7 @@ pub(super) fn search<G: SharedGoal>(
     let own = std::iter::once((&mut *symbolic, &mut *goal));
     let pairs = own.chain(others.iter_mut().map(|(symbolic, goal)| (symbolic, goal)));
     let workers = pairs.enumerate().map(|(index, (symbolic, goal))| {
-        let worker = Worker::new(symbolic, goal, (index, threads));
+        let worker = Worker::new(symbolic, goal, index, threads);
         Some(Box::new(worker))
     });
     let mut search = Search {
@@ -133,13 +133,14 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
     fn new(
         symbolic: &'s mut Symbolic<'a>,
         goal: &'s mut G,
-        (index, count): (usize, usize),
+        index: usize,
+        count: usize,
     ) -> Worker<'s, 'a, G> {
         let network = symbolic.stepper.network();
-        let (dimension, greatest) = (symbolic.dimension(), symbolic.greatest_constant());
+        let tree = Tree::new(network, symbolic.dimension(), symbolic.greatest_constant());
         Worker {
             explorer: Explorer::new(symbolic, goal),
-            shard: Shard::new(network, dimension, greatest, (index, count)),
+            shard: Shard::new(tree, index, count),
             incoming: (0..count).map(|_| Mail::default()).collect(),
             symbolic,
             goal,

@@ -8,7 +8,6 @@
 
 use std::collections::VecDeque;
 
-use crate::ir::Network;
 use crate::zones::Bound;
 
 use super::expand::Sink;
@@ -89,15 +88,10 @@ pub(super) struct Shard {
 }
 
 impl Shard {
-    /// The shard with this index of so many.
-    pub(super) fn new(
-        network: &Network,
-        dimension: usize,
-        greatest: i32,
-        (index, count): (usize, usize),
-    ) -> Shard {
+    /// The shard with this index, of `count` shards, with an empty tree.
+    pub(super) fn new(tree: Tree, index: usize, count: usize) -> Shard {
         Shard {
-            tree: Tree::new(network, dimension, greatest),
+            tree,
             current: Origin::NOWHERE,
             index,
             now: VecDeque::new(),

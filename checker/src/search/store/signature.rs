@@ -17,12 +17,27 @@ const FEW_CLOCKS: usize = 6;
 /// row smaller, or the other way round. So a number is the sum of columns: those of one clock show
 /// it in one direction, all others in the other one. In sums that mix rows and columns it would
 /// cancel out.
-fn period(dimension: usize) -> (usize, bool) {
+fn period(dimension: usize) -> Period {
     if dimension < FEW_CLOCKS {
-        (dimension * dimension, true)
+        Period {
+            length: dimension * dimension,
+            is_weighted: true,
+        }
     } else {
-        (dimension, false)
+        Period {
+            length: dimension,
+            is_weighted: false,
+        }
     }
+}
+
+/// How bounds are shared out among the numbers of a signature.
+#[derive(Clone, Copy, Debug)]
+struct Period {
+    /// How many bounds lie side by side before the numbers begin anew with the first one.
+    length: usize,
+    /// Whether bounds have weights.
+    is_weighted: bool,
 }
 
 /// The factor of the bounds of a block of eight in the sums of a signature.
@@ -39,14 +54,14 @@ fn weight(block: usize, is_weighted: bool) -> i32 {
 
 /// The weighted sums of every eighth bound of a period. A bound counts from the negated greatest
 /// one on, and up to one more than that.
-fn sums(matrix: &[Bound], greatest: i32, (period, is_weighted): (usize, bool)) -> [i32; 8] {
+fn sums(matrix: &[Bound], greatest: i32, period: Period) -> [i32; 8] {
     let mut sums = [0; 8];
     let mut add = |bounds: &[Bound], index| {
         for (sum, bound) in sums.iter_mut().zip(bounds) {
-            *sum += weight(index, is_weighted) * bound.raw().clamp(-greatest, greatest + 1);
+            *sum += weight(index, period.is_weighted) * bound.raw().clamp(-greatest, greatest + 1);
         }
     };
-    for row in matrix.chunks_exact(period) {
+    for row in matrix.chunks_exact(period.length) {
         let (blocks, rest) = row.as_chunks::<8>();
         for (index, block) in blocks.iter().enumerate() {
             add(block, index);
@@ -57,15 +72,15 @@ fn sums(matrix: &[Bound], greatest: i32, (period, is_weighted): (usize, bool)) -
 }
 
 /// As [`sums`] for entries whose greatest sum is below 2^15, in as narrow lanes.
-fn narrow_sums(matrix: &[i16], greatest: i16, (period, is_weighted): (usize, bool)) -> [i32; 8] {
+fn narrow_sums(matrix: &[i16], greatest: i16, period: Period) -> [i32; 8] {
     let mut sums = [0_i16; 8];
     let mut add = |entries: &[i16], index| {
-        let weight = weight(index, is_weighted) as i16;
+        let weight = weight(index, period.is_weighted) as i16;
         for (sum, entry) in sums.iter_mut().zip(entries) {
             *sum += weight * (*entry).clamp(-greatest, greatest + 1);
         }
     };
-    for row in matrix.chunks_exact(period) {
+    for row in matrix.chunks_exact(period.length) {
         let (blocks, rest) = row.as_chunks::<8>();
         for (index, block) in blocks.iter().enumerate() {
             add(block, index);
@@ -104,7 +119,7 @@ pub(super) fn widen_narrow(matrix: &[u8], limits: &[Bound], dimension: usize, ta
 pub(super) struct Signatures {
     /// How many bounds lie side by side before the numbers begin anew with the first one, and
     /// whether bounds have weights.
-    period: (usize, bool),
+    period: Period,
     /// The greatest encoded bound that signatures tell from greater ones.
     greatest: i32,
     /// By number: the sum of the weights of its bounds.
@@ -119,8 +134,8 @@ impl Signatures {
         let mut weights = [0; 8];
         let period = period(dimension);
         for entry in 0..dimension * dimension {
-            let place = entry % period.0;
-            weights[place % 8] += weight(place / 8, period.1);
+            let place = entry % period.length;
+            weights[place % 8] += weight(place / 8, period.is_weighted);
         }
         // So that sums of so many bounds fit into a word.
         let greatest = (2 * greatest.clamp(0, Bound::MAX_VALUE) + 1).min((1 << 29) / weights[0]);

@@ -28,6 +28,8 @@
 //! Cost: a bound that moves n times costs up to n times the bounds among them; alternatives are
 //! exponential in the worst case, and given up after [`MOST_ATTEMPTS`].
 
+use std::ops::Range;
+
 use crate::ir::Predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::clocks::Assignment;
@@ -362,11 +364,11 @@ impl<'s, 'a> Plan<'s, 'a> {
         // show.
         barriers.open.iter().for_each(|part| stops.subtract(part));
         for barrier in stops.zones() {
-            self.avoid((start, end), barrier, true);
+            self.avoid(start..end, barrier, true);
         }
         let outside = self.outside(&whole)?;
         for zone in outside.zones() {
-            self.avoid((start, end), zone, false);
+            self.avoid(start..end, zone, false);
         }
         Ok(end)
     }
@@ -483,7 +485,7 @@ impl<'s, 'a> Plan<'s, 'a> {
     /// All bounds of the closed zone count, not only the minimal ones: that a lower bound is met
     /// after an upper one has failed shows in the bound on their difference that follows from the
     /// two.
-    fn avoid(&mut self, (start, end): (usize, usize), zone: &[Bound], may_meet: bool) {
+    fn avoid(&mut self, wait: Range<usize>, zone: &[Bound], may_meet: bool) {
         let dimension = self.symbolic.dimension();
         let mut alternatives = Alternatives::new();
         for (index, &bound) in zone.iter().enumerate() {
@@ -507,10 +509,10 @@ impl<'s, 'a> Plan<'s, 'a> {
             // difference fails all the time if it does so at both, for it changes in one direction
             // where one of the clocks stands still, and else not at all.
             let events = match (left, right) {
-                (0, _) => vec![end],
-                (_, 0) => vec![start],
-                _ if matches!(self.solver, Solver::Times(_)) => vec![start],
-                _ => vec![start, end],
+                (0, _) => vec![wait.end],
+                (_, 0) => vec![wait.start],
+                _ if matches!(self.solver, Solver::Times(_)) => vec![wait.start],
+                _ => vec![wait.start, wait.end],
             };
             let limits = events.into_iter().map(|event| self.limit(event, failing));
             alternatives.extend(limits.collect::<Option<Vec<Limit>>>());
@@ -518,8 +520,8 @@ impl<'s, 'a> Plan<'s, 'a> {
         if may_meet {
             // No wait meets nothing new.
             alternatives.push(vec![Limit::Apart(Distance {
-                earlier: end,
-                later: start,
+                earlier: wait.end,
+                later: wait.start,
                 apart: (0, 0),
             })]);
         }
