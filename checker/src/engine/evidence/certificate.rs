@@ -18,7 +18,7 @@ use crate::network::{Failure, Symbolic};
 use crate::search::Outcome;
 use crate::search::StopReason;
 use crate::search::limits::{Counters, Watch};
-use crate::search::optimum::best_first::{Measure, Search};
+use crate::search::optimum::best_first::{BestFirst, Measure};
 use crate::verify::certificate::{self, Defect, States};
 use crate::verify::replay::{self, Claim, End, Moment, Run, Shown, Step};
 use crate::verify::strategy::{Constraint, Outcome as StrategyOutcome};
@@ -80,7 +80,7 @@ pub(in crate::engine) fn reached(
     let dimension = symbolic.dimension();
     let variables = &symbolic.stepper.network().layout.variables;
     let has_meta = variables.iter().any(|variable| variable.meta);
-    let mut search = Search::new(symbolic, &avoided, Measure::Moves, before);
+    let mut search = BestFirst::new(symbolic, &avoided, Measure::Moves, before);
     match cut_as_interrupted(|| search.run(watch)) {
         Ok(Outcome::Exhausted) => {}
         Ok(Outcome::Found(_)) if has_meta => {

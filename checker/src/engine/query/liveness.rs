@@ -162,7 +162,7 @@ fn best(
     if witnesses.is_doubtful() {
         return Err("where clocks stand still, what has the fewest moves may be no run".to_owned());
     }
-    let search = shortest_lasso::Search::new(witnesses.symbolic, wanted);
+    let search = shortest_lasso::LassoSearch::new(witnesses.symbolic, wanted);
     match cut_as_interrupted(|| search.run(watch)) {
         Ok(Outcome::Found((run, start))) => Ok(Some((run.trace, run.ending, start))),
         Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),

@@ -48,7 +48,7 @@ pub(super) fn best(
         TraceWanted::Any => return Ok(None),
         TraceWanted::Shortest => {
             let mut search =
-                best_first::Search::new(zones, &*target, best_first::Measure::Moves, none);
+                best_first::BestFirst::new(zones, &*target, best_first::Measure::Moves, none);
             cut_as_interrupted(|| search.run(watch))
         }
         TraceWanted::Fastest if subject.under.is_some() => {
@@ -63,7 +63,7 @@ pub(super) fn best(
             atoms.push(time_atom(clock));
             let mut zones = symbolic(subject, &[predicate], &atoms, Abstraction::LowerUpper);
             let measure = best_first::Measure::Time(clock);
-            let mut search = best_first::Search::new(&mut zones, &*target, measure, none);
+            let mut search = best_first::BestFirst::new(&mut zones, &*target, measure, none);
             cut_as_interrupted(|| search.run(watch))
         }
     };

@@ -11,7 +11,7 @@ use crate::network::{Failure, MoveRef, Moves, Part, Stepper, Symbolic};
 use crate::search::Outcome;
 use crate::search::StopReason;
 use crate::search::limits::Counters;
-use crate::search::optimum::best_first::{Measure, Met, Search};
+use crate::search::optimum::best_first::{BestFirst, Measure, Met};
 use crate::verify;
 use crate::verify::choices::Choices;
 use crate::zones::Zone;
@@ -92,7 +92,8 @@ impl LoadedModel {
         let nothing = &Predicate::Constant(false);
         let most = limits.states.map_or(usize::MAX, |most| most as usize);
         let mut watch = LimitWatch::new(limits);
-        let mut search = Search::new(&mut symbolic, &nothing, Measure::Moves, Counters::default());
+        let mut search =
+            BestFirst::new(&mut symbolic, &nothing, Measure::Moves, Counters::default());
         let stop = match watch.bound(|watch| search.run(watch)) {
             Ok(Ok(Outcome::Stopped(reason))) | Err((reason, _)) => Some(reason),
             Ok(Ok(Outcome::Found(_) | Outcome::Exhausted)) => None,

@@ -42,7 +42,7 @@ const NONE: u32 = u32::MAX;
 
 /// A run inside a predicate that never leaves it.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct EndlessRun {
     /// Its states and moves; the zones are those of the search.
     pub trace: Trace,
     /// Why it never leaves.
@@ -129,7 +129,7 @@ impl<'p> Liveness<'p> {
         &mut self,
         symbolic: &mut Symbolic<'_>,
         watch: &mut dyn Watch,
-    ) -> Result<Outcome<Run>, (Failure, Trace)> {
+    ) -> Result<Outcome<EndlessRun>, (Failure, Trace)> {
         let start = symbolic.start();
         let (words, zone, _) = start.map_err(|failure| (failure, Trace::default()))?;
         let entry = Entry::at(&zone);
@@ -145,7 +145,7 @@ impl<'p> Liveness<'p> {
         entry: Entry<'_>,
         before: Counters,
         watch: &mut dyn Watch,
-    ) -> Result<Outcome<Run>, (Failure, Trace)> {
+    ) -> Result<Outcome<EndlessRun>, (Failure, Trace)> {
         let mut words = words.to_vec();
         let outcome = self.run(symbolic, &mut words, entry, before, watch);
         let outcome = outcome.map_err(|failure| (failure, self.stack_trace()));
@@ -160,7 +160,7 @@ impl<'p> Liveness<'p> {
         entry: Entry<'_>,
         before: Counters,
         watch: &mut dyn Watch,
-    ) -> Result<Outcome<Run>, Failure> {
+    ) -> Result<Outcome<EndlessRun>, Failure> {
         let Some(invariant) = symbolic.invariant(words)? else {
             return Ok(Outcome::Exhausted);
         };
@@ -169,7 +169,7 @@ impl<'p> Liveness<'p> {
         if let Some(ending) = inside.ending {
             let mut trace = Trace::default();
             push_state(&mut trace, words, &inside.zones);
-            return Ok(Outcome::Found(Run { trace, ending }));
+            return Ok(Outcome::Found(EndlessRun { trace, ending }));
         }
         symbolic.extrapolate_all(words, &mut inside.zones);
         for zone in inside.zones {
@@ -375,13 +375,13 @@ impl<'p> Liveness<'p> {
     }
 
     /// The run on the stack, with the state in which it ends.
-    fn found(&self, ending: RunEnding) -> Run {
+    fn found(&self, ending: RunEnding) -> EndlessRun {
         let mut trace = self.stack_trace();
         if let Some(top) = self.frames.last() {
             trace.moves.push(top.parts.clone());
             push_state(&mut trace, &top.target, &top.pending);
         }
-        Run { trace, ending }
+        EndlessRun { trace, ending }
     }
 
     fn stack_trace(&self) -> Trace {

@@ -10,7 +10,7 @@ use crate::network::{Failure, Symbolic};
 use crate::zones::Zone;
 
 use super::delay_inside::Entry;
-use super::emptiness::{Liveness, Run};
+use super::emptiness::{EndlessRun, Liveness};
 use crate::search::limits::Counters;
 use crate::search::outcome::{Outcome, Trace};
 use crate::search::reachability::goal::{Goal, Look, Visited};
@@ -22,7 +22,7 @@ pub struct Unanswered<'p> {
     liveness: Liveness<'p>,
     is_doubtful: bool,
     /// The run that never meets q, from the state that was found.
-    pub run: Option<Run>,
+    pub run: Option<EndlessRun>,
     /// The way from the state at hand to a failure below it.
     pub failed: Option<Trace>,
 }

@@ -23,7 +23,7 @@ use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Zone};
 
 use super::delay_inside::{Entry, Inside};
-use super::emptiness::{Run, push_state};
+use super::emptiness::{EndlessRun, push_state};
 use super::ending::RunEnding;
 use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
 use crate::search::outcome::{Outcome, Trace};
@@ -77,7 +77,7 @@ enum Stay {
 }
 
 /// A search for a run with the fewest moves.
-pub struct Search<'s, 'a> {
+pub struct LassoSearch<'s, 'a> {
     symbolic: &'s mut Symbolic<'a>,
     wanted: Wanted<'s>,
     store: StateStore,
@@ -91,10 +91,10 @@ pub struct Search<'s, 'a> {
     steps: u64,
 }
 
-impl<'s, 'a> Search<'s, 'a> {
+impl<'s, 'a> LassoSearch<'s, 'a> {
     /// A search in zones that extrapolation leaves exact for what stays.
-    pub fn new(symbolic: &'s mut Symbolic<'a>, wanted: Wanted<'s>) -> Search<'s, 'a> {
-        Search {
+    pub fn new(symbolic: &'s mut Symbolic<'a>, wanted: Wanted<'s>) -> LassoSearch<'s, 'a> {
+        LassoSearch {
             store: StateStore::new(symbolic.stepper.network()),
             zones: ZoneTable::new(symbolic.dimension()),
             symbolic,
@@ -109,7 +109,7 @@ impl<'s, 'a> Search<'s, 'a> {
 
     /// Searches for a run with the fewest moves; returns it with the way to it, and the index of
     /// the state in which it opens.
-    pub fn run(mut self, watch: &mut dyn Watch) -> Result<Outcome<(Run, usize)>, Failure> {
+    pub fn run(mut self, watch: &mut dyn Watch) -> Result<Outcome<(EndlessRun, usize)>, Failure> {
         let (mut words, zone, invariant) = self.symbolic.start()?;
         self.enter(None, &mut words, vec![zone], &invariant)?;
         let mut index = 0;
@@ -425,14 +425,14 @@ impl<'s, 'a> Search<'s, 'a> {
     }
 
     /// The run with the way to it, and the index of the state in which it opens.
-    fn traced(&self, stay: Stay) -> (Run, usize) {
+    fn traced(&self, stay: Stay) -> (EndlessRun, usize) {
         let mut trace = Trace::default();
         match stay {
             Stay::Ends(ending, from, words, zones) => {
                 let mut opening = 0;
                 self.follow(&from, &mut trace, &mut opening);
                 push_state(&mut trace, &words, &zones);
-                (Run { trace, ending }, opening)
+                (EndlessRun { trace, ending }, opening)
             }
             Stay::Loops(head, way) => {
                 let mut opening = 0;
@@ -444,7 +444,7 @@ impl<'s, 'a> Search<'s, 'a> {
                     self.push_node(node, &mut trace);
                 }
                 let ending = RunEnding::Loop(start);
-                (Run { trace, ending }, opening)
+                (EndlessRun { trace, ending }, opening)
             }
         }
     }

@@ -92,7 +92,7 @@ struct Node {
 type Waiting = Reverse<(Cost, bool, u32)>;
 
 /// A search for a state of least cost.
-pub struct Search<'s, 'a> {
+pub struct BestFirst<'s, 'a> {
     symbolic: &'s mut Symbolic<'a>,
     goal: &'s dyn Target,
     measure: Measure,
@@ -105,15 +105,15 @@ pub struct Search<'s, 'a> {
     before: Counters,
 }
 
-impl<'s, 'a> Search<'s, 'a> {
+impl<'s, 'a> BestFirst<'s, 'a> {
     /// A search for the goal. `before` is what was done outside this search, for the limits.
     pub fn new(
         symbolic: &'s mut Symbolic<'a>,
         goal: &'s dyn Target,
         measure: Measure,
         before: Counters,
-    ) -> Search<'s, 'a> {
-        Search {
+    ) -> BestFirst<'s, 'a> {
+        BestFirst {
             store: StateStore::new(symbolic.stepper.network()),
             symbolic,
             goal,

@@ -83,7 +83,7 @@ pub enum Values {
 
 /// The end of a search for values.
 #[derive(Debug)]
-pub struct Report {
+pub struct ValuesReport {
     /// The values, or the failure and the way to the state whose exploration failed.
     pub outcome: Result<Values, (Failure, Trace)>,
     /// What was done, in all rounds; the stored states are those of the last.
@@ -100,7 +100,7 @@ pub fn search<'a>(
     symbolic: &mut dyn FnMut(&[ClockAtom]) -> Symbolic<'a>,
     manner: Manner,
     watch: &mut dyn Watch,
-) -> Report {
+) -> ValuesReport {
     let greatest_constant = greatest_constant(network, &question);
     let mut measuring = Measuring::new(question, greatest_constant);
     let mut explored = 0;
@@ -132,7 +132,7 @@ pub fn search<'a>(
             }
             Err(failed) => Err(failed),
         };
-        return Report {
+        return ValuesReport {
             outcome,
             counters: Counters {
                 explored,

@@ -85,7 +85,7 @@ pub(super) fn search<G: SharedGoal>(
         let worker = Worker::new(symbolic, goal, index, threads);
         Some(Box::new(worker))
     });
-    let mut search = Search {
+    let mut search = ParallelSearch {
         workers: workers.collect(),
         dimension,
         watch,
@@ -249,14 +249,14 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
 
 type Place<'s, 'a, G> = Option<Box<Worker<'s, 'a, G>>>;
 
-struct Search<'s, 'a, 'w, G> {
+struct ParallelSearch<'s, 'a, 'w, G> {
     /// Each is in its place except while a thread has it.
     workers: Vec<Place<'s, 'a, G>>,
     dimension: usize,
     watch: &'w mut dyn Watch,
 }
 
-impl<'s, 'a, G: SharedGoal> Search<'s, 'a, '_, G> {
+impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
     fn run(&mut self) -> Report {
         self.worker(0).start();
         let is_cut = AtomicBool::new(false);
