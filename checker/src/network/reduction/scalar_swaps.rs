@@ -8,14 +8,13 @@
 //! Invariant: every exchange is an involution, and it only moves words of the same range to each
 //! other.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::diagnostics::Span;
-use crate::ir::{AssignedValue, ClockRange, Coordinate, Edge, Network, Process, Shape, Update};
+use crate::ir::{Coordinate, Network, Shape};
 
+use super::ordered_receivers::has_ordered_receivers;
 use super::symmetry::{Exchange, Members, Swap, Symmetry};
-use crate::analysis::function_reads::read_words;
 
 /// The most members of a set that is reduced: all pairs of them are tried.
 const MOST_MEMBERS: u32 = 64;
@@ -77,9 +76,15 @@ impl Symmetry {
             first: self.sets.iter().map(|set| set.count as usize).sum(),
             first_swap: self.swaps.len(),
         };
-        let pairs = (0..set.size).flat_map(|a| (a + 1..set.size).map(move |b| (a, b)));
+        let pairs = (0..set.size).flat_map(|first| {
+            (first + 1..set.size).map(move |second| MemberPair {
+                set: number,
+                first,
+                second,
+            })
+        });
         let swaps: Option<Vec<Swap>> = pairs
-            .map(|pair| places.swap(self.sets.len(), members, pair))
+            .map(|pair| places.swap(self.sets.len(), pair))
             .collect();
         let swaps = swaps.ok_or(Obstacle::FirstValues)?;
         let moves = |swap: &Swap| !(swap.words.is_empty() && swap.clock_pairs.is_empty());
@@ -107,8 +112,26 @@ pub enum Obstacle {
     Unused,
 }
 
-/// Receivers whose updates read more words count as reading all.
-const MOST_READ_WORDS: usize = 1 << 16;
+/// Two members of a scalar set that change places, the smaller one first.
+#[derive(Clone, Copy, Debug)]
+struct MemberPair {
+    set: u32,
+    first: u32,
+    second: u32,
+}
+
+impl MemberPair {
+    /// Where something with these coordinates is moved to.
+    fn moved(self, place: u32, coordinates: &[Coordinate]) -> u32 {
+        let MemberPair { set, first, second } = self;
+        let own = coordinates.iter().filter(|one| one.set == set);
+        own.fold(place, |place, one| match one.member {
+            member if member == first => place + (second - first) * one.stride,
+            member if member == second => place - (second - first) * one.stride,
+            _ => place,
+        })
+    }
+}
 
 /// A word as exchanges see it.
 #[derive(Clone, Debug)]
@@ -173,11 +196,12 @@ impl<'n> Places<'n> {
         }
     }
 
-    /// The exchange of two members; `None` if it is none of the network.
-    fn swap(&self, number: usize, set: Members, pair: (u32, u32)) -> Option<Swap> {
+    /// The exchange of two members, of the set with this number among those that are reduced;
+    /// `None` if it is none of the network.
+    fn swap(&self, number: usize, pair: MemberPair) -> Option<Swap> {
         let mut swap = Swap {
             set: number,
-            members: (pair.0 as i32, pair.1 as i32),
+            members: (pair.first as i32, pair.second as i32),
             words: Vec::new(),
             identity_words: 0,
             clocks: Vec::new(),
@@ -185,8 +209,8 @@ impl<'n> Places<'n> {
         };
         let identity_words = self.network.layout.identity_words;
         for (index, word) in (0..).zip(&self.words) {
-            let source = self.image_of_word(index, set.set, pair)?;
-            let is_member = word.values == Some(set.set);
+            let source = self.image_of_word(index, pair)?;
+            let is_member = word.values == Some(pair.set);
             let exchange = Exchange {
                 word: index,
                 source,
@@ -199,7 +223,7 @@ impl<'n> Places<'n> {
             }
         }
         for clock in 0..self.network.clocks.len() as u32 {
-            let image = self.image_of_clock(clock, set.set, pair)?;
+            let image = self.image_of_clock(clock, pair)?;
             swap.clocks.push(image);
             if clock < image {
                 swap.clock_pairs.push((clock, image));
@@ -210,20 +234,20 @@ impl<'n> Places<'n> {
 
     /// Whether a word may get another value: something writes it, or it would get the value that it
     /// has.
-    fn is_movable(&self, exchange: Exchange, (first, second): (u32, u32)) -> bool {
+    fn is_movable(&self, exchange: Exchange, pair: MemberPair) -> bool {
         let (word, source) = (exchange.word as usize, exchange.source as usize);
         let initial = &self.network.initial;
         let value = match initial[source] {
-            value if exchange.is_member && value == first as i32 => second as i32,
-            value if exchange.is_member && value == second as i32 => first as i32,
+            value if exchange.is_member && value == pair.first as i32 => pair.second as i32,
+            value if exchange.is_member && value == pair.second as i32 => pair.first as i32,
             value => value,
         };
         self.written[word] == self.written[source] && (self.written[word] || initial[word] == value)
     }
 
-    fn image_of_process(&self, process: usize, set: u32, pair: (u32, u32)) -> Option<usize> {
+    fn image_of_process(&self, process: usize, pair: MemberPair) -> Option<usize> {
         let one = &self.network.processes[process];
-        let image = moved(process as u32, &one.coordinates, set, pair) as usize;
+        let image = pair.moved(process as u32, &one.coordinates) as usize;
         let other = &self.network.processes[image];
         let is_alike = one.locations.len() == other.locations.len()
             && one.edges.len() == other.edges.len()
@@ -233,24 +257,24 @@ impl<'n> Places<'n> {
         is_alike.then_some(image)
     }
 
-    fn image_of_word(&self, index: u32, set: u32, pair: (u32, u32)) -> Option<u32> {
+    fn image_of_word(&self, index: u32, pair: MemberPair) -> Option<u32> {
         let word = &self.words[index as usize];
-        let index = moved(index, &word.coordinates, set, pair);
+        let index = pair.moved(index, &word.coordinates);
         let Some((process, _)) = word.local else {
             return Some(index);
         };
-        let image = self.image_of_process(process, set, pair)?;
+        let image = self.image_of_process(process, pair)?;
         let (_, number) = self.words[index as usize].local?;
         Some(self.of_process[image].0[number])
     }
 
-    fn image_of_clock(&self, index: u32, set: u32, pair: (u32, u32)) -> Option<u32> {
+    fn image_of_clock(&self, index: u32, pair: MemberPair) -> Option<u32> {
         let clock = &self.network.clocks[index as usize];
-        let index = moved(index, &clock.coordinates, set, pair);
+        let index = pair.moved(index, &clock.coordinates);
         let Some(owner) = clock.owner else {
             return Some(index);
         };
-        let image = self.image_of_process(owner.0 as usize, set, pair)?;
+        let image = self.image_of_process(owner.0 as usize, pair)?;
         Some(self.of_process[image].1[self.numbers[index as usize]])
     }
 }
@@ -292,136 +316,4 @@ fn add_words(shape: &Shape, coordinates: &mut Vec<Coordinate>, words: &mut Vec<W
             }
         }
     }
-}
-
-/// Where something is moved to when two members are exchanged.
-fn moved(place: u32, coordinates: &[Coordinate], set: u32, (first, second): (u32, u32)) -> u32 {
-    let own = coordinates.iter().filter(|one| one.set == set);
-    own.fold(place, |place, one| match one.member {
-        member if member == first => place + (second - first) * one.stride,
-        member if member == second => place - (second - first) * one.stride,
-        _ => place,
-    })
-}
-
-/// Whether two processes that exchanging members of a set reorders may receive the same broadcast,
-/// with updates whose order matters.
-fn has_ordered_receivers(network: &Network, set: u32) -> bool {
-    let mut groups: HashMap<u32, Vec<&Process>> = HashMap::new();
-    for process in &network.processes {
-        if process.coordinates.iter().any(|one| one.set == set) {
-            groups.entry(process.group.0).or_default().push(process);
-        }
-    }
-    let mut groups: Vec<_> = groups.into_iter().collect();
-    groups.sort_unstable_by_key(|(first, _)| *first);
-    groups.iter().any(|(_, processes)| {
-        let received: Vec<Vec<Effects>> = processes
-            .iter()
-            .map(|process| {
-                let edges = process.edges.iter();
-                let edges = edges.filter(|edge| receives_broadcast(network, edge));
-                edges.map(|edge| Effects::new(network, edge)).collect()
-            })
-            .collect();
-        received.iter().enumerate().any(|(index, own)| {
-            let others = received[index + 1..].iter().flatten();
-            others
-                .into_iter()
-                .any(|other| own.iter().any(|one| !one.commutes_with(other)))
-        })
-    })
-}
-
-fn receives_broadcast(network: &Network, edge: &Edge) -> bool {
-    edge.sync.is_some_and(|sync| {
-        let first = sync.channel.0 as usize;
-        let channels = &network.channels[first..first + sync.count as usize];
-        !sync.send && channels.iter().any(|channel| channel.broadcast)
-    })
-}
-
-/// What the updates of an edge touch.
-struct Effects {
-    channels: (u32, u32),
-    /// The words that are read, if they are known.
-    reads: Option<Vec<u32>>,
-    writes: Vec<(u32, u32)>,
-    /// The clocks that are set, to what constant if it is always the same.
-    sets: Vec<(ClockRange, Option<i32>)>,
-    /// The clocks that are copied.
-    copies: Vec<ClockRange>,
-}
-
-impl Effects {
-    fn new(network: &Network, edge: &Edge) -> Effects {
-        let branches = edge.branches.iter().map(|branch| &branch.update);
-        let updates: Vec<&Update> = std::iter::once(&edge.update).chain(branches).collect();
-        let functions = updates.iter().filter_map(|update| update.function);
-        let assignments = || updates.iter().flat_map(|update| &update.assignments);
-        Effects {
-            channels: edge
-                .sync
-                .map_or((0, 0), |sync| (sync.channel.0, sync.count)),
-            reads: read_words(network, functions, MOST_READ_WORDS),
-            writes: updates.iter().flat_map(|one| one.writes.clone()).collect(),
-            sets: assignments()
-                .map(|one| match one.value {
-                    AssignedValue::Integer(low, high) => (one.target, (low == high).then_some(low)),
-                    AssignedValue::Clock(..) => (one.target, None),
-                })
-                .collect(),
-            copies: assignments()
-                .filter_map(|one| match one.value {
-                    AssignedValue::Clock(source, ..) => Some(source),
-                    AssignedValue::Integer(..) => None,
-                })
-                .collect(),
-        }
-    }
-
-    fn reads_any(&self, written: &[(u32, u32)]) -> bool {
-        let Some(reads) = &self.reads else {
-            return !written.is_empty();
-        };
-        written.iter().any(|&(first, count)| {
-            let next = reads.partition_point(|&word| word < first);
-            reads.get(next).is_some_and(|&word| word < first + count)
-        })
-    }
-
-    /// Whether the order of the two does not matter, or they never run together.
-    fn commutes_with(&self, other: &Effects) -> bool {
-        if !meet(self.channels, other.channels) {
-            return true;
-        }
-        let words_are_apart = !meet_any(&self.writes, &other.writes)
-            && !self.reads_any(&other.writes)
-            && !other.reads_any(&self.writes);
-        let range = |clocks: &ClockRange| (clocks.first.0, clocks.count);
-        let are_set_alike = self.sets.iter().all(|(clocks, value)| {
-            other.sets.iter().all(|(others, other)| {
-                !meet(range(clocks), range(others)) || (value.is_some() && value == other)
-            })
-        });
-        let is_copied = |one: &Effects, two: &Effects| {
-            let mut copies = one.copies.iter();
-            copies.any(|copied| {
-                two.sets
-                    .iter()
-                    .any(|(set, _)| meet(range(copied), range(set)))
-            })
-        };
-        words_are_apart && are_set_alike && !is_copied(self, other) && !is_copied(other, self)
-    }
-}
-
-fn meet(one: (u32, u32), other: (u32, u32)) -> bool {
-    one.0 < other.0 + other.1 && other.0 < one.0 + one.1
-}
-
-fn meet_any(ranges: &[(u32, u32)], others: &[(u32, u32)]) -> bool {
-    ranges
-        .iter()
-        .any(|&one| others.iter().any(|&other| meet(one, other)))
 }
