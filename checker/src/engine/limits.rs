@@ -178,6 +178,21 @@ impl LimitWatch {
     }
 }
 
+/// What becomes of a search in zones whose bounds are too great.
+pub(crate) const CLOCKS_GREW: &str =
+    "differences of clocks grow beyond what zones can hold: no abstraction keeps them small here";
+
+/// Why a search was stopped.
+pub(crate) fn stop_text(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::States => "the search for it was stopped by the limit of states",
+        StopReason::Memory => "the search for it was stopped by the limit of memory",
+        StopReason::Time => "the search for it was stopped by the limit of time",
+        StopReason::Interrupted => "the search for it was interrupted",
+        StopReason::Clocks => CLOCKS_GREW,
+    }
+}
+
 /// Does work that may be cut off in the middle of an operation without what was found before: then
 /// it fails as interrupted.
 ///

@@ -598,6 +598,12 @@ pub enum Predicate {
 }
 
 impl Predicate {
+    /// The opposite.
+    #[must_use]
+    pub fn negated(&self) -> Predicate {
+        Predicate::Not(Box::new(self.clone()))
+    }
+
     /// Whether the words of a state alone decide it.
     pub fn is_of_words(&self) -> bool {
         match self {

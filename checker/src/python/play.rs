@@ -8,14 +8,14 @@ use pyo3::types::PyBytes;
 
 use super::{Answer, FailedError, Model, forced_rule, priority_rule, rejected};
 use crate::diagnostics::Span;
-use crate::engine::LoadedModel;
-use crate::engine::evidence::named_strategies::{NamedStrategy, unnamed};
+use crate::engine::evidence::named_strategies::unnamed;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{strategy_json, text};
 use crate::engine::query::time_clock;
 use crate::engine::session::play::{
     self as engine, Done, Follower, Refused, Unadvised, player_name,
 };
+use crate::engine::{LoadedModel, NamedStrategy};
 use crate::game::strategy::attractor::Selection;
 use crate::verify::{self, Effort};
 

@@ -1,6 +1,6 @@
 //! Searches in some manner, whose traces are shown to be runs.
 
-use checker::engine::evidence::timed_run::Proof;
+use checker::engine::evidence::witness::Proof;
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options};
 use checker::search::reachability::report::Order;
 

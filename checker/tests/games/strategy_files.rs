@@ -56,7 +56,7 @@ fn file() -> Value {
     })
 }
 
-fn read(file: &Value) -> Result<Value, strategy_json::Mismatch> {
+fn read(file: &Value) -> Result<Value, checker::engine::format::json_reader::Mismatch> {
     let model = load();
     let (query, strategy) = strategy_json::read(model.network(), file.to_string().as_bytes())?;
     let file = strategy_json::write(model.network(), &strategy, &query);

@@ -1,6 +1,7 @@
 //! Certificates: those of the engine pass, and those that were made wrong on purpose are caught.
 
-use checker::engine::evidence::certificate::{Certificate, verify};
+use checker::engine::answer::Certificate;
+use checker::engine::evidence::certificate::verify;
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};
 use checker::verify::certificate::States;

@@ -12,7 +12,7 @@
 use crate::searches;
 use std::fmt::Write as _;
 
-use checker::engine::evidence::timed_run::Proof;
+use checker::engine::evidence::witness::Proof;
 use checker::engine::{Answer, Options, Verdict};
 use checker::search::reachability::report::Order;
 

@@ -12,7 +12,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use checker::engine::evidence::timed_run::Proof;
+use checker::engine::evidence::witness::Proof;
 use checker::engine::{CodeEngine, Limits, LoadedModel, Options, TraceWanted, Verdict};
 use checker::search::optimum::extremum::Extreme;
 use checker::verify::replay::End;

@@ -6,7 +6,7 @@
     reason = "UPDATE_EXPECT=1 writes them"
 )]
 
-use checker::engine::evidence::timed_run::Proof;
+use checker::engine::evidence::witness::Proof;
 use checker::engine::format::text;
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};

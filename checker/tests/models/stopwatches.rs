@@ -14,7 +14,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use checker::engine::evidence::certificate::verify;
-use checker::engine::evidence::timed_run::Proof;
+use checker::engine::evidence::witness::Proof;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};
 use checker::search::optimum::extremum::{Extreme, Extremes};

@@ -11,7 +11,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use checker::engine::query::answer::Values;
+use checker::engine::answer::Values;
 use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
 use checker::game::{Forced, Priorities};
 use checker::search::optimum::extremum::Extreme;

@@ -5,7 +5,7 @@ use std::io::Write as _;
 
 use checker::engine::Verdict;
 use checker::engine::evidence::strategy_check;
-use checker::engine::evidence::timed_run::Proof;
+use checker::engine::evidence::witness::Proof;
 use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Rejection};
 use checker::search::limits::StopReason;
 use proptest::strategy::Strategy;

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use checker::engine::evidence::timed_run::{Kind, Proof};
+use checker::engine::evidence::witness::{Proof, WitnessKind};
 use checker::engine::{Answer, LoadedModel, Options, TraceWanted, Verdict};
 use checker::search::limits::StopReason;
 use checker::search::optimum::extremum::{Extreme, Extremes};
@@ -259,7 +259,7 @@ fn check_best_values(
             continue;
         };
         for witness in &answer.evidence.witnesses {
-            let (Kind::Value(_, shown), Some(Proof::Replayed(run, ..))) =
+            let (WitnessKind::Value(_, shown), Some(Proof::Replayed(run, ..))) =
                 (witness.kind, &witness.run)
             else {
                 return Err(TestCaseError::fail(format!("{text}{query}\n{witness:?}")));

@@ -15,11 +15,14 @@ use crate::search::reachability::report::Order;
 use crate::search::reachability::search;
 use crate::zones::Zone;
 
-use super::timed_run::{self, Kind, Shows, Witness};
+use super::timed_run::{self, Shows};
+use super::witness::{Witness, WitnessKind};
+use crate::engine::answer::{Answer, Verdict};
 use crate::engine::limits::{LimitWatch, Limits};
-use crate::engine::query::answer::{self, Answer, Subject, Verdict};
+use crate::engine::loaded_model::LoadedModel;
+use crate::engine::options::Options;
+use crate::engine::query::subject::{self, Subject};
 use crate::engine::session::walk::{Point, successors_or_failure};
-use crate::engine::{LoadedModel, Options};
 
 /// The way to the error in a game is searched for among this many times the states that the game
 /// explored,
@@ -30,12 +33,7 @@ const LEAST_EFFORT: u64 = 10_000;
 
 impl LoadedModel {
     /// Completes the trace of an answer that is an error, and finds the move that fails.
-    pub(in crate::engine) fn complete_failure(
-        &self,
-        query: &Query,
-        options: &Options,
-        answer: &mut Answer,
-    ) {
+    pub(crate) fn complete_failure(&self, query: &Query, options: &Options, answer: &mut Answer) {
         let Verdict::Error(failure) = answer.verdict else {
             return;
         };
@@ -43,7 +41,7 @@ impl LoadedModel {
         let (failure, witness) = match answer.evidence.witnesses.pop() {
             Some(witness) => (failure, witness),
             None => match self.shortest_way(&predicates, &query.kind, options, answer) {
-                Some((found, trace)) => (found, Witness::new(trace, None, Kind::Failure)),
+                Some((found, trace)) => (found, Witness::new(trace, None, WitnessKind::Failure)),
                 None => return,
             },
         };
@@ -149,7 +147,7 @@ impl LoadedModel {
             priorities: options.priorities,
         };
         let wanted = Abstraction::LowerUpper;
-        let mut symbolic = answer::symbolic(subject, predicates, &[], wanted);
+        let mut symbolic = subject::symbolic(subject, predicates, &[], wanted);
         let mut probe = Probe { predicates };
         let order = Order::BreadthFirst;
         let watch = &mut LimitWatch::new(limits);

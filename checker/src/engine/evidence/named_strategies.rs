@@ -11,48 +11,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::diagnostics::{Diagnostic, Span};
-use crate::game::strategy::attractor::{Strategy, Under};
-use crate::ir::Query;
+use crate::game::strategy::attractor::Strategy;
 
-use super::certificate::stop_text;
 use super::strategy_place::{self, Refusal};
+use crate::engine::answer::{Answer, Evidence, Verdict};
+use crate::engine::codes;
 use crate::engine::format::strategy_json;
-use crate::engine::query::answer::{Answer, Evidence, Verdict, new_answer};
-use crate::engine::{LoadedModel, Options, Rejection, codes};
-
-/// A strategy with the query that it answers.
-#[derive(Clone, Debug)]
-pub struct NamedStrategy {
-    /// Its name.
-    pub name: String,
-    /// The text of the query, without the name.
-    pub query: String,
-    /// `None` if the query was not satisfied, or the strategy was not made.
-    pub strategy: Option<Arc<Strategy>>,
-    /// How it is made when it is first used.
-    pub(in crate::engine) due: Option<Box<Due>>,
-}
-
-/// A strategy that is still to be made.
-#[derive(Clone, Debug)]
-pub(in crate::engine) struct Due {
-    pub(in crate::engine) query: Query,
-    pub(in crate::engine) options: Options,
-    /// What the query is asked under.
-    pub(in crate::engine) within: Option<Arc<Under>>,
-}
-
-impl NamedStrategy {
-    /// A strategy that is known, or known to be missing.
-    pub fn new(name: String, query: String, strategy: Option<Arc<Strategy>>) -> NamedStrategy {
-        NamedStrategy {
-            name,
-            query,
-            strategy,
-            due: None,
-        }
-    }
-}
+use crate::engine::limits::stop_text;
+use crate::engine::loaded_model::{Due, LoadedModel, NamedStrategy};
+use crate::engine::options::Options;
+use crate::engine::rejection::Rejection;
+use crate::search::limits::Counters;
 
 /// The text of a query without the `strategy S =` before it, if it has one.
 pub fn unnamed(query: &str) -> &str {
@@ -65,26 +34,9 @@ pub fn unnamed(query: &str) -> &str {
 }
 
 impl LoadedModel {
-    /// The names of the strategies so far.
-    pub(in crate::engine) fn strategy_names(&self) -> Vec<String> {
-        let names = self.strategies.iter().map(|one| one.name.clone());
-        names.collect()
-    }
-
-    /// The strategy with this name, if a query defined it.
-    pub fn strategy(&self, name: &str) -> Option<&NamedStrategy> {
-        self.strategies.iter().find(|one| one.name == name)
-    }
-
-    /// Keeps a strategy under its name, in the place of an earlier one.
-    pub fn keep_strategy(&mut self, named: NamedStrategy) {
-        self.strategies.retain(|one| one.name != named.name);
-        self.strategies.push(named);
-    }
-
     /// The strategy that a query is asked under, or that is to be saved; it is made within these
     /// limits if that is due.
-    pub(in crate::engine) fn existing_strategy(
+    pub(crate) fn existing_strategy(
         &mut self,
         name: &str,
         span: Span,
@@ -138,7 +90,7 @@ impl LoadedModel {
     }
 
     /// Answers `saveStrategy`.
-    pub(in crate::engine) fn save_strategy(
+    pub(crate) fn save_strategy(
         &mut self,
         (file, name): (&str, &str),
         span: Span,
@@ -152,17 +104,13 @@ impl LoadedModel {
             let Refusal { message, help } = refusal;
             self.refused(codes::STRATEGY_FILE, span, message, Some(&help))
         })?;
-        let mut answer = new_answer(
-            Verdict::Satisfied,
-            Evidence::default(),
-            crate::search::Counters::default(),
-        );
-        answer.message = Some(format!("strategy {name} written to {}", path.display()));
+        let mut answer = Answer::new(Verdict::Satisfied, Counters::default());
+        answer.remark(format!("strategy {name} written to {}", path.display()));
         Ok(answer)
     }
 
     /// Answers `strategy S = loadStrategy("file")`.
-    pub(in crate::engine) fn load_strategy(
+    pub(crate) fn load_strategy(
         &mut self,
         (file, name): (&str, &str),
         span: Span,
@@ -182,16 +130,13 @@ impl LoadedModel {
             strategy: Some(strategy),
             ..Evidence::default()
         };
-        let mut answer = new_answer(
-            Verdict::Satisfied,
+        let from = path.display();
+        let message = format!("strategy {name} with {states} states read from {from}");
+        Ok(Answer {
+            message: Some(message),
             evidence,
-            crate::search::Counters::default(),
-        );
-        answer.message = Some(format!(
-            "strategy {name} with {states} states read from {}",
-            path.display()
-        ));
-        Ok(answer)
+            ..Answer::new(Verdict::Satisfied, Counters::default())
+        })
     }
 
     /// Reads a strategy from the bytes of a file; gives the query that it answers, and the

@@ -11,67 +11,8 @@ use crate::verify::replay::{End, Run};
 use crate::zones::dbm::Constraint;
 
 use crate::engine::format::json;
-use crate::engine::format::strategy_json::{At, Mismatch, Reader};
-
-/// What is wrong with what a file shows.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(in crate::engine) enum Difference {
-    /// It has a name that the format or the model does not have.
-    Unknown(String),
-    /// It shows something that is not so.
-    False(String),
-}
-
-impl From<Mismatch> for Difference {
-    fn from(mismatch: Mismatch) -> Difference {
-        Difference::Unknown(format!("at {}: {}", mismatch.place, mismatch.message))
-    }
-}
-
-/// Refuses fields of an object that are none of these.
-pub(in crate::engine) fn only(object: &Json, known: &[&str], place: &str) -> Result<(), String> {
-    let mut fields = object.as_object().into_iter().flat_map(|map| map.keys());
-    match fields.find(|name| !known.contains(&name.as_str())) {
-        Some(name) => Err(format!("{place}: there is no field \"{name}\" here")),
-        None => Ok(()),
-    }
-}
-
-/// Compares what is shown with what is so. What is not shown is not missed.
-pub(in crate::engine) fn compare(
-    shown: &Json,
-    right: &Json,
-    place: &str,
-) -> Result<(), Difference> {
-    match (shown, right) {
-        (Json::Object(shown), Json::Object(right)) => {
-            for (name, value) in shown {
-                let Some(right) = right.get(name) else {
-                    let text = format!("{place}: the model has no \"{name}\" here");
-                    return Err(Difference::Unknown(text));
-                };
-                compare(value, right, &format!("{place}.{name}"))?;
-            }
-            Ok(())
-        }
-        (Json::Array(shown), Json::Array(right)) if shown.len() == right.len() => {
-            let both = shown.iter().zip(right).enumerate();
-            for (index, (shown, right)) in both {
-                compare(shown, right, &format!("{place}[{index}]"))?;
-            }
-            Ok(())
-        }
-        (Json::Array(shown), Json::Array(right)) => Err(Difference::False(format!(
-            "{place} has {} entries, and should have {}",
-            shown.len(),
-            right.len()
-        ))),
-        _ if shown == right => Ok(()),
-        _ => Err(Difference::False(format!(
-            "{place} is {shown}, and should be {right}"
-        ))),
-    }
-}
+use crate::engine::format::json_reader::{At, Difference, compare, only};
+use crate::engine::format::strategy_json::Reader;
 
 /// Compares all that a trace shows with the run in it, which was replayed; what of it is not
 /// checked, by name.

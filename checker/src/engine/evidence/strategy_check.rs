@@ -15,14 +15,15 @@ use crate::verify::timed::Timed;
 use crate::verify::{self, Effort, GivenUp, Semantics, State, regions};
 use crate::zones::{Bound, Federation, minimal};
 
+use crate::engine::answer::Verification;
 use crate::engine::format::text;
+use crate::engine::loaded_model::LoadedModel;
 use crate::engine::query::time_clock;
+use crate::engine::rejection::Rejection;
+use crate::syntax::ast::QueryText;
 
 /// Regions that a check explores before it gives up.
 pub const MOST_REGIONS: u64 = 2_000_000;
-
-/// How the check of a strategy ended; an error says why it could not be done.
-pub type Verification = Result<strategy::Outcome, verify::Error>;
 
 /// What a control query asks for.
 #[derive(Clone, Copy, Debug)]
@@ -55,11 +56,7 @@ impl<'q> Asked<'q> {
     }
 
     /// The game that is played within a limit of time, if there is one.
-    pub(in crate::engine) fn game<'n>(
-        &self,
-        network: &'n Network,
-        limit: Option<i32>,
-    ) -> time_clock::Game<'n>
+    pub(crate) fn game<'n>(&self, network: &'n Network, limit: Option<i32>) -> time_clock::Game<'n>
     where
         'q: 'n,
     {
@@ -150,9 +147,27 @@ pub fn verify(
     strategy::verify(&game.network, played.decisions, &claim, &start, effort)
 }
 
+impl LoadedModel {
+    /// Checks in closed loop that decisions for a control query win, wherever they come from.
+    pub fn verify_strategy(
+        &mut self,
+        text: &QueryText,
+        strategy: Played<'_>,
+        rules: (Forced, Priorities),
+        effort: &mut Effort<'_>,
+    ) -> Result<Verification, Rejection> {
+        let (query, _) = self.compile(text.span)?;
+        let network = &self.model.network;
+        Ok(match Asked::of(&query.kind) {
+            Some(asked) => verify(network, asked, strategy, rules, effort),
+            None => Err(verify::Error::Unsupported("queries other than control")),
+        })
+    }
+}
+
 /// The run that a way is, with its states in ticks: on entry of each, and after the last wait;
 /// `None` if it is not possible.
-pub(in crate::engine) fn follow(
+pub(crate) fn follow(
     network: &Network,
     way: &Way,
     priorities: Priorities,
@@ -197,7 +212,7 @@ fn without_priorities(network: &Network) -> Network {
 }
 
 /// Whether a strategy with this start and limit of time answers the query, if it wins.
-pub(in crate::engine) fn is_for(
+pub(crate) fn is_for(
     network: &Network,
     asked: Asked<'_>,
     (owner, start, time_limit): (Player, &Start, Option<i32>),
@@ -235,7 +250,7 @@ fn is_for_time(
 }
 
 /// What is claimed of a strategy for an objective.
-pub(in crate::engine) fn claim(
+pub(crate) fn claim(
     objective: &Objective,
     (owner, selection): (Player, Selection),
     (forced, priorities): (Forced, Priorities),
@@ -269,9 +284,7 @@ pub(in crate::engine) fn claim(
     }
 }
 
-pub(in crate::engine) fn constants<'p>(
-    predicates: impl Iterator<Item = &'p Predicate>,
-) -> (i64, bool) {
+pub(crate) fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> (i64, bool) {
     let atoms: Vec<_> = predicates.flat_map(predicate::atoms).collect();
     let constant = atoms.iter().map(regions::greatest_constant).max();
     let has_differences = atoms

@@ -10,7 +10,8 @@ use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::engine::format::{machine_json, strategy_json};
+use crate::engine::format::json_reader::MACHINE_FORMAT;
+use crate::engine::format::strategy_json;
 
 /// The largest file that is loaded.
 const MOST_BYTES: u64 = 2 << 30;
@@ -116,7 +117,7 @@ fn is_free(place: &Path) -> io::Result<bool> {
 fn is_strategy(start: &str) -> bool {
     let has = |name: &str| start.contains(&format!("\"{name}\""));
     if start.trim_start().starts_with('{') {
-        let ours = [strategy_json::FORMAT, machine_json::FORMAT];
+        let ours = [strategy_json::FORMAT, MACHINE_FORMAT];
         let is_ours = has("format") && ours.iter().any(|format| has(format));
         return is_ours || (has("version") && has("type") && has("representation"));
     }

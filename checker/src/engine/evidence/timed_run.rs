@@ -15,89 +15,17 @@ use crate::search::liveness::ending::RunEnding;
 use crate::search::timed_trace::schedule::{
     self, Closing, Finish, Schedule, Stays, Unscheduled, Wanted,
 };
-use crate::verify::replay::{self, Claim, Coverage, End, Moment, Outcome, Run, Shown, Step};
-use crate::verify::{self, State, Violation};
+use crate::verify::replay::{self, Claim, End, Moment, Outcome, Run, Shown, Step};
+use crate::verify::{self, State};
 use crate::zones::dbm::Constraint;
+
+use super::witness::{Missing, Proof};
 
 /// Times that the loop of a trace is taken, at most.
 const MOST_ROUNDS: usize = 64;
 
 /// Moves of a run, at most, when its loop is taken again.
 const MOST_MOVES: usize = 20_000;
-
-/// What backs a verdict or a value: a witness, a counterexample, or the way to a failure.
-#[derive(Clone, Debug)]
-pub struct Witness {
-    /// What it shows, if the answer has several.
-    pub title: Option<String>,
-    /// The symbolic run.
-    pub trace: Trace,
-    /// Why it never ends, if it does not.
-    pub ending: Option<RunEnding>,
-    /// The move that fails in the last state, if it leads to a failure that is in one.
-    pub failing: Option<Vec<Part>>,
-    /// Whether it shows what the query asks about, a value, or only the way to a failure.
-    pub kind: Kind,
-    /// The run with exact times, if it was wanted.
-    pub run: Option<Proof>,
-}
-
-/// What a witness is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// The way to a failure of the model.
-    Failure,
-    /// What the query asks about.
-    Predicate,
-    /// A value of the item with this index.
-    Value(usize, Shown),
-}
-
-impl Witness {
-    /// A symbolic run without anything.
-    pub fn new(trace: Trace, ending: Option<RunEnding>, kind: Kind) -> Witness {
-        Witness {
-            title: None,
-            trace,
-            ending,
-            failing: None,
-            kind,
-            run: None,
-        }
-    }
-}
-
-/// What became of the run with exact times.
-#[derive(Clone, Debug)]
-pub enum Proof {
-    /// It was replayed: the states on entry, in ticks, and what was looked at.
-    Replayed(Run, Vec<State>, Coverage),
-    /// The replay shows a mistake in it.
-    Violated(Run, Violation),
-    /// The moves of the trace have no times although its zones are exact.
-    Impossible,
-    /// There is none.
-    Missing(Missing),
-}
-
-/// Why there is no run with exact times.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Missing {
-    /// The zones of the trace are too large, and its moves are not possible in this order.
-    Approximate,
-    /// The moves are not possible with the values that `meta` variables have on this way.
-    Meta,
-    /// Too many alternatives.
-    TooHard,
-    /// No two states on the loop were found that lie in the same region.
-    OpenLoop,
-    /// A limit came first, or the user interrupted.
-    Stopped,
-    /// The model failed.
-    Failed(Failure),
-    /// The replay does not cover the model or query.
-    NotCovered(verify::Error),
-}
 
 /// What a trace shows.
 #[derive(Clone, Copy, Debug)]
@@ -217,7 +145,7 @@ impl From<Unscheduled> for Missing {
 }
 
 /// A run of these moves that ends so, and of which nothing else is wanted.
-pub(in crate::engine) fn wanted<'t>(moves: &'t [Vec<Part>], finish: Finish<'t>) -> Wanted<'t> {
+pub(crate) fn wanted<'t>(moves: &'t [Vec<Part>], finish: Finish<'t>) -> Wanted<'t> {
     Wanted {
         moves,
         stays: None,
@@ -228,10 +156,7 @@ pub(in crate::engine) fn wanted<'t>(moves: &'t [Vec<Part>], finish: Finish<'t>) 
 }
 
 /// A run with the earliest times.
-pub(in crate::engine) fn timed(
-    symbolic: &mut Symbolic<'_>,
-    wanted: &Wanted<'_>,
-) -> Result<Run, Missing> {
+pub(crate) fn timed(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<Run, Missing> {
     let schedule = schedule::schedule(symbolic, wanted)?;
     let Schedule {
         ticks_per_unit,

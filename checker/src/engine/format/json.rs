@@ -14,8 +14,8 @@ use crate::verify::choices::Choice;
 use crate::verify::replay::{End, Run};
 
 use super::text::{self, Value};
-use crate::engine::evidence::timed_run::{Kind, Proof, Witness};
-use crate::engine::query::answer::Values;
+use crate::engine::answer::Values;
+use crate::engine::evidence::witness::{Proof, Witness, WitnessKind};
 
 /// An edge.
 pub fn part(network: &Network, part: Part) -> Json {
@@ -141,9 +141,9 @@ fn witness(network: &Network, witness: &Witness) -> Json {
         json["title"] = json!(title);
     }
     match witness.kind {
-        Kind::Failure => json["kind"] = json!("failure"),
-        Kind::Predicate => {}
-        Kind::Value(item, shown) => {
+        WitnessKind::Failure => json["kind"] = json!("failure"),
+        WitnessKind::Predicate => {}
+        WitnessKind::Value(item, shown) => {
             json["value"] = json!({
                 "item": item,
                 "value": shown.value,

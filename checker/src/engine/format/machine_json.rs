@@ -17,12 +17,9 @@ use crate::network::Part;
 use crate::verify::observed as check;
 use crate::zones::{Federation, Zone};
 
-use super::strategy_json::{self, At, Mismatch, Reader};
+use super::json_reader::{At, Difference, MACHINE_FORMAT, Mismatch, compare};
+use super::strategy_json::{self, Reader};
 use super::{json, text};
-use crate::engine::evidence::shown_states::{self, Difference};
-
-/// The name of the format.
-pub const FORMAT: &str = "ntagen-machine";
 
 /// The version of the format that is written, and the only one that is read.
 pub const VERSION: u64 = 1;
@@ -70,7 +67,7 @@ pub fn write(network: &Network, machine: &Machine, query: &str) -> Json {
     });
     let states: Vec<Json> = states.collect();
     json!({
-        "format": FORMAT,
+        "format": MACHINE_FORMAT,
         "version": VERSION,
         "query": query,
         "observations": observations(query),
@@ -130,7 +127,7 @@ pub fn read(
     }
     let right = observations(&whole.text("query")?);
     if let Err(Difference::False(text) | Difference::Unknown(text)) =
-        shown_states::compare(&file["observations"], &json!(right), "observations")
+        compare(&file["observations"], &json!(right), "observations")
     {
         return Err(whole.field("observations")?.wrong(text, OTHER_MODEL));
     }

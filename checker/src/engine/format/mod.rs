@@ -3,6 +3,7 @@
 pub mod decision_table;
 pub mod explain;
 pub mod json;
+pub mod json_reader;
 pub mod machine_c;
 pub mod machine_json;
 pub mod model_json;

@@ -27,7 +27,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use crate::diagnostics::{SourceMap, Span};
-use crate::engine::LoadedModel;
+use crate::engine::loaded_model::LoadedModel;
 use crate::ir::{Features, Network, ProcessId, Shape, Urgency};
 use crate::network::{Obstacle, Symmetry};
 use crate::syntax::ast::{

@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use serde_json::{Map, Value as Json, json};
+use serde_json::{Value as Json, json};
 
 use crate::game::Player;
 use crate::game::strategy::attractor::{
@@ -24,6 +24,7 @@ use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
 
 use super::json;
+use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT};
 use super::text::{self, Place};
 use crate::engine::query::time_clock;
 
@@ -33,20 +34,8 @@ pub const FORMAT: &str = "ntagen-strategy";
 /// The version of the format that is written, and the only one that is read.
 pub const VERSION: u64 = 1;
 
-/// Why a file is no strategy for the model.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Mismatch {
-    /// Where in the JSON, such as `states[3].decisions[0].zones[1]`; empty for the whole.
-    pub place: String,
-    /// What is wrong.
-    pub message: String,
-    /// What to do about it.
-    pub help: Option<&'static str>,
-}
-
 const OTHER_MODEL: &str =
     "the strategy was made for another model, or the model has changed: synthesise it again";
-const SEE_FORMAT: &str = "docs/strategy.md describes the format";
 
 /// A strategy as JSON. Decisions of states with the same words are joined and come in the order of
 /// their ranks.
@@ -203,7 +192,7 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
 fn read_whole(network: &Network, whole: &At<'_>) -> Result<(String, Strategy), Mismatch> {
     let file = whole.0;
     let format = whole.text("format").unwrap_or_default();
-    if format == super::machine_json::FORMAT {
+    if format == MACHINE_FORMAT {
         let message = "this is a machine that goes by observations, and no strategy over states";
         return Err(whole.wrong(message, "`ntagen verify MODEL FILE` checks it"));
     }
@@ -340,7 +329,7 @@ fn time_limit(at: &At<'_>) -> Result<i32, Mismatch> {
 ///
 /// # Errors
 /// It is none of the network.
-pub(in crate::engine) fn read_words(network: &Network, state: &Json) -> Result<Vec<i32>, Mismatch> {
+pub(crate) fn read_words(network: &Network, state: &Json) -> Result<Vec<i32>, Mismatch> {
     let reader = Reader::new(network);
     let mut words = network.initial.clone();
     let state = At::whole(state);
@@ -349,91 +338,15 @@ pub(in crate::engine) fn read_words(network: &Network, state: &Json) -> Result<V
     Ok(words)
 }
 
-/// A part of the file with its place.
-pub(in crate::engine) struct At<'j>(pub(in crate::engine) &'j Json, String);
-
-impl<'j> At<'j> {
-    /// The whole file.
-    pub(in crate::engine) fn whole(file: &'j Json) -> At<'j> {
-        At(file, String::new())
-    }
-
-    pub(super) fn wrong(&self, message: impl Into<String>, help: &'static str) -> Mismatch {
-        Mismatch {
-            place: self.1.clone(),
-            message: message.into(),
-            help: Some(help),
-        }
-    }
-
-    pub(in crate::engine) fn field(&self, name: &str) -> Result<At<'j>, Mismatch> {
-        let place = if self.1.is_empty() {
-            name.to_owned()
-        } else {
-            format!("{}.{name}", self.1)
-        };
-        match self.0.get(name) {
-            Some(value) => Ok(At(value, place)),
-            None => Err(self.wrong(format!("\"{name}\" is missing"), SEE_FORMAT)),
-        }
-    }
-
-    /// Refuses fields that are none of these.
-    pub(super) fn only(&self, known: &[&str]) -> Result<(), Mismatch> {
-        match crate::engine::evidence::shown_states::only(self.0, known, "the format") {
-            Ok(()) => Ok(()),
-            Err(message) => Err(self.wrong(message, SEE_FORMAT)),
-        }
-    }
-
-    fn typed<T>(
-        &self,
-        name: &str,
-        what: &str,
-        read: impl Fn(&'j Json) -> Option<T>,
-    ) -> Result<T, Mismatch> {
-        let field = self.field(name)?;
-        read(field.0).ok_or_else(|| field.wrong(format!("this is no {what}"), SEE_FORMAT))
-    }
-
-    pub(super) fn text(&self, name: &str) -> Result<String, Mismatch> {
-        self.typed(name, "text", |value| value.as_str().map(str::to_owned))
-    }
-
-    fn map(&self, name: &str) -> Result<&'j Map<String, Json>, Mismatch> {
-        self.typed(name, "object", Json::as_object)
-    }
-
-    pub(in crate::engine) fn index(&self, name: &str) -> Result<u32, Mismatch> {
-        self.typed(name, "index", |value| {
-            value.as_u64().and_then(|index| u32::try_from(index).ok())
-        })
-    }
-
-    pub(in crate::engine) fn list(&self, name: &str) -> Result<Vec<At<'j>>, Mismatch> {
-        self.field(name)?.entries()
-    }
-
-    fn entries(&self) -> Result<Vec<At<'j>>, Mismatch> {
-        let Some(entries) = self.0.as_array() else {
-            return Err(self.wrong("this is no list", SEE_FORMAT));
-        };
-        let entries = entries.iter().enumerate();
-        Ok(entries
-            .map(|(index, one)| At(one, format!("{}[{index}]", self.1)))
-            .collect())
-    }
-}
-
 /// Reads parts of a file for a network.
-pub(in crate::engine) struct Reader<'n> {
+pub(crate) struct Reader<'n> {
     network: &'n Network,
     owner: Player,
 }
 
 impl<'n> Reader<'n> {
     /// A reader of what the controller does.
-    pub(in crate::engine) fn new(network: &'n Network) -> Reader<'n> {
+    pub(crate) fn new(network: &'n Network) -> Reader<'n> {
         Reader {
             network,
             owner: Player::Controller,
@@ -583,7 +496,7 @@ impl Reader<'_> {
     }
 
     /// Adds the constraints that a text such as `x-y <= 3` stands for.
-    pub(in crate::engine) fn constraint(
+    pub(crate) fn constraint(
         &self,
         at: &At<'_>,
         into: &mut Vec<Constraint>,
@@ -656,7 +569,7 @@ impl Reader<'_> {
     }
 
     /// An edge with its branch and the values of its `select`.
-    pub(in crate::engine) fn part(&self, at: &At<'_>) -> Result<Part, Mismatch> {
+    pub(crate) fn part(&self, at: &At<'_>) -> Result<Part, Mismatch> {
         at.only(&[
             "process",
             "edge",

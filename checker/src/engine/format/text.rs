@@ -5,8 +5,8 @@
 
 use std::fmt::Write as _;
 
-use crate::engine::LoadedModel;
-use crate::engine::evidence::timed_run::{Missing, Proof, Witness};
+use crate::engine::evidence::witness::{Missing, Proof, Witness};
+use crate::engine::loaded_model::LoadedModel;
 use crate::ir::{Branch, Edge, EdgeLabels, Network, RunTimeErrorKind, Shape};
 use crate::network::discrete::selects::{select_count, select_values};
 use crate::network::{Failure, Part};
@@ -477,7 +477,7 @@ pub fn failure_text(model: &LoadedModel, failure: Failure) -> String {
             )
         }
         Failure::Interrupted => "interrupted".to_owned(),
-        Failure::ClockRange => crate::engine::evidence::certificate::CLOCKS_GREW.to_owned(),
+        Failure::ClockRange => crate::engine::limits::CLOCKS_GREW.to_owned(),
         Failure::InitialInvariant => "the initial state breaks an invariant".to_owned(),
     }
 }

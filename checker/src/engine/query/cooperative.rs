@@ -16,10 +16,10 @@ use crate::verify::replay::{End, Run};
 use crate::zones::minimal;
 
 use crate::engine::Options;
-use crate::engine::evidence::certificate::stop_text;
-use crate::engine::evidence::timed_run::Missing;
+use crate::engine::evidence::witness::Missing;
 use crate::engine::evidence::{strategy_check, timed_run};
 use crate::engine::format::text;
+use crate::engine::limits::stop_text;
 
 /// The strategy of the winner of a game that was solved with both players working together.
 /// `rounds` are those of a goal that is to recur, and `zones` fresh ones of the game. An error of

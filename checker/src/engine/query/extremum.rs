@@ -13,13 +13,13 @@ use crate::search::optimum::value_goal::Taking;
 use crate::search::reachability::search;
 use crate::verify::replay::Shown;
 
-use super::answer::{
-    Answer, Evidence, Subject, Values, Verdict, Witnesses, found, live_variables, new_answer,
-    symbolic,
-};
 use super::optimal_trace::{Sought, best, not_the_best};
+use super::subject::{Subject, live_variables, symbolic};
+use super::witnesses::{Witnesses, found};
 use crate::engine::Options;
-use crate::engine::evidence::timed_run::{Kind, Shows, Takes, Witness};
+use crate::engine::answer::{Answer, Evidence, Values, Verdict};
+use crate::engine::evidence::timed_run::{Shows, Takes};
+use crate::engine::evidence::witness::{Witness, WitnessKind};
 use crate::engine::limits::LimitWatch;
 
 /// The least and greatest values.
@@ -64,7 +64,7 @@ pub(super) fn extremum(
         Err((failure, trace)) => {
             evidence
                 .witnesses
-                .push(Witness::new(trace, None, Kind::Failure));
+                .push(Witness::new(trace, None, WitnessKind::Failure));
             Verdict::Error(failure)
         }
     };
@@ -92,10 +92,12 @@ pub(super) fn extremum(
             message = (!remarks.is_empty()).then(|| remarks.join("; "));
         }
     }
-    let mut answer = new_answer(verdict, evidence, report.counters);
-    answer.message = message;
-    answer.value = values;
-    answer
+    Answer {
+        value: values,
+        message,
+        evidence,
+        ..Answer::new(verdict, report.counters)
+    }
 }
 
 /// Runs to states with the values that were found.

@@ -20,15 +20,15 @@ use crate::network::{Failure, Restriction, Stepper, Symbolic};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::verify::Effort;
 
-use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
 use super::budgets::{
     CROWD, IN_DISCRETE_STATES, IN_DISCRETE_STATES_BY_ROUNDS, STATES_BEFORE_CROWD,
     WITHOUT_ABSTRACTION,
 };
 use super::cooperative;
-use crate::engine::evidence::certificate::stop_text;
-use crate::engine::evidence::strategy_check::{self, Asked, Played, Verification};
-use crate::engine::limits::{LimitWatch, cut_as_interrupted};
+use super::subject::has_differences;
+use crate::engine::answer::{Answer, Verdict, Verification};
+use crate::engine::evidence::strategy_check::{self, Asked, Played};
+use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::{MOST_THREADS, Options};
 /// What is said of a game whose model has priorities.
 pub(super) const IGNORED_PRIORITIES: &str =
@@ -60,7 +60,7 @@ pub(super) fn note_missing_plans(answer: &mut Answer, query: &QueryKind, is_unde
 }
 
 /// Names the part of a game query that there is no algorithm for.
-pub(in crate::engine) fn unsupported_game(
+pub(crate) fn unsupported_game(
     objective: &Objective,
     is_time_optimal: bool,
     is_cooperative: bool,
@@ -237,7 +237,7 @@ fn played(
         symbolic = symbolic.forgetting(live.map(Arc::new));
     }
     let mut zones_for_ways = symbolic.another();
-    let plain = |verdict, counters| (new_answer(verdict, Evidence::default(), counters), false);
+    let plain = |verdict, counters| (Answer::new(verdict, counters), false);
     let graph = match nodes {
         Nodes::Automatic | Nodes::Symbolic => Graph::new(&mut symbolic, wanted),
         Nodes::Discrete => Graph::of_discrete_states(&mut symbolic, wanted),
@@ -293,7 +293,7 @@ fn played(
         Player::Controller => Verdict::Satisfied,
         Player::Environment => Verdict::NotSatisfied,
     };
-    let mut answer = new_answer(verdict, Evidence::default(), counters);
+    let mut answer = Answer::new(verdict, counters);
     if solver.graph.symbolic.ignores_priorities() {
         answer.message = Some(IGNORED_PRIORITIES.to_owned());
     }

@@ -15,11 +15,12 @@ use crate::search::reachability::{report, search};
 use crate::search::timed_trace::schedule::Stays;
 use crate::search::{Outcome, Trace};
 
-use super::answer::{Answer, Subject, Verdict, Witnesses, coarser, negated, new_answer, symbolic};
 use super::optimal_trace::not_the_best;
-use crate::engine::evidence::certificate::stop_text;
+use super::subject::{Subject, coarser, symbolic};
+use super::witnesses::Witnesses;
+use crate::engine::answer::{Answer, Verdict};
 use crate::engine::evidence::timed_run::Shows;
-use crate::engine::limits::{LimitWatch, cut_as_interrupted};
+use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::{Options, TraceWanted};
 
 /// What a search in coarser zones came to, unless it found something that may not be there; else
@@ -70,9 +71,11 @@ pub(super) fn always<'a>(
             Verdict::Error(failure)
         }
     };
-    let mut answer = new_answer(verdict, witnesses.into_evidence(), search.counters());
-    answer.message = message;
-    answer
+    Answer {
+        message,
+        evidence: witnesses.into_evidence(),
+        ..Answer::new(verdict, search.counters())
+    }
 }
 
 /// Does every state of `open` lead out of `keep`?
@@ -121,10 +124,12 @@ pub(super) fn leads_to<'a>(
             Verdict::Error(failure)
         }
     };
-    let evidence = witnesses.into_evidence();
-    let mut answer = new_answer(verdict, evidence, report.counters);
-    answer.message = message;
-    negated(answer)
+    let answer = Answer {
+        message,
+        evidence: witnesses.into_evidence(),
+        ..Answer::new(verdict, report.counters)
+    };
+    answer.negated()
 }
 
 /// A trace, how it ends, and the state in which it begins to stay.

@@ -9,10 +9,9 @@ use crate::search::reachability::goal::Target;
 use crate::search::{Outcome, Trace};
 use crate::zones::Bound;
 
-use super::answer::{Subject, symbolic};
+use super::subject::{Subject, symbolic};
 use super::time_clock::with_time;
-use crate::engine::evidence::certificate::stop_text;
-use crate::engine::limits::{LimitWatch, cut_as_interrupted};
+use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::{Options, TraceWanted};
 
 /// The states that a trace is to lead to.

@@ -2,24 +2,22 @@
 
 use std::sync::Arc;
 
-use serde_json::Value as Json;
-
 use crate::analysis::{Abstraction, ClockBounds};
 use crate::exec::Executor;
 use crate::game::partial_observation::{Answer as GameAnswer, Question, Solver};
 use crate::game::strategy::attractor::Selection;
 use crate::game::{Forced, Player, Priorities};
-use crate::ir::{ClockAtom, Network, Objective, Predicate, QueryKind};
+use crate::ir::{ClockAtom, Network, Objective, Predicate};
 use crate::network::symbolic::predicate;
 use crate::search::limits::{Counters, Watch};
 use crate::verify::Effort;
 use crate::verify::observed::{self, MachineState};
 
-use super::answer::{Answer, Evidence, Verdict, has_differences, new_answer};
 use super::game::{self, objective_atoms, zones_of};
+use super::subject::has_differences;
 use crate::engine::Options;
-use crate::engine::evidence::certificate::{Checked, Unreadable};
-use crate::engine::evidence::strategy_check::{self, Verification};
+use crate::engine::answer::{Answer, Verdict, Verification};
+use crate::engine::evidence::strategy_check;
 use crate::engine::format::machine_json;
 use crate::engine::limits::LimitWatch;
 
@@ -68,7 +66,7 @@ pub(super) fn game(
         Ok(GameAnswer::Stopped(reason)) => Verdict::Unknown(reason),
         Err(failure) => Verdict::Error(failure),
     };
-    let mut answer = new_answer(verdict, Evidence::default(), counters);
+    let mut answer = Answer::new(verdict, counters);
     if ignores_priorities {
         answer.message = Some(game::IGNORED_PRIORITIES.to_owned());
     }
@@ -119,35 +117,8 @@ pub fn verify(
     observed::verify(network, machine, observations, &claim, effort)
 }
 
-/// Checks a machine as read from its file.
-pub(in crate::engine) fn check_file(
-    network: &Network,
-    query: &QueryKind,
-    file: &Json,
-    rules: (Forced, Priorities),
-) -> Result<Checked, Unreadable> {
-    let QueryKind::Control {
-        objective,
-        observations: Some(observations),
-        ..
-    } = query
-    else {
-        return Err("the query of a machine has observations".to_owned());
-    };
-    let machine = machine_json::read(network, file, observations.len())
-        .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))?;
-    let asked = (objective, &observations[..]);
-    let effort = &mut Effort::up_to(strategy_check::MOST_REGIONS);
-    let result = verify(network, asked, &machine, rules, effort);
-    Ok(Checked::of_strategy(network, &result)
-        .without("what its states say of where play may be and what is seen there"))
-}
-
 /// Names what a model has that there is no algorithm for under partial observation.
-pub(in crate::engine) fn unsupported(
-    network: &Network,
-    priorities: Priorities,
-) -> Option<&'static str> {
+pub(crate) fn unsupported(network: &Network, priorities: Priorities) -> Option<&'static str> {
     let features = &network.features;
     if features.stopwatches {
         Some("stopwatches in a game with observations")

@@ -11,11 +11,10 @@ use crate::search::reachability::report::Report;
 use crate::search::reachability::search;
 use crate::search::{Outcome, Trace};
 
-use super::answer::Evidence;
-use super::answer::{
-    Answer, Subject, Verdict, Witnesses, coarser, live_variables, new_answer, symbolic,
-};
 use super::optimal_trace::{Sought, best, not_the_best};
+use super::subject::{Subject, coarser, live_variables, symbolic};
+use super::witnesses::Witnesses;
+use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::evidence::certificate;
 use crate::engine::evidence::timed_run::Shows;
 use crate::engine::limits::LimitWatch;
@@ -143,7 +142,9 @@ fn conclude(
         certificate,
         ..witnesses.into_evidence()
     };
-    let mut answer = new_answer(verdict, evidence, counters);
-    answer.message = message;
-    answer
+    Answer {
+        message,
+        evidence,
+        ..Answer::new(verdict, counters)
+    }
 }

@@ -37,7 +37,7 @@ pub fn network_of<'n>(network: &'n Network, strategy: &Strategy) -> Cow<'n, Netw
 }
 
 /// The network, with the clock if there is a limit.
-pub(in crate::engine) fn with_limit(network: &Network, limit: Option<i32>) -> Cow<'_, Network> {
+pub(crate) fn with_limit(network: &Network, limit: Option<i32>) -> Cow<'_, Network> {
     match limit {
         None => Cow::Borrowed(network),
         Some(_) => Cow::Owned(with_time(network).0),
@@ -45,14 +45,14 @@ pub(in crate::engine) fn with_limit(network: &Network, limit: Option<i32>) -> Co
 }
 
 /// A game with its network.
-pub(in crate::engine) struct Game<'n> {
-    pub(in crate::engine) network: Cow<'n, Network>,
-    pub(in crate::engine) objective: Cow<'n, Objective>,
+pub(crate) struct Game<'n> {
+    pub(crate) network: Cow<'n, Network>,
+    pub(crate) objective: Cow<'n, Objective>,
 }
 
 /// The game for an objective, within a limit if there is one. `rest` is how much of it must be left
 /// wherever the goal does not hold yet; a negative value counts as 0.
-pub(in crate::engine) fn game<'n>(
+pub(crate) fn game<'n>(
     network: &'n Network,
     objective: &'n Objective,
     limit: Option<i32>,

@@ -31,13 +31,13 @@ use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::optimum::extremum::{Extreme, Extremes};
 use crate::zones::{Bound, Zone};
 
-use super::answer::{Answer, Evidence, Values, Verdict, has_differences, new_answer};
 use super::budgets::{IN_DISCRETE_STATES, STATES_BEFORE_CROWD};
 use super::game::{self, objective_atoms};
+use super::subject::has_differences;
 use super::time_clock::{TIME, with_time};
-use crate::engine::evidence::certificate::stop_text;
+use crate::engine::answer::{Answer, Values, Verdict};
 use crate::engine::evidence::strategy_check::Asked;
-use crate::engine::limits::{LimitWatch, cut_as_interrupted};
+use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::{MOST_THREADS, Options};
 
 /// The limit to start from if the query has none.
@@ -88,7 +88,7 @@ pub(super) fn fastest(
             Ok(limit) => limit.max(-1),
             Err(error) => {
                 let failure = Verdict::Error(error.into());
-                return new_answer(failure, Evidence::default(), counters);
+                return Answer::new(failure, counters);
             }
         }
     } else {
@@ -152,7 +152,7 @@ pub(super) fn fastest(
             Ok(Run::Approximate) => (Verdict::Maybe, None),
             Err(failure) => (Verdict::Error(failure), None),
         };
-        let mut answer = new_answer(verdict, Evidence::default(), counters);
+        let mut answer = Answer::new(verdict, counters);
         let mut remarks = Vec::new();
         if let Some((value, is_reached)) = time {
             let least = Some(Extreme::Value { value, is_reached });

@@ -24,10 +24,11 @@ use crate::verify::timed::{Timed, least_multiple};
 use crate::verify::{self, Effort, Part, Semantics};
 
 use crate::engine::evidence::strategy_check::{self, Asked, Played};
-use crate::engine::format::strategy_json::Mismatch;
+use crate::engine::format::json_reader::Mismatch;
 use crate::engine::format::{json, strategy_json};
+use crate::engine::loaded_model::LoadedModel;
 use crate::engine::query::time_clock;
-use crate::engine::{LoadedModel, Rejection};
+use crate::engine::rejection::Rejection;
 
 /// A strategy that can be followed.
 #[derive(Debug)]

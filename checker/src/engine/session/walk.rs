@@ -17,8 +17,10 @@ use crate::verify::choices::Choices;
 use crate::zones::Zone;
 
 use crate::engine::limits::{LimitWatch, Limits};
-use crate::engine::query::answer::has_differences;
-use crate::engine::{CodeEngine, LoadedModel, Rejection};
+use crate::engine::loaded_model::LoadedModel;
+use crate::engine::options::CodeEngine;
+use crate::engine::query::subject::has_differences;
+use crate::engine::rejection::Rejection;
 
 /// How finely the times of simulated runs are chosen, unless finer ones are asked for.
 pub const SIMULATED_TICKS_PER_UNIT: i64 = 1000;
@@ -107,7 +109,7 @@ impl LoadedModel {
     }
 
     /// Zones as they are, without abstraction.
-    pub(in crate::engine) fn symbolic(&self) -> Symbolic<'_> {
+    pub(crate) fn symbolic(&self) -> Symbolic<'_> {
         symbolic(self.network(), self.executor())
     }
 }
@@ -125,7 +127,7 @@ pub fn successors(symbolic: &mut Symbolic<'_>, point: &Point) -> Result<Successo
 }
 
 /// The same; a failure comes with the move that fails, unless it is the search for moves itself.
-pub(in crate::engine) fn successors_or_failure(
+pub(crate) fn successors_or_failure(
     symbolic: &mut Symbolic<'_>,
     point: &Point,
 ) -> Result<Successors, (Failure, Option<Vec<Part>>)> {

@@ -379,7 +379,7 @@ impl<'s, 'a> Plan<'s, 'a> {
         let Some(keep) = &self.keep else {
             return Ok(Federation::empty(dimension));
         };
-        let negation = Predicate::Not(Box::new(keep.clone()));
+        let negation = keep.negated();
         let extent = self
             .symbolic
             .extent(&negation, &mut self.words, whole.bounds())?;

@@ -1,0 +1,177 @@
+//! Answers as values: the verdict, what backs it, and what it took.
+
+use std::sync::Arc;
+
+use super::evidence::witness::{Proof, Witness};
+use crate::game::partial_observation::Machine;
+use crate::game::strategy::attractor::Strategy;
+use crate::game::strategy::plans::Plan;
+use crate::ir::SiteId;
+use crate::network::Failure;
+use crate::search::limits::{Counters, StopReason};
+use crate::search::optimum::extremum::Extremes;
+use crate::verify;
+use crate::verify::certificate::States;
+use crate::verify::strategy::Outcome as StrategyCheck;
+
+/// What a query came out as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// It holds.
+    Satisfied,
+    /// It does not.
+    NotSatisfied,
+    /// An over-approximation could not decide.
+    Maybe,
+    /// A limit came first.
+    Unknown(StopReason),
+    /// The model failed.
+    Error(Failure),
+}
+
+/// What backs a verdict.
+#[derive(Clone, Debug, Default)]
+pub struct Evidence {
+    /// Witnesses, counterexamples, or the way to a failure: one, or one a value.
+    pub witnesses: Vec<Witness>,
+    /// The states that a search for such a state has reached, if there is none and they were
+    /// wanted.
+    pub certificate: Option<Certificate>,
+    /// The strategy of the player who wins, if it was wanted.
+    pub strategy: Option<Arc<Strategy>>,
+    /// The strategy of the controller in a game with observations, if it wins and it was wanted.
+    pub machine: Option<Arc<Machine>>,
+    /// How the check of the strategy ended, if it was wanted.
+    pub verification: Option<Verification>,
+    /// Plans, if they were wanted.
+    pub plans: Option<Vec<Plan>>,
+    /// Whether there are more plans than were wanted, or may be: after the first, no other is
+    /// looked for.
+    pub has_more_plans: bool,
+}
+
+impl Evidence {
+    /// Leaves the last clock, which is none of the model, out of all runs.
+    pub(crate) fn forget_last_clock(&mut self) {
+        for witness in &mut self.witnesses {
+            for (_, zone) in &mut witness.trace.states {
+                *zone = zone.without_last_clock();
+            }
+            if let Some(Proof::Replayed(_, states, _)) = &mut witness.run {
+                for state in states {
+                    state.clocks.pop();
+                }
+            }
+        }
+    }
+
+    /// Whether the strategy and all runs passed their independent checks; `None` if there was none,
+    /// or one came to no end.
+    pub fn is_verified(&self) -> Option<bool> {
+        let strategy = self.verification.iter().map(|check| match check {
+            Ok(StrategyCheck::Verified(_)) => Some(true),
+            Ok(StrategyCheck::Violated(..)) => Some(false),
+            Ok(StrategyCheck::GivenUp(..)) | Err(_) => None,
+        });
+        let runs = self.witnesses.iter().filter_map(|one| one.run.as_ref());
+        let runs = runs.map(|run| match run {
+            Proof::Replayed(..) => Some(true),
+            Proof::Violated(..) | Proof::Impossible => Some(false),
+            Proof::Missing(_) => None,
+        });
+        let checks: Vec<Option<bool>> = strategy.chain(runs).collect();
+        if checks.contains(&Some(false)) {
+            return Some(false);
+        }
+        (!checks.is_empty() && !checks.contains(&None)).then_some(true)
+    }
+}
+
+/// The values of the items of a query with `sup`, `inf` or `bounds`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Values {
+    /// Whether the least values were asked for.
+    pub least: bool,
+    /// Whether the greatest values were asked for.
+    pub greatest: bool,
+    /// Of each item.
+    pub items: Vec<Extremes>,
+}
+
+/// The answer to a query.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The values of a query for them.
+    pub value: Option<Values>,
+    /// A remark for the user.
+    pub message: Option<String>,
+    /// Warnings about the query, rendered.
+    pub warnings: Vec<String>,
+    /// What backs it.
+    pub evidence: Evidence,
+    /// What was done.
+    pub counters: Counters,
+    /// The greatest number of bytes that states and tables took.
+    pub peak_bytes: u64,
+    /// Seconds of the search alone.
+    pub seconds: f64,
+    /// Seconds of loading the model and compiling its code.
+    pub load_seconds: f64,
+    /// The first place, in the order of the model, where the result of integer arithmetic did not
+    /// fit and wrapped round.
+    pub wrapped: Option<SiteId>,
+}
+
+impl Answer {
+    /// An answer with nothing beside the verdict and what was done for it.
+    pub(crate) fn new(verdict: Verdict, counters: Counters) -> Answer {
+        Answer {
+            verdict,
+            value: None,
+            message: None,
+            warnings: Vec::new(),
+            evidence: Evidence::default(),
+            counters,
+            peak_bytes: 0,
+            seconds: 0.0,
+            load_seconds: 0.0,
+            wrapped: None,
+        }
+    }
+
+    /// The answer to a query on a model that has no meaning.
+    pub(crate) fn failed(failure: Failure) -> Answer {
+        Answer::new(Verdict::Error(failure), Counters::default())
+    }
+
+    /// The answer to the negated query.
+    pub(crate) fn negated(self) -> Answer {
+        let verdict = match self.verdict {
+            Verdict::Satisfied => Verdict::NotSatisfied,
+            Verdict::NotSatisfied => Verdict::Satisfied,
+            other => other,
+        };
+        Answer { verdict, ..self }
+    }
+
+    /// Adds a remark for the user behind those that are there.
+    pub(crate) fn remark(&mut self, remark: impl Into<String>) {
+        let remark = remark.into();
+        self.message = Some(match self.message.take() {
+            Some(message) => format!("{message}; {remark}"),
+            None => remark,
+        });
+    }
+}
+
+/// How the check of a strategy ended; an error says why it could not be done.
+pub type Verification = Result<StrategyCheck, verify::Error>;
+
+/// States that contain all reachable ones.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Certificate {
+    /// The states, by words.
+    pub states: Vec<States>,
+}

@@ -1,0 +1,109 @@
+//! From the text of a query to its answer, with everything around the search itself: compilation,
+//! names of strategies, remarks on results that wrapped round.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::answer::{Answer, Verdict};
+use super::evidence::named_strategies;
+use super::loaded_model::{Due, LoadedModel, NamedStrategy};
+use super::options::Options;
+use super::rejection::Rejection;
+use crate::exec::RunTimeError;
+use crate::game::strategy::attractor::Under;
+use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
+use crate::network::Failure;
+use crate::syntax::ast::QueryText;
+
+impl LoadedModel {
+    /// Answers a query.
+    pub fn check(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
+        let before = std::mem::replace(&mut self.model.network.overflow, options.overflow);
+        let answer = self.check_it(text, options);
+        self.model.network.overflow = before;
+        answer
+    }
+
+    fn check_it(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
+        let start = Instant::now();
+        let (query, warnings) = self.compile(text.span)?;
+        self.load_seconds += start.elapsed().as_secs_f64();
+        if let Some(name) = &query.under {
+            // What is supported depends on it.
+            self.existing_strategy(name, query.span, options)?;
+        }
+        let start = Instant::now();
+        self.refuse_unsupported(&query, options.priorities)?;
+        self.prepare_code(options.code, query.span)?;
+        self.executor().wraps().clear();
+        self.load_seconds += start.elapsed().as_secs_f64();
+        let mut answer = match (&query.kind, self.constant_failure()) {
+            (_, Some(failure)) => Answer::failed(failure),
+            (QueryKind::SaveStrategy { file, strategy }, None) => {
+                self.save_strategy((file, strategy), query.span, options)?
+            }
+            (QueryKind::LoadStrategy { file }, None) => {
+                let name = query.strategy.as_deref().unwrap_or_default();
+                self.load_strategy((file, name), query.span, options)?
+            }
+            _ => self.answer(&query, options)?,
+        };
+        answer.wrapped = self.first_wrap();
+        self.complete_failure(&query, options, &mut answer);
+        answer.warnings = warnings;
+        answer.load_seconds = self.load_seconds;
+        Ok(answer)
+    }
+
+    /// Answers a query that is no file operation; keeps the strategy that it defines.
+    fn answer(&mut self, query: &Query, options: &Options) -> Result<Answer, Rejection> {
+        let within = match &query.under {
+            None => None,
+            Some(name) => {
+                let strategy = self.existing_strategy(name, query.span, options)?;
+                let query = self.strategy(name).map(|one| one.query.clone());
+                Some(Arc::new(Under {
+                    query: query.unwrap_or_default(),
+                    strategy,
+                }))
+            }
+        };
+        let answer = self.answer_within(query, options, within.as_ref());
+        let Some(name) = query.strategy.clone() else {
+            return Ok(answer);
+        };
+        let text = named_strategies::unnamed(self.sources.text(query.span)).to_owned();
+        // Where the query is not satisfied, the strategy is the environment's.
+        let is_won = answer.verdict == Verdict::Satisfied;
+        let known = is_won.then(|| answer.evidence.strategy.clone()).flatten();
+        let due = (is_won && known.is_none()).then(|| {
+            Box::new(Due {
+                query: query.clone(),
+                options: options.clone(),
+                within,
+            })
+        });
+        self.keep_strategy(NamedStrategy {
+            due,
+            ..NamedStrategy::new(name, text, known)
+        });
+        Ok(answer)
+    }
+
+    /// Why the model has no meaning if what does not fit is an error: a constant wrapped round.
+    fn constant_failure(&self) -> Option<Failure> {
+        let network = self.network();
+        let site = network.wrapped_constant?;
+        let kind = RunTimeErrorKind::Overflow;
+        let is_error = network.overflow == Overflow::Error;
+        is_error.then_some(Failure::RunTime(RunTimeError { kind, site }))
+    }
+
+    /// Where the answer to a query first wrapped round, in the order of the model, or a constant
+    /// did.
+    fn first_wrap(&self) -> Option<SiteId> {
+        let in_constants = self.network().wrapped_constant;
+        let noted = self.executor().wraps().first();
+        noted.into_iter().chain(in_constants).min()
+    }
+}

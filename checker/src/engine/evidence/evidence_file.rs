@@ -1,0 +1,113 @@
+//! Files of evidence are checked against the model, whatever they hold: a certificate, traces, a
+//! strategy or a machine.
+
+use serde_json::Value as Json;
+
+use crate::game::strategy::attractor::Strategy;
+use crate::game::{Forced, Priorities};
+use crate::ir::{Network, QueryKind};
+use crate::verify::Effort;
+
+use super::checked::{Checked, Unreadable};
+use super::strategy_check::{self, Asked, Played};
+use super::{certificate, trace_file};
+use crate::engine::format::json_reader::MACHINE_FORMAT;
+use crate::engine::format::{json, machine_json, strategy_json};
+use crate::engine::loaded_model::LoadedModel;
+use crate::engine::query::partial_observation;
+use crate::engine::rejection::Rejection;
+
+/// What a file of evidence is.
+const HINT: &str = "hint: it must come from `ntagen check` for this model: with --certificate FILE, --trace FILE.json or --strategy FILE.json; or from `ntagen play` with --log FILE";
+
+impl LoadedModel {
+    /// Checks a certificate, a trace or a strategy that was written for this model, independently
+    /// of how it was found. `rules` are those for forced moves and priorities that a strategy was
+    /// made for.
+    pub fn verify_evidence(
+        &mut self,
+        path: &str,
+        text: &str,
+        rules: (Forced, Priorities),
+    ) -> Result<Checked, Rejection> {
+        let unreadable = |why: Unreadable| Rejection {
+            diagnostics: Vec::new(),
+            rendered: vec![format!("error: {path}: {why}\n{HINT}")],
+        };
+        let header = text.lines().next().unwrap_or_default();
+        let header: Json = serde_json::from_str(header)
+            .or_else(|_| serde_json::from_str(text))
+            .map_err(|error| unreadable(format!("it is no JSON: {error}")))?;
+        let kind = header["format"].as_str().unwrap_or_default().to_owned();
+        if header["version"] != 1
+            || ![
+                certificate::FORMAT,
+                json::TRACE_FORMAT,
+                strategy_json::FORMAT,
+                MACHINE_FORMAT,
+            ]
+            .contains(&kind.as_str())
+        {
+            return Err(unreadable(
+                "it is neither a certificate nor a trace nor a strategy nor a machine of version 1"
+                    .to_owned(),
+            ));
+        }
+        let query = header["query"].as_str().unwrap_or_default();
+        let query_text = self.add_query(query);
+        let (compiled, _) = self.compile(query_text.span)?;
+        let network = self.network();
+        let checked = match kind.as_str() {
+            certificate::FORMAT => certificate::check_file(network, &compiled.kind, &header, text),
+            json::TRACE_FORMAT => trace_file::check_file(network, &compiled.kind, &header),
+            MACHINE_FORMAT => check_machine(network, &compiled.kind, &header, rules),
+            _ => strategy_json::read(network, text.as_bytes())
+                .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))
+                .and_then(|(_, strategy)| {
+                    check_strategy(network, &compiled.kind, &strategy, rules)
+                }),
+        };
+        checked.map_err(unreadable)
+    }
+}
+
+/// Checks in closed loop that the owner of a strategy wins.
+fn check_strategy(
+    network: &Network,
+    query: &QueryKind,
+    strategy: &Strategy,
+    rules: (Forced, Priorities),
+) -> Result<Checked, Unreadable> {
+    let Some(asked) = Asked::of(query) else {
+        return Err("the query of a strategy over states begins with control:".to_owned());
+    };
+    let decisions = strategy_check::decisions(network, strategy);
+    let played = Played::new(strategy, &decisions);
+    let effort = &mut Effort::up_to(strategy_check::MOST_REGIONS);
+    let result = strategy_check::verify(network, asked, played, rules, effort);
+    Ok(Checked::of_strategy(network, &result).without("states that play by it does not come to"))
+}
+
+/// Checks a machine as read from its file.
+fn check_machine(
+    network: &Network,
+    query: &QueryKind,
+    file: &Json,
+    rules: (Forced, Priorities),
+) -> Result<Checked, Unreadable> {
+    let QueryKind::Control {
+        objective,
+        observations: Some(observations),
+        ..
+    } = query
+    else {
+        return Err("the query of a machine has observations".to_owned());
+    };
+    let machine = machine_json::read(network, file, observations.len())
+        .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))?;
+    let asked = (objective, &observations[..]);
+    let effort = &mut Effort::up_to(strategy_check::MOST_REGIONS);
+    let result = partial_observation::verify(network, asked, &machine, rules, effort);
+    Ok(Checked::of_strategy(network, &result)
+        .without("what its states say of where play may be and what is seen there"))
+}

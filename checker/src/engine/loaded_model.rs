@@ -1,0 +1,206 @@
+//! A model that was loaded and accepted: its network, its texts, its code, and the strategies that
+//! queries named.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::code::PreparedCode;
+use super::codes;
+use super::options::{CodeEngine, Options};
+use super::rejection::Rejection;
+use crate::diagnostics::{Diagnostic, SourceMap, Span};
+use crate::exec::Executor;
+use crate::game::strategy::attractor::{Strategy, Under};
+use crate::ir::{Network, Overflow, Query};
+use crate::semantics::{self, Model};
+use crate::syntax::{
+    self,
+    ast::{QueryText, Template},
+};
+
+/// A model that was loaded and accepted.
+pub struct LoadedModel {
+    pub(super) model: Model,
+    pub(super) sources: SourceMap,
+    pub(super) templates: Vec<Template>,
+    /// The folder of the file.
+    pub(super) folder: PathBuf,
+    /// The strategies that queries defined, in the order of their definition.
+    pub(super) strategies: Vec<NamedStrategy>,
+    /// The queries of the file.
+    pub queries: Vec<QueryText>,
+    /// Warnings of loading the model and files of queries, rendered.
+    pub warnings: Vec<String>,
+    /// Seconds that loading took, compilation of code included once a query was checked.
+    pub load_seconds: f64,
+    code: Option<PreparedCode>,
+}
+
+impl LoadedModel {
+    /// Reads and checks a model. `path` names it in diagnostics.
+    pub fn load(path: &str, bytes: &[u8]) -> Result<LoadedModel, Rejection> {
+        let start = Instant::now();
+        let mut sources = SourceMap::default();
+        let prelude = syntax::prelude(&mut sources);
+        let parsed = syntax::read_model(path, bytes, &mut sources);
+        let mut diagnostics = parsed.diagnostics;
+        if diagnostics.iter().any(Diagnostic::is_error) {
+            return Err(Rejection::new(diagnostics, &sources));
+        }
+        let (model, more) = semantics::analyse(&parsed.document, &prelude, &sources);
+        diagnostics.extend(more);
+        let Some(model) = model else {
+            return Err(Rejection::new(diagnostics, &sources));
+        };
+        let warnings = Rejection::new(diagnostics, &sources).rendered;
+        let queries = parsed.document.queries;
+        let load_seconds = start.elapsed().as_secs_f64();
+        Ok(LoadedModel {
+            model,
+            sources,
+            templates: parsed.document.templates,
+            folder: Path::new(path)
+                .parent()
+                .map(Path::to_owned)
+                .unwrap_or_default(),
+            strategies: Vec::new(),
+            queries,
+            warnings,
+            load_seconds,
+            code: None,
+        })
+    }
+
+    /// The network.
+    pub fn network(&self) -> &Network {
+        &self.model.network
+    }
+
+    /// Where a span lies, as `file:line:column`, with the text it covers.
+    pub fn place(&self, span: Span) -> (String, String) {
+        let source = self.sources.get(span.source);
+        let position = self.sources.position(span);
+        let (line, column) = (position.line, position.column);
+        let place = match (&*source.path, source.place.as_str()) {
+            (path, "") => format!("{path}:{line}:{column}"),
+            ("", words) => format!("{words}:{line}:{column}"),
+            (path, words) => format!("{path}:{line}:{column} ({words})"),
+        };
+        (place, self.sources.text(span).to_owned())
+    }
+
+    /// Reads the queries of a `.q` file.
+    pub fn read_queries(&mut self, path: &str, bytes: &[u8]) -> Result<Vec<QueryText>, Rejection> {
+        let (queries, diagnostics) = syntax::read_queries(path, bytes, &mut self.sources);
+        if diagnostics.iter().any(Diagnostic::is_error) {
+            return Err(Rejection::new(diagnostics, &self.sources));
+        }
+        let warnings = Rejection::new(diagnostics, &self.sources).rendered;
+        self.warnings.extend(warnings);
+        Ok(queries)
+    }
+
+    /// A query given as text.
+    pub fn add_query(&mut self, text: &str) -> QueryText {
+        let span = syntax::add_query_text(text, &mut self.sources);
+        QueryText {
+            span,
+            text: text.trim().to_owned(),
+            comment: String::new(),
+            expect: None,
+        }
+    }
+
+    /// What runs the code of the model.
+    ///
+    /// # Panics
+    ///
+    /// If no query was checked and no simulation prepared before.
+    pub(super) fn executor(&self) -> &dyn Executor {
+        let code = self.code.as_ref();
+        code.expect("code is prepared before it is run").executor()
+    }
+
+    /// Makes the code of the model, or adds what queries brought since.
+    pub(super) fn prepare_code(&mut self, wanted: CodeEngine, span: Span) -> Result<(), Rejection> {
+        let network = &self.model.network;
+        PreparedCode::prepare(&mut self.code, network, wanted).map_err(|message| {
+            let diagnostic = Diagnostic::new(codes::NO_COMPILED_CODE, span, message)
+                .help("use the interpreter: --engine interpreter");
+            Rejection::new(vec![diagnostic], &self.sources)
+        })
+    }
+
+    /// Compiles a query, whose code becomes part of the network: the query, and its warnings as
+    /// text.
+    pub fn compile(&mut self, span: Span) -> Result<(Query, Vec<String>), Rejection> {
+        let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
+        if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
+            let names = self.strategy_names();
+            let (query, more) = self.model.compile_query(&parsed, &self.sources, &names);
+            diagnostics.extend(more);
+            if let Some(query) = query {
+                return Ok((query, Rejection::new(diagnostics, &self.sources).rendered));
+            }
+        }
+        Err(Rejection::new(diagnostics, &self.sources))
+    }
+
+    /// Says what happens where results of integer arithmetic do not fit into 32 bits; a query has
+    /// an option of its own.
+    pub fn set_overflow(&mut self, overflow: Overflow) {
+        self.model.network.overflow = overflow;
+    }
+
+    /// The names of the strategies so far.
+    pub(crate) fn strategy_names(&self) -> Vec<String> {
+        let names = self.strategies.iter().map(|one| one.name.clone());
+        names.collect()
+    }
+
+    /// The strategy with this name, if a query defined it.
+    pub fn strategy(&self, name: &str) -> Option<&NamedStrategy> {
+        self.strategies.iter().find(|one| one.name == name)
+    }
+
+    /// Keeps a strategy under its name, in the place of an earlier one.
+    pub fn keep_strategy(&mut self, named: NamedStrategy) {
+        self.strategies.retain(|one| one.name != named.name);
+        self.strategies.push(named);
+    }
+}
+
+/// A strategy with the query that it answers.
+#[derive(Clone, Debug)]
+pub struct NamedStrategy {
+    /// Its name.
+    pub name: String,
+    /// The text of the query, without the name.
+    pub query: String,
+    /// `None` if the query was not satisfied, or the strategy was not made.
+    pub strategy: Option<Arc<Strategy>>,
+    /// How it is made when it is first used.
+    pub(crate) due: Option<Box<Due>>,
+}
+
+/// A strategy that is still to be made.
+#[derive(Clone, Debug)]
+pub(crate) struct Due {
+    pub(crate) query: Query,
+    pub(crate) options: Options,
+    /// What the query is asked under.
+    pub(crate) within: Option<Arc<Under>>,
+}
+
+impl NamedStrategy {
+    /// A strategy that is known, or known to be missing.
+    pub fn new(name: String, query: String, strategy: Option<Arc<Strategy>>) -> NamedStrategy {
+        NamedStrategy {
+            name,
+            query,
+            strategy,
+            due: None,
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! From a compiled query to its answer: which search each kind of query takes, within which limits.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::cancellation;
+use crate::game::strategy::attractor::Under;
+use crate::game::strategy::closed_loop::ClosedLoop;
+use crate::ir::{Predicate, Query, QueryKind};
+use crate::network::symbolic::predicate;
+use crate::network::{Failure, Symmetry};
+use crate::search::limits::StopReason;
+use crate::search::optimum::extremum::Question;
+use crate::zones::Bound;
+
+use super::extremum::extremum;
+use super::liveness::{always, leads_to};
+use super::reachable::reachable;
+use super::subject::Subject;
+use super::time_optimal::{Race, fastest};
+use super::{game, partial_observation, time_clock};
+use crate::engine::answer::{Answer, Verdict};
+use crate::engine::limits::{CLOCKS_GREW, LimitWatch};
+use crate::engine::loaded_model::LoadedModel;
+use crate::engine::options::Options;
+
+impl LoadedModel {
+    /// Answers a query that is no file operation, under this strategy.
+    pub(crate) fn answer_within(
+        &self,
+        query: &Query,
+        options: &Options,
+        within: Option<&Arc<Under>>,
+    ) -> Answer {
+        let time_limit = within.and_then(|within| within.strategy.time_limit);
+        let network = time_clock::with_limit(&self.model.network, time_limit);
+        let under = within.map(|within| ClosedLoop::new(&network, &within.strategy));
+        let subject = Subject {
+            network: &network,
+            executor: self.executor(),
+            under: under.as_ref(),
+            within,
+            priorities: options.priorities,
+        };
+        let mut answer = answer(subject, query, options);
+        if time_limit.is_some() && query.strategy.is_none() {
+            answer.evidence.forget_last_clock();
+        }
+        answer
+    }
+}
+
+/// Answers a query that [`crate::engine::LoadedModel`] has accepted.
+fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> Answer {
+    let start = Instant::now();
+    let zone_bytes = subject.network.clocks.len().pow(2) * size_of::<Bound>();
+    let at_hand_bytes = (zones_at_hand(&query.kind) * zone_bytes) as u64;
+    let mut watch = LimitWatch::with_at_hand(options.limits.clone(), at_hand_bytes);
+    let result = watch.bound(|watch| {
+        // Where there are thousands of clocks this alone may be too much.
+        cancellation::ask_for(zone_bytes);
+        answer_within(subject, query, options, watch)
+    });
+    let mut answer =
+        result.unwrap_or_else(|(reason, counters)| Answer::new(Verdict::Unknown(reason), counters));
+    // What is known by then does not matter to a user who interrupts.
+    if answer.verdict == Verdict::Error(Failure::Interrupted) || watch.is_interrupted() {
+        let counters = answer.counters;
+        let verdict = Verdict::Unknown(watch.stop());
+        answer = Answer::new(verdict, counters);
+    }
+    if answer.verdict == Verdict::Error(Failure::ClockRange) {
+        let verdict = Verdict::Unknown(StopReason::Clocks);
+        answer = Answer::new(verdict, answer.counters);
+        answer.message = Some(CLOCKS_GREW.to_owned());
+    }
+    if options.plans.is_some() {
+        game::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());
+    }
+    answer.seconds = start.elapsed().as_secs_f64();
+    answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
+    answer
+}
+
+/// So many zones stand side by side in one step of the search, beside those of its account, at most
+/// about: where it is a matter of cutting zones by each other, more.
+fn zones_at_hand(kind: &QueryKind) -> usize {
+    match kind {
+        QueryKind::Reachable(predicate) | QueryKind::Invariantly(predicate)
+            if !predicate::has_deadlock(predicate) =>
+        {
+            1
+        }
+        QueryKind::Extremum { .. } => 1,
+        QueryKind::Control { .. } => 4,
+        _ => 8,
+    }
+}
+
+/// The same, within the limits.
+fn answer_within(
+    subject: Subject<'_>,
+    query: &Query,
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let Subject {
+        network, executor, ..
+    } = subject;
+    match &query.kind {
+        QueryKind::Reachable(goal) => reduced(subject, options, |symmetry| {
+            reachable(subject, goal, options, symmetry, watch)
+        }),
+        QueryKind::Invariantly(invariant) => {
+            let broken = invariant.negated();
+            let answer = reduced(subject, options, |symmetry| {
+                reachable(subject, &broken, options, symmetry, watch)
+            });
+            answer.negated()
+        }
+        QueryKind::PotentiallyAlways(keep) => always(subject, keep, options, watch),
+        QueryKind::Eventually(goal) => {
+            let keep = goal.negated();
+            always(subject, &keep, options, watch).negated()
+        }
+        QueryKind::LeadsTo(cause, effect) => {
+            let open = Predicate::And(vec![cause.clone(), effect.negated()]);
+            let keep = effect.negated();
+            leads_to(subject, (&open, &keep), options, watch)
+        }
+        QueryKind::Extremum {
+            least,
+            greatest,
+            predicate,
+            items,
+        } => {
+            let question = Question {
+                predicate,
+                items,
+                least: *least,
+                greatest: *greatest,
+                further: subject.atoms(),
+            };
+            reduced(subject, options, |symmetry| {
+                extremum(subject, question, options, symmetry, watch)
+            })
+        }
+        QueryKind::Control {
+            objective,
+            time_optimal: Some((limit, rest)),
+            ..
+        } => {
+            let (limit, rest) = (*limit, *rest);
+            let race = Race {
+                objective,
+                limit,
+                rest,
+            };
+            fastest(network, executor, &race, options, watch)
+        }
+        QueryKind::Control {
+            objective,
+            observations: Some(observations),
+            ..
+        } => {
+            let asked = (objective, &observations[..]);
+            partial_observation::game(network, executor, asked, options, watch)
+        }
+        QueryKind::Control {
+            objective,
+            cooperative,
+            ..
+        } => {
+            let asked = (objective, *cooperative);
+            let under = subject.under.zip(subject.within);
+            game::game((network, under), executor, asked, options, watch)
+        }
+        QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
+            unreachable!("strategies are saved and loaded elsewhere")
+        }
+    }
+}
+
+/// Answers with a search that takes states that differ only by exchanged members of scalar sets for
+/// the same, if that is wanted and sound. Whether a failure is met can hang on the order in which a
+/// quantifier runs through members, so that one that is found so is looked for again among all
+/// states.
+fn reduced(
+    subject: Subject<'_>,
+    options: &Options,
+    mut answer: impl FnMut(Option<&Arc<Symmetry>>) -> Answer,
+) -> Answer {
+    let is_allowed = options.symmetry && subject.under.is_none();
+    let symmetry = is_allowed
+        .then(|| Symmetry::of_network(subject.network))
+        .flatten();
+    let first = answer(symmetry.as_ref());
+    match first.verdict {
+        Verdict::Error(failure) if symmetry.is_some() && failure != Failure::Interrupted => {
+            answer(None)
+        }
+        _ => first,
+    }
+}

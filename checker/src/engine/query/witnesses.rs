@@ -1,0 +1,107 @@
+//! Collects what backs an answer: traces, with their runs in exact times.
+
+use crate::cancellation;
+use crate::network::Symbolic;
+use crate::network::symbolic::predicate;
+use crate::search::Trace;
+use crate::search::liveness::ending::RunEnding;
+
+use crate::engine::answer::{Evidence, Verdict};
+use crate::engine::evidence::timed_run::{self, Shows, Takes};
+use crate::engine::evidence::witness::{Missing, Proof, Witness, WitnessKind};
+use crate::engine::options::Options;
+
+/// The verdict on something that was found, in zones that may be too large.
+pub(super) fn found(is_approximate: bool) -> Verdict {
+    if is_approximate {
+        Verdict::Maybe
+    } else {
+        Verdict::Satisfied
+    }
+}
+
+/// Collects what backs an answer.
+pub(super) struct Witnesses<'w, 'a> {
+    pub(super) symbolic: &'w mut Symbolic<'a>,
+    has_runs: bool,
+    /// Whether what was found is sure only if a run is replayed.
+    is_doubtful: bool,
+    /// Whether the runs follow a strategy.
+    is_restricted: bool,
+    found: Vec<Witness>,
+}
+
+impl<'w, 'a> Witnesses<'w, 'a> {
+    pub(super) fn new(symbolic: &'w mut Symbolic<'a>, options: &Options) -> Witnesses<'w, 'a> {
+        Witnesses {
+            has_runs: options.runs,
+            is_doubtful: symbolic.is_approximate(),
+            is_restricted: symbolic.is_restricted(),
+            symbolic,
+            found: Vec::new(),
+        }
+    }
+
+    /// The same for what is sure only if a run is replayed, where there is a doubt beside zones
+    /// that are too large.
+    pub(super) fn doubting(self, is_doubtful: bool) -> Witnesses<'w, 'a> {
+        Witnesses {
+            is_doubtful: self.is_doubtful || is_doubtful,
+            ..self
+        }
+    }
+
+    /// Whether what was found is sure only if a run is replayed.
+    pub(super) fn is_doubtful(&self) -> bool {
+        self.is_doubtful
+    }
+
+    /// Adds a trace, with its run if runs are wanted; returns the verdict on what it shows: a run
+    /// is also looked for where there is a doubt, since then it alone makes sure.
+    pub(super) fn add(
+        &mut self,
+        trace: Trace,
+        ending: Option<RunEnding>,
+        shows: Shows<'_>,
+    ) -> Verdict {
+        let kind = match shows {
+            Shows::Possible => WitnessKind::Failure,
+            Shows::Reaches(..) | Shows::Stays(_) => WitnessKind::Predicate,
+            Shows::Takes(takes) => WitnessKind::Value(takes.item, takes.shown),
+        };
+        let mut witness = Witness::new(trace, ending, kind);
+        // An initial state that cannot be entered is no run. What is stuck under a strategy may go
+        // on in the model, which is what the replay knows, and priorities count in the model.
+        let is_dead = match shows {
+            Shows::Reaches(predicate, _) | Shows::Takes(Takes { predicate, .. }) => {
+                predicate::has_deadlock(predicate)
+            }
+            Shows::Stays(_) => ending == Some(RunEnding::Stuck),
+            Shows::Possible => false,
+        };
+        let is_comparable = !(self.is_restricted && is_dead || self.symbolic.ignores_priorities());
+        let mut is_replayed = false;
+        let is_wanted = self.has_runs || self.is_doubtful;
+        if is_wanted && is_comparable && !witness.trace.states.is_empty() {
+            let network = self.symbolic.stepper.network();
+            let is_doubtful = self.is_doubtful || self.symbolic.is_approximate();
+            let subject = (ending, shows);
+            let trace = &witness.trace;
+            let symbolic = &mut *self.symbolic;
+            let prove = || timed_run::prove(symbolic, network, trace, subject, is_doubtful);
+            let proof = cancellation::unless_cut(prove);
+            let proof = proof.unwrap_or(Proof::Missing(Missing::Stopped));
+            is_replayed = matches!(proof, Proof::Replayed(..));
+            witness.run = self.has_runs.then_some(proof);
+        }
+        self.found.push(witness);
+        found(self.is_doubtful && !is_replayed)
+    }
+
+    pub(super) fn into_evidence(self) -> Evidence {
+        Evidence {
+            witnesses: self.found,
+            ..Evidence::default()
+        }
+    }
+}
