@@ -1,25 +1,26 @@
 """The online controller: the paper's workflow (section 3) on any device.
 
-A run is a walk through the state machine of `ntagen.drive.states`; each state has one task here.
-What the driver decides depends on its settings, the a-priori scene, the measurements and the
-synthesiser alone: it reads no clock but the device's and draws nothing at random, so that the same
-measurements lead to the same decisions again (`ntagen.drive.replay`).
+A run goes through the state machine of `ntagen.drive.states`; each state has one task here. The
+driver's decisions depend only on its settings, the a-priori scene, the measurements and the
+synthesiser. It reads no clock except the device's and uses no random numbers, so that the same
+measurements always lead to the same decisions (`ntagen.drive.replay`).
 
-Safety rules, in one place:
+The safety rules:
 
 * every end of a run, and every alarm, stops the needle first;
-* the needle is pulled back only along its channel, rolls being undone where they were made, and no
-  alarm is looked for meanwhile (paper, section 3.2);
-* a plan is driven only if its certificate holds, from the pose and radius that were just estimated.
+* the needle is pulled back only along its channel. Rolls are undone where they were made, and there
+  are no alarms during the pull (paper, section 3.2);
+* the driver follows a plan only if its certificate holds for the newest estimate of pose and
+  radius.
 
-Where no plan is left the needle is not pulled back in the hope of one: the driver first asks from
-which place behind the tip, on the channel that it knows, there would be a strategy. If there is
-none back to the entry, the run ends where it is.
+If there is no plan, the driver does not pull back at once. It first looks for a place behind the
+tip, on the known channel, from which there is a strategy. If there is none back to the entry, the
+run ends where it is.
 
-Who wants the run to end is listened to at known points: before each motion and each synthesis.
-Between two such points something is always recorded, so that a replay knows at which of them the
-run ended. A motion counts as made when it is commanded: how far the needle got when a motion failed
-is not known.
+The driver looks at known points whether somebody wants the run to end: before each motion and each
+synthesis. Between two such points something is always recorded, so that a replay knows at which
+point the run ended. A motion counts as made when it is commanded: nobody knows how far the needle
+got if a motion failed.
 """
 
 from __future__ import annotations
@@ -67,11 +68,11 @@ class Controller:
     """One run.
 
     Args:
-        scene: The a-priori scene: what the driver is told.
+        scene: The a-priori scene, which the driver knows.
         device: The needle.
-        synthesise: Where plans come from.
+        synthesise: Finds plans.
         settings: How to drive.
-        journal: Who is told what happens.
+        journal: Records what happens.
         listen: Raises `KeyboardInterrupt`, with the reason, if somebody wants the run to end.
     """
 
@@ -115,7 +116,7 @@ class Controller:
         }
 
     def run(self) -> Ended:
-        """Drives to an end, with the needle stopped; the last record of the run is returned."""
+        """Drives until the run ends and the needle is stopped; returns the last record."""
         self._journal.started(self._knowledge.a_priori)
         state = State.ARM
         try:
@@ -125,7 +126,7 @@ class Controller:
                 self._note(Transition(self._now_s(), state.value, event.value, following.value))
                 state = following
         except BaseException:
-            # A mistake of ours or a log that cannot be written: the needle must not move on.
+            # A bug, or a log that cannot be written: the needle must not move on.
             self._device.stop()
             raise
         self._halt()
@@ -141,7 +142,7 @@ class Controller:
         return ended
 
     def _perform(self, state: State) -> Event:
-        """The event with which a state's task ended; what goes wrong in it is an event too."""
+        """Does a state's task; returns the event with which it ended. An error is an event too."""
         try:
             self._require_time()
             return self._tasks[state]()
@@ -255,7 +256,7 @@ class Controller:
         goal_mm = self._retreat_mm
         if goal_mm is None:
             goal_mm = max(0.0, depth_mm - self._settings.pull_mm + self._settings.push_mm)
-        # At the entry there is no channel to push in: the next plan starts right there.
+        # At the entry there is no channel to push in: the next plan starts there.
         self._retreat_mm = goal_mm
         start_mm = max(0.0, goal_mm - self._settings.push_mm) if goal_mm > 0.0 else 0.0
         while self._path.depth_mm > start_mm + _SMALL_MM:
@@ -273,7 +274,7 @@ class Controller:
     # Knowledge.
 
     def _learn(self) -> None:
-        """Turns the contact at the present place into a region."""
+        """Turns a contact at the current place into a region."""
         tip = self._estimator.estimate().tip
         before = set(self._knowledge.learned)
         self._knowledge = self._knowledge.with_contact(
@@ -284,7 +285,7 @@ class Controller:
                 self._note(Learned.of(self._now_s(), region))
 
     def _visit(self, position_mm: tuple[float, float, float], *, last_too: bool) -> None:
-        """Counts targets that the tip is in; the last one only where that is asked for."""
+        """Counts targets that the tip has reached; the last one only with `last_too`."""
         targets = self._knowledge.a_priori.targets
         while self._knowledge.visited < len(targets):
             target = targets[self._knowledge.visited]
@@ -297,7 +298,7 @@ class Controller:
             self._note(Visited(self._now_s(), target.name))
 
     def _ask(self, tip: Pose, depth_mm: float) -> Synthesis:
-        """The synthesis from a pose with all that is known now."""
+        """The synthesis from a pose, with the current knowledge."""
         scene = self._knowledge.scene(tip, self._known_estimate().radius_mm, depth_mm)
         self._listen()
         synthesis = self._in_time(self._synthesise(scene))
@@ -316,20 +317,20 @@ class Controller:
                 model_sha256=hashlib.sha256(synthesis.model_xml.encode()).hexdigest(),
             )
         )
-        # A run that ended in a synthesis has not made it.
+        # If the run ended during the synthesis, the synthesis does not count.
         self._syntheses = number
         self._note(Timed(self._now_s(), number, synthesis.seconds))
         return synthesis
 
     def _in_time(self, synthesis: Synthesis) -> Synthesis:
-        """The synthesis without the plans that the time limit would not let end."""
+        """The synthesis without the plans that cannot end within the time limit."""
         left_s = self._settings.timeout_s - (self._now_s() - self._started_s)
         longest_mm = left_s * synthesis.scene.needle.speed_mm_per_s
         kept = tuple(c for c in synthesis.candidates if c.plan.length_mm <= longest_mm)
         return replace(synthesis, candidates=kept)
 
     def _adopt(self, synthesis: Synthesis) -> None:
-        """Makes the best plan the one to be driven."""
+        """Chooses the best plan as the one to follow."""
         best = synthesis.best
         if best is None:
             raise AssertionError("a synthesis without a plan was adopted")
@@ -344,7 +345,7 @@ class Controller:
     # The device: every command and every reading goes through here, to estimator and journal.
 
     def _push_watching(self, length_mm: float) -> Event:
-        """Pushes in pieces, with an eye on the force but without a prediction."""
+        """Pushes in pieces; checks the force, but has no prediction."""
         for piece_mm in _pieces(length_mm, self._settings.spacing_mm):
             self._require_time()
             self._push(piece_mm)
@@ -371,12 +372,12 @@ class Controller:
         self._device.pull(length_mm)
 
     def _command(self, kind: str, value: float) -> None:
-        """Records a motion that begins now, unless the run is to end."""
+        """Records a motion that begins now, unless somebody wants the run to end."""
         self._listen()
         self._note(Command(self._now_s(), kind, value))
 
     def _undo_roll(self) -> None:
-        """Rolls back what was rolled at or beyond this place: the tip fits its channel again."""
+        """Undoes the rolls at or beyond this place, so that the tip fits its channel again."""
         angle_rad = math.remainder(self._path.pending_roll_rad, 2.0 * math.pi)
         if abs(angle_rad) > _ROLL_NEGLIGIBLE_RAD:
             self._roll(-angle_rad)
@@ -399,12 +400,12 @@ class Controller:
         return measurement
 
     def _halt(self) -> None:
-        """The safe state at the end of a run, whatever led to it."""
+        """Stops the needle at the end of a run, whatever the reason."""
         self._note(Command(self._now_s(), "stop", 0.0))
         try:
             self._device.stop()
         except DeviceError as error:
-            # The run ends here anyway; that the device does not even stop must be in the report.
+            # The run ends anyway, but the report must say that the device did not stop.
             self._reason = f"{self._reason}; it cannot be stopped: {error}"
 
     def _feels(self, measurement: Measurement) -> bool:
@@ -429,7 +430,7 @@ class Controller:
 def _moves(
     scene: Scene, actions: tuple[Push | Roll, ...], spacing_mm: float
 ) -> Iterator[tuple[Push | Roll, Pose]]:
-    """A plan in pieces that can be watched, each with the pose that is expected after it."""
+    """A plan in short pieces, each with the pose that is expected after it."""
     path = Path(scene.needle.tip)
     for action in actions:
         if isinstance(action, Roll):
@@ -442,7 +443,7 @@ def _moves(
 
 
 def _pieces(length_mm: float, spacing_mm: float) -> list[float]:
-    """Equal pieces of a length, none longer than the spacing."""
+    """A length in equal pieces, none longer than the spacing."""
     if length_mm <= _SMALL_MM:
         return []
     count = math.ceil(length_mm / spacing_mm - _SMALL_MM)
@@ -450,7 +451,7 @@ def _pieces(length_mm: float, spacing_mm: float) -> list[float]:
 
 
 def _unrolled(path: Path) -> Pose:
-    """The pose at the end of a channel with the rolls beyond it undone."""
+    """The pose at the end of a channel, after the rolls beyond it have been undone."""
     return orthonormal(Path(path.entry, path.stretches).tip)
 
 

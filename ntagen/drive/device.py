@@ -1,9 +1,9 @@
-"""What the driver needs of a needle: the protocol that virtual and real devices follow.
+"""The protocol that virtual and real needles follow.
 
-A device obeys one command at a time and returns when the motion is over. It raises `DeviceError`
-when it cannot do what it is told, when it falls silent, or when a sensor gives no reading; the
-driver then stops it. Lengths are in mm, angles in rad, times in seconds on the device's own clock,
-which never goes back.
+A device executes one command at a time and returns when the motion is over. It raises `DeviceError`
+if it cannot execute a command, if it does not answer, or if a sensor gives no reading; the driver
+then stops it. Lengths are in mm, angles in rad, times in seconds on the device's own clock, which
+never goes back.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from ntagen.needle.measurement import Measurement
 
 
 class Sensor(Protocol):
-    """Whatever sees the tip and feels the force."""
+    """A sensor for the position of the tip and the force on it."""
 
     def measure(self) -> Measurement:
-        """A reading of the needle as it is now.
+        """Measures the needle now.
 
         Raises:
             DeviceError: There is no reading.
@@ -52,4 +52,4 @@ class Device(Sensor, Protocol):
         """
 
     def stop(self) -> None:
-        """Holds the needle where it is; the safe state. Must work at any time, and twice."""
+        """Stops the needle where it is: the safe state. It must work at any time, also twice."""

@@ -1,4 +1,4 @@
-"""Values of a run from the JSON of its log: each entry is there, and of the kind that is wanted."""
+"""Reads values of a run from the JSON of its log; checks that all entries and types are right."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ Value = TypeVar("Value")
 
 
 def value_from_json(document: object, kind: type[Value]) -> Value:
-    """The value that `dataclasses.asdict` and JSON made this document of.
+    """The value from which `dataclasses.asdict` and JSON made this document.
 
     Args:
-        document: What the JSON reader gives.
+        document: The result of the JSON reader.
         kind: The dataclass of the value.
 
     Raises:
@@ -24,9 +24,9 @@ def value_from_json(document: object, kind: type[Value]) -> Value:
         value = msgspec.convert(document, kind)
     except (msgspec.ValidationError, RecursionError) as error:
         raise ValueError(str(error)) from error
-    # A default in place of a missing entry would be another run.
+    # A default in place of a missing entry could change the run.
     if _plain(value) != _plain(document):
-        raise ValueError("entries are missing or not known")
+        raise ValueError("entries are missing or unknown")
     return value
 
 

@@ -1,16 +1,15 @@
-"""What the driver knows, in three kinds that never mix (paper, section 3).
+"""The knowledge of the driver, in three kinds that never mix (paper, section 3).
 
-*Actual* knowledge is what is true; only a simulation has it, and it stays in the virtual needle.
-*A-priori* knowledge is the scene that the driver is given. *Learned* knowledge is what it concludes
-from contacts, always an assumption. This module divides a scene into what is told and what is kept
-back, and turns contacts into learned regions.
+*Actual* knowledge is the truth; only a simulation has it, and it stays in the virtual needle.
+*A-priori* knowledge is the scene that the driver is given. *Learned* knowledge comes from contacts
+and is always an assumption. This module hides regions of a scene from the driver, and turns
+contacts into learned regions.
 
-A contact says: here the force begins to rise, so the surface of something critical is one sensing
-margin away, and it lies ahead, since there was no force on the way here. It becomes a ball straight
-ahead whose shell just touches the tip. Nothing is known of its size. When another contact gives a
-ball whose shell overlaps an earlier one's, no plan could pass between the two, and the smallest
-ball around both takes their place: so learned regions grow with every contact, and the driver
-cannot try the same way for ever.
+At a contact the force begins to rise. So the surface of a critical region is one sensing margin
+away. The region lies ahead, because there was no force before. The driver assumes a ball straight
+ahead whose shell just touches the tip; its true size is unknown. If its shell overlaps the shell of
+an earlier ball, no plan can pass between the two, and the smallest ball around both replaces them.
+So learned regions grow with every contact, and the driver cannot try the same path for ever.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from ntagen.needle.vectors import add, combine, distance, scale
 from ntagen.scene import Pose, Region, Scene
 
 _EXPLAINED_MM = 1.0
-"""A contact this near to a known detection region is put down to that region."""
+"""A contact this near to a known detection region is explained by that region."""
 
 _GROWTH_MM = 1.0
-"""How much wider a known region's shell is made by a contact near it."""
+"""A contact near a known region makes its shell wider by this length."""
 
 
 def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, ...]:
-    """The detection regions of a critical region: made around it, or containing it."""
+    """The detection regions of a critical region: written around it, or containing it."""
     return tuple(
         shell
         for shell in detections
@@ -40,7 +39,7 @@ def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, .
 
 
 def sensing_margin_mm(critical: Region, detections: Iterable[Region], otherwise_mm: float) -> float:
-    """How far from its surface a critical region is felt: the depth of its thinnest shell."""
+    """The distance at which a critical region is felt: the depth of its thinnest shell."""
     return min(
         (
             shell.radius_mm - distance(shell.center_mm, critical.center_mm) - critical.radius_mm
@@ -51,14 +50,14 @@ def sensing_margin_mm(critical: Region, detections: Iterable[Region], otherwise_
 
 
 def told(scene: Scene, known: str) -> Scene:
-    """The scene with only the critical regions that the driver is told about.
+    """The scene with only those critical regions that the driver knows.
 
     Args:
         scene: The actual scene.
-        known: ``all``, ``none``, or names of critical regions with commas between them.
+        known: ``all``, ``none``, or names of critical regions, separated by commas.
 
     Raises:
-        InputError: A name is not that of a critical region of the scene.
+        InputError: The scene has no critical region with one of the names.
     """
     if known == "all":
         return scene
@@ -67,7 +66,9 @@ def told(scene: Scene, known: str) -> Scene:
     for name in names:
         if name not in existing:
             choice = ", ".join(["all", "none", *existing])
-            raise InputError(f"unknown critical region '{name}' in --known\nhint: one of {choice}")
+            raise InputError(
+                f"unknown critical region '{name}' in --known\nhint: choose from {choice}"
+            )
     kept_back = [region for region in scene.criticals if region.name not in names]
     hidden = {shell for region in kept_back for shell in shells_of(region, scene.detections)}
     return replace(
@@ -84,8 +85,8 @@ class Knowledge:
     Attributes:
         a_priori: The scene that the driver was given.
         learned: Critical and detection regions from contacts.
-        visited: How many of the targets have been reached.
-        contacts: How many contacts there were.
+        visited: The number of targets that have been reached.
+        contacts: The number of contacts.
     """
 
     a_priori: Scene
@@ -94,13 +95,13 @@ class Knowledge:
     contacts: int = 0
 
     def scene(self, tip: Pose, radius_mm: float, depth_mm: float = 0.0) -> Scene:
-        """All that is known, for a needle that is where it is now, inserted to a depth."""
+        """The known scene, for a needle with this pose and radius, inserted to this depth."""
         needle_known = self.a_priori.with_needle(tip, radius_mm, depth_mm)
         scene = needle_known.with_regions(*self.learned)
         return scene.with_targets(scene.targets[self.visited :])
 
     def visiting(self) -> Knowledge:
-        """The knowledge that one more target was reached."""
+        """The knowledge after one more target was reached."""
         return replace(self, visited=self.visited + 1)
 
     def with_contact(self, tip: Pose, margin_mm: float, radius_mm: float) -> Knowledge:
@@ -108,8 +109,8 @@ class Knowledge:
 
         Args:
             tip: The tip's pose at the contact.
-            margin_mm: How far from a region the force is expected to rise.
-            radius_mm: The radius that an unknown region is given at first.
+            margin_mm: The expected distance from a region at which the force rises.
+            radius_mm: The first radius of an unknown region.
         """
         contacts = self.contacts + 1
         felt = self._felt(tip, margin_mm)
@@ -131,7 +132,7 @@ class Knowledge:
         return None
 
     def _with_wider_shell(self, felt: Region, tip: Pose, margin_mm: float) -> tuple[Region, ...]:
-        """A known region is felt where it should not be: its shell is wider than was thought."""
+        """Makes the shell of a known region wider: it was felt farther away than expected."""
         shells = shells_of(felt, self.a_priori.detections + self.learned)
         reach_mm = max((s.radius_mm for s in shells), default=felt.radius_mm + margin_mm)
         reach_mm = max(reach_mm, distance(tip.position_mm, felt.center_mm)) + _GROWTH_MM
@@ -167,7 +168,7 @@ def _overlap(one: Region, other: Region, margin_mm: float) -> bool:
 
 
 def _around(balls: Sequence[Region]) -> Region:
-    """A ball around all of these, as small as pairwise merging makes it; named after the oldest."""
+    """A ball around all of these, made by merging pairs; it has the name of the oldest."""
     result = balls[0]
     for ball in balls[1:]:
         result = replace(_around_two(result, ball), name=min(result.name, ball.name, key=_age))

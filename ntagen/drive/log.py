@@ -1,21 +1,20 @@
-"""The log of a run: MCAP that is complete up to the last record, whatever kills the program.
+"""The log of a run: an MCAP file that is complete up to the last record, even after a crash.
 
-What is in it:
+It contains:
 
-* metadata ``ntagen``: format version, program version, seed, settings and what else the caller
-  gives;
-* attachments ``scene.json`` (what the driver was told), ``actual.json`` and ``scene.nsl`` (what was
-  really so, and its source), and for each synthesis ``rebuild-0001/scene.json``, ``…/model.xml``,
-  ``…/plans.json``;
-* one channel ``/ntagen/…`` a kind of record (`ntagen.drive.messages`), and the channels for viewers
-  (`ntagen.drive.viewing`).
+* metadata ``ntagen``: format version, program version, seed, settings and more from the caller;
+* attachments ``scene.json`` (the scene that the driver knew), ``actual.json`` and ``scene.nsl``
+  (the true scene and its source), and for each synthesis ``rebuild-0001/scene.json``,
+  ``…/model.xml``, ``…/plans.json``;
+* one channel ``/ntagen/…`` for each kind of record (`ntagen.drive.messages`), and the channels for
+  viewers (`ntagen.drive.viewing`).
 
-A record is acknowledged when `record` returns: then it has been handed to the operating system, so
-that the death of this process loses nothing. The disk itself is waited for at the start, at alarms
-and at the end, since a power cut is rarer and waiting costs milliseconds.
+A record is acknowledged when `record` returns. The operating system has it then, so that it
+survives the death of this process. The log waits for the disk itself only at the start, at alarms
+and at the end: power cuts are rarer, and waiting takes milliseconds.
 
-Source of the choices: measurements with killed writers; without a flush the MCAP library holds up
-to 1 MiB back.
+These choices come from measurements with killed writers; without a flush the MCAP library keeps up
+to 1 MiB in memory.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ ACTUAL: Final = "actual.json"
 SOURCE: Final = "scene.nsl"
 
 _PLANS_LOGGED: Final = 200
-"""At most so many plans of a synthesis are attached, the best first."""
+"""At most this many plans of a synthesis are attached, the best first."""
 
 _ALARMS: Final = frozenset(event.value for event in (Event.FORCE, Event.DEVIATION, *ABORTS))
 
@@ -60,20 +59,20 @@ class Log:
     """A journal that writes MCAP; use it as a context manager.
 
     Args:
-        path: The file; an existing one is replaced. Nobody else can write it meanwhile.
-        metadata: What is to be known of the run; texts.
-        attachments: Files to be kept with it, by name.
+        path: The file; an existing one is replaced. Others cannot write to it during the run.
+        metadata: Facts about the run, as texts.
+        attachments: Files to store with the run, by name.
 
     Raises:
-        InputError: The file cannot be written, also while the run goes on, or another run is being
-            written into it.
+        InputError: The file cannot be written (also later, during the run), or another run is
+            writing to it.
     """
 
     def __init__(
         self, path: Path, metadata: Mapping[str, str], attachments: Mapping[str, bytes]
     ) -> None:
         self._file = GrowingFile(path)
-        # The file is a stream as far as the writer needs one.
+        # The file has all methods of a stream that the writer needs.
         self._writer = Writer(cast("IO[bytes]", self._file), chunk_size=1 << 16)
         self._writer.start(profile="", library="ntagen")
         self._sequence = 0
@@ -93,7 +92,7 @@ class Log:
         if kind is None or issubclass(kind, Exception):
             self.close()
         else:
-            # Somebody wants an end at once, perhaps in the middle of a record.
+            # The user wants an end at once, perhaps in the middle of a record.
             self._file.close()
 
     def started(self, scene: Scene) -> None:
@@ -115,7 +114,7 @@ class Log:
         self._acknowledge(to_disk=False)
 
     def record(self, record: Record) -> None:
-        """Writes a record; when this returns, the death of the process cannot lose it."""
+        """Writes a record; it then survives the death of the process."""
         self._time_ns = round(record.time_s * 1e9)
         self._add(self._channels[type(record)], encode(record, self._sequence))
         self._sequence += 1
@@ -125,7 +124,7 @@ class Log:
         self._acknowledge(to_disk=is_alarm or isinstance(record, Learned | Ended))
 
     def close(self) -> None:
-        """Completes the file; without this it is torn, but readable."""
+        """Completes the file; without this it is cut off, but readable."""
         if self._file.closed:
             return
         self._writer.finish()  # type: ignore[no-untyped-call]
@@ -163,7 +162,7 @@ class Log:
 
 
 def metadata_of(values: Mapping[str, Any]) -> dict[str, str]:
-    """Values as the texts that MCAP's metadata holds: texts as they are, the rest as JSON."""
+    """The texts for MCAP's metadata: texts unchanged, other values as JSON."""
     return {
         name: value if isinstance(value, str) else json.dumps(value)
         for name, value in values.items()

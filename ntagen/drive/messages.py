@@ -1,11 +1,12 @@
-"""The message types of the log: protobuf, one for each kind of record, built at run time.
+"""The message types of the log: one protobuf type for each kind of record, built at run time.
 
 A record is a flat dataclass, and its message type follows from its annotations: a number becomes a
-``double`` or ``int64``, a text a ``string``, a vector a repeated ``double``. Fields are numbered in
-the order of the dataclass, base class first, after the record's sequence number (1). So no compiler
-is needed, and the log carries the descriptors itself.
+``double`` or ``int64``, a text a ``string``, a vector a repeated ``double``. Field 1 is the
+record's sequence number; the others are numbered in the order of the dataclass, base class first.
+So no compiler is needed, and the log contains the descriptors itself.
 
-Compatibility: new fields go to the end of a record, none is ever removed or changes its type.
+Compatibility: new fields are added at the end of a record; a field is never removed and never
+changes its type.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from ntagen.drive.records import Record
 
 PACKAGE: Final = "ntagen"
 SEQUENCE: Final = "sequence"
-"""The field with a record's place in the run, from 0: it tells the order where times are equal."""
+"""The field with a record's position in the run, from 0: it gives the order if times are equal."""
 
 KINDS: Final[tuple[type[Record], ...]] = (
     records.Transition,
@@ -76,7 +77,7 @@ def decode(name: str, data: bytes) -> tuple[int, Record]:
 
     Raises:
         KeyError: No kind of record has this name.
-        google.protobuf.message.DecodeError: The data is no such message.
+        google.protobuf.message.DecodeError: The data is not a message of this type.
     """
     kind = {f"{PACKAGE}.{kind.__name__}": kind for kind in KINDS}[name]
     message: Any = message_class(kind)()

@@ -1,11 +1,10 @@
-"""Reading the log of a run, whole or torn.
+"""Reads the log of a run, whole or cut off.
 
-The file is read from front to back and never through its index: a writer that was killed leaves no
-index, and everything before the tear is good. What is behind the tear is nothing that was ever
-acknowledged.
+The file is read from front to back, without its index: a writer that was killed leaves no index.
+All data before the cut is good; data after the cut was never acknowledged.
 
-A log comes from anybody: what is packed in it is unpacked piece by piece, and never to more than a
-multiple of the file (`_Budget`).
+Anybody may have written a log. Compressed data is unpacked piece by piece, and never to more than a
+multiple of the file's size (`_Budget`).
 """
 
 from __future__ import annotations
@@ -39,20 +38,20 @@ MAX_LOG_BYTES: Final = 512 * 2**20
 """The largest file; a run of a minute takes less than one MiB."""
 
 MAX_RECORD_BYTES: Final = 64 * 2**20
-"""The largest record of a file, packed; the model of a thousand regions takes less than one MiB."""
+"""The largest compressed record; the model of a thousand regions takes less than one MiB."""
 
 _SPARE_BYTES: Final = 8 * 2**20
 _LARGEST_RATIO: Final = 32
 _KEPT_BYTES: Final = 400
-"""About what a record takes in memory, beside its message."""
+"""The approximate memory of a record, besides its message."""
 
 _PIECE_BYTES: Final = 2**16
 
 _HEAD: Final = struct.Struct("<BQ")
-"""How a record begins: its kind, and the length of the rest."""
+"""The start of a record: its kind, and the length of the rest."""
 
 _LARGEST_WINDOW_BYTES: Final = 8 * 2**20
-"""How far back what is packed may refer; more than any common setting needs."""
+"""The largest window of compressed data; more than any common setting needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +60,9 @@ class RunLog:
 
     Attributes:
         records: The records in order.
-        metadata: What the run was started with.
+        metadata: The options with which the run was started.
         attachments: The attached files by name.
-        torn_at_byte: Where a torn file stops to be readable; None for a whole one.
+        torn_at_byte: The byte at which a file that is cut off becomes unreadable; None if whole.
     """
 
     records: tuple[Record, ...]
@@ -73,16 +72,16 @@ class RunLog:
 
     @property
     def scene(self) -> Scene:
-        """What the driver was told.
+        """The scene that the driver knew.
 
         Raises:
-            InputError: The log holds no scene.
+            InputError: The log has no scene.
         """
         return self._scene(SCENE)
 
     @property
     def actual(self) -> Scene:
-        """What was really so, or what the driver was told where nobody knows more."""
+        """The true scene; if the log does not have it, the scene that the driver knew."""
         return self._scene(ACTUAL if ACTUAL in self.attachments else SCENE)
 
     @property
@@ -90,25 +89,25 @@ class RunLog:
         """The settings of the run.
 
         Raises:
-            InputError: The log holds none.
+            InputError: The log has none.
         """
         try:
             document = json.loads(self.metadata["settings"])
         except (KeyError, ValueError) as error:
-            raise InputError("the log holds no settings of a run") from error
+            raise InputError("the log has no settings of a run") from error
         return Settings.from_json(document)
 
     def _scene(self, name: str) -> Scene:
         if name not in self.attachments:
-            raise InputError("the log holds no scene\nhint: it was torn before the run began")
+            raise InputError("the log has no scene\nhint: it was cut off before the run began")
         return scene_from_json(self.attachments[name])
 
 
 def read_log(path: Path) -> RunLog:
-    """Reads a log, as far as it is readable.
+    """Reads the readable part of a log.
 
     Raises:
-        InputError: The file cannot be read, is no MCAP, or is no log of a run.
+        InputError: The file cannot be read, is not MCAP, or is not the log of a run.
     """
     try:
         file = open_file(path, MAX_LOG_BYTES)
@@ -125,13 +124,16 @@ def read_log(path: Path) -> RunLog:
         )
     metadata = collected.metadata[METADATA]
     if metadata.get("format_version") != str(FORMAT_VERSION):
-        raise InputError(f"{path}: log of version {metadata.get('format_version')} is not known")
+        raise InputError(
+            f"{path}: this log has version {metadata.get('format_version')}, but this ntagen "
+            f"reads only version {FORMAT_VERSION}"
+        )
     records = tuple(record for _, record in sorted(collected.records, key=lambda item: item[0]))
     return RunLog(records, metadata, collected.attachments, torn_at_byte)
 
 
 class _Collected:
-    """What was read so far."""
+    """The data that has been read until now."""
 
     def __init__(self) -> None:
         self.records: list[tuple[int, Record]] = []
@@ -158,7 +160,7 @@ class _Collected:
 
 
 def _read(file: IO[bytes], collected: _Collected, budget: _Budget) -> int | None:
-    """Reads what is readable; where it stops being so, or None if the file is whole."""
+    """Reads the readable part; returns the byte at which it ends, or None if the file is whole."""
     good_byte = 0
     whole = cast("io.BytesIO", _Whole(file, budget.file_bytes))
     reader = StreamReader(whole, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES)
@@ -173,8 +175,8 @@ def _read(file: IO[bytes], collected: _Collected, budget: _Budget) -> int | None
         except (InputError, MemoryError):
             raise
         except Exception:
-            # At a tear the libraries raise whatever their parsers stumble on: errors of their own,
-            # of struct, of the decompressor. All of them mean that the file is good up to here.
+            # Where a file is cut off, the libraries raise many kinds of errors: their own, those of
+            # struct, those of the decompressor. All of them mean that the file is good up to here.
             return good_byte
         if isinstance(item, Footer):
             return None
@@ -182,24 +184,24 @@ def _read(file: IO[bytes], collected: _Collected, budget: _Budget) -> int | None
 
 
 class _Whole:
-    """A file that is asked for no more than it has: a wrong length in it would reserve memory."""
+    """A file that reads no more bytes than it has: a wrong length would reserve memory."""
 
     def __init__(self, file: IO[bytes], file_bytes: int) -> None:
         self._file = file
         self._left = file_bytes
 
     def read(self, size: int) -> bytes:
-        """So many bytes; fewer at the end."""
+        """`size` bytes, or fewer at the end."""
         piece = self._file.read(min(size, self._left))
         self._left -= len(piece)
         return piece
 
 
 class _Budget:
-    """How many bytes may still be unpacked and kept.
+    """The number of bytes that may still be unpacked and kept.
 
-    A few kilobytes can be packed such that they unpack to gigabytes. What a run writes shrinks to
-    half, and to a tenth if it is packed anew as a whole.
+    A few kilobytes of compressed data can unpack to gigabytes. A real run shrinks to a half, or to
+    a tenth if it is compressed as a whole.
     """
 
     def __init__(self, path: Path, file_bytes: int) -> None:
@@ -208,10 +210,10 @@ class _Budget:
         self._all = self._left = _SPARE_BYTES + _LARGEST_RATIO * file_bytes
 
     def take(self, count: int) -> None:
-        """Takes from it.
+        """Takes bytes from the budget.
 
         Raises:
-            InputError: There is not so much left.
+            InputError: There is not enough left.
         """
         self._left -= count
         if self._left < 0:
@@ -222,7 +224,7 @@ class _Budget:
 
 
 class _Unpacking:
-    """A stream of what a chunk holds, unpacked as it is read."""
+    """The contents of a chunk as a stream, unpacked during reading."""
 
     def __init__(self, chunk: Chunk, budget: _Budget) -> None:
         self._budget = budget
@@ -237,14 +239,14 @@ class _Unpacking:
                 self._stream = io.BytesIO(chunk.data)
 
     def read(self, size: int) -> bytes:
-        """So many bytes; none at the end.
+        """`size` bytes, or none at the end.
 
         Raises:
             EOFError: The stream ends within them.
             InputError: They are more than the budget allows.
         """
         pieces, missing = [], size
-        # A length may be wrong, too: only what is there counts.
+        # The length may be wrong too; only the real data counts.
         while missing and (piece := self._stream.read(min(missing, _PIECE_BYTES))):
             self._budget.take(len(piece))
             pieces.append(piece)

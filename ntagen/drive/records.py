@@ -1,8 +1,8 @@
-"""What happens in a run, as flat values: the vocabulary of the log, of the terminal and of replay.
+"""The events of a run as flat values, for the log, the terminal and the replay.
 
-Every record is a frozen dataclass of numbers, texts and vectors, so that the log can give it a
-message type by itself (`ntagen.drive.messages`). A record is *decided* if the driver's decisions
-alone determine it; replay compares those. Times are seconds on the device's clock.
+Every record is a frozen dataclass of numbers, texts and vectors, so that the log can make a message
+type from it (`ntagen.drive.messages`). A record is *decided* if it follows from the driver's
+decisions alone; a replay compares those. Times are seconds on the device's clock.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from ntagen.scene import Pose, Region, Scene, Vector
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Something that happened.
+    """An event of a run.
 
     Attributes:
-        time_s: When.
+        time_s: The time of the event.
     """
 
     decided: ClassVar[bool] = True
@@ -46,7 +46,7 @@ class Command(Record):
 
 @dataclass(frozen=True, slots=True)
 class Measured(Record):
-    """The sensor reported; an empty heading or bevel was not measured."""
+    """A measurement; an empty heading or bevel was not measured."""
 
     decided: ClassVar[bool] = False
 
@@ -59,7 +59,7 @@ class Measured(Record):
 
 @dataclass(frozen=True, slots=True)
 class Predicted(Record):
-    """Where the plan expected the tip, and how far from there it was measured."""
+    """The position that the plan expected, and its distance from the measured one."""
 
     position_mm: Vector
     heading: Vector
@@ -89,14 +89,15 @@ class Synthesised(Record):
     """A strategy was looked for.
 
     Attributes:
-        number: The synthesis's number in the run, from 1.
-        depth_mm: The depth from which a plan was asked for: less than the tip's when looking back.
-        found: How many plans the model has.
-        accepted: How many of them hold in exact kinematics and can be driven in the time left.
+        number: The number of the synthesis in the run, from 1.
+        depth_mm: The depth at which the plans start; it is less than the tip's depth if the driver
+            looks for a place behind the tip.
+        found: The number of plans of the model.
+        accepted: The number of plans that hold in exact kinematics and fit into the time left.
         plan: The best of them in words; empty if there is none.
         clearance_mm: Its distance to critical regions; -1 if there is no plan, 1e9 if there is no
             region.
-        model_sha256: Digest of the model that was checked.
+        model_sha256: The digest of the model that was checked.
     """
 
     number: int
@@ -110,7 +111,7 @@ class Synthesised(Record):
 
 @dataclass(frozen=True, slots=True)
 class Timed(Record):
-    """How long a synthesis took on the computer; simulated time stands still meanwhile."""
+    """The computer's time for a synthesis; simulated time stands still during it."""
 
     decided: ClassVar[bool] = False
 
@@ -145,11 +146,11 @@ class Ended(Record):
     """The run is over.
 
     Attributes:
-        outcome: The end's value of `State`.
-        reason: Why, in words.
+        outcome: The value of `State` at the end.
+        reason: The reason, in words.
         depth_mm: The insertion depth at the end.
-        adjustments: How often the needle was pulled back.
-        syntheses: How often a strategy was looked for.
+        adjustments: The number of times that the needle was pulled back.
+        syntheses: The number of syntheses.
     """
 
     outcome: str
@@ -161,11 +162,11 @@ class Ended(Record):
 
 @dataclass(frozen=True, slots=True)
 class Truth(Record):
-    """What was really so; only the simulation knows. Written at each cycle and at the end.
+    """The truth, which only the simulation knows. It is written in each cycle and at the end.
 
     Attributes:
-        position_mm: Where the tip is.
-        clearance_mm: Smallest distance of all that was pierced to any actual critical region; 1e9
+        position_mm: The true position of the tip.
+        clearance_mm: The smallest distance of the needle's path to any actual critical region; 1e9
             without one.
     """
 
@@ -176,16 +177,16 @@ class Truth(Record):
 
 
 class Journal(Protocol):
-    """Whoever wants to know what happens in a run: the log, the terminal, a replay."""
+    """Anything that records a run: the log, the terminal, a replay."""
 
     def record(self, record: Record) -> None:
         """Takes a record; when this returns, the record is acknowledged."""
 
     def started(self, scene: Scene) -> None:
-        """Is told the a-priori scene before the first record."""
+        """Gets the a-priori scene before the first record."""
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """Is shown a whole synthesis, before its record."""
+        """Gets a whole synthesis, before its record."""
 
 
 class Journals:
@@ -200,11 +201,11 @@ class Journals:
             journal.record(record)
 
     def started(self, scene: Scene) -> None:
-        """Tells each."""
+        """Gives the scene to each."""
         for journal in self._journals:
             journal.started(scene)
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """Shows each."""
+        """Gives the synthesis to each."""
         for journal in self._journals:
             journal.synthesised(number, synthesis)

@@ -1,11 +1,9 @@
-"""Running the decisions of a logged run again.
+"""Repeats the decisions of a logged run.
 
-The driver is run once more, on a device that does not move and reports what was measured then.
-Everything that it decides
-- each state, command, prediction, estimate, synthesis and learned region - is compared with the
-  log, record by record.
-Since the driver depends on nothing but measurements, scene, settings and engine, the decisions must
-be the same; if they are not, the program, its engine or the log has changed.
+The driver runs once more, on a device that does not move and reports the logged measurements. All
+its decisions (each state, command, prediction, estimate, synthesis and learned region) are compared
+with the log, record by record. The driver depends only on measurements, scene, settings and engine,
+so the decisions must be the same. If they differ, the program, its engine or the log has changed.
 
 Numbers may differ by one part in a million: mathematical libraries round differently.
 """
@@ -33,13 +31,13 @@ _ABSOLUTE: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What a replay found.
+    """The result of a replay.
 
     Attributes:
-        compared: How many decisions were compared.
+        compared: The number of decisions that were compared.
         logged: The first logged record that was decided differently; None if all are the same.
-        decided: What was decided instead; None if nothing more was.
-        complete: Whether the run was compared to its end; a torn log is not.
+        decided: The decision instead; None if there was none.
+        complete: Whether the run was compared to its end; a log that is cut off is not.
     """
 
     compared: int
@@ -54,7 +52,7 @@ class Comparison:
 
 
 class _Different(Exception):  # noqa: N818  it reports a finding, not an error
-    """The driver decided otherwise; ends the replay."""
+    """The driver decided differently; ends the replay."""
 
     def __init__(self, logged: Record | None, decided: Record | None) -> None:
         super().__init__()
@@ -71,11 +69,11 @@ def replay(log: RunLog, synthesise: Synthesiser) -> Comparison:
 
     Args:
         log: The log.
-        synthesise: Where plans come from; with the settings of the log.
+        synthesise: Finds plans, with the settings of the log.
 
     Raises:
-        InputError: The log holds no scene or settings.
-        LimitError: The engine reached a limit that it did not reach then.
+        InputError: The log has no scene or no settings.
+        LimitError: The engine reached a limit that it did not reach in the run.
     """
     stage = _Stage(record for record in log.records if not isinstance(record, Truth))
     controller = Controller(log.scene, stage, synthesise, log.settings, stage, stage.listen)
@@ -90,7 +88,7 @@ def replay(log: RunLog, synthesise: Synthesiser) -> Comparison:
 
 
 class _Stage:
-    """The device of a replay and its journal: both read the same log, side by side."""
+    """The device of a replay and its journal; both read the same log."""
 
     def __init__(self, records: Iterable[Record]) -> None:
         self._records = tuple(records)
@@ -99,33 +97,33 @@ class _Stage:
 
     @property
     def next_logged(self) -> Record | None:
-        """The record that comes next in the log."""
+        """The next record in the log."""
         return self._records[self._place] if self._place < len(self._records) else None
 
     # The device.
 
     def now_s(self) -> float:
-        """The time at which the next record was written."""
+        """The time of the next record."""
         following = self.next_logged or (self._records[-1] if self._records else None)
         return following.time_s if following else 0.0
 
     def push(self, length_mm: float) -> None:
-        """Nothing moves; the command was compared as a record."""
+        """Does nothing: the command was compared as a record."""
         self._repeat_failure()
 
     def roll(self, angle_rad: float) -> None:
-        """Nothing moves."""
+        """Does nothing: the device does not move."""
         self._repeat_failure()
 
     def pull(self, length_mm: float) -> None:
-        """Nothing moves."""
+        """Does nothing: the device does not move."""
         self._repeat_failure()
 
     def stop(self) -> None:
-        """Nothing moves."""
+        """Does nothing: the device does not move."""
 
     def measure(self) -> Measurement:
-        """What was measured at this point."""
+        """The logged measurement at this point."""
         logged = self._expected()
         if not isinstance(logged, Measured):
             self._repeat_abort(logged)
@@ -138,10 +136,10 @@ class _Stage:
             bevel=_vector_or_none(logged.bevel),
         )
 
-    # Whoever ended the run.
+    # The operator.
 
     def listen(self) -> None:
-        """Ends the run if it ended here."""
+        """Ends the run if the logged run was ended here."""
         self._repeat_failure()
 
     # The journal.
@@ -157,10 +155,10 @@ class _Stage:
         self.compared += type(record).decided
 
     def started(self, scene: Scene) -> None:
-        """The scene is the log's own."""
+        """Does nothing: the scene comes from the log itself."""
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """The synthesis is compared through its record."""
+        """Does nothing: the record of the synthesis is compared."""
 
     def _expected(self) -> Record:
         logged = self.next_logged
@@ -169,12 +167,12 @@ class _Stage:
         return logged
 
     def _repeat_failure(self) -> None:
-        """A motion that did not end well then does not end well now."""
+        """Raises the same fault as the logged motion, if it had one."""
         if self.next_logged is not None:
             self._repeat_abort(self.next_logged)
 
     def _repeat_abort(self, logged: Record) -> None:
-        """What came from outside then comes from outside now: a fault or the operator."""
+        """Raises what came from outside in the logged run: a fault, or the operator's end."""
         if not isinstance(logged, Transition):
             return
         ended = self._records[-1]

@@ -1,4 +1,4 @@
-"""A scene as JSON, exactly: what a run was told travels in its log."""
+"""A scene as exact JSON, for the log of a run."""
 
 from __future__ import annotations
 
@@ -22,12 +22,15 @@ def scene_from_json(text: str | bytes) -> Scene:
     """The scene of such a text.
 
     Raises:
-        InputError: The text is no scene, or its scene does not obey the rules.
+        InputError: The text is not a scene, or the scene breaks the rules.
     """
     try:
         document = json.loads(text)
         if document["version"] != VERSION:
-            raise InputError(f"scene of version {document['version']!r}: only {VERSION} is known")
+            raise InputError(
+                f"the scene of the run has version {document['version']!r}, but this ntagen reads "
+                f"only version {VERSION}"
+            )
         return value_from_json(document["scene"], Scene)
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"the scene of the run cannot be read: {error!r}") from error

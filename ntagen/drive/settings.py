@@ -1,6 +1,6 @@
-"""The driver's settings: what a run depends on beside scene, device and seed.
+"""The driver's settings: with scene, device and seed, they determine a run.
 
-Where a source gives no figure the default is ours, and said to be.
+If no source gives a value, the default is our choice; the docstring says so with "ours".
 """
 
 from __future__ import annotations
@@ -19,29 +19,29 @@ from ntagen.plan.synthesise import Margins
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What the driver does how.
+    """The parameters of the driver.
 
     Attributes:
-        initial_push_mm: Length of the first push, before there is a plan. The paper's virtual runs
-            take 5.1 s for it and its fit, at 1 mm/s.
+        initial_push_mm: The length of the first push, before there is a plan. The paper's virtual
+            runs need 5.1 s for it and its fit, at 1 mm/s.
         spacing_mm: A push is made in pieces of this length, with a measurement after each. Ours:
-            small against a detection margin of 2 to 3 mm.
-        deviation_mm: The measured position may differ this much from the prediction. The authors
-            tried 0 to 10 mm; ours.
-        deviation_count: So many measurements in a row must differ, so that one bad reading is no
-            alarm.
-        force_n: A force above this is an alarm. The authors used rises of 0.1 to 0.2 of an unknown
+            small compared with a detection margin of 2 to 3 mm.
+        deviation_mm: The measured position may differ this much from the prediction. Ours; the
+            authors tried 0 to 10 mm.
+        deviation_count: The number of measurements in a row that must differ for an alarm, so that
+            one bad measurement is not enough.
+        force_n: A force above this is an alarm. The authors used rises of 0.1 to 0.2 in an unknown
             unit.
-        pull_mm: How far the needle is pulled back to readjust; fixed, as in the paper, the figure
-            ours.
-        push_mm: How far it is pushed again before the next estimate; less than `pull_mm`; ours.
+        pull_mm: The length by which the needle is pulled back to readjust. It is fixed, as in the
+            paper; the value is ours.
+        push_mm: The length of the push before the next estimate; less than `pull_mm`; ours.
         timeout_s: A run ends after this time (paper, section 4).
-        sensing_margin_mm: How far from a region that is not known the force is expected to rise;
+        sensing_margin_mm: The expected distance from an unknown region at which the force rises;
             ours.
         learned_radius_mm: The radius of a learned critical region; ours.
-        margins: What a plan must hold by in exact kinematics.
+        margins: The margins that a plan must have in exact kinematics.
         ranking: The criteria by which the plan is chosen.
-        priors: What the estimator takes for granted, and how much.
+        priors: The assumptions of the estimator.
     """
 
     initial_push_mm: float = 5.0
@@ -59,19 +59,23 @@ class Settings:
     priors: Priors = field(default_factory=Priors)
 
     def __post_init__(self) -> None:
-        """Refuses what no drive can be made with.
+        """Refuses settings with which the driver cannot work.
 
         Raises:
-            InputError: A value is no number, or of a size that makes no sense.
+            InputError: A value is not a number, or too large or too small.
         """
         for name, value in _numbers(self):
             least = _LEAST.get(name, 0.0)
             if not isinstance(value, int | float) or not least <= value <= _LARGEST:
                 raise InputError(
-                    f"the setting {name} is {value!r}\nhint: it is from {least:g} to {_LARGEST:g}"
+                    f"the setting {name} is {value!r}, which is not allowed\n"
+                    f"hint: choose a number from {least:g} to {_LARGEST:g}"
                 )
         if self.pull_mm - self.push_mm < _LEAST["spacing_mm"]:
-            raise InputError("pull_mm must be greater than push_mm: nothing would be pulled back")
+            raise InputError(
+                "pull_mm must be greater than push_mm by at least "
+                f"{_LEAST['spacing_mm']:g} mm: the needle must be pulled back"
+            )
         parse_ranking(",".join(self.ranking))
 
     def to_json(self) -> dict[str, Any]:
@@ -92,7 +96,7 @@ class Settings:
 
 
 _LARGEST: Final = 1e6
-"""The largest setting, in whatever unit."""
+"""The largest value of any setting, in its unit."""
 
 _LEAST: Final = {
     "spacing_mm": 0.01,
@@ -100,11 +104,11 @@ _LEAST: Final = {
     "deviation_count": 1.0,
     **dict.fromkeys((field.name for field in dataclasses.fields(Priors)), 1e-12),
 }
-"""The least value of those settings that cannot be 0."""
+"""The least values of the settings that cannot be 0."""
 
 
 def _numbers(settings: Settings) -> Iterator[tuple[str, object]]:
-    """All numbers by name, those of its parts too."""
+    """All numbers by name, including those of its parts."""
     for part in (settings, settings.margins, settings.priors):
         for one in dataclasses.fields(part):
             if one.name not in ("margins", "priors", "ranking"):

@@ -1,4 +1,4 @@
-"""A run with the virtual needle: what is true on one side, what the driver is told on the other."""
+"""Runs the driver with the virtual needle, which alone knows the true scene."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ _NO_REGION_MM: Final = 1e9
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """How a simulated run ended, and what was true of it.
+    """The end of a simulated run, and the truth about it.
 
     Attributes:
         ended: The driver's own last record.
-        clearance_mm: Smallest distance of everything that was pierced to any actual critical
-            region; infinite without one, negative if one was pierced.
-        target_distance_mm: Distance of the true tip to the surface of the last target; negative
+        clearance_mm: The smallest distance of the needle's path to any actual critical region;
+            infinite without one, negative if one was pierced.
+        target_distance_mm: The distance of the true tip to the surface of the last target; negative
             inside.
-        pierced: Every arc that was truly cut.
+        pierced: All arcs that were really cut.
     """
 
     ended: Ended
@@ -54,12 +54,12 @@ def simulate(
 
     Args:
         scene: The actual scene.
-        synthesise: Where plans come from.
+        synthesise: Finds plans.
         settings: How to drive.
-        journal: Who is told what happens.
-        known: Which critical regions the driver is told about (`ntagen.drive.knowledge.told`).
+        journal: Records what happens.
+        known: The critical regions that the driver knows (`ntagen.drive.knowledge.told`).
         errors: The needle's errors; none by default.
-        seed: What they are drawn from.
+        seed: The seed of the errors.
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
     """
     obstacles = tuple(
@@ -86,7 +86,7 @@ def simulate(
 
 
 def settings_for(settings: Settings, errors: Errors) -> Settings:
-    """The settings with priors that fit the needle's errors, as a calibration would find them."""
+    """The settings with priors that fit the needle's errors, as after a calibration."""
     priors = settings.priors
     roll_rad = max(priors.roll_rad, errors.roll_rad)
     noise_mm = max(priors.noise_mm, errors.noise_mm)
@@ -94,7 +94,7 @@ def settings_for(settings: Settings, errors: Errors) -> Settings:
 
 
 class _Witness:
-    """Adds to a journal what is true at each measurement and at the end."""
+    """Adds the truth to a journal, at each measurement and at the end."""
 
     def __init__(self, needle: VirtualNeedle, journal: Journal) -> None:
         self._needle = needle
@@ -108,7 +108,7 @@ class _Witness:
             self._journal.record(Truth(record.time_s, tip_mm, shown_mm))
 
     def started(self, scene: Scene) -> None:
-        """Nothing is true of a scene that the needle does not know."""
+        """Does nothing: the truth is added to measurements only."""
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """Nothing is true of a plan before it is driven."""
+        """Does nothing: the truth is added to measurements only."""

@@ -7,10 +7,10 @@
                               │            │ from farther back             ▼
                               └── push ◀── pull back ◀─────────────────── stop
 
-Each state is a task that ends with one of its events; the table says which state follows. `EVENTS`
-lists what each state can report, and `TRANSITIONS` has exactly one entry for each of these pairs:
-nothing is undefined. Time-out, device fault and interruption can end every task, and each leads to
-its own end with the needle stopped.
+Each state is a task that ends with one of its events; the table gives the next state. `EVENTS`
+lists the events of each state, and `TRANSITIONS` has exactly one entry for each pair of state and
+event: nothing is undefined. Time-out, device fault and interruption can end every task; each has
+its own final state, with the needle stopped.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import Final
 
 @unique
 class State(Enum):
-    """What the driver is doing, or how it ended."""
+    """The current task of the driver, or the end of the run."""
 
     ARM = "arm"
     INITIAL_PUSH = "initial push"
@@ -42,7 +42,7 @@ class State(Enum):
 
 @unique
 class Event(Enum):
-    """How a task ended."""
+    """The end of a task."""
 
     ARMED = "armed"
     PUSHED = "pushed"
@@ -80,7 +80,7 @@ ABORTS: Final = {
     Event.FAULT: State.FAULTED,
     Event.INTERRUPT: State.INTERRUPTED,
 }
-"""The events that can end every task, and where they lead."""
+"""The events that can end every task, and the states to which they lead."""
 
 _WORKFLOW: Final = {
     (State.ARM, Event.ARMED): State.INITIAL_PUSH,
@@ -105,18 +105,18 @@ _WORKFLOW: Final = {
 TRANSITIONS: Final = _WORKFLOW | {
     (state, event): end for state in State if state not in ENDS for event, end in ABORTS.items()
 }
-"""The state that follows, for each pair of a state and an event that it can report."""
+"""The next state, for each pair of a state and an event that it can report."""
 
 EVENTS: Final = {
     state: frozenset(event for source, event in TRANSITIONS if source is state) for state in State
 }
-"""The events that each state can report; none for the ends."""
+"""The events that each state can report; final states have none."""
 
 
 def next_state(state: State, event: Event) -> State:
-    """The state that follows.
+    """The next state.
 
     Raises:
-        KeyError: The state cannot report this event: a mistake in the driver.
+        KeyError: The state cannot report this event: a bug in the driver.
     """
     return TRANSITIONS[state, event]

@@ -1,4 +1,4 @@
-"""A run in words: one line for what a person wants to know of a record, nothing for the rest."""
+"""A run in words: one line for each record that a person wants to read."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FAR_MM = 1e8
 
 
 def tell(record: Record) -> str | None:
-    """The line for a record; None if it is routine."""
+    """The line for a record; None if the record is routine."""
     text = _text(record)
     return None if text is None else f"{record.time_s:7.2f} s  {text}"
 

@@ -1,8 +1,8 @@
-"""The run in the messages that common viewers draw: Foxglove's schemas.
+"""Messages of a run that common viewers can draw: Foxglove's schemas.
 
-The needle is written twice, since no viewer draws everything: as scene entities and transforms, and
-as poses and points. Everything is in metres, as viewers expect, in the frame ``world``, whose axes
-are those of the environment file.
+The needle is written twice, because no viewer draws everything: as scene entities and transforms,
+and as poses and points. Everything is in metres, as viewers expect, in the frame ``world``, whose
+axes are those of the environment file.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ TOPICS: Final[dict[str, type[Message]]] = {
 """The topics for viewers and their message types."""
 
 ROUTINE: Final = frozenset({Event.ACTED.value, Event.AS_PREDICTED.value})
-"""Events of every cycle, which are not worth a line of text."""
+"""Events of every cycle, which have no line of text."""
 
 _M_PER_MM: Final = 1e-3
 _FRAME: Final = "world"
@@ -92,7 +92,7 @@ def show_plan(synthesis: Synthesis, time_s: float) -> Shown:
 
 
 def show_record(record: Record) -> Shown:
-    """What viewers are shown of a record."""
+    """The messages of a record for viewers."""
     match record:
         case Measured():
             yield "/needle/measured", _cloud(record)
@@ -185,10 +185,10 @@ def _pose(pose: Pose) -> PoseMessage:
 
 
 def quaternion(pose: Pose) -> tuple[float, float, float, float]:
-    """The rotation (x, y, z, w) that takes the world's axes to heading, bending axis and bevel.
+    """The rotation (x, y, z, w) from the world's axes to heading, bending axis and bevel.
 
-    Of the four ways to read it off the matrix the one that divides by the largest number is used
-    (Shepperd, 1978).
+    There are four formulas for it; the one that divides by the largest number is used (Shepperd,
+    1978).
     """
     h, s, b = pose.heading, bending_axis(pose), pose.bevel
     squares = (

@@ -10,10 +10,10 @@ analysis for circle fitting algorithms", 2009):
 3. a geometric fit (Levenberg-Marquardt) in the parametrisation (curvature, direction, offset),
    which passes through curvature 0 without a singularity, as (centre, radius) does not.
 
-A short arc tells little of its curvature: with `n` points over a length `L` and noise `s` its
-standard deviation is ``s / L^2 sqrt(720 / (n + 4))`` (Gluckstern, 1963), for 5 mm, 20 points and
-0.1 mm as much as two thirds of the curvature of a circle of 30 mm. So a prior for the curvature can
-be given; it enters as one more observation.
+A short arc tells little about its curvature. With `n` points over a length `L` and noise `s` its
+standard deviation is ``s / L^2 sqrt(720 / (n + 4))`` (Gluckstern, 1963). For 5 mm, 20 points and
+0.1 mm this is two thirds of the curvature of a circle of 30 mm. So a prior for the curvature can be
+given; it counts as one more observation.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from ntagen.scene import Pose, Vector
 _Array = NDArray[np.float64]
 
 _SMALLEST_CURVATURE_PER_MM = 1e-7
-"""A radius of 10 km: what is straighter counts as this straight, so that a centre exists."""
+"""A radius of 10 km: a straighter arc gets this curvature, so that it has a centre."""
 
 
 @dataclass(frozen=True, slots=True)
 class CurvaturePrior:
-    """What is known of the curvature before the fit, as a normal distribution.
+    """The knowledge about the curvature before the fit, as a normal distribution.
 
     Attributes:
         mean_per_mm: The expected curvature.
@@ -57,8 +57,7 @@ class CircleFit:
         normal: Unit normal of the plane; the motion turns right-handed about it.
         curvature_per_mm: One over the radius.
         curvature_std_per_mm: Its standard deviation, from the noise and the shape of the arc.
-        rms_mm: Root mean square of the distances of the points from the circle, out of the plane
-            included.
+        rms_mm: Root mean square of the distances of the points from the circle, in space.
     """
 
     center_mm: Vector
@@ -92,9 +91,9 @@ def fit_circle(
 
     Args:
         points_mm: One point a row, at least three that do not coincide.
-        noise_mm: Standard deviation of the measurement; with a prior it decides how much the points
-            say.
-        prior: What is known of the curvature.
+        noise_mm: Standard deviation of the measurement; with a prior it decides the weight of the
+            points.
+        prior: The knowledge about the curvature before the fit.
 
     Raises:
         ValueError: Fewer than three points, points that are not finite, or all at one place.
@@ -119,7 +118,7 @@ def _algebraic(flat: _Array) -> _Array:
 
     Minimises the mean square of ``A (x^2 + y^2) + B x + C y + D`` under the hyper constraint: the
     generalised eigenvector of the smallest positive eigenvalue. The constraint has one negative
-    direction, so exactly one eigenvalue is negative, and the one wanted is the second.
+    direction, so exactly one eigenvalue is negative, and the second one is the right one.
     """
     x, y = flat.T
     squares = x * x + y * y
@@ -184,7 +183,7 @@ def _geometric(
 def _in_space(
     points: _Array, centroid: _Array, axes: _Array, shape: _Array, std_per_mm: float
 ) -> CircleFit:
-    """The plane's circle put back into space, its motion made right-handed about the normal."""
+    """The circle of the plane in space; its motion is right-handed about the normal."""
     curvature, direction, offset = shape
     if curvature < 0.0:
         curvature, direction, offset = -curvature, direction + math.pi, -offset

@@ -1,20 +1,19 @@
-"""Where the needle is and how it bends, estimated from all that was commanded and measured.
+"""Estimates where the needle is and how it bends, from all commands and measurements.
 
-The measured positions alone tell little of the direction in which a needle will bend: on the first
-5 mm of a circle of 30 mm the tip moves 0.4 mm sideways, while the noise of a tracker is 0.1 mm.
-What helps is that the commands are known. The estimator replays them - pushes, rolls and pulls, on
-the tree of all channels that were ever cut - with a few unknowns:
+The measured positions alone tell little about the direction in which a needle will bend: on the
+first 5 mm of a circle of 30 mm the tip moves 0.4 mm sideways, and the noise of a tracker is 0.1 mm.
+But the commands are known. The estimator replays them (pushes, rolls and pulls) on the tree of all
+channels that were cut, with a few unknowns:
 
 * the entry pose (three for the position, three small rotations),
 * the curvature, as a factor of the expected one,
 * the error of each roll, since a shaft does not turn its tip exactly as it is turned at its base.
 
-The unknowns with the greatest posterior density are found by non-linear least squares, each
-measurement weighed by the noise and each unknown by its prior. Rolls and pulls do not end a
-history: what was measured in a channel that was left still tells of entry, curvature and rolls.
+Non-linear least squares finds the unknowns with the greatest posterior density. The noise weighs
+each measurement, and the prior weighs each unknown. Measurements in a channel that the needle has
+left still count: they tell about the entry, the curvature and the rolls.
 
-Cost: about 0.3 ms for one residual vector of 200 measurements; some ten to forty of them an
-    estimate.
+Cost: about 0.3 ms for one residual vector of 200 measurements; an estimate needs ten to forty.
 """
 
 from __future__ import annotations
@@ -44,16 +43,16 @@ _POSE_UNKNOWNS = 7
 
 @dataclass(frozen=True, slots=True)
 class Priors:
-    """What is known before anything is measured, as standard deviations.
+    """Standard deviations that are assumed before anything is measured.
 
     Attributes:
-        position_mm: Of each coordinate of the entry point.
-        heading_rad: Of the entry's heading, about either transverse axis.
-        bevel_rad: Of the bevel's angle about the shaft at the entry.
-        curvature_ratio: Of the curvature, relative to the expected one.
-        roll_rad: Of the error of each roll.
-        noise_mm: Of each coordinate of a measured position.
-        direction_rad: Of a measured direction, where the sensor reports directions.
+        position_mm: Each coordinate of the entry point.
+        heading_rad: The entry's heading, about either transverse axis.
+        bevel_rad: The bevel's angle about the shaft at the entry.
+        curvature_ratio: The curvature, relative to the expected one.
+        roll_rad: The error of each roll.
+        noise_mm: Each coordinate of a measured position.
+        direction_rad: A measured direction, if the sensor reports directions.
     """
 
     position_mm: float = 0.2
@@ -70,7 +69,7 @@ class Estimate:
     """An estimate.
 
     Attributes:
-        path: The channel in which the needle lies now, as estimated; its end is the tip.
+        path: The estimated channel in which the needle lies now; its end is the tip.
         radius_mm: The radius of the motion circle.
         radius_std_mm: Its standard deviation.
         rms_mm: Root mean square of the distances between measured and estimated positions.
@@ -110,7 +109,7 @@ class Estimator:
     Args:
         entry: The expected pose at depth 0.
         radius_mm: The expected radius of the motion circle.
-        priors: How much these expectations are worth.
+        priors: The standard deviations of these expectations.
     """
 
     def __init__(self, entry: Pose, radius_mm: float, priors: Priors) -> None:
@@ -182,7 +181,7 @@ class Estimator:
                 [places.residuals(starts, curvature, self._priors), unknowns / weights]
             )
 
-        # Unknowns are measured in their standard deviations, so that one step size fits all.
+        # Unknowns are in units of their standard deviations, so that one step size fits all.
         result = scipy.optimize.least_squares(residuals, start, method="lm", x_scale=weights)
         self._solution = result.x
         starts, curvature = self._starts(result.x)
@@ -295,12 +294,12 @@ def _positions(start: Pose, curvature: float, offsets_mm: _Array) -> _Array:
 def pose_from_points(
     points_mm: _Array, noise_mm: float, prior: CurvaturePrior | None = None
 ) -> tuple[Pose, float]:
-    """The pose and the radius that the points of one push imply, whatever the entry was.
+    """The pose and the radius that follow from the points of one push, without the entry.
 
     The position is that of the circle nearest to the last point, the heading the tangent there.
 
     Raises:
-        ValueError: The points are no arc (`ntagen.needle.circle.fit_circle`).
+        ValueError: The points are not an arc (`ntagen.needle.circle.fit_circle`).
     """
     fit = fit_circle(points_mm, noise_mm, prior)
     last = points_mm[-1]

@@ -1,8 +1,8 @@
 """Exact kinematics of a bevel-tip needle in SE(3), in double precision.
 
-A push moves the tip along its motion circle, a roll turns it about its heading; nothing else
-happens (paper, section 2.3 and appendix; the unicycle model of Webster et al., 2006). With heading
-``h``, bevel ``b`` and radius ``r``, and the conventions of `ntagen.scene`::
+A push moves the tip along its motion circle; a roll turns it about its heading (paper, section 2.3
+and appendix; the unicycle model of Webster et al., 2006). With heading ``h``, bevel ``b`` and
+radius ``r``, and the conventions of `ntagen.scene`::
 
     centre  c = p - r b          bending axis  y = b x h
     push by s, t = s / r:   p' = c + r b'   h' = h cos t - b sin t   b' = b cos t + h sin t
@@ -11,8 +11,7 @@ happens (paper, section 2.3 and appendix; the unicycle model of Webster et al., 
 The generated model computes the same with integers and loses about 1 % of the arc: five pushes of 2
 mm from the origin end at (0, -9.816, -1.651) mm here and at (0, -9.720, -1.620) mm there.
 
-Cost: constant time for every function; the distance to a point is a closed form, nothing is
-    sampled.
+Cost: constant time for every function; the distance to a point is a closed form, without sampling.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from ntagen.scene import Pose, Vector
 
 _TURN_RAD = 2.0 * math.pi
 _BISECTIONS = 60
-"""Halvings after which an arc length is exact to the last bit that matters."""
+"""After this many halvings, an arc length is as exact as floating-point numbers allow."""
 
 
 def circle_center(pose: Pose, radius_mm: float) -> Vector:
@@ -47,7 +46,7 @@ def push(pose: Pose, radius_mm: float, length_mm: float) -> Pose:
         length_mm: The length of the arc; a negative one moves backwards on the circle.
     """
     turn_rad = length_mm / radius_mm
-    # The half angle keeps the small sideways part exact for short arcs and for large radii.
+    # With the half angle, the small sideways part is exact for short arcs and for large radii.
     half_sinc = 1.0 if turn_rad == 0.0 else math.sin(turn_rad / 2.0) / (turn_rad / 2.0)
     chord_mm = length_mm * half_sinc
     cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
@@ -73,7 +72,7 @@ def roll(pose: Pose, angle_rad: float) -> Pose:
 
 
 def orthonormal(pose: Pose) -> Pose:
-    """The pose with heading and bevel made unit and orthogonal; the heading keeps its direction.
+    """The pose with unit vectors at right angles; the heading keeps its direction.
 
     Raises:
         ValueError: Heading and bevel are parallel, or one of them is zero.
@@ -89,7 +88,7 @@ class Nearest:
 
     Attributes:
         distance_mm: The smallest distance.
-        at_mm: The arc length from the curve's start at which it is taken.
+        at_mm: The arc length from the curve's start to the nearest point.
     """
 
     distance_mm: float
@@ -128,8 +127,8 @@ class Arc:
 
         On the circle the squared distance is ``constant - 2 r (w.b cos t + w.h sin t)`` with ``w``
         from the centre to the point: it has one minimum, at ``t = atan2(w.h, w.b)``, and falls
-        towards it from both sides. So the minimum over the arc lies there if the arc reaches it,
-        and else at one of its ends.
+        towards it from both sides. So the minimum over the arc is there if the arc reaches it, and
+        otherwise at one of its ends.
         """
         ends = (
             Nearest(distance(self.start.position_mm, point_mm), 0.0),
@@ -149,9 +148,9 @@ class Arc:
         nearest = self.nearest_to(center_mm)
         if nearest.distance_mm > radius_mm:
             return None
-        # The distance falls on the whole way from the start, which is outside, to the nearest
-        # place, unless the far side of the circle comes first: there it has its one maximum, and
-        # nothing is entered before it.
+        # The distance falls all the way from the start, which is outside, to the nearest place,
+        # unless the far side of the circle comes first: there is its only maximum, and the arc
+        # enters nothing before it.
         low_mm, high_mm = self._farthest_before(nearest.at_mm), nearest.at_mm
         for _ in range(_BISECTIONS):
             middle_mm = 0.5 * (low_mm + high_mm)
@@ -160,12 +159,12 @@ class Arc:
         return high_mm
 
     def _farthest_before(self, at_mm: float) -> float:
-        """Where before `at_mm` the circle opposite to that place is; 0 if it only comes nearer."""
+        """The arc length at the far side of the circle before `at_mm`; 0 if it is not passed."""
         opposite_mm = at_mm - math.pi * self.radius_mm
         return opposite_mm if opposite_mm > 0.0 else 0.0
 
     def _foot_mm(self, point_mm: Vector) -> float:
-        """Where, going forward from the start, the circle first comes nearest to the point."""
+        """The arc length, forward from the start, at which the circle is nearest to the point."""
         if math.isinf(self.radius_mm):
             ahead = dot(subtract(point_mm, self.start.position_mm), self.start.heading)
             return ahead if ahead >= 0.0 else math.inf

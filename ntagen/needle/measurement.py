@@ -1,4 +1,4 @@
-"""What a sensor reports of the needle, as a value."""
+"""A measurement of the needle, as a value."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class Measurement:
     """One reading.
 
     Attributes:
-        time_s: When it was taken, on the device's clock.
+        time_s: The time of the measurement, on the device's clock.
         position_mm: The measured position of the tip.
-        force_n: The force at the tip beyond that of plain insertion.
-        heading: The measured direction of travel, where the sensor knows it.
-        bevel: The measured bevel direction, where the sensor knows it.
+        force_n: The force at the tip, minus that of plain insertion.
+        heading: The measured direction of travel, if the sensor reports it.
+        bevel: The measured bevel direction, if the sensor reports it.
     """
 
     time_s: float

@@ -1,10 +1,9 @@
-"""The path that the needle has cut into the tissue: arcs, the rolls between them, and the way back.
+"""The path that the needle has cut into the tissue: arcs, and the rolls between them.
 
-The path is what the shaft lies in. A push adds to its end, a pull takes the tip back along it, and
-a roll turns the shaft. A pull does not undo a roll: the shaft keeps its angle, and so the bevel at
-a place passed for the second time differs from the first by the rolls that were made beyond it
-(`Path.pull`). Whoever wants to move on in the old channel rolls back (`ntagen.drive.controller`
-does).
+The shaft lies in the path. A push adds to its end, a pull takes the tip back along it, and a roll
+turns the shaft. A pull does not undo a roll: the shaft keeps its angle. So when the tip comes back
+to a place, its bevel differs from the first time by the rolls that were made beyond that place
+(`Path.pull`). To go on in the old channel, the driver rolls back (`ntagen.drive.controller`).
 
 A path is an immutable value; every operation gives a new one. Lengths along it are insertion depths
 in mm.
@@ -23,12 +22,11 @@ _NOTHING_MM = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """One arc of a path, and the roll by which it was entered from the one before.
+    """One arc of a path, and the roll before it.
 
     Attributes:
         arc: The arc.
-        roll_before_rad: The roll made just before it, at the end of the stretch before (or at the
-            entry).
+        roll_before_rad: The roll just before it, at the end of the arc before (or at the entry).
     """
 
     arc: Arc
@@ -51,7 +49,7 @@ class Path:
 
     @property
     def depth_mm(self) -> float:
-        """How much needle is inserted."""
+        """The inserted length of the needle."""
         return sum(stretch.arc.length_mm for stretch in self.stretches)
 
     @property
@@ -66,7 +64,7 @@ class Path:
         return tuple(stretch.arc for stretch in self.stretches)
 
     def push(self, radius_mm: float, length_mm: float) -> Path:
-        """The path after a push; one that goes on along the last arc lengthens it."""
+        """The path after a push; a push on the same circle lengthens the last arc."""
         if length_mm <= 0.0:
             return self
         last = self.stretches[-1] if self.stretches else None
@@ -90,17 +88,17 @@ class Path:
             if rest_mm > _NOTHING_MM:
                 kept.append(replace(last, arc=last.arc.upto(rest_mm)))
                 break
-            # The roll before this stretch stays in the shaft although its place is passed.
+            # The roll before this arc stays in the shaft, although the tip has left its place.
             pending_rad += last.roll_before_rad
         return Path(self.entry, tuple(kept), pending_rad)
 
     def nearest_to(self, point_mm: Vector) -> Nearest:
-        """The smallest distance of the path to a point, and the depth at which it is taken."""
+        """The smallest distance of the path to a point, and the depth of the nearest place."""
         return nearest_on(self.arcs, self.entry.position_mm, point_mm)
 
 
 def nearest_on(arcs: tuple[Arc, ...], entry_mm: Vector, point_mm: Vector) -> Nearest:
-    """The smallest distance of a chain of arcs to a point; of the entry alone if there are none."""
+    """The smallest distance of a chain of arcs to a point; without arcs that of the entry."""
     best = Arc(Pose(entry_mm, (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), 1.0, 0.0).nearest_to(point_mm)
     start_mm = 0.0
     for arc in arcs:
@@ -112,7 +110,7 @@ def nearest_on(arcs: tuple[Arc, ...], entry_mm: Vector, point_mm: Vector) -> Nea
 
 
 def sample_poses(arcs: tuple[Arc, ...], spacing_mm: float) -> list[Pose]:
-    """Poses along a chain of arcs, at most `spacing_mm` apart, every arc's both ends among them."""
+    """Poses along a chain of arcs, at most `spacing_mm` apart, with both ends of every arc."""
     poses: list[Pose] = []
     for arc in arcs:
         count = max(1, round(arc.length_mm / spacing_mm + 0.5))

@@ -1,8 +1,7 @@
 """Small vector algebra on tuples of three floats.
 
-For three numbers plain tuples are faster than arrays and are values that can be compared, hashed
-and put into frozen dataclasses. Arrays are used where there are many points
-(`ntagen.needle.estimate`).
+For three numbers, plain tuples are faster than arrays; they can be compared, hashed and put into
+frozen dataclasses. Arrays are used for many points (`ntagen.needle.estimate`).
 """
 
 from __future__ import annotations

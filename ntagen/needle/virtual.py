@@ -1,10 +1,10 @@
-"""The virtual needle: exact kinematics, a hidden true state, and sensors that see it through noise.
+"""The virtual needle: exact kinematics, a hidden true state, and sensors with noise.
 
-It stands in for a needle in a phantom. It moves on exact circles, as the paper's virtual needle
-does; each roll may err and each measured coordinate is noisy, all drawn from one seed. It knows the
-actual critical regions, also those that the driver was not told about, and lets them be felt only
-as a force: nothing within the sensing margin of a region, then growing with the depth in that
-margin. What it never reveals is where a region is.
+It replaces a needle in a phantom. It moves on exact circles, as the paper's virtual needle does.
+Each roll has a random error and each measured coordinate has noise, all from one seed. It knows the
+actual critical regions, also those that the driver does not know, and shows them only as a force:
+0 outside the sensing margin of a region, and growing with the depth inside the margin. It never
+reveals where a region is.
 
 It never reads a clock or waits: motions take simulated time on the clock that it is given.
 """
@@ -25,17 +25,17 @@ from ntagen.needle.vectors import distance
 from ntagen.scene import Needle, Pose, Region, Vector
 
 FORCE_N_PER_MM: Final = 1.0
-"""The rise of the force in the sensing margin; ours, since no source gives a figure."""
+"""The rise of the force in the sensing margin; our choice, since no source gives a value."""
 
 ROLL_RAD_PER_S: Final = math.pi
-"""Speed of a roll: half a turn a second; ours."""
+"""The speed of a roll: half a turn per second; our choice."""
 
 PULL_SPEED_RATIO: Final = 5.0
-"""Pulling in an open channel is this much faster than insertion; ours."""
+"""Pulling in an open channel is faster than insertion by this factor; our choice."""
 
 
 class SimulatedClock:
-    """A clock that goes on only when somebody tells it to."""
+    """A clock that advances only when it is told to."""
 
     def __init__(self) -> None:
         self._now_s = 0.0
@@ -51,7 +51,7 @@ class SimulatedClock:
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """An actual critical region and how far from its surface it is felt."""
+    """An actual critical region, and the distance from its surface at which it is felt."""
 
     region: Region
     margin_mm: float
@@ -64,11 +64,11 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """How far the virtual needle is from ideal, as standard deviations.
+    """The errors of the virtual needle, as standard deviations.
 
     Attributes:
-        noise_mm: Of each coordinate of a measured position.
-        roll_rad: Of each roll.
+        noise_mm: Each coordinate of a measured position.
+        roll_rad: Each roll.
     """
 
     noise_mm: float = 0.0
@@ -82,9 +82,9 @@ class VirtualNeedle:
         needle: The true entry pose, radius and speed.
         obstacles: The actual critical regions.
         errors: The size of the random errors.
-        seed: What they are drawn from.
-        clock: What time passes on.
-        reports_pose: Whether measurements hold heading and bevel, noisy as the rolls are.
+        seed: The seed of the random errors.
+        clock: The clock on which time passes.
+        reports_pose: Whether measurements have heading and bevel, with the noise of the rolls.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class VirtualNeedle:
         self._errors = errors
         self._clock = clock
         self._reports_pose = reports_pose
-        # Two streams, so that a drive that measures more often still makes the same roll errors.
+        # Two streams, so that the number of measurements does not change the roll errors.
         noise, rolls = np.random.SeedSequence(seed).spawn(2)
         self._noise = np.random.default_rng(noise)
         self._roll_errors = np.random.default_rng(rolls)
@@ -124,7 +124,7 @@ class VirtualNeedle:
         self._clock.advance(length_mm / self._needle.speed_mm_per_s)
 
     def roll(self, angle_rad: float) -> None:
-        """Turns the shaft; the tip follows up to the roll error.
+        """Turns the shaft; the tip turns by the same angle plus the roll error.
 
         Raises:
             DeviceError: The angle is not finite.
@@ -146,10 +146,10 @@ class VirtualNeedle:
         self._clock.advance(length_mm / (PULL_SPEED_RATIO * self._needle.speed_mm_per_s))
 
     def stop(self) -> None:
-        """Holds the needle; it stands already between two commands."""
+        """Does nothing: the needle stands still between commands."""
 
     def measure(self) -> Measurement:
-        """The position as the sensor sees it, and the force."""
+        """The position with noise, and the force."""
         tip = self._path.tip
         x, y, z = (
             float(c + self._noise.normal(0.0, self._errors.noise_mm)) for c in tip.position_mm
@@ -164,16 +164,16 @@ class VirtualNeedle:
 
     @property
     def true_tip(self) -> Pose:
-        """Where the tip really is; for reports and tests, never for the driver."""
+        """The true pose of the tip; for reports and tests, never for the driver."""
         return self._path.tip
 
     @property
     def pierced(self) -> tuple[Arc, ...]:
-        """Every arc that was ever cut, the ones that were left included."""
+        """All arcs that were cut, including those that the needle has left."""
         return (*self._left, *self._path.arcs)
 
     def true_clearance_mm(self) -> float:
-        """The smallest distance of all that was pierced to any actual critical region.
+        """The smallest distance of all arcs that were cut to any actual critical region.
 
         Infinite without critical regions, negative if one was pierced.
         """

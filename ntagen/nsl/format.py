@@ -1,9 +1,9 @@
-"""The canonical layout of environment files.
+"""The standard layout of environment files.
 
-* Two spaces of indentation for each brace; words of a clause one space apart, clauses two.
-* Statements that stand on one line stay on one line, those on several lines stay apart; a line
-  break within a statement goes. At most one empty line is kept, none inside a brace's edge.
-* Regions on neighbouring lines stand in columns; comments at the ends of neighbouring lines too.
+* Each brace indents by two spaces. Words of a clause are one space apart, clauses two.
+* Statements on the same line stay on one line, and statements on different lines stay apart. Line
+  breaks within a statement are removed. At most one empty line is kept, and none next to a brace.
+* Regions on neighbouring lines are aligned in columns, and so are comments at the ends of lines.
 
 Only white space changes: the tokens and comments of the result are those of the text. Formatting
 the result changes nothing.
@@ -40,10 +40,10 @@ _CLAUSES: Final = frozenset({"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT"})
 
 
 def format_source(source: Source) -> str:
-    """The text of a source in its canonical layout.
+    """The text of a source in the standard layout.
 
     Raises:
-        SourceError: The text has mistakes of form; what it means is not looked at.
+        SourceError: The text has syntax errors; its meaning is not checked.
     """
     reporter = Reporter()
     reporter.enter(source.path)
@@ -59,11 +59,11 @@ class _Line:
     """A line of the result before it is aligned with its neighbours.
 
     Attributes:
-        depth: How many braces it stands in.
-        cells: Its clauses; all of the line if it is not to be aligned.
+        depth: The number of braces around it.
+        cells: Its clauses; the whole line if it is not aligned.
         comment: The comment at its end.
         follows_gap: Whether an empty line comes before it.
-        is_region: Whether it is one region, so that its cells form columns with the lines around.
+        is_region: Whether it is one region, whose cells are aligned with those of its neighbours.
         is_opening: Whether it ends in an opening brace.
     """
 
@@ -76,11 +76,11 @@ class _Line:
 
     @property
     def is_single(self) -> bool:
-        """Whether it is one line in the text, too, and more than a closing brace."""
+        """Whether it is also one line in the text, and more than a closing brace."""
         return self.cells != ["}"] and not any("\n" in cell for cell in self.cells)
 
     def append(self, cells: Sequence[str]) -> None:
-        """Adds clauses; behind a region they make it a line that stands in no columns."""
+        """Adds clauses; a line with more than a region is not aligned."""
         if self.is_region and self.cells:
             self.cells[:2] = [" ".join(self.cells[:2])]
             self.is_region = False
@@ -110,11 +110,11 @@ class _Layout:
         return self._lines
 
     def _block(self) -> BlockKind | None:
-        """The kind of the braces that are open."""
+        """The kind of the innermost open braces."""
         return self._blocks[-1] if self._blocks else None
 
     def _token(self, token: Token) -> None:
-        """One token, on the line it belongs to."""
+        """Adds a token to the right line."""
         if token.type == "BRACE" and token.text == "{":
             self._statement.append(token)
             self._blocks.append(BLOCKS.get(self._keyword))
@@ -135,7 +135,7 @@ class _Layout:
             self._statement.append(token)
 
     def _comment(self, comment: Comment, following: Token | None) -> None:
-        """One comment: within a statement, at the end of a line or on lines of its own."""
+        """Adds a comment: within a statement, at the end of a line or on lines of its own."""
         is_inside = (
             bool(self._statement)
             and following is not None
@@ -159,14 +159,14 @@ class _Layout:
             line.comment = comment.text
 
     def _can_continue(self) -> bool:
-        """Whether another statement may stand on the line that is open."""
+        """Whether another statement may be added to the current line."""
         if not self._lines or self._lines[-1].comment is not None:
             return False
         cells = self._lines[-1].cells
         return bool(cells) and not (cells[-1].endswith(("{", "}")) or cells[0].startswith("/"))
 
     def _open_line(self, item: Token | Comment) -> _Line:
-        """A new line; empty lines before it become one, or none at the edge of a brace."""
+        """Begins a line; empty lines before it become one, or none next to a brace."""
         is_first = not self._lines or self._lines[-1].is_opening
         line = _Line(len(self._blocks))
         line.follows_gap = item.line > self._end_line + 1 and not is_first
@@ -174,7 +174,7 @@ class _Layout:
         return line
 
     def _end_statement(self) -> None:
-        """Writes the statement that is being collected on the line that is open."""
+        """Adds the collected statement to the current line."""
         if not self._statement:
             return
         line = self._lines[-1]
@@ -189,7 +189,7 @@ class _Layout:
 
 
 def _following_tokens(items: Sequence[Token | Comment]) -> list[Token | None]:
-    """For each item the first token behind it."""
+    """The first token after each item."""
     following: list[Token | None] = []
     token: Token | None = None
     for item in reversed(items):
@@ -228,7 +228,7 @@ def _begins_clause(previous: Token | Comment | None, item: Token | Comment) -> b
 
 
 def _is_prefix(last_token: Token | None, item: Token | Comment) -> bool:
-    """Whether an item is a sign that belongs to what follows, not an operator."""
+    """Whether an item is a sign of the following value, not an operator."""
     if isinstance(item, Comment) or item.type != "SIGN":
         return False
     return last_token is None or last_token.type not in _OPERAND_ENDS
@@ -246,7 +246,7 @@ def _space(previous: Token | Comment, item: Token | Comment) -> str:
 
 
 def _text(item: Token | Comment) -> str:
-    """A token or comment as it is written."""
+    """The text of a token or comment."""
     if isinstance(item, Token) and item.type == "RATIO":
         return "".join(item.text.split())
     if isinstance(item, Token) and item.type == "QUERY":
@@ -277,7 +277,7 @@ def _render(lines: Sequence[_Line]) -> Iterator[str]:
 
 
 def _runs(lines: Sequence[_Line], is_member: Callable[[_Line], bool]) -> Iterator[list[_Line]]:
-    """Neighbouring lines that are aligned together; a line that is not to be aligned is alone."""
+    """Groups of neighbouring lines that are aligned together; any other line is a group alone."""
     run: list[_Line] = []
     for line in lines:
         if run and not (
@@ -299,7 +299,7 @@ def _bodies(lines: Sequence[_Line]) -> Iterator[str]:
     columns = zip_longest(*(line.cells[:-1] for line in aligned), fillvalue="")
     widths = [max(map(len, column)) for column in columns]
     if len({line.cells[2].partition(" ")[0] for line in aligned}) > 1:
-        # Spheres and what lies around them are too different in length to share a column.
+        # Spheres and `around` clauses differ too much in length to share a column.
         del widths[2:]
     for line in lines:
         cells = line.cells

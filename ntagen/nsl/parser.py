@@ -1,19 +1,19 @@
-"""Text to typed tree, with every mistake of form reported in one run.
+"""Parses a text to a typed tree, and reports all syntax errors in one run.
 
-The way of a file:
+The steps:
 
-1. lark's lexer cuts the text into tokens. What is no token is reported and left out.
-2. The tokens are cut into statements: at braces, and at the words that begin one. All of these
-   words are reserved, so that the cut is right even where the statement before it is wrong.
-3. Each statement is parsed alone by the grammar (`grammar.lark`, LALR). One with a mistake is
-   reported at the first token that cannot stand where it stands, and becomes a `Broken`; the others
-   are not touched by it.
+1. lark's lexer cuts the text into tokens. Other characters are reported and left out.
+2. The tokens are cut into statements: at braces, and at the words that begin a statement. All of
+   these words are reserved, so that the cut is right even after a statement with a mistake.
+3. Each statement is parsed alone by the grammar (`grammar.lark`, LALR). A mistake is reported at
+   the first token that cannot stand at its place. That statement becomes a `Broken`; it does not
+   affect the others.
 
-A first word that is nearly a keyword is reported and then taken for it, so that a slip in
-``needle`` does not also make all that stands in its braces look wrong.
+A first word that is nearly a keyword is reported and then replaced by it. Otherwise a misspelt
+``needle`` would make everything in its braces look wrong.
 
-Cost: linear in the length of the text. The depth of the tree is bounded (`MAX_DEPTH`), so that
-whoever walks it may recurse.
+Cost: linear in the length of the text. The depth of the tree is at most `MAX_DEPTH`, so recursion
+over it is safe.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ MAX_DEPTH: Final = 40
 
 
 def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -> tree.File:
-    """The tree of a source; mistakes of form go to the reporter.
+    """The tree of a source; syntax errors go to the reporter.
 
     Args:
         source: The text.
-        reporter: Where mistakes go.
-        kind: In which braces the text stands: those of an include; None allows what any may hold.
+        reporter: Collects the mistakes.
+        kind: The braces in which the text stands: those of an include. None allows all statements.
 
     Returns:
         The tree of all that could be read.
@@ -100,7 +100,7 @@ class _Parser:
             )
 
     def _block(self, kind: BlockKind | None, depth: int) -> Iterator[tree.Statement]:
-        """The statements up to a closing brace, which is left, or the end of the tokens."""
+        """The statements up to a closing brace, which is not taken, or the end of the tokens."""
         while (token := self._peek()) is not None and token.text != "}":
             if token.text == "{" and token.type == "BRACE":
                 self._reporter.report(
@@ -138,7 +138,7 @@ class _Parser:
         return _with_body(parsed, body)
 
     def _body(self, words: Sequence[Token], depth: int) -> Iterator[tree.Statement]:
-        """What stands in the braces of a statement that has some."""
+        """The statements in the braces of a statement that has braces."""
         keyword, brace = words[0].text, self._peek()
         if brace is not None and brace.text == "{":
             yield from self._braces(BLOCKS[keyword], depth)
@@ -147,7 +147,7 @@ class _Parser:
             "missing-brace", words[-1].span.behind(), f"`{{` is missing after `{keyword}`"
         )
         if self._missing_closing < 0:
-            # There is a closing brace too many, so that only the opening one was forgotten.
+            # There is an extra closing brace, so only the opening one was forgotten.
             self._missing_closing += 1
             yield from self._block(BLOCKS[keyword], depth + 1)
             self._close(words[-1])
@@ -155,7 +155,7 @@ class _Parser:
     def _superfluous_braces(
         self, words: Sequence[Token], depth: int, is_reported: bool
     ) -> Iterator[tree.Statement]:
-        """What stands in braces behind a statement that has none."""
+        """The statements in braces after a statement that must not have braces."""
         brace = self._peek()
         if brace is None or brace.text != "{" or brace.line > words[-1].line:
             return
@@ -182,7 +182,7 @@ class _Parser:
         self._close(opening)
 
     def _skip_block(self) -> None:
-        """Goes to the brace that closes the block, without looking at what is in it."""
+        """Goes to the brace that closes the block, without parsing the block."""
         depth = 0
         while (token := self._peek()) is not None:
             if token.type == "BRACE":
@@ -212,8 +212,8 @@ class _Parser:
         first = self._as_keyword(self._tokens[self._index], kind)
         self._index += 1
         words = [first]
-        # The words of a needle begin behind its brace, even if that was forgotten; and the radius
-        # of a sphere is no statement, even in a needle.
+        # The words of a needle begin after its brace, even if that was forgotten. The radius of a
+        # sphere is not a statement, even in a needle.
         if first.text in ("needle", "motion"):
             kind = BLOCKS[first.text]
         elif first.text in REGIONS:
@@ -233,7 +233,7 @@ class _Parser:
         return words
 
     def _as_keyword(self, token: Token, kind: BlockKind | None) -> Token:
-        """The first word of a statement, replaced by the keyword that it was meant to be."""
+        """The first word of a statement; a misspelt keyword is reported and replaced."""
         if token.text in KEYWORDS or token.type in ("QUERY", "REGION_KIND"):
             return token
         allowed = KEYWORDS if kind is None else ALLOWED[kind]
@@ -253,7 +253,7 @@ class _Parser:
     def _begins_unknown_statement(self, previous: Token, token: Token) -> bool:
         """Whether a name that begins a line can only be a misspelt keyword.
 
-        It can if a whole value stands before it, or if what follows would not go on with a value.
+        This is so if a whole value stands before it, or if the next token cannot continue a value.
         """
         if token.type != "NAME" or token.line <= previous.line or is_unit(token.text):
             return False
@@ -266,7 +266,7 @@ class _Parser:
         )
 
     def _is_name_reserved(self, first: Token, token: Token) -> bool:
-        """Whether a reserved word stands where a name must; reports it if so."""
+        """Whether a reserved word stands in the place of a name; if so, reports it."""
         if token.text not in RESERVED - {"sphere", "around", "in"} or token.line != first.line:
             return False
         self._reporter.report(
@@ -278,7 +278,7 @@ class _Parser:
         return True
 
     def _peek(self, distance: int = 0) -> Token | None:
-        """The token that comes next, or one behind it."""
+        """The next token, or the one `distance` tokens after it."""
         index = self._index + distance
         return self._tokens[index] if index < len(self._tokens) else None
 
@@ -298,7 +298,7 @@ class _Parser:
         return TreeBuilder(self._source).statement(parsed, span)
 
     def _parse_with_grammar(self, words: Sequence[Token]) -> lark.Tree[lark.Token] | None:
-        """What the grammar makes of the tokens; None if it refuses one, which is then reported."""
+        """The tree of the tokens; None if the grammar refuses a token, which is then reported."""
         import lark
 
         parser = grammar().parse_interactive("", start="statement")
@@ -340,7 +340,7 @@ class _Parser:
         return tree.Query(span, identifier, query.strip())
 
     def _is_too_deep(self, words: Sequence[Token]) -> bool:
-        """Whether parentheses are nested too deep to walk the tree; reports it if so."""
+        """Whether parentheses are nested too deep for recursion; if so, reports it."""
         depth = 0
         for word in words:
             depth += {"LPAR": 1, "RPAR": -1, "LSQB": 1, "RSQB": -1}.get(word.type, 0)
@@ -355,7 +355,7 @@ class _Parser:
         return False
 
     def _has_gap(self, words: Sequence[Token]) -> bool:
-        """Whether something that is no token was left out of a statement, or off its last word."""
+        """Whether characters that are not tokens were left out of a statement, or after it."""
         start, end = words[0].span.start, words[-1].span.end
         if self._is_stray_between(start, end):
             return True
@@ -367,13 +367,13 @@ class _Parser:
         )
 
     def _is_stray_between(self, start: int, end: int) -> bool:
-        """Whether something that is no token stands between two places."""
+        """Whether characters that are not tokens stand between two places."""
         return bisect_left(self._stray_starts, start) < bisect_left(self._stray_starts, end)
 
     # ---------------------------------------------------------------------------------- reporting
 
     def _report_stray(self) -> None:
-        """Reports what is no token of the language."""
+        """Reports characters that are not tokens of the language."""
         for token in self._stray:
             if token.type == "UNCLOSED_COMMENT":
                 self._reporter.report(
@@ -420,7 +420,7 @@ class _Parser:
         start = words[0].span.start
         end = following.span.start if following else len(self._source.text)
         if self._is_stray_between(start, end):
-            return  # What is left out because it is no token explains the gap.
+            return  # Characters that were left out are the mistake, and reported already.
         expected = describe(set(accepts))
         what = "the end" if following is None else quoted(following)
         words_near = [TERMINAL_WORDS.get(terminal, terminal.lower()) for terminal in accepts]
@@ -445,14 +445,14 @@ _SEPARATORS: Final = frozenset({";", ","})
 
 
 def _declared_name(words: Sequence[Token]) -> str | None:
-    """The name that a statement declares, if that much of it is right."""
+    """The name that a statement declares, if that part of it is right."""
     if len(words) > 1 and words[0].text in NAMING and words[1].type == "NAME":
         return words[1].text
     return None
 
 
 def _with_body(parsed: tree.Statement, body: tuple[tree.Statement, ...]) -> tree.Statement:
-    """A statement with what stands in its braces."""
+    """A statement with the statements in its braces."""
     if isinstance(parsed, tree.Section | tree.Loop | tree.Environment | tree.Broken):
         return replace(parsed, body=body)
     return parsed

@@ -1,7 +1,7 @@
 """Values with a dimension: numbers, lengths, angles, times, speeds, and vectors of them.
 
-Everything is held in mm, rad and s. An angle is a dimension of its own here, although it is a plain
-number in physics: that is what catches a missing ``deg``.
+Everything is stored in mm, rad and s. An angle is a dimension of its own here, although it is a
+plain number in physics: this finds a missing ``deg``.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ ALIASES: Final = {
     "minutes": "min",
     "msec": "ms",
 }
-"""What people write for a unit, and the unit."""
+"""Other words that people write for a unit, and the unit."""
 
 UNITS: Final[dict[str, tuple[float, Dimension]]] = {
     **{name: (factor, LENGTH) for name, factor in MM_PER.items()},
@@ -110,7 +110,7 @@ UNITS: Final[dict[str, tuple[float, Dimension]]] = {
 
 
 def is_unit(name: str) -> bool:
-    """Whether a name is a unit's, so that nothing else may have it."""
+    """Whether a name is reserved because it is a unit."""
     return name in UNITS
 
 
@@ -128,7 +128,7 @@ class Quantity:
 
     @property
     def number(self) -> float:
-        """The only number of a value that is no vector."""
+        """The number of a value that is not a vector."""
         (number,) = self.numbers
         return number
 
@@ -143,5 +143,5 @@ class Quantity:
 
 
 def scalar(number: float, dimension: Dimension = NUMBER) -> Quantity:
-    """A value that is no vector."""
+    """A value that is not a vector."""
     return Quantity((number,), dimension)

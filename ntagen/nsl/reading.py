@@ -1,4 +1,4 @@
-"""Files to text: the only place of the language that touches the disk."""
+"""Reads files as text: the only module of the language that touches the disk."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def read_source(path: str, reporter: Reporter, included_at: Span | None = None) 
 
     Args:
         path: The file.
-        reporter: Where it is said why a file cannot be read.
-        included_at: The path in the include statement, which is then the place of that diagnostic.
+        reporter: Collects the reasons why a file cannot be read.
+        included_at: The path in the include statement, which is the place of the diagnostic.
 
     Returns:
-        The text, or None if there is none.
+        The text, or None after a mistake.
     """
     report = _Report(path, reporter, included_at)
     try:
@@ -42,13 +42,13 @@ def read_source(path: str, reporter: Reporter, included_at: Span | None = None) 
 
 
 def decode_source(path: str, data: bytes, reporter: Reporter) -> Source | None:
-    """The text of a file that was read already; `path` is what it is called."""
+    """The text of a file that was read already; `path` is its name."""
     return _decoded(path, data, _Report(path, reporter, None))
 
 
 @dataclass(frozen=True, slots=True)
 class _Report:
-    """Reports why a file cannot be read, at the include that asked for it if there is one."""
+    """Reports why a file cannot be read, at the include statement if there is one."""
 
     path: str
     reporter: Reporter
@@ -84,7 +84,7 @@ def _decoded(path: str, data: bytes, report: _Report) -> Source | None:
 
 
 def _nearby(path: str) -> str | None:
-    """A hint with the file that was most likely meant."""
+    """A hint with the most similar file name in the folder."""
     parent, name = os.path.split(path)
     try:
         names = sorted(entry for entry in os.listdir(parent or ".") if entry.endswith(".nsl"))

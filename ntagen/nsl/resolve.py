@@ -1,8 +1,7 @@
-"""The tree to a draft of the scene: includes read, loops unrolled, names and units resolved.
+"""Makes a draft of the scene: reads includes, unrolls loops, resolves names and units.
 
-A `Draft` holds what the file says, each value with the place where it stands; a value with a
-mistake is None, and the mistake is reported. Whether the values make sense together is not asked
-here but in `ntagen.nsl.build`.
+A `Draft` has the values in the file, each with its place. A value with a mistake is None, and the
+mistake is reported. `ntagen.nsl.build` checks later whether the values fit together.
 
 Cost: one step for each statement and each round of a loop; rounds are limited by `MAX_ROUNDS`.
 """
@@ -36,23 +35,23 @@ from ntagen.nsl.tokens import ALLOWED, BLOCKS, BlockKind
 from ntagen.scene import RegionKind, Vector
 
 MAX_ROUNDS: Final = 10_000
-"""Rounds that all loops of an environment may make together."""
+"""All loops of an environment together make at most this many rounds."""
 
 MAX_LOOP_STATEMENTS: Final = 100_000
-"""Statements that all these rounds may go through together."""
+"""All these rounds together execute at most this many statements."""
 
 MAX_REGIONS: Final = 10_000
-"""Regions of an environment."""
+"""An environment has at most this many regions."""
 
 MAX_TARGETS: Final = 100
-"""Targets of an environment."""
+"""An environment has at most this many targets."""
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
 class Placed(Generic[T]):
-    """A value and where it is written; None is a value with a mistake."""
+    """A value and its place in the file; None is a value with a mistake."""
 
     value: T | None
     span: Span
@@ -60,7 +59,7 @@ class Placed(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class DraftRegion:
-    """A region: a sphere, or what it takes to make one around another region."""
+    """A region: a sphere, or a margin around another region."""
 
     kind: RegionKind
     name: str
@@ -71,13 +70,13 @@ class DraftRegion:
 
     @property
     def margin(self) -> Placed[float]:
-        """The margin of a region that lies around another; it stands in the radius' place."""
+        """The margin of a region that lies around another; it is stored as the radius."""
         return self.radius
 
 
 @dataclass
 class Draft:
-    """What a file says of an environment."""
+    """An environment as a file describes it."""
 
     span: Span
     name: str
@@ -108,24 +107,24 @@ _VECTORS: Final = {
     "bevel": (NUMBER, "the bevel"),
 }
 CHOICES: Final = {"tissue": ("static",), "safety": ("sampled", "swept")}
-"""The words that a choice allows, the default first."""
+"""The words that each property allows, the default first."""
 
 _ONCE: Final = frozenset({"needle", "motion", "roll", "resolution", *_NUMBERS, *_VECTORS, *CHOICES})
 
 
 def resolve(source: Source, reporter: Reporter, folders: Sequence[str | Path] = ()) -> Draft | None:
-    """What the file says; None if it has no environment. Mistakes go to the reporter.
+    """The draft of a file; None if it has no environment. Mistakes go to the reporter.
 
     Args:
         source: The file.
-        reporter: Where mistakes go.
-        folders: Below which includes may lie, beside the folder of the file.
+        reporter: Collects the mistakes.
+        folders: Folders below which included files may lie, besides the folder of the file.
     """
     return _Resolver(reporter, folders).file(source)
 
 
 class _Resolver:
-    """Walks through the statements of a file and those it includes."""
+    """Goes through the statements of a file and of the files that it includes."""
 
     def __init__(self, reporter: Reporter, folders: Sequence[str | Path]) -> None:
         self._reporter = reporter
@@ -174,7 +173,7 @@ class _Resolver:
                 self._statement(statement, scope, place)
 
     def _misplaced(self, statement: tree.Statement, place: BlockKind) -> None:
-        """Reports a statement of an included file that may not stand where the include does."""
+        """Reports a statement of an included file that cannot stand at the place of the include."""
         where = "at the top of a file" if place == "file" else f"in `{place}`"
         self._reporter.report(
             "misplaced-statement",
@@ -184,7 +183,7 @@ class _Resolver:
         )
 
     def _broken(self, statement: tree.Broken, scope: Scope) -> None:
-        """Remembers what a statement with a mistake would have given, and looks into its braces."""
+        """Notes what a statement with a mistake would have declared, and checks its braces."""
         name, keyword = statement.name, statement.keyword
         if self._draft is not None:
             self._draft.has_gaps = True
@@ -202,7 +201,7 @@ class _Resolver:
             self._draft.broken_names.add(name)
 
     def _statement(self, statement: tree.Statement, scope: Scope, place: BlockKind) -> None:
-        """One statement that may stand where it stands."""
+        """Resolves a statement that is at a right place."""
         if self._is_repeated(statement):
             return
         match statement:
@@ -220,7 +219,7 @@ class _Resolver:
                 self._content(statement, scope, self._draft)
 
     def _content(self, statement: tree.Statement, scope: Scope, draft: Draft) -> None:
-        """A statement that says something of the environment itself."""
+        """Resolves a statement about the environment itself."""
         match statement:
             case tree.Region():
                 self._region(statement, scope, draft)
@@ -236,7 +235,7 @@ class _Resolver:
                 self._resolution(statement, scope, draft)
 
     def _is_repeated(self, statement: tree.Statement) -> bool:
-        """Whether a statement that may be written once comes a second time; reports it if so."""
+        """Whether a statement that may occur only once is repeated; if so, reports it."""
         if self._draft is None or statement.keyword not in _ONCE:
             return False
         first = self._draft.seen.setdefault(statement.keyword, statement.span)
@@ -254,7 +253,7 @@ class _Resolver:
     # ------------------------------------------------------------------------------- composition
 
     def _environment(self, statement: tree.Environment, scope: Scope) -> None:
-        """The environment itself; a second one is reported and left out."""
+        """Resolves the environment; a second one is reported and left out."""
         if self._draft is not None:
             self._reporter.report(
                 "environment-repeated",
@@ -268,14 +267,14 @@ class _Resolver:
         self._statements(statement.body, Scope(scope), "environment")
 
     def _include(self, statement: tree.Include, scope: Scope, place: BlockKind) -> None:
-        """The statements of another file, once, as though they stood here."""
+        """Resolves the statements of another file as if they stood here; a file counts once."""
         span = statement.path.span
         source_path = span.source.path
         path = os.path.join(os.path.dirname(source_path), statement.path.text)
         try:
             key = os.path.realpath(path)
         except ValueError as error:
-            # No file has such a name; a text that comes from no file may hold anything.
+            # No file can have such a name, but a text that is not from a file may contain it.
             reason = str(error)
             self._reporter.report("file-unreadable", span, f"cannot include `{path}`: {reason}")
             return
@@ -317,7 +316,7 @@ class _Resolver:
         self._open_files.pop()
 
     def _loop(self, statement: tree.Loop, scope: Scope) -> None:
-        """The body once for each number from the first to the last."""
+        """Resolves the body once for each number from the first to the last."""
         first = self._evaluator.whole(statement.first, scope, "the first number of a loop")
         last = self._evaluator.whole(statement.last, scope, "the last number of a loop")
         is_free = self._is_name_free(statement.variable, scope)
@@ -360,7 +359,7 @@ class _Resolver:
         variable: tree.Identifier,
         value: Quantity | None,
     ) -> None:
-        """The body of a loop with a value of its variable."""
+        """Resolves the body of a loop with a value of its variable."""
         inner = Scope(scope)
         inner.define(variable.text, variable.span, value)
         self._loop_depth += 1
@@ -376,7 +375,7 @@ class _Resolver:
             scope.define(statement.name.text, statement.name.span, value)
 
     def _is_name_free(self, name: tree.Identifier, scope: Scope) -> bool:
-        """Whether a constant or a loop's variable may have a name; reports it if not."""
+        """Whether a constant or a loop's variable can have this name; if not, reports it."""
         text = name.text
         home = scope.find(text)
         if text in CONSTANTS or text in FUNCTIONS or is_unit(text):
@@ -414,7 +413,7 @@ class _Resolver:
     # ----------------------------------------------------------------------------------- content
 
     def _region(self, statement: tree.Region, scope: Scope, draft: Draft) -> None:
-        """A region, whether or not all of it is right."""
+        """Adds a region to the draft, even if it has mistakes."""
         name = self._region_name(statement.name, scope)
         region = self._shape(statement, name or statement.name.identifier.text, scope)
         draft.seen.setdefault(statement.keyword, statement.span)
@@ -444,7 +443,7 @@ class _Resolver:
             )
 
     def _is_full(self, statement: tree.Region, draft: Draft) -> bool:
-        """Whether there are as many regions as an environment may hold; reports it if so."""
+        """Whether the environment has the maximum number of regions; if so, reports it."""
         is_last_target = statement.keyword == "target" and draft.target_count == MAX_TARGETS
         if len(draft.regions) < MAX_REGIONS and not is_last_target:
             draft.target_count += statement.keyword == "target"
@@ -459,7 +458,7 @@ class _Resolver:
         return True
 
     def _shape(self, statement: tree.Region, name: str, scope: Scope) -> DraftRegion | None:
-        """A region with its sphere, or with what it lies around."""
+        """A region with its sphere, or with the region that it lies around."""
         keyword, span, shape = statement.keyword, statement.name.span, statement.shape
         if isinstance(shape, tree.Sphere):
             role = f"the radius of `{name}`"
@@ -492,7 +491,7 @@ class _Resolver:
         )
 
     def _query(self, statement: tree.Query, draft: Draft) -> None:
-        """A named query; its text is looked at by the checker, not here."""
+        """A named query; the engine checks its text later."""
         name = statement.name
         first = draft.queries.setdefault(name.text, Placed(statement.text, name.span))
         if first.span is not name.span:
@@ -575,5 +574,5 @@ class _Resolver:
 
 
 def _is_below(path: str, folder: str) -> bool:
-    """Whether a file lies in a folder or in one in it; links have been followed in both."""
+    """Whether a file lies below a folder; links have been followed in both paths."""
     return path.startswith(folder if folder.endswith(os.sep) else folder + os.sep)

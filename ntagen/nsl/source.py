@@ -1,8 +1,8 @@
 """Source text and places in it.
 
-A `Source` is one file as it was read; a `Span` is a stretch of its characters. Lines and columns
-are counted from 1, columns in characters (a tab is one), and are worked out only when a diagnostic
-is shown.
+A `Source` is one file as it was read; a `Span` is a range of its characters. Lines and columns are
+counted from 1, columns in characters (a tab is one). They are computed only when a diagnostic is
+shown.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Final
 
 MAX_SOURCE_BYTES: Final = 1024 * 1024
-"""Larger files are refused: 10,000 regions written one a line take about 0.6 MB."""
+"""Larger files are refused: 10,000 regions, one on each line, take about 0.6 MB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Source:
 
     @cached_property
     def _line_starts(self) -> list[int]:
-        """Offsets at which lines begin; a line ends with a line feed and nothing else."""
+        """Offsets at which lines begin; only a line feed ends a line."""
         starts = [0]
         starts.extend(index + 1 for index, character in enumerate(self.text) if character == "\n")
         return starts
@@ -37,7 +37,7 @@ class Source:
 
     @cached_property
     def _shown_lines(self) -> dict[int, str]:
-        """Lines that were asked for, so that many diagnostics on a long one share its text."""
+        """Lines that were used before, so that many diagnostics on a long line share its text."""
         return {}
 
     def line(self, number: int) -> str:
@@ -47,19 +47,19 @@ class Source:
         return self._shown_lines[number]
 
     def _line(self, number: int) -> str:
-        """The text of a line, cut out of all the text."""
+        """The text of a line, without the cache."""
         start = self._line_starts[number - 1]
         end = self.text.find("\n", start)
         return self.text[start : len(self.text) if end < 0 else end].rstrip("\r")
 
     def span(self, start: int, end: int) -> Span:
-        """The characters from `start` up to, and without, `end`."""
+        """The characters from `start` up to `end`, without the one at `end`."""
         return Span(self, start, end)
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A stretch of a source: offsets of its first character and of the one behind its last."""
+    """A range in a source: the offsets of its first character and of the one after its last."""
 
     source: Source = field(repr=False)
     start: int
@@ -72,7 +72,7 @@ class Span:
 
     @property
     def place(self) -> str:
-        """Where it begins, as it is named in a note: ``path:line:column``."""
+        """The place where it begins, as a note shows it: ``path:line:column``."""
         line, column = self.source.position(self.start)
         return f"{self.source.path}:{line}:{column}"
 
@@ -81,5 +81,5 @@ class Span:
         return Span(self.source, self.start, other.end)
 
     def behind(self) -> Span:
-        """The empty place just behind this one."""
+        """The empty range just after this one."""
         return Span(self.source, self.end, self.end)

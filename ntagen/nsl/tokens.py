@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import lark
 
 BlockKind = Literal["file", "environment", "needle", "motion", "for"]
-"""Where a statement stands: at the top of a file or in somebody's braces."""
+"""The place of a statement: at the top of a file, or in the braces of another one."""
 
 REGIONS: Final = frozenset({"target", "critical", "detection"})
 _NEEDLE_ITEMS: Final = frozenset({"tip", "heading", "bevel", "radius", "speed", "length"})
@@ -40,7 +40,7 @@ ALLOWED: Final[dict[BlockKind, frozenset[str]]] = {
     "motion": _MOTION_ITEMS,
     "for": REGIONS | {"let", "for"},
 }
-"""Which statements may stand where."""
+"""The statements that are allowed at each place."""
 
 KEYWORDS: Final = frozenset().union(*ALLOWED.values())
 """The words that begin a statement."""
@@ -60,13 +60,13 @@ BLOCKS: Final[dict[str, BlockKind]] = {
 """The statements that have braces."""
 
 NAMING: Final = REGIONS | {"environment", "let", "for"}
-"""The statements that declare a name, right behind the keyword."""
+"""The statements that declare a name, right after the keyword."""
 
 STRAY: Final = frozenset({"STRAY", "HASH", "UNCLOSED_STRING", "UNCLOSED_COMMENT"})
-"""Terminals of what is no word of the language."""
+"""Terminals of characters that are not part of the language."""
 
 MAX_STRAY: Final = 1000
-"""A text with more of them is none of the language."""
+"""A text with more of them is not an environment."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +92,9 @@ class Comment:
 def grammar() -> lark.Lark:
     """The parser of single statements.
 
-    Working out its tables takes longer than all else that happens to a file (some 80 ms), so lark
-    keeps them in the user's cache folder; it works them out anew when the grammar or lark changes,
-    or when the folder cannot be used.
+    Computing its tables takes longer than all other work on a file (about 80 ms). So lark stores
+    them in the user's cache folder; it computes them again if the grammar or lark has changed, or
+    if the folder cannot be used.
     """
     import lark
 
@@ -111,16 +111,16 @@ def grammar() -> lark.Lark:
 
 
 def _cache_file() -> str | None:
-    """Where the grammar's tables are kept; None if there is no place that is the user's own."""
+    """The file with the grammar's tables; None if there is no cache folder."""
     folder = cache_folder()
     version = f"{sys.version_info[0]}.{sys.version_info[1]}"
     return None if folder is None else str(folder / f"nsl-grammar-{version}.tables")
 
 
 def tokenise(source: Source) -> list[Token | Comment]:
-    """Every token and comment of a source; together with white space they are all of its text.
+    """All tokens and comments of a source; with the white space they are the whole text.
 
-    After `MAX_STRAY` tokens that are no words of the language the rest of the text is left out.
+    After `MAX_STRAY` tokens that are not part of the language, the rest of the text is left out.
     """
     found: list[Token | Comment] = []
     stray_count = 0
@@ -138,9 +138,9 @@ def tokenise(source: Source) -> list[Token | Comment]:
 
 
 def begins_statement(token: Token, kind: BlockKind | None) -> bool:
-    """Whether a token is a word that begins a statement in a block; None is any but a needle.
+    """Whether a token begins a statement in a block; None is any block but a needle.
 
-    `radius` is one in a needle only: elsewhere it is a clause of a sphere.
+    `radius` begins one only in a needle: elsewhere it is a clause of a sphere.
     """
     if token.type == "QUERY":
         return True

@@ -1,7 +1,7 @@
-"""The typed tree of an environment file: what is written where, without its meaning.
+"""The typed tree of an environment file: its statements with their places, without their meaning.
 
-Every node carries the `Span` it was read from. Names are not resolved, units not applied, and
-nothing is checked here but the form.
+Every node has the `Span` from which it was read. Names are not resolved, units are not applied, and
+only the syntax has been checked.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Vector:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """An expression with a unit behind it."""
+    """An expression with a unit after it."""
 
     span: Span
     operand: Expression
@@ -67,7 +67,7 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class Signed:
-    """An expression with signs before it, taken together."""
+    """An expression with a sign before it; several signs are combined."""
 
     span: Span
     operand: Expression
@@ -226,13 +226,13 @@ class Environment:
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A statement with a mistake in its form, which is reported already.
+    """A statement with a syntax error, which is reported already.
 
     Attributes:
         span: Its words.
-        keyword: What it begins with, so that nobody complains that it is missing.
-        name: The name that it would have declared, if that much could be read.
-        body: The statements in its braces, which are checked all the same.
+        keyword: Its first word, so that the statement is not reported as missing.
+        name: The name that it would have declared, if it could be read.
+        body: The statements in its braces, which are still checked.
     """
 
     span: Span

@@ -1,4 +1,4 @@
-"""How mistakes of form are put into words: what was expected, what was found, what to write."""
+"""The words for syntax errors: what was expected, what was found, what to write."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def describe(terminals: set[str]) -> str:
         rest -= _VALUE_TERMINALS
         words.append("a value")
     elif "SCALE" in rest:
-        # Behind a value nearly anything may go on; what must come is the useful part.
+        # After a value nearly anything can follow; the message names only what must follow.
         if "RATIO" in rest:
             rest -= {"NAME"}
             words.append("a unit")
@@ -96,13 +96,13 @@ def _either(words: Sequence[str]) -> str:
 
 
 def quoted(token: Token) -> str:
-    """A token as it is named in a message."""
+    """A token as a message shows it."""
     text = token.text if len(token.text) <= 30 else token.text[:27] + "..."
     return f"`{text}`"
 
 
 def visible(text: str) -> str:
-    """Characters as they are named in a message, also one that cannot be seen."""
+    """Characters as a message shows them; invisible ones are shown by their number."""
     if text.startswith("#"):
         return "character `#`"
     if len(text) > 1:

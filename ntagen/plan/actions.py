@@ -1,4 +1,4 @@
-"""A plan: the concrete sequence of pushes and rolls that steers the needle, without any frame.
+"""A plan: the sequence of pushes and rolls that steers the needle.
 
 A plan is a value. Pushes that follow each other are one push, and no push is empty, so that two
 plans that move the needle in the same way are equal.
@@ -65,7 +65,7 @@ class Plan:
 
     @property
     def roll_count(self) -> int:
-        """How many rolls it holds."""
+        """The number of rolls."""
         return sum(1 for action in self.actions if isinstance(action, Roll))
 
     def arcs(self, needle: Needle) -> tuple[Arc, ...]:
@@ -97,7 +97,7 @@ class Plan:
 def _require_possible(action: Action) -> None:
     number = action.length_mm if isinstance(action, Push) else action.angle_rad
     if not math.isfinite(number) or (isinstance(action, Push) and number < 0.0):
-        raise ValueError(f"no needle can do {action}")
+        raise ValueError(f"a needle cannot do {action}")
 
 
 def _text(action: Action) -> str:

@@ -1,11 +1,11 @@
 """The certificate of a plan: its distances to every region along the whole continuous path.
 
 The model checks regions at the ends of its steps, in integers that lose about 1 % of the arc. A
-certificate is made from the exact kinematics in double precision and from closed forms over whole
-arcs, so that it says what a needle on exact circles would do, between the samples too. It shares
-nothing with the engine.
+certificate uses the exact kinematics in double precision and closed forms over whole arcs. So it
+describes a needle on exact circles, also between the ends of steps. It shares no code with the
+engine.
 
-Cost: arcs x regions closed forms; some 20 microseconds each.
+Cost: one closed form for each arc and region, about 20 microseconds each.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Clearance:
         region: The region's name.
         kind: The region's kind.
         distance_mm: The smallest distance to the region's surface; negative inside.
-        at_mm: How much has been inserted since the plan's start when it is taken.
+        at_mm: The insertion since the plan's start at which the path is nearest.
     """
 
     region: str
@@ -45,8 +45,8 @@ class Arrival:
         region: The target's name.
         entered_at_mm: Insertion since the plan's start at which the target is entered, in the order
             of the targets; None if it is not.
-        depth_mm: How deep in the target: for the last target at the end of the path, for one passed
-            on the way the deepest; negative outside.
+        depth_mm: The depth in the target: for the last target at the end of the path, for an
+            earlier one the greatest depth; negative outside.
     """
 
     region: str
@@ -56,13 +56,13 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What is true of a plan in exact kinematics.
+    """The properties of a plan in exact kinematics.
 
     Attributes:
         clearances: One per critical and detection region, in the order of the scene.
         arrivals: One per target, in the order of the scene.
-        end_mm: Where the tip ends.
-        end_distance_mm: Distance from there to the centre of the last target.
+        end_mm: The position of the tip at the end.
+        end_distance_mm: The distance from there to the centre of the last target.
         length_mm: Total insertion.
         roll_count: Number of rolls.
     """
@@ -86,12 +86,12 @@ class Certificate:
 
     @property
     def target_depth_mm(self) -> float:
-        """How deep in its targets the plan gets, the worst of them; negative if it misses one."""
+        """The least depth that the plan reaches in its targets; negative if it misses one."""
         depths = [a.depth_mm if a.entered_at_mm is not None else -math.inf for a in self.arrivals]
         return min(depths, default=math.inf)
 
     def holds(self, clearance_mm: float = 0.0, depth_mm: float = 0.0) -> bool:
-        """Whether the plan avoids critical regions and ends in its targets, by these margins.
+        """Whether the plan avoids critical regions and reaches its targets, with these margins.
 
         A path that touches a critical region does not hold, whatever the margin.
         """

@@ -46,7 +46,7 @@ def plan_from_json(actions: object) -> Plan:
     """The plan of such objects.
 
     Raises:
-        InputError: The text is no plan.
+        InputError: The objects are not a plan.
     """
     if not isinstance(actions, list):
         raise InputError("a plan is a list of actions")
@@ -69,7 +69,7 @@ def _action_from_json(action: object) -> Action:
         case {"roll_deg": float() | int() as angle_deg}:
             return Roll(rad_from_deg(float(angle_deg)))
         case _:
-            raise InputError(f"unknown action {action!r}\nhelp: push_mm and roll_deg are known")
+            raise InputError(f"unknown action {action!r}\nhint: use push_mm or roll_deg")
 
 
 def _certificate(certificate: Certificate) -> dict[str, Any]:
@@ -96,5 +96,5 @@ def _certificate(certificate: Certificate) -> dict[str, Any]:
 
 
 def _finite(number: float) -> float | None:
-    """The number, or None where there is nothing to be far from: JSON has no infinity."""
+    """The number, or None if it is infinite, which JSON cannot express."""
     return number if math.isfinite(number) else None

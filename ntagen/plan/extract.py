@@ -1,8 +1,8 @@
-"""From the engine's runs to plans: the one place that knows how the generated model acts.
+"""Makes plans from the engine's runs: the only module that knows the generated model's actions.
 
-In the model the User's edge with ``do_push!`` is a push of one model step, and its edge with
-``do_rotate!`` is a roll by the angle whose index the edge selects. Everything else (checks, the
-tissue's answers) is no action of the needle.
+In the model, the User's edge with ``do_push!`` is a push of one model step. Its edge with
+``do_rotate!`` is a roll by the angle whose index the edge selects. All other edges (checks, the
+tissue's answers) are not actions of the needle.
 """
 
 from __future__ import annotations
@@ -48,17 +48,17 @@ class Run(Protocol):
 
 
 def extract(runs: Iterable[Run], scene: Scene) -> tuple[Plan, ...]:
-    """The plans of the runs, each once, in the order of the runs.
+    """The different plans of the runs, in the order of the runs.
 
     Raises:
-        NtagenError: A run selects an angle that the scene does not have: model and scene do not
-            belong together.
+        NtagenError: A run selects an angle that the scene does not have, so the model is not that
+            of the scene.
     """
     return tuple(dict.fromkeys(_plan(run, scene) for run in runs))
 
 
 def step_length_mm(scene: Scene) -> float:
-    """How far one push of the model goes, before its rounding to integers."""
+    """The length of one push of the model, before it is rounded to integers."""
     return scene.needle.speed_mm_per_s * scene.limits.step_s
 
 

@@ -1,7 +1,7 @@
-"""The ranking of plans: which of all certified plans is the best.
+"""The ranking of plans: which certified plan is the best.
 
-Criteria are compared one after the other in the order that the user gives. Clearance beyond
-`USEFUL_CLEARANCE_MM` counts as equal: among plans that are far enough from everything critical the
+Criteria are compared one after the other, in the order that the user gives. Clearances above
+`USEFUL_CLEARANCE_MM` count as equal: among plans that are far enough from all critical regions, the
 simpler one is better.
 """
 
@@ -16,7 +16,7 @@ from ntagen.plan.actions import Plan
 from ntagen.plan.certify import Certificate
 
 USEFUL_CLEARANCE_MM: Final = 5.0
-"""Clearance that needs no more: twice the error of a needle in a phantom (2 to 3 mm)."""
+"""More clearance is not better: this is twice the error of a needle in a phantom (2 to 3 mm)."""
 
 _CLEARANCE_STEP_MM: Final = 0.1
 """Clearances are compared in steps of this size: no sensor sees a smaller difference."""
@@ -47,7 +47,7 @@ CRITERIA: Final[dict[str, Callable[[Candidate], float]]] = {
     "length": lambda candidate: candidate.certificate.length_mm,
     "target": _by_target,
 }
-"""What plans can be ranked by; smaller is better. ``target``: distance of the end to the centre."""
+"""The criteria; smaller is better. ``target`` is the distance of the end to the target's centre."""
 
 
 def parse_ranking(text: str) -> tuple[str, ...]:
@@ -60,9 +60,9 @@ def parse_ranking(text: str) -> tuple[str, ...]:
     known = ", ".join(CRITERIA)
     for name in names:
         if name not in CRITERIA:
-            raise InputError(f"unknown ranking criterion '{name}'\nhelp: choose from {known}")
+            raise InputError(f"unknown ranking criterion '{name}'\nhint: choose from {known}")
         if names.count(name) > 1:
-            raise InputError(f"ranking criterion '{name}' is given twice\nhelp: name each once")
+            raise InputError(f"ranking criterion '{name}' is given twice\nhint: name each once")
     return names
 
 

@@ -1,8 +1,8 @@
-"""From a scene to its plans: model, strategy synthesis, certificates, ranking.
+"""Finds the plans of a scene: model, strategy synthesis, certificates, ranking.
 
-The model decides which plans exist; the certificate in exact kinematics decides which of them may
-be driven. A plan of the model can fail its certificate, since the model checks regions at the ends
-of its steps and with integers: such a plan is refused, and if none is left there is no strategy.
+The model decides which plans exist. The certificate in exact kinematics decides which of them may
+be driven. A plan can fail its certificate, because the model checks regions only at the ends of
+its steps, and with integers. Such a plan is refused; if no plan is left, there is no strategy.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ntagen.plan.rank import DEFAULT_RANKING, Candidate, rank
 from ntagen.scene import Scene
 
 STRATEGY_QUERY: Final = "control: A<> Checker.Final_TR_Reached"
-"""The paper's second query, whose strategy holds the plans."""
+"""The paper's second query; its strategy has the plans."""
 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """By how much a plan must hold in exact kinematics.
+    """The margins that a plan must have in exact kinematics.
 
     Attributes:
         clearance_mm: The path's distance to every critical region is greater than this.
@@ -40,11 +40,11 @@ class Synthesis:
     """The answer for one scene.
 
     Attributes:
-        scene: The scene that was asked about.
+        scene: The scene.
         model_xml: The model that was checked; empty if the plans have another origin.
-        found: How many plans the model has.
-        candidates: Those that hold in exact kinematics, best first.
-        seconds: How long the engine took.
+        found: The number of plans of the model.
+        candidates: The plans that hold in exact kinematics, best first.
+        seconds: The time that the engine took.
     """
 
     scene: Scene
@@ -60,10 +60,10 @@ class Synthesis:
 
 
 class Synthesiser(Protocol):
-    """Whatever can find the plans of a scene."""
+    """Anything that can find the plans of a scene."""
 
     def __call__(self, scene: Scene) -> Synthesis:
-        """The plans of a scene; equal scenes have equal answers, but for the seconds."""
+        """The plans of a scene; equal scenes have equal answers, except for the seconds."""
 
 
 def select(
@@ -72,7 +72,7 @@ def select(
     margins: Margins,
     ranking: Sequence[str] = DEFAULT_RANKING,
 ) -> tuple[Candidate, ...]:
-    """The plans that hold by these margins, best first."""
+    """The plans that hold with these margins, best first."""
     candidates = (Candidate(plan, certify(plan, scene)) for plan in plans)
     return rank(
         (c for c in candidates if c.certificate.holds(margins.clearance_mm, margins.depth_mm)),
@@ -85,12 +85,12 @@ class EngineSynthesiser:
     """The synthesiser that renders the model of a scene and asks the engine.
 
     Attributes:
-        margins: What a plan must hold by.
-        ranking: The criteria, the weightiest first.
+        margins: The margins that a plan must have.
+        ranking: The criteria, the most important first.
         max_plans: At most this many plans are listed.
         timeout_s: The engine stops after this time.
         memory_bytes: The engine stops when its states take this much.
-        listen: Is called now and then, and raises `KeyboardInterrupt` to end a synthesis.
+        listen: Is called regularly, and raises `KeyboardInterrupt` to end a synthesis.
     """
 
     margins: Margins = Margins()
@@ -114,7 +114,7 @@ class EngineSynthesiser:
 
         model_xml = render(scene)
         model = checker.load(model_xml)
-        # The model computes distances: one that wrapped round would be a wrong answer in silence.
+        # The model computes distances: if one wrapped round, the answer would be wrong.
         model.overflow = "error"
         answer = model.check(
             STRATEGY_QUERY,
@@ -138,7 +138,7 @@ class EngineSynthesiser:
         )
 
     def _heard(self, plans: Iterable[Plan]) -> Iterator[Plan]:
-        """The plans, listening before each."""
+        """The plans; calls `listen` before each."""
         for plan in plans:
             self.listen()
             yield plan

@@ -1,11 +1,11 @@
 """A picture of a scene: two projections and a view in space, with plans and paths.
 
-The two projections hold the direction of insertion, drawn from top to bottom, and one of the two
-other axes each; all lengths are in mm and all axes have one scale. A path that crosses a region in
-one projection may pass in
-front of it: what is true of distances stands in the certificate, whose numbers the caption repeats.
+Each projection shows the direction of insertion, from top to bottom, and one of the two other axes.
+All lengths are in mm, and all axes have the same scale. A path that crosses a region in one
+projection may pass in front of it: the certificate has the true distances, and the caption repeats
+its numbers.
 
-Nothing here computes anything of a needle: the curves come as points.
+Nothing about needles is computed here: the curves are given as points.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ Curve = Sequence[Vector]
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What is to be drawn.
+    """The contents of a picture.
 
     Attributes:
         scene: The regions and the needle's pose.
         best: The path of the best plan.
         others: The paths of other plans.
-        true_path: Where the tip really was (simulation only).
+        true_path: The true path of the tip (simulation only).
         measured: Measured positions of the tip.
         learned: Names of regions that the driver learned; they are hatched.
-        unknown: Names of regions that the driver was not told about.
-        title: The line above.
-        caption: The lines below.
+        unknown: Names of regions that the driver did not know.
+        title: The line above the picture.
+        caption: The lines below the picture.
     """
 
     scene: Scene
@@ -98,7 +98,7 @@ def _depth_axis(scene: Scene) -> int:
 
 
 def _bounds(picture: Picture) -> list[tuple[float, float]]:
-    """The range of each coordinate that holds everything, with a little room."""
+    """The range of each coordinate that contains everything, with a little space."""
     room_mm = 2.0
     curves = [picture.best, *picture.others, *picture.true_path]
     points = [point for curve in curves for point in curve]
@@ -112,7 +112,7 @@ def _bounds(picture: Picture) -> list[tuple[float, float]]:
             high = max(high, region.center_mm[axis] + region.radius_mm)
         bounds.append((low - room_mm, high + room_mm))
     across = [i for i in range(3) if i != _depth_axis(picture.scene)]
-    # One width for both projections lets them stand side by side on one scale.
+    # Both projections have the same width, so that they fit side by side on one scale.
     half = max(bounds[i][1] - bounds[i][0] for i in across) / 2.0
     for i in across:
         middle = sum(bounds[i]) / 2.0
@@ -140,7 +140,7 @@ def _draw_projection(
     axes.plot(entry[across], entry[depth], **_TIP_STYLE)
     axes.set_xlim(bounds[across])
     low, high = bounds[depth]
-    # Insertion goes down the page, whichever sign it has.
+    # Insertion always goes down the page.
     axes.set_ylim((low, high) if picture.scene.axis[depth] <= 0.0 else (high, low))
     axes.set_aspect("equal")
     axes.set_xlabel(f"{_AXES[across]} [mm]")
@@ -162,12 +162,12 @@ _TIP_STYLE: Final[dict[str, Any]] = {
 
 
 def _back_to_front(regions: Sequence[Region]) -> list[Region]:
-    """Large ones first, and targets before the rest, so that nothing is hidden."""
+    """The regions in the order of drawing: targets first, large ones first, to hide nothing."""
     return sorted(regions, key=lambda r: (r.kind != "target", -r.radius_mm))
 
 
 def _face(region: Region, picture: Picture) -> dict[str, Any]:
-    """How a region's disc is drawn."""
+    """The style of a region's disc."""
     colour = _COLOURS[region.kind]
     label = _LABELS[region.kind]
     style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.2, "zorder": 2}
@@ -199,7 +199,7 @@ def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     plan = {"color": _NEEDLE, "linewidth": 2.2, "label": "best plan"}
     true = {"color": _TRUE, "linewidth": 1.0, "label": "true path"}
     if picture.true_path:
-        # Under the path that was driven the plan is a light band, so that both can be seen.
+        # The plan is a light band under the true path, so that both are visible.
         plan |= {"linewidth": 4.0, "alpha": 0.45, "label": "last plan"}
     return [
         (other | {"zorder": 4}, picture.others),

@@ -1,4 +1,4 @@
-"""From a scene's plans, or from the log of a run, to the picture of it."""
+"""Makes the picture of a scene with its plans, or of a run from its log."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ntagen.scene import Needle, Scene, Vector
 
 _SPACING_MM: Final = 0.5
 _GAP_MM: Final = 1.0
-"""Places of the tip farther apart than this are on different curves: it was pulled back between."""
+"""Tip positions farther apart than this are on different curves: the tip was pulled back."""
 
 
 def picture_of_plans(scene: Scene, candidates: tuple[Candidate, ...], shown: int) -> Picture:
@@ -42,10 +42,10 @@ def picture_of_plans(scene: Scene, candidates: tuple[Candidate, ...], shown: int
 
 
 def picture_of_run(log: RunLog, shown: int) -> Picture:
-    """The picture of a run: the regions, what was learned, the last plans, where the tip was.
+    """The picture of a run: the regions, also learned ones, the last plans, and the tip's path.
 
     Raises:
-        InputError: The log holds no scene, or one that cannot be read.
+        InputError: The log has no scene, or one that cannot be read.
     """
     actual, told = log.actual, log.scene
     names = {region.name for region in actual.regions}
@@ -66,7 +66,7 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
 
 
 def curve(plan: Plan, needle: Needle) -> Curve:
-    """The points of the path that a plan gives a needle."""
+    """The points of the path of a needle that follows a plan."""
     poses = sample_poses(plan.arcs(needle), _SPACING_MM)
     return [pose.position_mm for pose in poses]
 
@@ -79,13 +79,13 @@ def _outcome(ended: Ended) -> str:
 
 
 def _last_scene(log: RunLog) -> Scene:
-    """What the driver knew at the last synthesis."""
+    """The scene that the driver knew at the last synthesis."""
     scenes = sorted(name for name in log.attachments if name.endswith("/scene.json"))
     return scene_from_json(log.attachments[scenes[-1]]) if scenes else log.scene
 
 
 def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
-    """The plans of the last synthesis that had any, best first, and the needle they start from."""
+    """The plans of the last synthesis that had plans, best first, and the needle at their start."""
     numbers = [r.number for r in log.records if isinstance(r, Synthesised) and r.plan]
     for number in reversed(numbers):
         folder = f"rebuild-{number:04d}"

@@ -1,4 +1,4 @@
-"""Saving figures: the format by the file's ending, and nothing half written."""
+"""Saves figures: the file's ending decides the format; files are written whole or not at all."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ FORMATS: Final = ("png", "pdf", "svg")
 
 
 def format_of(path: Path) -> str:
-    """The format that a file's ending asks for.
+    """The format of a file's ending.
 
     Raises:
-        InputError: No picture is written with this ending.
+        InputError: The ending is not that of a supported format.
     """
     ending = path.suffix.lower().removeprefix(".")
     if ending not in FORMATS:
@@ -37,7 +37,7 @@ def save(figure: Figure, path: Path) -> None:
     import matplotlib as mpl
 
     kind = format_of(path)
-    # Fixed salt and no dates: the same picture is the same file, byte for byte.
+    # A fixed salt and no dates: the same picture gives the same bytes.
     metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
     picture = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "ntagen"}):

@@ -1,11 +1,11 @@
-"""From a scene to the UPPAAL model of the paper, and to its queries.
+"""Writes the UPPAAL model of a scene, and its queries.
 
 `render` writes the whole XML document, `render_queries` the same queries as a ``.q`` file. Both
 depend on the scene alone: the same scene gives the same text, byte for byte.
 
-The templates are in ``templates/``: they hold the language, the automata and the arithmetic. Every
-number is made in `ntagen.render.values`. templates/README.md lists where the model differs from the
-paper.
+The templates in ``templates/`` have the automata and the arithmetic in UPPAAL's language.
+`ntagen.render.values` computes every number. templates/README.md lists where the model differs from
+the paper.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def render(scene: Scene, source: str | None = None) -> str:
     """The timed-game model of a scene as UPPAAL's XML.
 
     Args:
-        scene: What is known of the task.
-        source: Where the scene was read from, for the comment at the top of the declaration.
+        scene: The scene.
+        source: The file of the scene, for the comment at the top of the declaration.
 
     Returns:
         The XML document; its queries are those of `render_queries`.

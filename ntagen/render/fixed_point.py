@@ -1,10 +1,10 @@
-"""Fixed-point numbers of the model: the one place where millimetres become integer units.
+"""Fixed-point numbers of the model: the only module where millimetres become integer units.
 
-A value ``v`` becomes the integer nearest to ``v * resolution`` (ties to the even one), computed
-exactly: the difference ``v - units / resolution`` is at most ``0.5 / resolution`` in magnitude,
-whatever ``v``.
+A value ``v`` becomes the integer nearest to ``v * resolution`` (ties go to the even number). The
+computation is exact: for every ``v`` the absolute value of ``v - units / resolution`` is at most
+``0.5 / resolution``.
 
-Only values of absurd size are refused (`ntagen.rules.LARGEST_UNITS`).
+Only absurdly large values are refused (`ntagen.rules.LARGEST_UNITS`).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from ntagen.rules import LARGEST_UNITS, units_of
 
 
 def fixed_point(value: float, resolution: int, what: str) -> int:
-    """The number of units, `resolution` of which make 1, that is nearest to a value.
+    """The number of units nearest to a value.
 
     Args:
         value: A length in mm (or a component of a direction).
-        resolution: Units in 1 mm (or in 1).
+        resolution: The number of units in 1 mm (or in 1).
         what: The value's name in the message if it does not fit.
 
     Returns:
@@ -42,7 +42,7 @@ def fixed_point(value: float, resolution: int, what: str) -> int:
 
 
 def c_literal(units: int, resolution: int) -> str:
-    """A number of units as the declaration writes it: ``-25*_SI_`` when whole, else the units."""
+    """A number of units as the declaration writes it: ``-25*_SI_`` if whole, else the units."""
     if units == 0:
         return "0"
     whole, rest = divmod(units, resolution)

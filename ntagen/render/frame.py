@@ -1,8 +1,7 @@
 """The model's frame: insertion along -y, whatever direction it has in the scene.
 
-The model's tests (`check_path_valid`, `check_TR_reachable`) are about the y-axis, as in the paper.
-A scene whose insertion runs another way is turned as a whole, about the origin, before it is
-written down.
+The model's tests (`check_path_valid`, `check_TR_reachable`) use the y-axis, as in the paper. A
+scene with another direction of insertion is rotated as a whole about the origin first.
 
 The turn is the shortest one from the axis to -y (formula of Rodrigues, without the trigonometric
 functions): ``R = I + K + K^2 / (1 + c)`` with ``K`` the cross-product matrix of ``axis x (-y)`` and
@@ -37,13 +36,13 @@ def turned(matrix: Matrix, vector: Vector) -> Vector:
 
 
 def model_frame(axis: Vector) -> Matrix:
-    """The rotation from the scene's frame to the model's: it takes `axis` to -y.
+    """The rotation from the scene's frame to the model's: it turns `axis` to -y.
 
     Args:
-        axis: The direction of insertion, not zero; normalised here.
+        axis: The direction of insertion, not zero; it need not have length 1.
 
     Returns:
-        A rotation matrix; its transpose leads from the model back to the scene.
+        A rotation matrix; its transpose rotates from the model back to the scene.
     """
     length = math.hypot(*axis)
     x, y, z = axis[0] / length, axis[1] / length, axis[2] / length

@@ -12,12 +12,12 @@ from ntagen.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A query as it stands in the files.
+    """A query as it is written to the files.
 
     Attributes:
-        name: What `ntagen check --query` calls it.
+        name: Its name for `ntagen check --query`.
         formula: Its text in UPPAAL's language.
-        comment: The name in the first line, then, if any, what the query asks.
+        comment: The name in the first line, then an explanation, if there is one.
     """
 
     name: str
@@ -43,11 +43,11 @@ PAPER_QUERIES: Final = (
 def model_queries(scene: Scene) -> tuple[Query, ...]:
     """The queries of a scene's model, in order.
 
-    A game query (``control: …``) of the scene defines a strategy of its own name. A query of the
-    scene that repeats one of the paper's is left out.
+    A game query (``control: …``) of the scene defines a strategy with the name of the query. A
+    query of the scene that repeats one of the paper's is left out.
 
     Raises:
-        InputError: A query of the scene has the name of another one.
+        InputError: Two queries have the same name.
     """
     queries = {query.name: query for query in PAPER_QUERIES}
     for named in scene.queries:
@@ -59,8 +59,7 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
         query = queries.setdefault(named.name, Query(named.name, formula, named.name))
         if query.formula != formula:
             raise InputError(
-                f"there are two queries with the name {named.name}\n"
-                f"hint: rename the one that says `{text}`"
+                f"there are two queries with the name {named.name}\nhint: rename the query `{text}`"
             )
     return tuple(queries.values())
 

@@ -1,4 +1,4 @@
-"""The Jinja environment of the templates: strict about names, escaping by kind of file."""
+"""The Jinja environment of the templates: unknown names are errors, XML files are escaped."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ntagen.cache import cache_folder
 
 
 class _CompiledTemplates(jinja2.FileSystemBytecodeCache):
-    """Templates compiled in earlier runs; compiling takes longer than all else that rendering does.
+    """Templates from earlier runs; compiling them takes longer than the rest of rendering.
 
-    Jinja compares a digest of the template's text and drops what does not fit.
+    Jinja compares a digest of the template's text, and ignores an entry that does not fit.
     """
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        # A full or read-only disk costs time, not the result.
+        # A full or read-only disk only makes rendering slower.
         with contextlib.suppress(OSError):
             super().dump_bytecode(bucket)
 
@@ -27,9 +27,9 @@ class _CompiledTemplates(jinja2.FileSystemBytecodeCache):
 def environment() -> jinja2.Environment:
     """The environment with the package's templates.
 
-    An unknown name is an error. What is put into ``*.xml.jinja`` is escaped for XML, so that guards
-    may be written as they are (``a < b && c``); the C declaration is escaped as a whole where the
-    XML takes it in.
+    An unknown name is an error. Values in ``*.xml.jinja`` are escaped for XML, so that guards can
+    be given as they are (``a < b && c``). The C declaration is escaped as a whole when it is put
+    into the XML.
     """
     folder = cache_folder()
     return jinja2.Environment(

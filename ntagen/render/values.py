@@ -1,8 +1,8 @@
-"""What the templates are given: a scene's numbers in the model's frame and units.
+"""The values for the templates: a scene's numbers in the model's frame and units.
 
-The templates hold the language and the arithmetic, this module every decision about a number:
+The templates have the text and the arithmetic; this module makes every decision about a number:
 
-* **Frame**: the whole scene is turned so that insertion runs along -y (`ntagen.render.frame`).
+* **Frame**: the whole scene is rotated so that insertion runs along -y (`ntagen.render.frame`).
 * **Units**: lengths, and components of directions, become integers (`ntagen.render.fixed_point`).
 * **Time**: the model's unit of time is 1 s if the step is a whole number of seconds, otherwise the
   step itself (and `dt` is 1). So `dt` is an integer, as in the paper, and the insertion of one push
@@ -23,13 +23,13 @@ from ntagen.scene import Region, Scene, Vector
 from ntagen.units import deg_from_rad
 
 MIN_ACTIONS = 10
-"""Entries of the log in the paper (`MAX_ACT_COUNT`); more are made only if more rolls are
+"""The number of log entries in the paper (`MAX_ACT_COUNT`); there are more only if more rolls are
 allowed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of an initialiser, and what it is."""
+    """One row of an initialiser, and its comment."""
 
     text: str
     note: str
@@ -46,7 +46,7 @@ class Spheres:
 
 @dataclass(frozen=True, slots=True)
 class ModelValues:
-    """All that the templates may use; lengths are texts in units of ``1 / scale`` mm."""
+    """All values for the templates; lengths are texts in units of ``1 / scale`` mm."""
 
     name: str
     frame_note: str
@@ -71,7 +71,7 @@ class ModelValues:
 
 @dataclass(frozen=True, slots=True)
 class _Writer:
-    """Turns values of one scene into the declaration's texts."""
+    """Converts values of one scene to texts of the declaration."""
 
     scale: int
     frame: Matrix
@@ -148,7 +148,7 @@ def model_values(scene: Scene) -> ModelValues:
 
 
 def _check_motion(scene: Scene) -> None:
-    """Refuses a step that the model's numbers cannot hold.
+    """Refuses a step that the model's numbers cannot represent.
 
     Raises:
         InputError: The radius or the angle of one step is less than one unit, or a step is too
@@ -173,7 +173,7 @@ def _check_motion(scene: Scene) -> None:
 
 
 def _sweep_margin(scale: int, radius_mm: float) -> int:
-    """How much regions are enlarged for the swept check, in units.
+    """By how many units regions are enlarged for the swept check.
 
     The rounding of a position on the motion circle is less than 11 units of a direction, times the
     radius, plus 2 units; templates/uppaal/sweep.c.jinja derives it.
@@ -183,17 +183,16 @@ def _sweep_margin(scale: int, radius_mm: float) -> int:
 
 
 def _whole_degrees(angle_rad: float) -> int:
-    """An angle as the whole number of degrees that the model wants.
+    """An angle as a whole number of degrees, for the model.
 
     Raises:
-        InputError: It is no whole number of degrees.
+        InputError: It is not a whole number of degrees.
     """
     angle_deg = deg_from_rad(angle_rad)
     whole = round(angle_deg)
     if abs(angle_deg - whole) > rules.WHOLE_TOLERANCE * 360.0:
         raise InputError(
-            f"a roll of {angle_deg:g} deg is not a whole number of degrees\n"
-            "hint: the model chooses among whole degrees"
+            f"a roll of {angle_deg:g} deg is not a whole number of degrees\nhint: use whole degrees"
         )
     return whole
 
@@ -203,5 +202,5 @@ def _is_identity(frame: Matrix) -> bool:
 
 
 def _one_line(text: str) -> str:
-    """A name as it may stand in a line comment."""
+    """A name in a form that is safe in a line comment."""
     return " ".join(text.split())

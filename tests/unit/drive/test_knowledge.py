@@ -41,7 +41,7 @@ def test_a_shell_belongs_to_the_region_that_it_contains() -> None:
 
 
 def test_an_unknown_name_is_refused_with_the_choice() -> None:
-    with pytest.raises(InputError, match="one of all, none, C1, C2"):
+    with pytest.raises(InputError, match="choose from all, none, C1, C2"):
         told(TWO, "C1,C3")
 
 
