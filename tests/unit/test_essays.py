@@ -10,7 +10,7 @@ An essay has fenced blocks; the second word behind the opening fence names the m
 * ``states NAME``: the reachable symbolic states as `Model.states` gives them, a state a line.
 * ``decisions NAME``: a game query, and below it the decisions of its strategy, each once, with its
   rank.
-* ``console NAME``: a command behind ``$``, and lines that it prints, in this order.
+* ``console NAME``: commands, each behind ``$``, and lines that they print, in this order.
 * ``json NAME``: a file NAME.json that commands read.
 """
 
@@ -88,7 +88,9 @@ def check_answers(block: Block, capsys: pytest.CaptureFixture[str]) -> None:
         *options, expected = line.strip().split(": ", 1)
         arguments = [*shlex.split(" ".join(options)), "--query", query, "--json"]
         main(["check", f"{block.model}.xta", *arguments])
-        answer = json.loads(capsys.readouterr().out)
+        captured = capsys.readouterr()
+        assert captured.out, captured.err
+        answer = json.loads(captured.out)
         said = {
             answer["verdict"],
             f"{answer['explored']} explored",
