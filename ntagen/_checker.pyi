@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Literal, final
 
 __all__ = [
+    "PARTS",
     "Answer",
     "ExactWalk",
     "FailedError",
@@ -15,6 +16,8 @@ __all__ = [
     "explanations",
     "load",
 ]
+
+PARTS: list[tuple[str, str]]
 
 class FailedError(RuntimeError): ...
 class RejectedError(ValueError): ...
@@ -77,6 +80,7 @@ class Model:
         symmetry: bool,
         partial_order: bool,
         live_variables: bool,
+        without: Sequence[str],
         folder: str | None,
         allow_write: Sequence[str],
         progress: Callable[[int, int, int, int], object] | None,

@@ -7,6 +7,7 @@
 pub mod cancellation;
 pub mod diagnostics;
 pub mod syntax;
+pub mod tuning;
 
 pub mod ir;
 

@@ -31,6 +31,7 @@ use crate::ir::Overflow;
 use crate::search::limits::StopReason;
 use crate::search::optimum::best_first::Met;
 use crate::search::reachability::report::Order;
+use crate::tuning::{PARTS, Tuning};
 
 use walks::{ExactWalk, Simulation};
 
@@ -352,7 +353,7 @@ impl Model {
     }
 
     /// Answers a query.
-    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, partial_order, live_variables, folder, allow_write, progress))]
+    #[pyo3(signature = (query, *, search, threads, seed, forced, priorities, engine, states, memory_bytes, timeout_s, max_plans, strategy, verify, trace, wanted_trace, certificate, symmetry, partial_order, live_variables, without, folder, allow_write, progress))]
     #[expect(
         clippy::too_many_arguments,
         clippy::fn_params_excessive_bools,
@@ -379,6 +380,7 @@ impl Model {
         symmetry: bool,
         partial_order: bool,
         live_variables: bool,
+        without: Vec<String>,
         folder: Option<PathBuf>,
         allow_write: Vec<PathBuf>,
         progress: Option<Py<PyAny>>,
@@ -416,6 +418,8 @@ impl Model {
             symmetry,
             partial_order,
             live_variables,
+            tuning: Tuning::without(without)
+                .map_err(|error| PyValueError::new_err(error.to_string()))?,
             folder,
             allow_write,
             overflow: Overflow::default(),
@@ -762,6 +766,7 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<play::Play>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;
     module.add("RejectedError", module.py().get_type::<RejectedError>())?;
+    module.add("PARTS", PARTS.to_vec())?;
     module.add_function(wrap_pyfunction!(load, module)?)?;
     module.add_function(wrap_pyfunction!(explanations, module)?)
 }

@@ -10,6 +10,7 @@ from ntagen.checker.answer import Answer, Extreme, Place, Value, Verdict
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
 from ntagen.checker.model import (
+    HEURISTICS,
     MAX_PLANS,
     CodeEngine,
     Model,
@@ -25,6 +26,7 @@ from ntagen.checker.model import (
 from ntagen.checker.states import Simulation, SymbolicState
 
 __all__ = [
+    "HEURISTICS",
     "MAX_PLANS",
     "Answer",
     "CodeEngine",

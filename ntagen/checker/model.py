@@ -43,6 +43,9 @@ Progress = Callable[[int, int, int, int], object]
 MAX_PLANS = 1_000_000
 """The default maximum of plans that are listed."""
 
+HEURISTICS: dict[str, str] = dict(_checker.PARTS)
+"""The heuristics that can be switched off, each with what it does."""
+
 _GAME = re.compile(r"\s*(strategy\s+\w+\s*=\s*)?(\{[^{}]*\}\s*)?(E\s*<>\s*)?control(_t\*|\b)")
 """The start of a query that asks for a strategy."""
 
@@ -199,6 +202,7 @@ class Model:
         symmetry: bool = True,
         partial_order: bool = True,
         live_variables: bool = True,
+        without: Sequence[str] = (),
         folder: Path | None = None,
         allow_write: Sequence[str | Path] = (),
         progress: Progress | None = None,
@@ -249,6 +253,8 @@ class Model:
                 states for one that differ only in variables whose values nothing reads before
                 they are written, and so may games if neither a strategy nor plans are wanted;
                 verdicts, values and traces do not depend on it, counts do.
+            without: Heuristics of `HEURISTICS` that are not used; verdicts and values do not
+                depend on them, time and counts do.
             folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
                 folder of the model.
             allow_write: Folders below which ``saveStrategy`` may write, beside the current one. An
@@ -260,7 +266,7 @@ class Model:
             The answer; a limit that was reached is an answer too.
 
         Raises:
-            ValueError: `max_plans` is less than 1.
+            ValueError: `max_plans` is less than 1, or `without` has an unknown name.
             RejectedError: The query is wrong or of a kind that is not supported.
             ValueError: There are to be more than 2048 threads, or fewer than none.
             KeyboardInterrupt: The user interrupted.
@@ -291,6 +297,7 @@ class Model:
                 symmetry=symmetry,
                 partial_order=partial_order,
                 live_variables=live_variables,
+                without=without,
                 folder=None if folder is None else str(folder),
                 allow_write=[os.fspath(one) for one in allow_write],
                 progress=progress,

@@ -70,6 +70,24 @@ class _Threads(click.ParamType[int]):
         return int(text)
 
 
+class _Heuristics(click.ParamType[tuple[str, ...]]):
+    """Names of heuristics, separated by commas."""
+
+    name = "heuristics"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        from ntagen import checker
+
+        names = tuple(name.strip() for name in str(value).split(",") if name.strip())
+        for name in names:
+            if name not in checker.HEURISTICS:
+                known = "".join(f"\n  {one}: {does}" for one, does in checker.HEURISTICS.items())
+                self.fail(f"{name!r} is no heuristic. There are:{known}", param, ctx)
+        return names
+
+
 @dataclass(frozen=True, slots=True)
 class _Asked:
     """A query to be answered."""
@@ -249,6 +267,14 @@ class _Outputs:
     help="Whether states are one that differ only in variables which are written before they are "
     "read again (E<>, A[], sup, inf, bounds; games, where no strategy or plan is wanted).",
 )
+@click.option(
+    "--without",
+    metavar="NAME[,NAME…]",
+    type=_Heuristics(),
+    default="",
+    help="For experiments: do not use these heuristics of the engine. Verdicts do not depend on "
+    "them; time and counts do. A wrong name lists all.",
+)
 @forced_rule()
 @priority_rule(
     "Whether priorities of channels and processes count in games and in queries under a strategy. "
@@ -292,6 +318,7 @@ def command(
     symmetry: str,
     partial_order: str,
     live_variables: str,
+    without: tuple[str, ...],
     seed: int,
     forced: Any,  # noqa: ANN401
     priorities: Any,  # noqa: ANN401
@@ -374,6 +401,7 @@ def command(
                         symmetry=symmetry == "on",
                         partial_order=partial_order == "on",
                         live_variables=live_variables == "on",
+                        without=without,
                         folder=query.folder,
                         allow_write=allow_write,
                         progress=report,

@@ -18,6 +18,7 @@
 //! [`crate::ir::Update::fixed`]).
 
 use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Process};
+use crate::tuning::Tuning;
 use crate::zones::extrapolate::{Ceiling, Ceilings};
 use crate::zones::{Bound, Federation, extrapolate};
 
@@ -132,8 +133,14 @@ impl Summary {
 }
 
 impl ClockBounds {
-    /// The bounds of a network; `atoms` are comparisons of queries, which matter in every location.
-    pub fn new(network: &Network, atoms: &[ClockAtom], abstraction: Abstraction) -> ClockBounds {
+    /// The bounds of a network, found with these heuristics; `atoms` are comparisons of queries,
+    /// which matter in every location.
+    pub fn new(
+        network: &Network,
+        atoms: &[ClockAtom],
+        abstraction: Abstraction,
+        tuning: Tuning,
+    ) -> ClockBounds {
         let clock_count = network.clocks.len();
         let (abstraction, differences) = if abstraction == Abstraction::Differences {
             match Differences::new(network, atoms) {
@@ -144,8 +151,8 @@ impl ClockBounds {
             (abstraction, Differences::default())
         };
         let reset = differences.greatest_reset;
-        let partners = Partners::new(network);
-        let mut analysis = Analysis::new(network);
+        let partners = Partners::new(network).filter(|_| tuning.joint_resets);
+        let mut analysis = Analysis::new(network, tuning);
         let (mut tables, mut tracked) = (Vec::new(), Vec::new());
         let mut summary = Summary::default();
         let is_maximum = abstraction == Abstraction::Maximum;

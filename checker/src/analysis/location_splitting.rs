@@ -20,6 +20,7 @@ use crate::exec::{Context, EmittedConstraint, Interpreter};
 use crate::ir::{ClockAtom, ClockRange, Edge, FunctionId, Guard, Network, Shape, Update, Variable};
 
 use super::function_reads::read_words;
+use crate::tuning::Tuning;
 
 /// A variable with more values is not tracked.
 const MOST_VALUES: i64 = 8;
@@ -169,6 +170,7 @@ pub(super) struct Analysis<'a> {
     state: Vec<i32>,
     /// Found out with the first word that is asked for.
     writers: Option<Writers>,
+    tuning: Tuning,
 }
 
 /// What can happen with a guard in a valuation.
@@ -179,13 +181,14 @@ struct Answer {
 }
 
 impl<'a> Analysis<'a> {
-    pub(super) fn new(network: &'a Network) -> Analysis<'a> {
+    pub(super) fn new(network: &'a Network, tuning: Tuning) -> Analysis<'a> {
         Analysis {
             network,
             interpreter: None,
             runs: 0,
             state: network.initial.clone(),
             writers: None,
+            tuning,
         }
     }
 
@@ -221,7 +224,8 @@ impl<'a> Analysis<'a> {
         let mut nodes = network.processes[process].locations.len();
         let mut tracked: Vec<Ranged> = Vec::new();
         let guards = edges.iter().map(|edge| &edge.guard);
-        for guard in guards.filter(|guard| !guard.atoms.is_empty()) {
+        let is_used = self.tuning.location_splitting;
+        for guard in guards.filter(|guard| is_used && !guard.atoms.is_empty()) {
             let words = guard
                 .function
                 .and_then(|function| read_words(network, [function], MOST_READ));

@@ -34,7 +34,7 @@ impl LoadedModel {
         }
         let start = Instant::now();
         self.refuse_unsupported(&query, options.priorities)?;
-        self.prepare_code(options.code, query.span)?;
+        self.prepare_code(options.code, options.tuning, query.span)?;
         self.executor().wraps().clear();
         self.load_seconds += start.elapsed().as_secs_f64();
         let mut answer = match (&query.kind, self.constant_failure()) {

@@ -5,11 +5,13 @@ use super::options::CodeEngine;
 use crate::exec::Jit;
 use crate::exec::{Executor, Interpreter};
 use crate::ir::{Network, Overflow};
+use crate::tuning::Tuning;
 
 /// The code of the model, ready to run.
 pub(super) struct PreparedCode {
     /// The rule for overflows that it was made for.
     overflow: Overflow,
+    tuning: Tuning,
     runner: Runner,
 }
 
@@ -38,9 +40,10 @@ impl PreparedCode {
         code: &mut Option<PreparedCode>,
         network: &Network,
         wanted: CodeEngine,
+        tuning: Tuning,
     ) -> Result<(), String> {
         let overflow = network.overflow;
-        code.take_if(|code| code.overflow != overflow);
+        code.take_if(|code| (code.overflow, code.tuning) != (overflow, tuning));
         let (functions, constants) = (&network.functions, &network.constants);
         let runner = match (code.as_mut().map(|code| &mut code.runner), wanted) {
             (Some(Runner::Interpreter(interpreter)), CodeEngine::Interpreter) => {
@@ -58,7 +61,7 @@ impl PreparedCode {
             }
             #[cfg(feature = "jit")]
             (_, CodeEngine::Jit) => {
-                let jit = Jit::with_overflow(functions, constants, overflow);
+                let jit = Jit::tuned(functions, constants, overflow, tuning);
                 let jit = jit.map_err(|error| error.to_string())?;
                 jit.prepare(network.functions_of_edges());
                 Runner::Jit(Box::new(jit))
@@ -68,7 +71,11 @@ impl PreparedCode {
                 return Err("this build of the engine has no compiler".to_owned());
             }
         };
-        *code = Some(PreparedCode { overflow, runner });
+        *code = Some(PreparedCode {
+            overflow,
+            tuning,
+            runner,
+        });
         Ok(())
     }
 }

@@ -18,6 +18,7 @@ use crate::syntax::{
     self,
     ast::{QueryText, Template},
 };
+use crate::tuning::Tuning;
 
 /// A model that was loaded and accepted.
 pub struct LoadedModel {
@@ -123,9 +124,14 @@ impl LoadedModel {
     }
 
     /// Makes the code of the model, or adds what queries brought since.
-    pub(super) fn prepare_code(&mut self, wanted: CodeEngine, span: Span) -> Result<(), Rejection> {
+    pub(super) fn prepare_code(
+        &mut self,
+        wanted: CodeEngine,
+        tuning: Tuning,
+        span: Span,
+    ) -> Result<(), Rejection> {
         let network = &self.model.network;
-        PreparedCode::prepare(&mut self.code, network, wanted).map_err(|message| {
+        PreparedCode::prepare(&mut self.code, network, wanted, tuning).map_err(|message| {
             let diagnostic = Diagnostic::new(codes::NO_COMPILED_CODE, span, message)
                 .help("use the interpreter: --engine interpreter");
             Rejection::new(vec![diagnostic], &self.sources)

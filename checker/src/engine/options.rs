@@ -6,6 +6,7 @@ use super::limits::Limits;
 use crate::game::{Forced, Nodes, Priorities};
 use crate::ir::Overflow;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
+use crate::tuning::Tuning;
 
 /// What runs the code of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -76,6 +77,8 @@ pub struct Options {
     /// Whether a search for states or values, and a game of which only the winner is asked, may
     /// take states for the same that differ only in variables that are not live.
     pub live_variables: bool,
+    /// Which heuristics are used.
+    pub tuning: Tuning,
 }
 
 impl Options {
@@ -110,6 +113,7 @@ impl Default for Options {
             symmetry: true,
             partial_order: true,
             live_variables: true,
+            tuning: Tuning::default(),
         }
     }
 }

@@ -17,6 +17,7 @@ use checker::network::{Stepper, Symbolic};
 use checker::search::limits::{Counters, StopReason, Watch};
 use checker::search::reachability::report::Order;
 use checker::search::reachability::search;
+use checker::tuning::Tuning;
 
 fn load(text: &str) -> LoadedModel {
     LoadedModel::load("model.xta", text.as_bytes())
@@ -59,7 +60,7 @@ fn stored_by(abstraction: Abstraction, text: &str) -> Option<u64> {
     let model = load(text);
     let network = model.network();
     let interpreter = Interpreter::new(&network.functions, &network.constants);
-    let bounds = ClockBounds::new(network, &[], abstraction);
+    let bounds = ClockBounds::new(network, &[], abstraction, Tuning::default());
     let mut symbolic = Symbolic::new(Stepper::new(network, &interpreter), bounds);
     let goal = Predicate::Constant(false);
     let report = search::search(&mut symbolic, &mut &goal, Order::BreadthFirst, &mut Few);

@@ -20,6 +20,7 @@ use checker::search::limits::Unlimited;
 use checker::search::reachability::goal::{Goal, SharedGoal};
 use checker::search::reachability::report::{Manner, Order};
 use checker::search::reachability::search;
+use checker::tuning::Tuning;
 use checker::zones::Zone;
 
 const THREADS: [usize; 4] = [1, 2, 3, 4];
@@ -245,7 +246,7 @@ fn panic_of_a_thread_ends_the_search_with_it() {
     };
     let network = model.network();
     let interpreter = Interpreter::new(&network.functions, &network.constants);
-    let bounds = ClockBounds::new(network, &[], Abstraction::LowerUpper);
+    let bounds = ClockBounds::new(network, &[], Abstraction::LowerUpper, Tuning::default());
     let mut symbolic = Symbolic::new(Stepper::new(network, &interpreter), bounds);
     let mut goal = Panics {
         caller: thread::current().id(),

@@ -10,6 +10,7 @@ use checker::search::limits::Unlimited;
 use checker::search::reachability::goal::{Goal, SharedGoal};
 use checker::search::reachability::report::{Manner, Order};
 use checker::search::reachability::search;
+use checker::tuning::Tuning;
 use checker::zones::{Bound, Zone};
 
 /// Workers who take turns at a machine, some with flags that updates set and guards ask for.
@@ -87,7 +88,7 @@ fn end(wanted: &Wanted, abstraction: Abstraction, threads: usize, limits: MemoLi
         .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
     let network = model.network();
     let interpreter = Interpreter::new(&network.functions, &network.constants);
-    let bounds = ClockBounds::new(network, &[], abstraction);
+    let bounds = ClockBounds::new(network, &[], abstraction, Tuning::default());
     let symbolic = Symbolic::new(Stepper::new(network, &interpreter), bounds);
     let mut symbolic = symbolic.remembering(limits);
     let manner = Manner {

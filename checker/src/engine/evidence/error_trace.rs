@@ -145,6 +145,7 @@ impl LoadedModel {
             under: None,
             within: None,
             priorities: options.priorities,
+            tuning: options.tuning,
         };
         let wanted = Abstraction::LowerUpper;
         let mut symbolic = subject::symbolic(subject, predicates, &[], wanted);

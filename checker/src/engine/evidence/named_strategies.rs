@@ -46,7 +46,7 @@ impl LoadedModel {
         let remark = match due {
             Some(due) => {
                 self.model.network.overflow = due.options.overflow;
-                self.prepare_code(due.options.code, span)?;
+                self.prepare_code(due.options.code, due.options.tuning, span)?;
                 let remark = self.make_strategy(name, *due, options);
                 self.model.network.overflow = options.overflow;
                 remark

@@ -41,6 +41,7 @@ impl LoadedModel {
             under: under.as_ref(),
             within,
             priorities: options.priorities,
+            tuning: options.tuning,
         };
         let mut answer = answer(subject, query, options);
         if time_limit.is_some() && query.strategy.is_none() {

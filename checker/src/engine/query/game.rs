@@ -91,7 +91,7 @@ pub(super) fn game(
     let mut atoms = objective_atoms(asked.0);
     atoms.extend(under.iter().flat_map(|(closed, _)| closed.atoms()).cloned());
     let zones = |abstraction| {
-        let bounds = ClockBounds::new(network, &atoms, abstraction);
+        let bounds = ClockBounds::new(network, &atoms, abstraction, options.tuning);
         let restriction = under.map(|(closed, _)| closed as &dyn Restriction);
         zones_of(network, executor, bounds, options).restricted(restriction)
     };
@@ -114,7 +114,10 @@ pub(super) fn game(
         };
         let in_symbolic_states =
             |nodes, watch: &mut LimitWatch| played(zones(Abstraction::Maximum), nodes, None, watch);
-        let nodes = if under.is_none() && can_be_discrete(network, asked.1, options) {
+        let nodes = if options.tuning.discrete_nodes
+            && under.is_none()
+            && can_be_discrete(network, asked.1, options)
+        {
             options.nodes
         } else {
             Nodes::Symbolic
@@ -141,16 +144,20 @@ pub(super) fn game(
         answer.counters.explored += before.explored;
         return answer;
     }
-    let exact = zones(Abstraction::Exact);
-    let allowance = Some(WITHOUT_ABSTRACTION);
-    let (first, has_given_up) = played(exact, Nodes::Symbolic, allowance, watch);
-    if !has_given_up && first.verdict != Verdict::Error(Failure::ClockRange) {
-        return first;
+    let mut before = 0;
+    if options.tuning.exact_first {
+        let exact = zones(Abstraction::Exact);
+        let allowance = Some(WITHOUT_ABSTRACTION);
+        let (first, has_given_up) = played(exact, Nodes::Symbolic, allowance, watch);
+        if !has_given_up && first.verdict != Verdict::Error(Failure::ClockRange) {
+            return first;
+        }
+        before = first.counters.explored;
     }
     let cut = zones(Abstraction::Differences);
-    let (mut second, _) = played(cut, Nodes::Symbolic, None, watch);
-    second.counters.explored += first.counters.explored;
-    second
+    let (mut answer, _) = played(cut, Nodes::Symbolic, None, watch);
+    answer.counters.explored += before;
+    answer
 }
 
 /// The zones of games: with the priorities of the network, if they are to count.
@@ -160,7 +167,7 @@ pub(super) fn zones_of<'a>(
     bounds: ClockBounds,
     options: &Options,
 ) -> Symbolic<'a> {
-    let symbolic = Symbolic::new(Stepper::new(network, executor), bounds);
+    let symbolic = Symbolic::new(Stepper::tuned(network, executor, options.tuning), bounds);
     match options.priorities {
         Priorities::Kept => symbolic,
         Priorities::Ignored => symbolic.without_priorities(),

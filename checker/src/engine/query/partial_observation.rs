@@ -39,7 +39,7 @@ pub(super) fn game(
     } else {
         Abstraction::Maximum
     };
-    let bounds = ClockBounds::new(network, &atoms, abstraction);
+    let bounds = ClockBounds::new(network, &atoms, abstraction, options.tuning);
     let mut symbolic = zones_of(network, executor, bounds, options);
     let (goal, keep, must_reach) = match objective {
         Objective::Reach(goal) => (Some(goal), None, true),

@@ -31,7 +31,7 @@ pub(super) fn reachable<'a>(
     // A strategy may forbid moves in one order and allow them in another.
     let is_ordered = options.partial_order && subject.under.is_none();
     let order = is_ordered
-        .then(|| PartialOrder::new(subject.network, goal))
+        .then(|| PartialOrder::new(subject.network, goal, options.tuning))
         .flatten();
     let live = live_variables(subject, predicate::functions(goal), options, symmetry);
     let reduced = |symbolic: Symbolic<'a>| {

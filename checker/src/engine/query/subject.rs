@@ -12,6 +12,7 @@ use crate::network::symbolic::predicate;
 use crate::network::{Restriction, Stepper, Symbolic, Symmetry};
 
 use crate::engine::options::Options;
+use crate::tuning::Tuning;
 
 /// What a query is about.
 #[derive(Clone, Copy)]
@@ -24,6 +25,8 @@ pub(crate) struct Subject<'a> {
     pub(crate) within: Option<&'a Arc<Under>>,
     /// Whether priorities count under the strategy.
     pub(crate) priorities: Priorities,
+    /// Which heuristics are used.
+    pub(crate) tuning: Tuning,
 }
 
 impl<'a> Subject<'a> {
@@ -68,6 +71,7 @@ pub(crate) fn symbolic<'a>(
         executor,
         under,
         priorities,
+        tuning,
         ..
     } = subject;
     let mut atoms: Vec<ClockAtom> = predicates
@@ -92,8 +96,8 @@ pub(crate) fn symbolic<'a>(
     } else {
         wanted
     };
-    let bounds = ClockBounds::new(network, &atoms, abstraction);
-    let symbolic = Symbolic::new(Stepper::new(network, executor), bounds)
+    let bounds = ClockBounds::new(network, &atoms, abstraction, tuning);
+    let symbolic = Symbolic::new(Stepper::tuned(network, executor, tuning), bounds)
         .restricted(under.map(|one| one as &dyn Restriction));
     if under.is_some() && priorities == Priorities::Ignored {
         symbolic.without_priorities()
@@ -106,7 +110,7 @@ pub(crate) fn symbolic<'a>(
 /// nothing that these zones do not have is there, but what they have may not be. `None` if there
 /// are none but those of [`symbolic`].
 pub(super) fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Option<Symbolic<'a>> {
-    if predicate::depends_on_negations(subject.network) {
+    if !subject.tuning.coarser_first || predicate::depends_on_negations(subject.network) {
         return None;
     }
     let atoms: Vec<ClockAtom> = predicates

@@ -83,7 +83,7 @@ pub(super) fn fastest(
     let is_strategy_wanted = options.strategy || options.verify;
     let mut limit = if let Some(limit) = race.limit {
         let mut words = network.initial.clone();
-        match Stepper::new(network, executor).evaluate(limit, &mut words) {
+        match Stepper::tuned(network, executor, options.tuning).evaluate(limit, &mut words) {
             // Time is never negative.
             Ok(limit) => limit.max(-1),
             Err(error) => {
@@ -97,6 +97,7 @@ pub(super) fn fastest(
             limits: options.limits.clone(),
             forced: options.forced,
             priorities: options.priorities,
+            tuning: options.tuning,
             ..Options::default()
         };
         let answer = game::game((network, None), executor, asked, &plain, watch);
@@ -221,7 +222,8 @@ struct Timed<'a, 'q> {
 impl Timed<'_, '_> {
     /// What nodes are tried first.
     fn first_nodes(&self) -> Nodes {
-        let can_be_discrete = game::can_be_discrete(self.network, false, self.options)
+        let can_be_discrete = self.options.tuning.discrete_nodes
+            && game::can_be_discrete(self.network, false, self.options)
             && !has_differences(self.network, &objective_atoms(self.race.objective));
         if can_be_discrete {
             self.options.nodes
@@ -291,7 +293,7 @@ impl Timed<'_, '_> {
             Some(Nodes::Discrete) => Abstraction::Exact,
             _ => Abstraction::Maximum,
         };
-        let bounds = ClockBounds::new(self.network, &atoms, abstraction);
+        let bounds = ClockBounds::new(self.network, &atoms, abstraction, self.options.tuning);
         let mut symbolic = game::zones_of(self.network, self.executor, bounds, self.options);
         let (goal, keep): (&Predicate, _) = match self.race.objective {
             Objective::Until(keep, goal) => (goal, Some(keep)),

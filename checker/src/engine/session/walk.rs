@@ -12,6 +12,7 @@ use crate::search::Outcome;
 use crate::search::StopReason;
 use crate::search::limits::Counters;
 use crate::search::optimum::best_first::{BestFirst, Measure, Met};
+use crate::tuning::Tuning;
 use crate::verify;
 use crate::verify::choices::Choices;
 use crate::zones::Zone;
@@ -48,7 +49,7 @@ impl LoadedModel {
 
     /// Makes the code ready to run; needed once before the other functions here.
     pub fn prepare_simulation(&mut self, code: CodeEngine) -> Result<(), Rejection> {
-        self.prepare_code(code, crate::diagnostics::Span::default())
+        self.prepare_code(code, Tuning::default(), crate::diagnostics::Span::default())
     }
 
     /// The initial state.
@@ -89,7 +90,7 @@ impl LoadedModel {
         } else {
             Abstraction::Maximum
         };
-        let bounds = ClockBounds::new(network, &[], abstraction);
+        let bounds = ClockBounds::new(network, &[], abstraction, Tuning::default());
         let mut symbolic = Symbolic::new(Stepper::new(network, self.executor()), bounds);
         let nothing = &Predicate::Constant(false);
         let most = limits.states.map_or(usize::MAX, |most| most as usize);
@@ -116,7 +117,7 @@ impl LoadedModel {
 
 /// The semantics of a network as simulations take it: nothing is extrapolated.
 pub fn symbolic<'a>(network: &'a Network, executor: &'a dyn Executor) -> Symbolic<'a> {
-    let bounds = ClockBounds::new(network, &[], Abstraction::Exact);
+    let bounds = ClockBounds::new(network, &[], Abstraction::Exact, Tuning::default());
     Symbolic::new(Stepper::new(network, executor), bounds)
 }
 

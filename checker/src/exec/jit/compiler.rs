@@ -17,6 +17,7 @@ use cranelift_module::{FuncId, Module, default_libcall_names};
 
 use crate::exec::optimise::Optimiser;
 use crate::ir::{Function, FunctionId, Overflow, RegisterType};
+use crate::tuning::Tuning;
 
 use super::JitError;
 use super::needs::{AllNeeds, callees};
@@ -51,7 +52,7 @@ pub(super) struct Compiler {
 }
 
 impl Compiler {
-    pub(super) fn new(overflow: Overflow) -> Result<Compiler, JitError> {
+    pub(super) fn new(overflow: Overflow, tuning: Tuning) -> Result<Compiler, JitError> {
         if cfg!(target_endian = "big") {
             // Doubles lie in memory with the low word first.
             return Err(JitError("the processor stores the high word first".into()));
@@ -83,7 +84,7 @@ impl Compiler {
             convention,
             overflow,
             builder_context: FunctionBuilderContext::new(),
-            optimiser: Optimiser::default(),
+            optimiser: Optimiser::tuned(tuning),
             needs: AllNeeds::default(),
             optimised_needs: AllNeeds::default(),
             declared: Vec::new(),

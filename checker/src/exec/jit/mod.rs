@@ -29,6 +29,8 @@ use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
 use crate::ir::{Function, FunctionId, Overflow, SiteId};
 
+use crate::tuning::Tuning;
+
 use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, validate};
 
 use compiler::Compiler;
@@ -67,6 +69,7 @@ pub struct Jit {
     constants: Vec<i32>,
     /// How many words of state the code reaches.
     state_words: usize,
+    hot_instructions: u64,
     compiler: Mutex<Compiler>,
 }
 
@@ -93,12 +96,27 @@ impl Jit {
         constants: &[i32],
         overflow: Overflow,
     ) -> Result<Jit, JitError> {
+        Jit::tuned(functions, constants, overflow, Tuning::default())
+    }
+
+    /// The same, with these heuristics only.
+    pub fn tuned(
+        functions: &[Function],
+        constants: &[i32],
+        overflow: Overflow,
+        tuning: Tuning,
+    ) -> Result<Jit, JitError> {
         let mut jit = Jit {
             interpreter: Interpreter::default().with_overflow(overflow),
             entries: Vec::new(),
             constants: Vec::new(),
             state_words: 0,
-            compiler: Mutex::new(Compiler::new(overflow)?),
+            hot_instructions: if tuning.interpret_first {
+                HOT_INSTRUCTIONS
+            } else {
+                0
+            },
+            compiler: Mutex::new(Compiler::new(overflow, tuning)?),
         };
         jit.extend(functions, constants)?;
         Ok(jit)
@@ -193,7 +211,7 @@ impl Jit {
         }
         let heat = heat + effort.instructions;
         entry.heat.store(heat, Ordering::Relaxed);
-        if heat > HOT_INSTRUCTIONS {
+        if heat > self.hot_instructions {
             // A function that cannot be compiled goes on being interpreted, which gives the same
             // results.
             let _ = self.compile_function(function);

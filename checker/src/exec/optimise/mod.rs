@@ -25,6 +25,7 @@ use std::collections::BTreeMap;
 use crate::ir::{Block, Function, FunctionId, Instruction, Register};
 
 use super::rounds::count_rounds;
+use crate::tuning::Tuning;
 
 /// Callees of at most this size are inlined.
 const MAX_SIZE_TO_INLINE: usize = 60;
@@ -86,6 +87,7 @@ type Constants = Vec<Option<i32>>;
 pub(super) struct Optimiser {
     functions: Vec<Function>,
     constants: Vec<i32>,
+    tuning: Tuning,
     /// The optimised functions; calls in them refer to each other.
     made: Vec<Function>,
     /// The number of the optimised function, by function and constant arguments.
@@ -93,6 +95,15 @@ pub(super) struct Optimiser {
 }
 
 impl Optimiser {
+    /// One that knows no functions, with these heuristics only.
+    #[cfg(feature = "jit")]
+    pub(super) fn tuned(tuning: Tuning) -> Optimiser {
+        Optimiser {
+            tuning,
+            ..Optimiser::default()
+        }
+    }
+
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what
     /// was given before.
     pub(super) fn extend(&mut self, functions: &[Function], constants: &[i32]) {
@@ -125,7 +136,8 @@ impl Optimiser {
         let general = (function, Constants::new());
         let variants = self.numbers.range(general..).take(MAX_VARIANTS);
         let variants = variants.take_while(|((other, _), _)| *other == function);
-        arguments.iter().any(Option::is_some)
+        self.tuning.specialising
+            && arguments.iter().any(Option::is_some)
             && size_of(&self.functions[function.0 as usize]) > MAX_SIZE_TO_LEAVE_GENERAL
             && (self.numbers.contains_key(&(function, arguments.clone()))
                 || variants.count() < MAX_VARIANTS)
@@ -166,9 +178,11 @@ impl Optimiser {
             let callee = &made[number as usize];
             (size_of(callee) <= MAX_SIZE_TO_INLINE).then_some(callee)
         };
-        inline::inline_calls(function, &small, MAX_SIZE);
+        if self.tuning.inlining {
+            inline::inline_calls(function, &small, MAX_SIZE);
+        }
         self.tidy(function);
-        while unroll::unroll_one(function, MAX_SIZE) {
+        while self.tuning.unrolling && unroll::unroll_one(function, MAX_SIZE) {
             self.tidy(function);
         }
     }
@@ -177,12 +191,14 @@ impl Optimiser {
     /// blocks can be joined.
     fn tidy(&self, function: &mut Function) {
         graph::clean(function);
-        if numbering::number_values(function, &self.constants) {
+        if self.tuning.value_numbering && numbering::number_values(function, &self.constants) {
             graph::clean(function);
             numbering::number_values(function, &self.constants);
         }
         graph::clean(function);
-        dead::remove_dead_code(function);
+        if self.tuning.dead_code {
+            dead::remove_dead_code(function);
+        }
     }
 
     /// Lets calls refer to optimised functions, made for the arguments that are constants.

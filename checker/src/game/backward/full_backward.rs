@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch, states_between_looks};
 
-use super::solver::{Answer, LOOK_EVERY, MOST_TASKS, Solver, Win};
+use super::solver::{Answer, Extent, LOOK_EVERY, MOST_TASKS, Solver, Win};
 use crate::game::forward::graph::{Graph, NONE};
 
 /// Batches of nodes between two looks at the limits.
@@ -73,6 +73,9 @@ impl Solver<'_, '_, '_> {
     /// # Errors
     /// The model fails in one of their states.
     pub fn solve_backward(&mut self, watch: &mut dyn Watch) -> Result<Answer, Failure> {
+        if !self.graph.symbolic.tuning().full_backward {
+            return self.solve(Extent::Everything, watch);
+        }
         if let Some(reason) = self.explore(watch)? {
             return Ok(Answer::Stopped(reason));
         }

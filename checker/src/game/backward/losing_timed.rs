@@ -78,7 +78,7 @@ impl Solver<'_, '_, '_> {
         if self.defences.uses_weak || !self.defences.is_pressed() {
             return Ok(Outlook::Settled);
         }
-        if self.graph.explored >= self.schedule.next {
+        if self.graph.symbolic.tuning().losing_timed && self.graph.explored >= self.schedule.next {
             return self.look_ahead(watch);
         }
         self.use_weak_moves();
@@ -88,10 +88,11 @@ impl Solver<'_, '_, '_> {
     /// Whether it is time to compute the prospects although nodes in play wait to be explored.
     pub(super) fn is_prospect_due(&self) -> bool {
         let explored = self.graph.explored;
-        let is_of_use = match self.seeker {
-            Player::Environment => self.defences.uses_weak,
-            Player::Controller => explored <= MOST_STATES_OF_A_GOAL,
-        };
+        let is_of_use = self.graph.symbolic.tuning().losing_timed
+            && match self.seeker {
+                Player::Environment => self.defences.uses_weak,
+                Player::Controller => explored <= MOST_STATES_OF_A_GOAL,
+            };
         is_of_use && explored >= self.schedule.next
     }
 

@@ -69,7 +69,9 @@ impl Solver<'_, '_, '_> {
     /// Looks whether a node is a case, and one that was met before.
     pub(super) fn case_of(&mut self, node: u32) -> Result<Case, Failure> {
         let repeats = &self.repeats;
-        if repeats.lookups >= TRIAL && repeats.hits < repeats.lookups / WORTH || !self.is_case(node)
+        if !self.graph.symbolic.tuning().result_cache
+            || repeats.lookups >= TRIAL && repeats.hits < repeats.lookups / WORTH
+            || !self.is_case(node)
         {
             return Ok(Case::None);
         }

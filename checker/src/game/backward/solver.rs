@@ -278,7 +278,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             let is_dry = self.frontier.len() == 0;
             let is_computed = is_dry || explored >= self.next_computation;
             let reason = if is_computed {
-                self.next_computation = explored + explored / BETWEEN_COMPUTATIONS;
+                self.next_computation = if self.graph.symbolic.tuning().delayed_zones {
+                    explored + explored / BETWEEN_COMPUTATIONS
+                } else {
+                    explored
+                };
                 self.propagate(watch)?
             } else {
                 self.propagate_words(watch)
@@ -299,7 +303,8 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                     }
                 }
                 if explored >= next_hope && extent == Extent::Verdict {
-                    if !self.has_hope() {
+                    let is_looked_at = self.graph.symbolic.tuning().losing_untimed;
+                    if is_looked_at && !self.has_hope() {
                         break;
                     }
                     next_hope = if has_reserve {

@@ -131,6 +131,7 @@ impl Solver<'_, '_, '_> {
         let mut own = self.graph.edges[edges.clone()].iter();
         if self.seeker == Player::Controller
             || !self.frontier.reserve.is_kept
+            || !self.graph.symbolic.tuning().lazy_safety
             || !self.graph.nodes[node as usize].delays
             || self.graph.urgent(node).is_some()
             || !self.graph.chances.of(node).is_empty()

@@ -54,7 +54,8 @@ impl Reserve {
 impl Solver<'_, '_, '_> {
     /// Whether moves of the evader from a node that was just expanded are kept in reserve.
     pub(super) fn begin_reserve(&mut self, node: u32) -> bool {
-        let is_kept = self.frontier.reserve.is_kept
+        let is_kept = self.graph.symbolic.tuning().lazy_zero_time
+            && self.frontier.reserve.is_kept
             && self.graph.chances.of(node).is_empty()
             && !self.graph.nodes[node as usize].delays
             && self.chosen(node).is_some();

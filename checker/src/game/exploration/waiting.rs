@@ -103,7 +103,8 @@ impl Random {
 impl Solver<'_, '_, '_> {
     /// The node to be expanded next; some are expanded already.
     pub(in crate::game) fn next_waiting(&mut self) -> Option<u32> {
-        let node = if self.frontier.is_over {
+        let tuning = self.graph.symbolic.tuning();
+        let node = if self.frontier.is_over && (tuning.dives || tuning.spoilers) {
             self.next_start()
         } else {
             self.frontier.waiting.pop()
@@ -115,14 +116,16 @@ impl Solver<'_, '_, '_> {
     }
 
     fn next_start(&mut self) -> Option<u32> {
+        let tuning = self.graph.symbolic.tuning();
         self.frontier.starts += 1;
-        if self.frontier.starts.is_multiple_of(STARTS_FROM_OLDEST)
+        if tuning.dives
+            && self.frontier.starts.is_multiple_of(STARTS_FROM_OLDEST)
             && let Some(node) = self.oldest_waiting()
         {
             return Some(node);
         }
         while let Some(node) = self.frontier.spoilers.pop() {
-            if !self.graph.nodes[node as usize].is_expanded {
+            if tuning.spoilers && !self.graph.nodes[node as usize].is_expanded {
                 return Some(node);
             }
         }
@@ -131,6 +134,9 @@ impl Solver<'_, '_, '_> {
         } = &mut self.frontier;
         if waiting.is_empty() {
             return None;
+        }
+        if !tuning.dives {
+            return waiting.pop();
         }
         let index = random.below(waiting.len());
         Some(waiting.swap_remove(index))
@@ -153,10 +159,15 @@ impl Solver<'_, '_, '_> {
         self.adopt_new_nodes();
         let waiting = self.frontier.len();
         let edges = self.graph.edges_of(node);
-        let first = edges.start + self.frontier.random.below(edges.len().max(1));
+        let has_dives = self.graph.symbolic.tuning().dives;
+        let first = if has_dives {
+            edges.start + self.frontier.random.below(edges.len().max(1))
+        } else {
+            edges.start
+        };
         let has_reserve = self.begin_reserve(node);
         let is_held = !has_reserve && self.hold_back(node)?;
-        let turns: &[Option<bool>] = if self.frontier.is_impartial {
+        let turns: &[Option<bool>] = if self.frontier.is_impartial || !has_dives {
             &[None]
         } else {
             &[Some(false), Some(true)]
@@ -222,7 +233,7 @@ impl Solver<'_, '_, '_> {
     /// Whether the winning valuations of some predecessor with hope may still grow by those of the
     /// node.
     pub(in crate::game) fn is_relevant(&self, node: u32) -> bool {
-        if node == 0 {
+        if node == 0 || !self.graph.symbolic.tuning().relevance {
             return true;
         }
         let mut edge = self.graph.nodes[node as usize].first_in;

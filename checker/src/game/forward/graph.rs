@@ -240,6 +240,8 @@ impl<'s, 'a> Graph<'s, 'a> {
         let network = symbolic.stepper.network();
         let deadline = objective.deadline;
         let latest = deadline.map(|deadline| deadline.until(deadline.limit));
+        let tuning = symbolic.tuning();
+        let has_trails = tuning.chains && tuning.chain_cache && symbolic.is_fixed();
         Ok(Graph {
             latest: latest.transpose()?,
             store: StateStore::new(network),
@@ -262,15 +264,19 @@ impl<'s, 'a> Graph<'s, 'a> {
             effect: ClockEffect::default(),
             entries: Vec::new(),
             chains_delays: objective.must_progress && !network.features.stopwatches,
-            trails: Trails::new(symbolic.is_fixed(), &objective),
+            trails: Trails::new(has_trails, &objective),
             chances: Chances::new(network),
             has_discrete_nodes: false,
-            dead_ends: if objective.leaves_dead_ends {
+            dead_ends: if objective.leaves_dead_ends && symbolic.tuning().dead_ends {
                 DeadEnds::new(network, &objective)
             } else {
                 DeadEnds::default()
             },
-            longest_chain: LONGEST_CHAIN,
+            longest_chain: if symbolic.tuning().chains {
+                LONGEST_CHAIN
+            } else {
+                1
+            },
             objective,
             symbolic,
         })

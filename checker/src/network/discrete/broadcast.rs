@@ -114,7 +114,7 @@ impl Stepper<'_> {
         out: &mut Moves,
     ) -> Result<(), Failure> {
         // Whoever records wants to see all that is evaluated.
-        let is_shared = self.record.is_none();
+        let is_shared = self.record.is_none() && self.tuning.broadcast_receivers;
         if is_shared && self.has_audience(channel) {
             return self.broadcast_again(sender, needs_committed, words, scope, out);
         }
@@ -200,7 +200,8 @@ impl Stepper<'_> {
         if rank_after > MOST_RANKS {
             return Err(Failure::Moves(MOST_RANKS as usize));
         }
-        if combinations <= FEW_COMBINATIONS {
+        let is_cut = self.tuning.broadcast_filter || !matches!(scope, Scope::Within(_));
+        if combinations <= FEW_COMBINATIONS || !is_cut {
             return Ok((rank_after, Scope::Everything));
         }
         Ok((rank_after, scope))

@@ -71,7 +71,7 @@ impl<'a> Stepper<'a> {
         words: &mut [i32],
     ) -> Option<SetId> {
         // Whoever records wants to see all that is evaluated.
-        if self.record.is_some() {
+        if self.record.is_some() || !self.tuning.select_cache {
             return None;
         }
         match self.instances.find(process, entry.index, self.round, words) {
@@ -207,7 +207,7 @@ impl<'a> Stepper<'a> {
         needs_committed: bool,
         words: &mut [i32],
     ) -> bool {
-        let Some(sync) = entry.edge.sync else {
+        let Some(sync) = entry.edge.sync.filter(|_| self.tuning.pairing) else {
             return false;
         };
         let count = self.instances.set(set).instances.len();

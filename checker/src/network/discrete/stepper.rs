@@ -28,10 +28,13 @@ use super::selects::select_values;
 use super::transition::{MoveRef, Moves, OfferId, Part};
 use super::transition_cache::{Next, Offers, Record, VectorId};
 use crate::network::failure::Failure;
+use crate::tuning::Tuning;
 
 /// Computes moves and their effects. Holds the buffers, so one per thread.
 pub struct Stepper<'a> {
     pub(super) network: &'a Network,
+    /// Which heuristics are used, here and by all that works with these moves.
+    pub(crate) tuning: Tuning,
     pub(super) executor: &'a dyn Executor,
     pub(super) tables: Vec<Vec<LocationTable<'a>>>,
     /// By channel: the processes that may receive on it.
@@ -84,6 +87,11 @@ enum Found {
 impl<'a> Stepper<'a> {
     /// A stepper for a network, running its code by `executor`.
     pub fn new(network: &'a Network, executor: &'a dyn Executor) -> Stepper<'a> {
+        Stepper::tuned(network, executor, Tuning::default())
+    }
+
+    /// The same, with these heuristics only.
+    pub fn tuned(network: &'a Network, executor: &'a dyn Executor, tuning: Tuning) -> Stepper<'a> {
         let tables = network.processes.iter().map(|process| {
             let locations = process.locations.iter();
             locations
@@ -92,6 +100,7 @@ impl<'a> Stepper<'a> {
         });
         let receivers = receivers(network);
         Stepper {
+            tuning,
             instances: Instances::new(network),
             partners: partners(network, &receivers),
             pairs: Vec::new(),
@@ -128,7 +137,7 @@ impl<'a> Stepper<'a> {
     /// One for another thread.
     #[must_use]
     pub fn another(&self) -> Stepper<'a> {
-        Stepper::new(self.network, self.executor)
+        Stepper::tuned(self.network, self.executor, self.tuning)
     }
 
     /// The network.
@@ -191,7 +200,7 @@ impl<'a> Stepper<'a> {
 
     /// All moves of the state, as far as the words decide, into `out`.
     pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
-        if let Some(vector) = self.offers.vector(words)
+        if let Some(vector) = self.vector(words)
             && let Some(offer) = self.offer(vector, words)?
         {
             out.copy_from(self.offers.moves(offer));
@@ -203,6 +212,9 @@ impl<'a> Stepper<'a> {
     /// The location vector of the state, if it is known; it is after the first time that it was
     /// asked for.
     pub fn vector(&mut self, words: &[i32]) -> Option<VectorId> {
+        if !self.tuning.transition_cache {
+            return None;
+        }
         self.offers.vector(words)
     }
 
@@ -214,7 +226,8 @@ impl<'a> Stepper<'a> {
         scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
-        if self.offers.is_worth_asking()
+        if self.tuning.transition_cache
+            && self.offers.is_worth_asking()
             && let Some(vector) = self.offers.vector(words)
         {
             match self.known_offer(vector, words)? {

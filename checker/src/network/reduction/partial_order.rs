@@ -7,6 +7,7 @@ use crate::analysis::dependence::greatest_values;
 use crate::analysis::visibility::Watched;
 use crate::analysis::zero_time_cycles::recurrent_edges;
 use crate::ir::{Network, Predicate, Urgency};
+use crate::tuning::Tuning;
 
 use super::time_stoppers::Holders;
 
@@ -27,13 +28,13 @@ pub struct PartialOrder {
 impl PartialOrder {
     /// What a search for a state with the predicate may reduce by; `None` if nothing can be gained,
     /// or that is not known to be sound.
-    pub fn new(network: &Network, goal: &Predicate) -> Option<Arc<PartialOrder>> {
+    pub fn new(network: &Network, goal: &Predicate, tuning: Tuning) -> Option<Arc<PartialOrder>> {
         let locations: usize = network
             .processes
             .iter()
             .map(|process| process.locations.len())
             .sum();
-        let holders = Holders::new(network);
+        let holders = Holders::new(network, tuning);
         let may_commit = network.processes.iter().filter(|process| {
             let mut locations = process.locations.iter();
             locations.any(|location| location.urgency == Urgency::Committed)
@@ -52,7 +53,12 @@ impl PartialOrder {
         let greatest = greatest_values(network);
         Some(Arc::new(PartialOrder {
             watched,
-            recurrent: recurrent_edges(network, &greatest),
+            recurrent: if tuning.zero_time_cycles {
+                recurrent_edges(network, &greatest)
+            } else {
+                let processes = network.processes.iter();
+                processes.map(|one| vec![true; one.edges.len()]).collect()
+            },
             greatest,
             holders,
         }))

@@ -14,6 +14,7 @@
 //! Where the rate of a clock may be 0, bounds of invariants do not count.
 
 use crate::ir::{Location, Network, Urgency};
+use crate::tuning::Tuning;
 use crate::zones::{Bound, Zone};
 
 use crate::analysis::dependence::Still;
@@ -39,7 +40,7 @@ pub(super) struct Holders {
 }
 
 impl Holders {
-    pub(super) fn new(network: &Network) -> Holders {
+    pub(super) fn new(network: &Network, tuning: Tuning) -> Holders {
         let processes = || network.processes.iter();
         let has_rates = processes().any(|process| {
             let mut locations = process.locations.iter();
@@ -49,7 +50,7 @@ impl Holders {
             locations
                 .iter()
                 .map(|location| {
-                    if has_rates {
+                    if has_rates || !tuning.time_stoppers {
                         Vec::new()
                     } else {
                         limits(location)
@@ -64,7 +65,8 @@ impl Holders {
             limits: processes()
                 .map(|process| of_process(&process.locations))
                 .collect(),
-            has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
+            has_urgent_channels: tuning.time_stoppers
+                && network.channels.iter().any(|channel| channel.urgent),
         }
     }
 

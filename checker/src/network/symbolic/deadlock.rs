@@ -92,7 +92,8 @@ impl Symbolic<'_> {
             Barriers::none(self.dimension())
         };
         self.moves_within(words, zone, &mut lookout.moves)?;
-        if barriers.is_empty() && stopped.is_empty() {
+        let is_witness_of_use = self.tuning().deadlock_witness;
+        if is_witness_of_use && barriers.is_empty() && stopped.is_empty() {
             // Moves without guards are the likeliest to be within reach.
             for is_first in [true, false] {
                 if self.is_one_within_reach(words, zone, may_delay, is_first, lookout)? {

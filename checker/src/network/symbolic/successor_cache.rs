@@ -278,7 +278,8 @@ impl<'a> Symbolic<'a> {
     /// The number of the zone of a state that is explored; `None` where looking up moves by it is
     /// impossible or does not pay.
     pub fn know(&mut self, zone: &[Bound]) -> Option<KnownZone> {
-        if !self.memo.is_possible || self.has_barriers() || self.splits() {
+        let is_used = self.tuning().successor_cache && self.memo.is_possible;
+        if !is_used || self.has_barriers() || self.splits() {
             return None;
         }
         self.memo.know(zone)
@@ -378,7 +379,8 @@ impl<'a> Symbolic<'a> {
         if self.memo.fixed.contains_key(&offered) {
             return;
         }
-        let is_fixed = self.is_fixed() && self.bounds.follow_locations();
+        let is_fixed =
+            self.tuning().constant_effect && self.is_fixed() && self.bounds.follow_locations();
         let fixed = self.fix(one, words).filter(|_| is_fixed);
         let fixed = fixed.map(|one| FixedEffect { one, effect });
         self.memo.fixed.insert(offered, fixed);

@@ -28,6 +28,7 @@ use crate::analysis::clock_bounds::ClockBounds;
 use crate::analysis::clock_differences::greatest_reset;
 use crate::network::discrete::broadcast_filter::Scope;
 use crate::network::{Failure, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, Symmetry};
+use crate::tuning::Tuning;
 
 /// What it takes to take a move, beside its zones: see [`cancellation::work`].
 const UNITS_FOR_MOVE: usize = 512;
@@ -109,6 +110,11 @@ impl<'a> Symbolic<'a> {
             ..Symbolic::new(self.stepper.another(), self.bounds.clone())
         }
         .remembering(self.memo.limits)
+    }
+
+    /// Which heuristics are used.
+    pub fn tuning(&self) -> Tuning {
+        self.stepper.tuning
     }
 
     /// Takes over what is known of the zones that another thread has made.
@@ -484,7 +490,7 @@ impl<'a> Symbolic<'a> {
 
     /// Whether [`Symbolic::to_stored`] makes anything else of extrapolated zones.
     pub fn stores_reduced(&self) -> bool {
-        self.dimension > 1 && self.bounds.compares_by_simulation()
+        self.dimension > 1 && self.tuning().simulation && self.bounds.compares_by_simulation()
     }
 
     /// Replaces the zone of a state, extrapolated or not, by its reduced form (see [`simulation`]),

@@ -110,6 +110,7 @@ struct Frame {
 pub(super) struct Explorer {
     /// The committed states that were explored last.
     recent: RecentStates,
+    keeps_recent: bool,
     frames: Vec<Frame>,
     /// The frame at hand.
     depth: usize,
@@ -141,6 +142,7 @@ impl Explorer {
             stubborn: order.map(|order| StubbornSets::new(network, order)),
             leads_on: false,
             recent: RecentStates::new(),
+            keeps_recent: symbolic.tuning().recent_states,
             frames: Vec::new(),
             depth: 0,
             way: Vec::new(),
@@ -460,7 +462,7 @@ impl Explorer {
     /// Goes down to a committed state, unless it was explored lately.
     fn descend<S: Sink>(&mut self, sink: &mut S, words: &[i32], zone: &[Bound]) -> Taken {
         let stored = sink.stored();
-        if self.recent.enter(sink.pack(words), zone, stored) {
+        if self.keeps_recent && self.recent.enter(sink.pack(words), zone, stored) {
             self.leads_on = false;
             self.way.pop();
             return Taken::Nothing;

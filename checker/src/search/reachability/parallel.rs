@@ -136,8 +136,7 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         index: usize,
         count: usize,
     ) -> Worker<'s, 'a, G> {
-        let network = symbolic.stepper.network();
-        let tree = Tree::new(network, symbolic.dimension(), symbolic.greatest_constant());
+        let tree = Tree::new(symbolic);
         Worker {
             explorer: Explorer::new(symbolic, goal),
             shard: Shard::new(tree, index, count),

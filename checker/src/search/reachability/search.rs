@@ -108,11 +108,10 @@ impl<'s, 'a> Search<'s, 'a> {
         order: Order,
         watch: &'s mut dyn Watch,
     ) -> Search<'s, 'a> {
-        let network = symbolic.stepper.network();
         Search {
             explorer: Explorer::new(symbolic, goal),
             store: Store {
-                tree: Tree::new(network, symbolic.dimension(), symbolic.greatest_constant()),
+                tree: Tree::new(symbolic),
                 waiting: VecDeque::new(),
                 current: Origin::NOWHERE,
             },

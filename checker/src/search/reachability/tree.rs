@@ -7,7 +7,7 @@
 //! Cost: eight bytes a state; the moves of a way of more than one take four bytes each and four
 //! more.
 
-use crate::ir::Network;
+use crate::network::Symbolic;
 
 use crate::search::outcome::Step;
 use crate::search::store::packed_paths;
@@ -63,9 +63,9 @@ pub(super) struct Tree {
 
 impl Tree {
     /// An empty tree; see [`PassedList::new`].
-    pub(super) fn new(network: &Network, dimension: usize, greatest: i32) -> Tree {
+    pub(super) fn new(symbolic: &Symbolic<'_>) -> Tree {
         Tree {
-            passed: PassedList::new(network, dimension, greatest),
+            passed: PassedList::new(symbolic),
             nodes: Vec::new(),
             paths: Vec::new(),
         }

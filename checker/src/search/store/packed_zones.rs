@@ -11,6 +11,7 @@
 //! Cost: packing and comparing touch each bound once, a vector of them at a time.
 
 use crate::network::KeptZone;
+use crate::tuning::Tuning;
 use crate::zones::simulation::{self, NO_DEMAND};
 use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, dbm};
@@ -201,6 +202,7 @@ impl Known {
 #[derive(Debug)]
 pub(super) struct PackedZones {
     dimension: usize,
+    tuning: Tuning,
     signatures: Signatures,
     width: Width,
     matrices: Matrices,
@@ -225,6 +227,7 @@ impl PackedZones {
     pub(super) fn new(dimension: usize, greatest: i32) -> PackedZones {
         PackedZones {
             dimension,
+            tuning: Tuning::default(),
             signatures: Signatures::new(dimension, greatest),
             width: Width::One,
             matrices: Matrices::new(dimension * dimension),
@@ -239,13 +242,24 @@ impl PackedZones {
         }
     }
 
+    /// The same, with these heuristics only; before the first zone.
+    pub(super) fn tuned(mut self, tuning: Tuning) -> PackedZones {
+        self.tuning = tuning;
+        if !tuning.narrow_zones {
+            self.widen();
+            self.widen();
+        }
+        self
+    }
+
     fn get(&self, id: u32) -> &[u8] {
         self.matrices.get(id)
     }
 
     /// Makes a zone the candidate, which the following questions are about; returns its signature.
     pub(super) fn propose(&mut self, zone: Kept<'_>) -> Signature {
-        if let Some(known) = zone.known
+        if self.tuning.kept_signatures
+            && let Some(known) = zone.known
             && let Some(signature) = self.known.copy_into(known, &mut self.candidate)
         {
             return signature;
@@ -255,7 +269,9 @@ impl PackedZones {
         }
         let dimension = self.dimension;
         let size = dimension * dimension;
-        let signature = if self.width == Width::One && self.signatures.are_narrow() {
+        let signature = if !self.tuning.signatures {
+            Signature::of([0; 8])
+        } else if self.width == Width::One && self.signatures.are_narrow() {
             self.narrow.resize(size, 0);
             widen_narrow(&self.candidate, zone.limits, dimension, &mut self.narrow);
             self.signatures.of_narrow(&self.narrow)
@@ -266,7 +282,9 @@ impl PackedZones {
             simulation::demands(zone.matrix, dimension, zone.limits, &mut self.demands);
             self.signatures.of(&self.demands)
         };
-        if let Some(known) = zone.known {
+        if self.tuning.kept_signatures
+            && let Some(known) = zone.known
+        {
             self.known.add(known, &self.candidate, signature);
         }
         signature

@@ -12,7 +12,7 @@
 //! Cost: one look-up of the words, one or two comparisons of zones for each zone stored with the
 //! same words, and a look-up of the zone if it is to be stored.
 
-use crate::ir::Network;
+use crate::network::Symbolic;
 use crate::zones::Bound;
 use crate::zones::zone_table::ZoneId;
 
@@ -45,13 +45,14 @@ pub(in crate::search) struct PassedList {
 }
 
 impl PassedList {
-    /// An empty list for the states of a network, with zones of this dimension, most of whose
-    /// constants are at most `greatest`.
-    pub(in crate::search) fn new(network: &Network, dimension: usize, greatest: i32) -> PassedList {
+    /// An empty list for the states of a network.
+    pub(in crate::search) fn new(symbolic: &Symbolic<'_>) -> PassedList {
+        let (dimension, tuning) = (symbolic.dimension(), symbolic.tuning());
+        let zones = PackedZones::new(dimension, symbolic.greatest_constant());
         PassedList {
-            store: StateStore::new(network),
-            zones: PackedZones::new(dimension, greatest),
-            lists: Lists::default(),
+            store: StateStore::new(symbolic.stepper.network()),
+            zones: zones.tuned(tuning),
+            lists: Lists::new(tuning.split_lists),
             covered: Vec::new(),
             nodes: 0,
             covered_count: 0,

@@ -62,6 +62,7 @@ pub(super) struct Lists {
     /// By discrete state: its entries.
     by_discrete: Vec<List>,
     splits: Vec<Split>,
+    may_split: bool,
     /// The parts of all splits.
     parts: usize,
     /// By exponent of their size: the places that are not in use.
@@ -69,6 +70,14 @@ pub(super) struct Lists {
 }
 
 impl Lists {
+    /// No lists. `may_split`: whether long ones are to be taken apart.
+    pub(super) fn new(may_split: bool) -> Lists {
+        Lists {
+            may_split,
+            ..Lists::default()
+        }
+    }
+
     /// The bytes that they take.
     pub(super) fn bytes(&self) -> usize {
         let free = self.free.iter().map(|places| size_of_val(&**places));
@@ -167,7 +176,11 @@ impl Lists {
             let list = self.list(at);
             if list.len == SPLIT {
                 at = self.part_for(list.first, entry.signature);
-            } else if list.len >= LONG && list.len.is_power_of_two() && self.split(at) {
+            } else if self.may_split
+                && list.len >= LONG
+                && list.len.is_power_of_two()
+                && self.split(at)
+            {
                 // Now it has parts.
             } else {
                 return self.push_at(at, entry);
@@ -318,7 +331,7 @@ mod tests {
     /// Lists and vectors of the same entries are asked and changed in the same ways.
     fn check(spread: u64, count: u32) {
         let mut numbers = Numbers(u64::from(count) + spread);
-        let mut lists = Lists::default();
+        let mut lists = Lists::new(true);
         let mut vectors: [Vec<Entry>; 2] = Default::default();
         lists.open();
         lists.open();
