@@ -89,7 +89,7 @@ def require_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str,
 
     Args:
         outputs: The files that are written, by the option that names them; ``-`` is not a file.
-        inputs: The files that are read, by what they hold.
+        inputs: The files that are read, by what they contain.
 
     Raises:
         InputError: Two of them are the same plain file.

@@ -40,7 +40,7 @@ def load(
 
     Args:
         source: A path to a file (UPPAAL XML or XTA, or an environment ``.nsl``), or the text of a
-            UPPAAL model. A string is a text if it holds a line break, a ``;`` or a ``<``.
+            UPPAAL model. A string is a text if it has a line break, a ``;`` or a ``<``.
         include: Folders below which an environment may include files, besides its own folder.
         overflow: What happens if a result of integer arithmetic does not fit into 32 bits; see
             `Model.overflow`.

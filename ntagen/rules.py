@@ -127,7 +127,7 @@ def roll_count(count: int) -> Breach | None:
 
 
 def resolution(per_mm: float) -> Breach | None:
-    """The fixed-point scale is a whole number that the model can hold."""
+    """The fixed-point scale is a whole number that fits into the model."""
     whole = max(1, round(per_mm))
     if per_mm < 1.0 - WHOLE_TOLERANCE or abs(per_mm - whole) > WHOLE_TOLERANCE * whole:
         return Breach(

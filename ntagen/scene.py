@@ -11,7 +11,7 @@ Conventions (paper, section 2 and appendix; the code of the appendix wins over i
 * Heading and bevel are unit vectors at right angles. The third axis is ``bevel x heading``
   (`TIP_Y`).
 * `Scene.axis` is the direction in which insertion makes progress: the heading written in the file.
-  It stays the same when the tip's pose is measured anew. The model calls this direction -y.
+  It stays the same when the tip's pose is measured again. The model calls this direction -y.
 
 Each value is checked by the rules of `ntagen.rules` when it is made; a wrong one raises
 `InputError`.
@@ -216,7 +216,7 @@ class Scene:
         return self.targets + self.criticals + self.detections
 
     def with_needle(self, tip: Pose, radius_mm: float, inserted_mm: float = 0.0) -> Scene:
-        """The same scene with the tip's pose and the motion circle's radius measured anew.
+        """The same scene with a new measurement of the tip's pose and the motion circle's radius.
 
         Args:
             tip: The tip's pose.

@@ -40,7 +40,7 @@ class EnginePlan:
 
 @dataclass(frozen=True, slots=True)
 class EdgeEntry:
-    """An edge as it stands in the model."""
+    """An edge of the model."""
 
     process: str
     source: str

@@ -132,7 +132,7 @@ class Query:
 
     Attributes:
         text: Its formula.
-        comment: The comment beside it.
+        comment: The comment of the query.
         expect: The verdict that the file states, the number that ``sup`` or ``inf`` should give, or
             ``None``.
     """

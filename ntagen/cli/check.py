@@ -95,7 +95,7 @@ class _Asked:
     name: str | None
     text: str
     folder: Path | None = None
-    """Where files that the query names lie; ``None`` is beside the model."""
+    """The folder of files that the query names; ``None`` is that of the model."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -296,7 +296,7 @@ class _Session:
     def _end(self, why: str, winner: str) -> None:
         reason = {
             "goal": "The goal holds",
-            "broken": "What the controller must keep does not hold any more",
+            "broken": "The condition that the controller must keep does not hold any more",
             "stopped": "Time cannot pass, and nobody moves",
             "endless": "Time passes for ever, and nobody moves",
         }[why]
@@ -356,7 +356,7 @@ class _Session:
             return f"{when} the strategy has no next move: {then.why}"
         outcome = {
             "goal": f"{when} the goal holds, and the {then.winner} wins",
-            "broken": f"{when} what must be kept does not hold, and the {then.winner} wins",
+            "broken": f"{when} the condition to keep does not hold, and the {then.winner} wins",
             "stopped": f"{when} time cannot pass; if nobody moves the {then.winner} wins",
             "endless": f"if nobody ever moves the {then.winner} wins",
         }[then.why]

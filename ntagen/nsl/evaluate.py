@@ -225,7 +225,7 @@ class Evaluator:
             return home.values[name]
         hint = did_you_mean(name, [*scope.names(), *CONSTANTS])
         if is_unit(name) or name in ALIASES:
-            hint = f"the unit is written behind a number: `1 {ALIASES.get(name, name)}`"
+            hint = f"write a unit after a number: `1 {ALIASES.get(name, name)}`"
         elif name in FUNCTIONS:
             hint = f"a function has its argument in parentheses: `{name}(…)`"
         self._report(
@@ -307,7 +307,7 @@ class Evaluator:
                     "dimensions-differ",
                     component.span,
                     f"the first component is {known[0].dimension}, but this is {value.dimension}",
-                    hint="give each component its unit, or write one behind the parentheses",
+                    hint="give each component its unit, or write one after the parentheses",
                 )
                 return None
         return Quantity(tuple(value.number for value in known), known[0].dimension)

@@ -294,7 +294,7 @@ def _runs(lines: Sequence[_Line], is_member: Callable[[_Line], bool]) -> Iterato
 
 
 def _bodies(lines: Sequence[_Line]) -> Iterator[str]:
-    """Lines without their comments; the clauses of several regions stand in columns."""
+    """Lines without their comments; the clauses of several regions are aligned in columns."""
     aligned = [line for line in lines if line.is_region and line.is_single]
     columns = zip_longest(*(line.cells[:-1] for line in aligned), fillvalue="")
     widths = [max(map(len, column)) for column in columns]

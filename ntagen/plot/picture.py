@@ -179,7 +179,7 @@ def _face(region: Region, picture: Picture) -> dict[str, Any]:
         label += " (learned)"
         style |= {"hatch": "//////" if region.kind == "critical" else None, "linewidth": 0.9}
     elif region.name in picture.unknown:
-        label += " (not told)"
+        label += " (not known)"
         style |= {"linestyle": ":"}
     return style | {"label": label}
 

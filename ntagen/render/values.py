@@ -37,7 +37,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Spheres:
-    """The regions of one kind. Without any, `centers` and `radii` hold one row of zeros."""
+    """The regions of one kind. If there are none, `centers` and `radii` have one row of zeros."""
 
     count: int
     centers: tuple[Row, ...]

@@ -361,7 +361,7 @@ def _with_places(diagram: Diagram, boxes: list[_Box], chains: dict[int, list[int
 
 
 def _routed(edge: Edge, chain: list[int], boxes: list[_Box], *, upwards: bool) -> Edge:
-    """The edge through its places, and its labels beside the one that was made for them."""
+    """The edge through its places, with its labels at the place that was made for them."""
     nails: list[Point] = []
     for box in chain:
         # Along its labels the line is upright, so that it does not run through them.
