@@ -351,7 +351,7 @@ class _Session:
             waits = "" if then.delay == 0 else "waits, and "
             return f"the {owner} {waits}{when} takes {_move(then.edges)}"
         if then.kind == "must":
-            return f"the {owner} waits; time cannot pass any more, and you must move"
+            return f"the {owner} waits; you must move before time stops"
         if then.kind == "fails":
             return f"{when} the strategy has no next move: {then.why}"
         outcome = {
@@ -457,7 +457,7 @@ class _Session:
             only = situation.replies[0]
             self._make(situation, only, only.windows[-1].soon())
         elif then.kind == "must":
-            raise InputError("time cannot pass any more, and you must move")
+            raise InputError("you must move before time stops: choose one of your moves")
         else:
             self._pass(then.delay or Fraction(0))
             if then.kind == "fails":

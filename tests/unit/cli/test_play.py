@@ -110,7 +110,7 @@ def test_enter_makes_the_only_move_that_must_be_made(tmp_path: Path, player: Pla
         "system P;"
     )
     out = player(model, "--query", "control: A<> P.G", lines="w 3\n\n")
-    assert "the controller waits; time cannot pass any more, and you must move" in out
+    assert "the controller waits; you must move before time stops" in out
     assert "  · you take P.I -> G" in out
     assert "The goal holds: the controller has won after 3; the strategy has won." in out
 
