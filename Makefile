@@ -1,5 +1,5 @@
-# The house of ntagen. Needs Python 3.11 or newer and a C tool chain; cargo is fetched if there is none.
-# Nothing has to be activated: everything runs in .venv, which is made on first use and kept up to date.
+# How to build, test and measure ntagen. It needs Python 3.11 or newer and a C tool chain; if there is no cargo, it is
+# downloaded. You need not activate anything: everything runs in .venv, which is made on first use and kept up to date.
 
 SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
@@ -8,13 +8,13 @@ SHELL := bash
 PYTHON ?= $(firstword $(foreach name,python3 python3.14 python3.13 python3.12 python3.11,\
 	$(shell $(name) -c 'import sys; sys.version_info >= (3, 11) and print("$(name)")' 2>/dev/null)) python3)
 BIN := .venv/bin
-# What the shell must know to find cargo: nothing, or where the fetched tool chain lies.
+# A shell script that finds cargo: empty, or with the path of the downloaded tool chain.
 RUST := .venv/rust.sh
-# Which packages development needs, with versions and hashes; users may have any that pyproject.toml allows.
+# The packages for development, with versions and hashes; users can have all versions that pyproject.toml allows.
 LOCK := requirements-dev.lock
 PACKAGES := .venv/packages
 INSTALLED := .venv/installed
-# What the installed engine is built from. Python files and templates are used in place.
+# The sources of the installed engine. Python files and templates are used in place.
 ENGINE := pyproject.toml checker/Cargo.toml checker/Cargo.lock $(shell find checker/src checker/pages -name '*.rs' -o -name '*.md')
 
 .PHONY: help
@@ -32,8 +32,8 @@ demo: $(INSTALLED) ## Run the main job on the paper's environment; results in de
 	$(BIN)/ntagen plot examples/paper.nsl -o demo/scene.png --plans 10
 	$(BIN)/ntagen drive examples/paper.nsl --log demo/run.mcap
 	@printf '%s\n' '' \
-	  'What happened: the environment became a UPPAAL model; both queries of the paper were checked on it;' \
-	  'all plans were ranked; a virtual needle was steered to the target by measuring and planning anew.' \
+	  'What happened: the environment was turned into a UPPAAL model. Both queries of the paper were checked on it.' \
+	  'All plans were ranked. A virtual needle was steered to the target, with measuring and planning in turns.' \
 	  'Where to look:' \
 	  '  demo/paper.xml   the model; UPPAAL opens it, with the queries in its verifier' \
 	  '  demo/plans.json  all plans with their clearance from the critical regions, best first' \
@@ -46,7 +46,7 @@ test: $(INSTALLED) ## Run all tests, Rust and Python
 	source $(RUST) && $(BIN)/python -m pytest
 
 .PHONY: quick
-quick: $(INSTALLED) ## Run the Python tests that take no more than a few seconds each
+quick: $(INSTALLED) ## Run the Python tests that take at most a few seconds each
 	$(BIN)/python -m pytest -m 'not slow'
 
 .PHONY: lint
@@ -59,19 +59,19 @@ lint: $(INSTALLED) ## Check formats, lints and types
 	source $(RUST) && cd checker && cargo clippy --locked --all-targets --features python --quiet -- -D warnings
 
 .PHONY: format
-format: $(INSTALLED) ## Format all sources and repair what the linter can
+format: $(INSTALLED) ## Format all sources, and fix what the linter can fix
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	source $(RUST) && cd checker && cargo fmt
 
 .PHONY: lock
-lock: | .venv ## Write requirements-dev.lock anew: the newest versions that pyproject.toml allows
+lock: | .venv ## Update requirements-dev.lock to the newest versions that pyproject.toml allows
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --upgrade --extra dev --generate-hashes \
 	  --no-annotate --no-emit-index-url --custom-compile-command 'make lock' --output-file $(LOCK) pyproject.toml
 
 .PHONY: picture
-picture: $(INSTALLED) ## Draw examples/scene.png, the picture of the README
+picture: $(INSTALLED) ## Draw examples/scene.png, the picture in the README
 	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10
 
 .PHONY: bench
@@ -93,12 +93,12 @@ bench-games: $(INSTALLED) ## Measure how far the solver of games gets: seven fam
 	$(BIN)/python tests/benchmarks/games.py
 
 .PHONY: clean
-clean: ## Remove all that was built, also .venv
+clean: ## Remove everything that was built, also .venv
 	rm -rf .venv build dist demo checker/target ntagen/_checker*.so
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find ntagen tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# The build takes maturin from .venv, and not the newest there is.
+# The build uses the maturin in .venv, not the newest version.
 $(INSTALLED): $(RUST) $(ENGINE) | $(PACKAGES)
 	source $(RUST) && PATH="$(CURDIR)/$(BIN):$$PATH" \
 	  $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
@@ -110,7 +110,7 @@ $(PACKAGES): $(LOCK) | .venv
 
 $(RUST): | $(PACKAGES)
 	@if ! command -v cargo >/dev/null; then \
-	  echo 'There is no cargo on the PATH: fetching a Rust tool chain into the cache.'; \
+	  echo 'There is no cargo on the PATH: downloading a Rust tool chain into the cache.'; \
 	  $(BIN)/python -m puccinialin --program ntagen --info-json .venv/rust.json >/dev/null; \
 	  $(BIN)/python -c 'import json, shlex; \
 	    [print(f"export {k}={shlex.quote(v)}") for k, v in json.load(open(".venv/rust.json"))["env"].items()]' > $@.part; \
