@@ -237,7 +237,7 @@ def _readable_kind(
             raise _too_large(path, limit_bytes)
         return "file"
     if stat.S_ISDIR(found.st_mode):
-        raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+        raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file", str(path))
     if stat.S_ISFIFO(found.st_mode):
         return "pipe"
     if os.isatty(descriptor):
@@ -298,7 +298,7 @@ def _target(path: Path) -> _Target:
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         return _Target(path, final, final.with_name(f".ntagen-{secrets.token_hex(8)}.part"), found)
     if stat.S_ISDIR(found.st_mode):
-        raise InputError(f"cannot write {path}: it is a folder")
+        raise InputError(f"cannot write {path}: it is a folder\nhint: add a file name to the path")
     return _Target(path, final, None, found)
 
 
@@ -410,5 +410,5 @@ def _naming(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise InputError(
-            f"cannot write {path}: {reason}\nhint: choose another place for it"
+            f"cannot write {path}: {reason}\nhint: choose another place for the file"
         ) from error

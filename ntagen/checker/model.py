@@ -216,65 +216,65 @@ class Model:
         Args:
             query: The query in UPPAAL's language.
             search: The order of the search; verdicts do not depend on it.
-            threads: How many threads share the search for a reachable state (``E<>``, ``A[]``) or
-                for values, breadth first, and compute what is won in games; ``"all"`` (or 0) is one
-                for each core. Other searches take one. With the same number everything is the same
-                again, counts and traces included; verdicts do not depend on the number, unless the
-                model has a run-time error, which may be met before or after what is looked for. In
-                games nothing depends on it.
+            threads: The number of threads; ``"all"`` (or 0) is one for each core. They share the
+                breadth-first search for a reachable state (``E<>``, ``A[]``) or for values, and the
+                computation of winning states in games; other searches use one thread. The same
+                number gives the same counts and traces. The verdict can depend on the number only
+                if the model has a run-time error, because the search may or may not meet it before
+                its goal. In games nothing depends on the number.
             seed: For ``search="random"``.
-            forced: When the environment must move because time cannot pass.
+            forced: When the environment must move at a moment at which time cannot pass: if the
+                process that stops time has no controllable move (``tiga``), if no process has one
+                (``product``), or always (``neutral``).
             priorities: Whether priorities of channels and processes count in games and under
                 strategies; in all other queries they do.
-            engine: What runs the code of the model; answers do not depend on it.
+            engine: How the code of the model runs; answers do not depend on it.
             states: The search stops after this many stored states.
-            memory_bytes: The search stops when its states take this much.
-            timeout_s: The search stops after this time.
+            memory_bytes: The search stops when its states take this many bytes.
+            timeout_s: The search stops after this time, in seconds.
             plans: Which winning sequences to list.
-            max_plans: At most this many plans are listed; a single one is found without looking
-                for the others.
-            strategy: Whether the strategy of the player who wins is wanted.
-            verify: Whether the strategy is to be checked against every move of the opponent.
+            max_plans: At most this many plans are listed; with 1 the search stops at the first.
+            strategy: Whether to make the strategy of the player who wins.
+            verify: Whether to check the strategy against every move of the opponent.
             trace: Whether witnesses and counterexamples get exact times, which an independent
                 replay checks. For ``sup``, ``inf`` and ``bounds`` this takes a second search.
-            wanted_trace: Whether traces are to have the fewest transitions (``shortest``; of a
-                run that never ends, those of its loop once), or to take the least time
-                (``fastest``; not of ``E[]``, ``A<>`` and ``-->``, whose runs do not end); either
-                takes a second search.
-            certificate: Whether the reached set is wanted if ``E<>`` is not satisfied or ``A[]``
-                is; it takes a second search, in which states that differ in ``meta`` variables
-                alone are not the same.
-            symmetry: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may take states
-                that differ only by exchanged members of scalar sets for one; verdicts, values
-                and traces do not depend on it, counts do.
-            partial_order: Whether ``E<>`` and ``A[]`` may leave out orders of independent moves
-                while time stands still; verdicts do not depend on it, counts do.
-            live_variables: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may take
-                states for one that differ only in variables whose values nothing reads before
-                they are written, and so may games if neither a strategy nor plans are wanted;
-                verdicts, values and traces do not depend on it, counts do.
+            wanted_trace: ``shortest``: traces have the fewest transitions; if a run never ends, its
+                loop counts once. ``fastest``: traces take the least time; not for ``E[]``, ``A<>``
+                and ``-->``, whose runs do not end. Both take a second search.
+            certificate: Whether to keep the set of reached states if ``E<>`` is not satisfied or
+                ``A[]`` is. This takes a second search, in which states are different if they
+                differ only in ``meta`` variables.
+            symmetry: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may treat states as
+                one if they differ only by exchanged members of scalar sets. Verdicts, values and
+                traces do not depend on it; counts do.
+            partial_order: Whether ``E<>`` and ``A[]`` may take independent moves in one order only
+                while time cannot pass. Verdicts do not depend on it; counts do.
+            live_variables: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may treat
+                states as one if they differ only in variables that are written before they are
+                read again; games may too, if neither a strategy nor plans are asked for. Verdicts,
+                values and traces do not depend on it; counts do.
             without: Heuristics of `HEURISTICS` that are not used; verdicts and values do not
                 depend on them, time and counts do.
-            folder: Where the files of ``saveStrategy`` and ``loadStrategy`` lie; by default the
+            folder: The folder of the files of ``saveStrategy`` and ``loadStrategy``; by default the
                 folder of the model.
-            allow_write: Folders below which ``saveStrategy`` may write, beside the current one. An
-                existing file that is no strategy is never replaced.
-            progress: Is called some twenty times a second with the numbers of explored,
+            allow_write: Folders below which ``saveStrategy`` may write, besides the current one. It
+                replaces no files but strategies.
+            progress: Is called about twenty times per second with the numbers of explored,
                 stored and waiting states and of bytes.
 
         Returns:
-            The answer; a limit that was reached is an answer too.
+            The answer. If a limit was reached, the answer says so.
 
         Raises:
             ValueError: `max_plans` is less than 1, or `without` has an unknown name.
             RejectedError: The query is wrong or of a kind that is not supported.
-            ValueError: There are to be more than 2048 threads, or fewer than none.
+            ValueError: `threads` is negative or more than 2048.
             KeyboardInterrupt: The user interrupted.
         """
         if threads != "all" and threads < 0:
-            raise ValueError(f"{threads} threads: there must be at least one, or all")
+            raise ValueError(f"{threads} threads: there must be at least 1, or 'all'")
         if max_plans < 1:
-            raise ValueError("max_plans is the number of plans to list, at least 1")
+            raise ValueError(f"max_plans is {max_plans}, but must be at least 1")
         wanted = {"none": None, "all": max_plans}[plans]
         with rejecting():
             raw = self._raw.check(

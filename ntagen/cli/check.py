@@ -84,7 +84,7 @@ class _Heuristics(click.ParamType[tuple[str, ...]]):
         for name in names:
             if name not in checker.HEURISTICS:
                 known = "".join(f"\n  {one}: {does}" for one, does in checker.HEURISTICS.items())
-                self.fail(f"{name!r} is no heuristic. There are:{known}", param, ctx)
+                self.fail(f"{name!r} is not a heuristic. The heuristics are:{known}", param, ctx)
         return names
 
 
@@ -249,31 +249,31 @@ class _Outputs:
     "--symmetry",
     type=click.Choice(["on", "off"]),
     default="on",
-    help="Whether states that differ only by exchanged members of scalar sets are one (E<>, A[], "
-    "sup, inf, bounds; where the model cannot tell them apart).",
+    help="Treat states as one if they differ only by exchanged members of scalar sets, and the "
+    "model cannot tell these apart. For E<>, A[], sup, inf and bounds.  [default: on]",
 )
 @click.option(
     "--partial-order",
     type=click.Choice(["on", "off"]),
     default="on",
-    help="Whether independent moves are taken in one order only where time cannot pass: in urgent "
-    "and committed locations, where bounds of invariants are reached, beside urgent channels "
-    "(E<>, A[]).",
+    help="While time cannot pass, take independent moves in one order only. For E<> and A[].  "
+    "[default: on]",
 )
 @click.option(
     "--live-variables",
     type=click.Choice(["on", "off"]),
     default="on",
-    help="Whether states are one that differ only in variables which are written before they are "
-    "read again (E<>, A[], sup, inf, bounds; games, where no strategy or plan is wanted).",
+    help="Treat states as one if they differ only in variables that are written before they are "
+    "read again. For E<>, A[], sup, inf and bounds, and for games if neither a strategy nor plans "
+    "are asked for.  [default: on]",
 )
 @click.option(
     "--without",
     metavar="NAME[,NAME…]",
     type=_Heuristics(),
     default="",
-    help="For experiments: do not use these heuristics of the engine. Verdicts do not depend on "
-    "them; time and counts do. A wrong name lists all.",
+    help="For experiments: switch these heuristics of the engine off. Verdicts do not depend on "
+    "them; time and counts do. A wrong name lists all names.",
 )
 @forced_rule()
 @priority_rule(

@@ -44,7 +44,7 @@ def _seconds(_ctx: click.Context, _option: click.Parameter, text: str) -> float:
     factor = S_PER.get(match[2] or "s") if match else None
     seconds = float(match[1]) * factor if match and factor else 0.0
     if not 0.0 < seconds < math.inf:
-        raise click.BadParameter(f"'{text}' is not a time; write for example 120s or 2min")
+        raise click.BadParameter(f"'{text}' is not a time above 0; write for example 120s or 2min")
     return seconds
 
 

@@ -31,8 +31,8 @@ _NOTHING_WRITTEN: Final = {
     "--trace": "no answer has a trace",
     "--certificate": "only an E<> that is not satisfied and an A[] that is satisfied have a "
     "certificate",
-    "--strategy": "no answer has a strategy",
-    "--controller": "no answer has a strategy",
+    "--strategy": "no answer has a strategy; only control queries can have one",
+    "--controller": "no answer has a strategy; only control queries can have one",
     "--plans": "plans are listed for control: A<> and A[ U ] without `under`, if the environment "
     "has no choices",
 }

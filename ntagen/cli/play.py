@@ -185,7 +185,7 @@ def _query(model: Model, asked: str | None) -> str:
         shown = "".join(f"\n  {query.text}" for query in games)
         raise InputError(
             f"the model has {len(games) or 'no'} control queries{':' if games else ''}{shown}\n"
-            "hint: choose a query with --query, or a strategy file with --strategy"
+            "hint: give a control query with --query, or a strategy file with --strategy"
         )
     for query in games:
         name = query.comment.strip().partition("\n")[0].strip()

@@ -24,7 +24,10 @@ def format_of(path: Path) -> str:
     ending = path.suffix.lower().removeprefix(".")
     if ending not in FORMATS:
         known = ", ".join(f".{name}" for name in FORMATS)
-        raise InputError(f"cannot draw {path}: unknown kind of picture\nhint: end it with {known}")
+        raise InputError(
+            f"cannot draw {path}: unknown kind of picture\n"
+            f"hint: choose a file name with one of these endings: {known}"
+        )
     return ending
 
 
