@@ -9,12 +9,17 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Limits, Options, Verdict};
 use checker::game::Nodes;
 use checker::zones::federation::block_bytes;
 
+#[path = "common/checks.rs"]
+#[allow(dead_code, reason = "this program asks in some of the ways only")]
+mod checks;
 #[path = "common/games.rs"]
 mod games;
+
+use checks::{interpreted, load};
 
 /// Plates that come on a belt, an arm that takes each to a press that is ready when it likes; a
 /// plate that waits too long falls. `arrow` says who lets plates come: `->` or `-u->`.
@@ -74,7 +79,7 @@ static ALLOCATOR: Counting = Counting;
 
 /// What lives at most while a query is answered, beside what lived before, and the answer.
 fn measured(text: &str, query: &str, options: &Options) -> (usize, Answer) {
-    let mut model = LoadedModel::load("game.xta", text.as_bytes()).expect("it is accepted");
+    let mut model = load(text);
     let query = model.add_query(query);
     let before = LIVE.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);
@@ -106,10 +111,9 @@ fn account_is_what_games_take() {
     ];
     for ((text, query), nodes, strategy) in cases {
         let options = Options {
-            code: CodeEngine::Interpreter,
             nodes,
             strategy,
-            ..Options::default()
+            ..interpreted()
         };
         let (taken, answer) = measured(text, query, &options);
         assert_eq!(answer.verdict, Verdict::Satisfied);
@@ -153,14 +157,13 @@ fn limit_holds_where_there_are_many_clocks() {
     ];
     for (text, query, strategy) in cases {
         let options = Options {
-            code: CodeEngine::Interpreter,
             strategy,
             limits: Limits {
                 states: Some(1000),
                 memory_bytes: Some(LIMIT),
                 ..Limits::default()
             },
-            ..Options::default()
+            ..interpreted()
         };
         let (taken, _) = measured(&text, query, &options);
         let percent = taken as u64 * 100 / LIMIT;
@@ -173,12 +176,11 @@ fn limit_holds_where_there_are_many_clocks() {
 
 fn bounds_of_clocks_take_no_table_of_all() {
     let options = Options {
-        code: CodeEngine::Interpreter,
         limits: Limits {
             states: Some(1),
             ..Limits::default()
         },
-        ..Options::default()
+        ..interpreted()
     };
     let clocks = 1000;
     let (taken, _) = measured(&jobs(clocks, "->"), "E<> false", &options);

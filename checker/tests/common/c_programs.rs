@@ -4,22 +4,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::corpus;
+
 /// The games of the corpus, each with one of its queries that begins like this.
 pub(crate) fn games(beginning: &str) -> Vec<(PathBuf, String)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/games");
-    let files = fs::read_dir(folder).expect("the folder is there");
-    let mut files: Vec<PathBuf> = files
-        .map(|file| file.expect("the folder can be read").path())
-        .collect();
-    files.sort();
     let mut games = Vec::new();
-    for path in files {
+    for path in corpus::files("games") {
         let text = fs::read_to_string(&path).expect("the model is there");
-        let queries = text
-            .lines()
-            .filter_map(|line| line.strip_prefix("// query: "));
+        let queries = corpus::queries(&text).into_iter();
         let wanted = queries.filter(|query| query.starts_with(beginning));
-        games.extend(wanted.map(|query| (path.clone(), query.to_owned())));
+        games.extend(wanted.map(|query| (path.clone(), query)));
     }
     games
 }

@@ -1,21 +1,30 @@
-//! Games of files, solved with what the winner does.
+//! Games solved: who won, what it took, and what the winner does.
 
-use std::fs;
 use std::path::Path;
 
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options};
+use checker::engine::{Answer, LoadedModel, Options, Verdict};
+
+use crate::checks::{interpreted, load_file, try_ask};
 
 /// The answer to a query, with what the winner does, if the model of the file accepts the query;
 /// and the model.
 pub(crate) fn solved(path: &Path, query: &str) -> Option<(LoadedModel, Answer)> {
-    let bytes = fs::read(path).expect("the model is there");
-    let mut model = LoadedModel::load("model.xta", &bytes).expect("the model is right");
-    let text = model.add_query(query);
+    let mut model = load_file(path);
     let options = Options {
-        code: CodeEngine::Interpreter,
         strategy: true,
-        ..Options::default()
+        ..interpreted()
     };
-    let answer = model.check(&text, &options).ok()?;
+    let answer = try_ask(&mut model, query, &options).ok()?;
     Some((model, answer))
+}
+
+/// Whether the player that the query is about wins, and how many states were explored for it.
+#[track_caller]
+pub(crate) fn won_and_explored(answer: &Answer) -> (bool, u64) {
+    let is_won = match answer.verdict {
+        Verdict::Satisfied => true,
+        Verdict::NotSatisfied => false,
+        other => panic!("{other:?}"),
+    };
+    (is_won, answer.counters.explored)
 }

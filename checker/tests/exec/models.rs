@@ -5,7 +5,7 @@
 //! * `ENGINES_MODELS`: folders with more models, separated by colons.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use checker::engine::LoadedModel;
 use checker::engine::session::walk::{Point, successors, symbolic};
@@ -14,6 +14,7 @@ use checker::ir::{Network, Overflow};
 use checker::network::Symbolic;
 use checker::zones::Bound;
 
+use crate::corpus;
 use crate::support::engines;
 
 /// Walks from the initial state, so that not all depends on the first moves.
@@ -115,36 +116,18 @@ fn compare(
     Ok(())
 }
 
-fn models(folder: &Path, found: &mut Vec<PathBuf>) {
-    let Ok(entries) = fs::read_dir(folder) else {
-        return;
-    };
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    paths.sort();
-    for path in paths {
-        if path.is_dir() {
-            models(&path, found);
-        } else if path
-            .extension()
-            .is_some_and(|kind| kind == "xml" || kind == "xta")
-        {
-            found.push(path);
-        }
-    }
+fn is_model(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|kind| kind == "xml" || kind == "xta")
 }
 
 #[test]
 fn engines_agree_on_walks_through_every_model() {
-    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus");
-    let more = std::env::var("ENGINES_MODELS").unwrap_or_default();
     let steps = std::env::var("ENGINES_STEPS").map_or(60, |steps| {
         steps.parse().expect("ENGINES_STEPS is a number")
     });
-    let mut paths = Vec::new();
-    models(&corpus, &mut paths);
-    for folder in more.split(':').filter(|folder| !folder.is_empty()) {
-        models(Path::new(folder), &mut paths);
-    }
+    let mut paths = corpus::files_and_more("ENGINES_MODELS");
+    paths.retain(|path| is_model(path));
     let mut walked = 0;
     let mut differences = Vec::new();
     for path in &paths {

@@ -3,8 +3,9 @@
 
 use checker::exec::RunTimeError;
 use checker::ir::{
-    ClockId, ClockOperand, DoubleOperator, Function, FunctionId, Instruction, IntegerOperator,
-    MathFunction, Overflow, Register, RegisterType, Relation, RunTimeErrorKind, SiteId,
+    Block, BlockId, ClockId, ClockOperand, DoubleOperator, Function, FunctionId, Instruction,
+    IntegerOperator, MathFunction, Overflow, Register, RegisterType, Relation, RunTimeErrorKind,
+    SiteId, Terminator,
 };
 
 use crate::support::{OVERFLOWS, Outcome, engines, run, state_word, straight_line};
@@ -727,10 +728,9 @@ fn clocks_are_set_and_compared_within_the_limit() {
     }
 }
 
-#[test]
-fn an_endless_loop_ends_at_the_limit_of_rounds() {
-    use checker::ir::{Block, BlockId, Function, Terminator};
-    let functions = [Function {
+/// A function that jumps from its only block to the same block.
+fn endless() -> Function {
+    Function {
         name: "endless".into(),
         registers: vec![],
         parameters: 0,
@@ -740,8 +740,12 @@ fn an_endless_loop_ends_at_the_limit_of_rounds() {
             instructions: vec![],
             terminator: Terminator::Jump(BlockId(0)),
         }],
-    }];
-    for (name, engine) in engines(&functions, &[], Overflow::default()) {
+    }
+}
+
+#[test]
+fn an_endless_loop_ends_at_the_limit_of_rounds() {
+    for (name, engine) in engines(&[endless()], &[], Overflow::default()) {
         let outcome = run(&*engine, FunctionId(0), &[], &[]);
         let expected = Err(RunTimeError {
             kind: Kind::StepLimit,
@@ -754,27 +758,15 @@ fn an_endless_loop_ends_at_the_limit_of_rounds() {
 #[test]
 fn a_look_ends_a_call_that_runs_long() {
     use checker::cancellation::{self, Look};
-    use checker::ir::{Block, BlockId, Function, Terminator};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU32, Ordering};
-    let functions = [Function {
-        name: "endless".into(),
-        registers: vec![],
-        parameters: 0,
-        frame_words: 0,
-        result: None,
-        blocks: vec![Block {
-            instructions: vec![],
-            terminator: Terminator::Jump(BlockId(0)),
-        }],
-    }];
     let error = |kind| {
         Err(RunTimeError {
             kind,
             site: SiteId(0),
         })
     };
-    for (name, engine) in engines(&functions, &[], Overflow::default()) {
+    for (name, engine) in engines(&[endless()], &[], Overflow::default()) {
         let looks = Arc::new(AtomicU32::new(0));
         let seen = Arc::clone(&looks);
         let look: Look = Arc::new(move |_| seen.fetch_add(1, Ordering::Relaxed) == 2);

@@ -12,6 +12,8 @@
 //! * `FUZZ_SHOW`: say the number of each input before it is tried, to find one that never ends
 //!   (with `--nocapture`).
 
+#[path = "../common/corpus.rs"]
+mod corpus;
 mod evidence;
 mod mutate;
 mod seeds;

@@ -1,13 +1,14 @@
 //! What mutation begins from: the files of the corpus, and the texts that stand in them.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use checker::diagnostics::SourceMap;
 use checker::syntax;
 
-use super::evidence::Evidence;
-use super::targets::Kind;
+use crate::corpus;
+use crate::evidence::Evidence;
+use crate::targets::Kind;
 
 /// Larger files take too long to be worth it.
 const MOST_BYTES: usize = 20_000;
@@ -21,19 +22,12 @@ pub(crate) struct Seeds {
 
 impl Seeds {
     pub(crate) fn read() -> Seeds {
-        let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus");
-        let more = std::env::var("FUZZ_SEEDS").unwrap_or_default();
-        let folders = more.split(':').filter(|folder| !folder.is_empty());
-        let mut files = Vec::new();
-        for folder in std::iter::once(corpus).chain(folders.map(PathBuf::from)) {
-            collect(&folder, &mut files);
-        }
         let mut seeds = Seeds {
             by_kind: vec![Vec::new(); Kind::ALL.len()],
             words: words(),
             evidence: Evidence::default(),
         };
-        for file in files {
+        for file in corpus::files_and_more("FUZZ_SEEDS") {
             // Models at the limits take as long as the limits allow.
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             if name.starts_with("limits") {
@@ -90,11 +84,7 @@ impl Seeds {
             let text = String::from_utf8_lossy(&bytes);
             let declarations = text.split("process").next().unwrap_or("");
             self.add(Kind::Declarations, declarations.as_bytes());
-            let of_file = text
-                .lines()
-                .filter_map(|line| line.strip_prefix("// query: "));
-            let queries: Vec<String> = of_file.map(str::to_owned).collect();
-            self.evidence.add_model(&bytes, &queries);
+            self.evidence.add_model(&bytes, &corpus::queries(&text));
             for line in text.lines() {
                 if let Some((_, query)) = line.split_once(": ") {
                     self.add(Kind::Query, query.as_bytes());
@@ -120,21 +110,6 @@ impl Seeds {
                 let part = part.replace("&lt;", "<").replace("&gt;", ">");
                 self.add(kind, part.replace("&amp;", "&").as_bytes());
             }
-        }
-    }
-}
-
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
-    let Ok(entries) = fs::read_dir(folder) else {
-        return;
-    };
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    paths.sort();
-    for path in paths {
-        if path.is_dir() {
-            collect(&path, files);
-        } else {
-            files.push(path);
         }
     }
 }

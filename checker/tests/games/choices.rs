@@ -2,9 +2,12 @@
 //! wins against those before. Where time passes, the evader may wait: no way is explored before
 //! there is something to evade.
 
-use crate::families;
-use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{CodeEngine, Options};
 use checker::game::Nodes;
+
+use crate::checks::check;
+use crate::families;
+use crate::solved::won_and_explored;
 
 /// Every round the controller gives and the environment takes, both up to four.
 const TEXT: &str = "
@@ -35,19 +38,11 @@ fn asked(order: &str, query: &str, verify: bool) -> (bool, u64) {
 
 /// Whether the controller wins, and how many states were explored for it.
 fn asked_of(text: &str, query: &str, options: Options) -> (bool, u64) {
-    let mut model = LoadedModel::load("model.xta", text.as_bytes()).expect("it is accepted");
     let options = Options {
         code: CodeEngine::Interpreter,
         ..options
     };
-    let query = model.add_query(query);
-    let answer = model.check(&query, &options).expect("it is answered");
-    let is_satisfied = match answer.verdict {
-        Verdict::Satisfied => true,
-        Verdict::NotSatisfied => false,
-        other => panic!("{query:?}: {other:?}"),
-    };
-    (is_satisfied, answer.counters.explored)
+    won_and_explored(&check(text, query, &options))
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! What follows after a dead end is not explored, however the goal is written; where only variables
 //! make one, or the locations do not show it, all of it is.
 
-use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
+use crate::checks::{check, interpreted};
+use crate::solved::won_and_explored;
 
 /// Two counters run for two hundred states each: after `Lost` nothing can be won, after `Late` it
 /// can.
@@ -29,20 +30,7 @@ system Runner;
 
 /// The verdict of a query, and how many states were explored for it.
 fn asked(query: &str) -> (bool, u64) {
-    let mut model = LoadedModel::load("runners.xta", TEXT.as_bytes()).expect("it is accepted");
-    let options = Options {
-        code: CodeEngine::Interpreter,
-        ..Options::default()
-    };
-    let query = model.add_query(query);
-    let answer = model.check(&query, &options).expect("it is answered");
-    assert!(
-        matches!(answer.verdict, Verdict::Satisfied | Verdict::NotSatisfied),
-        "{:?}",
-        answer.verdict
-    );
-    let is_satisfied = answer.verdict == Verdict::Satisfied;
-    (is_satisfied, answer.counters.explored)
+    won_and_explored(&check(TEXT, query, &interpreted()))
 }
 
 #[test]

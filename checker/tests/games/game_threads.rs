@@ -5,28 +5,19 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Limits, Options, Verdict};
 use checker::search::StopReason;
 
+use crate::checks::{check, interpreted};
 use crate::families::{ONE_ON_THE_BRIDGE, trains};
 use crate::plates::{NONE_FALLEN, plates};
-
-fn check(text: &str, query: &str, options: &Options) -> Answer {
-    let mut model = LoadedModel::load("trains.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-    let query = model.add_query(query);
-    model
-        .check(&query, options)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
-}
 
 /// All that is answered, with a strategy if one is wanted.
 fn facts(text: &str, query: &str, strategy: bool, threads: usize) -> String {
     let options = Options {
-        code: CodeEngine::Interpreter,
         threads,
         strategy,
-        ..Options::default()
+        ..interpreted()
     };
     let answer = check(text, query, &options);
     assert_eq!(answer.evidence.strategy.is_some(), strategy);
@@ -70,10 +61,9 @@ fn limits_stop_all_threads() {
     for threads in [1, 2, 4] {
         let limited = |limits: Limits| {
             let options = Options {
-                code: CodeEngine::Interpreter,
                 limits,
                 threads,
-                ..Options::default()
+                ..interpreted()
             };
             check(&text, ONE_ON_THE_BRIDGE, &options).verdict
         };

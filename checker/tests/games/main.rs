@@ -3,8 +3,14 @@
 
 #[path = "../common/c_programs.rs"]
 mod c_programs;
+#[path = "../common/checks.rs"]
+#[allow(dead_code, reason = "this program asks in some of the ways only")]
+mod checks;
 mod choices;
 mod controllers;
+#[path = "../common/corpus.rs"]
+#[allow(dead_code, reason = "this program reads some of the files only")]
+mod corpus;
 mod dead_ends;
 #[path = "../common/games.rs"]
 mod families;

@@ -3,27 +3,24 @@
 
 use std::time::Duration;
 
-use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Limits, Options, Verdict};
 use checker::game::Nodes;
 
+use crate::checks::{check, interpreted};
 use crate::plates::{NONE_FALLEN, plates};
 
 fn played(nodes: Nodes) -> Answer {
-    let mut model =
-        LoadedModel::load("plates.xta", plates(4, [8, 10, 9]).as_bytes()).expect("it is accepted");
     let options = Options {
         nodes,
         // So all that the controller may do is explored; for a verdict few states are.
         strategy: true,
-        code: CodeEngine::Interpreter,
         limits: Limits {
             timeout: Some(Duration::from_mins(10)),
             ..Limits::default()
         },
-        ..Options::default()
+        ..interpreted()
     };
-    let query = model.add_query(NONE_FALLEN);
-    model.check(&query, &options).expect("it is answered")
+    check(&plates(4, [8, 10, 9]), NONE_FALLEN, &options)
 }
 
 #[test]

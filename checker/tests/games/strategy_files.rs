@@ -1,9 +1,10 @@
 //! Strategies read from files: what does not fit the model is refused with its place.
 
-use checker::engine::Verdict;
 use checker::engine::format::strategy_json;
-use checker::engine::{CodeEngine, LoadedModel, Options};
+use checker::engine::{Options, Verdict};
 use serde_json::{Value, json};
+
+use crate::checks::{ask, interpreted, load, try_ask};
 
 const MODEL: &str = "
 clock x, y;
@@ -24,10 +25,6 @@ process Q() {
 }
 system P, Q;
 ";
-
-fn load() -> LoadedModel {
-    LoadedModel::load("model.xta", MODEL.as_bytes()).expect("the model is right")
-}
 
 /// A strategy for the model, as a file.
 fn file() -> Value {
@@ -57,7 +54,7 @@ fn file() -> Value {
 }
 
 fn read(file: &Value) -> Result<Value, checker::engine::format::json_reader::Mismatch> {
-    let model = load();
+    let model = load(MODEL);
     let (query, strategy) = strategy_json::read(model.network(), file.to_string().as_bytes())?;
     let file = strategy_json::write(model.network(), &strategy, &query);
     let text = strategy_json::text(model.network(), &strategy, &query);
@@ -231,17 +228,14 @@ fn what_does_not_fit_is_refused_with_its_place() {
 fn strategies_are_saved_and_loaded_beside_the_model() {
     let folder = std::env::temp_dir().join(format!("ntagen-strategies-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("there is a place for files");
-    let mut model = load();
+    let mut model = load(MODEL);
     let options = Options {
-        code: CodeEngine::Interpreter,
         folder: Some(folder.clone()),
         allow_write: vec![folder.clone()],
-        ..Options::default()
+        ..interpreted()
     };
     let mut ask = |query: &str| {
-        let text = model.add_query(query);
-        model
-            .check(&text, &options)
+        try_ask(&mut model, query, &options)
             .map(|answer| (answer.verdict, answer.message))
             .map_err(|rejection| rejection.rendered.join("\n"))
     };
@@ -268,15 +262,13 @@ const RACE: &str = "clock x; process P() { state A { x <= 5 }, B, C; init A; tra
 /// model, without the clock.
 #[test]
 fn strategies_within_a_time_are_asked_under() {
-    let mut model = LoadedModel::load("model.xta", RACE.as_bytes()).expect("the model is right");
+    let mut model = load(RACE);
+    let options = Options {
+        runs: true,
+        ..interpreted()
+    };
     let mut ask = |query: &str| {
-        let query = model.add_query(query);
-        let options = Options {
-            code: CodeEngine::Interpreter,
-            runs: true,
-            ..Options::default()
-        };
-        let answer = model.check(&query, &options).expect("the query is right");
+        let answer = ask(&mut model, query, &options);
         let witnesses = &answer.evidence.witnesses;
         let trace = checker::engine::format::json::witnesses(model.network(), witnesses, "");
         (answer.verdict, answer.evidence.is_verified(), trace)
@@ -299,14 +291,12 @@ fn strategies_within_a_time_are_asked_under() {
 
 #[test]
 fn limit_of_time_is_read_with_care() {
-    let mut model = LoadedModel::load("model.xta", RACE.as_bytes()).expect("the model is right");
-    let query = model.add_query("control_t*: A<> P.C");
+    let mut model = load(RACE);
     let options = Options {
-        code: CodeEngine::Interpreter,
         strategy: true,
-        ..Options::default()
+        ..interpreted()
     };
-    let answer = model.check(&query, &options).expect("the query is right");
+    let answer = ask(&mut model, "control_t*: A<> P.C", &options);
     let strategy = answer.evidence.strategy.expect("the controller wins");
     let file = strategy_json::write(model.network(), &strategy, "control_t*: A<> P.C");
     assert_eq!(file["time_limit"], 1);

@@ -3,25 +3,20 @@
 
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
-use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Limits, Options, Verdict};
 use checker::verify::strategy::Outcome;
 use checker::verify::{Effort, GivenUp};
 
+use crate::checks::{self, interpreted, load};
 use crate::families::{ONE_ON_THE_BRIDGE, trains};
 
 fn check(text: &str, query: &str, limits: Limits) -> Answer {
-    let mut model = LoadedModel::load("trains.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
     let options = Options {
-        code: CodeEngine::Interpreter,
         strategy: true,
         limits,
-        ..Options::default()
+        ..interpreted()
     };
-    let query = model.add_query(query);
-    model
-        .check(&query, &options)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
+    checks::check(text, query, &options)
 }
 
 #[test]
@@ -62,12 +57,11 @@ fn memory_ends_a_strategy_and_not_the_answer() {
 #[test]
 fn a_check_of_a_strategy_ends_when_it_is_to() {
     let text = trains(2, "-u->");
-    let mut model = LoadedModel::load("trains.xta", text.as_bytes()).expect("it is accepted");
+    let mut model = load(&text);
     let query = model.add_query(ONE_ON_THE_BRIDGE);
     let options = Options {
-        code: CodeEngine::Interpreter,
         strategy: true,
-        ..Options::default()
+        ..interpreted()
     };
     let answer = model.check(&query, &options).expect("it is answered");
     let strategy = answer.evidence.strategy.expect("it is wanted");

@@ -10,10 +10,11 @@ use std::path::{Path, PathBuf};
 
 use checker::engine::format::strategy_text;
 
+use crate::corpus;
 use crate::solved::solved;
 
-fn games() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/games")
+fn game(name: &str) -> PathBuf {
+    corpus::folder("games").join(name)
 }
 
 /// The text of the winner's strategy.
@@ -65,15 +66,14 @@ fn check_file(path: &Path) -> usize {
 
 #[test]
 fn strategies_of_the_corpus_read_as_expected() {
-    let files = fs::read_dir(games()).expect("the folder is there");
-    let files = files.map(|file| file.expect("the folder can be read").path());
-    let count: usize = files.map(|path| check_file(&path)).sum();
+    let files = corpus::files("games");
+    let count: usize = files.iter().map(|path| check_file(path)).sum();
     assert!(count >= 30, "only {count} strategies have expected lines");
 }
 
 #[test]
 fn text_begins_with_the_initial_state() {
-    let text = text_of(&games().join("manual_example.xta"), "control: A<> P.goal");
+    let text = text_of(&game("manual_example.xta"), "control: A<> P.goal");
     let lines: Vec<&str> = text.lines().take(5).collect();
     assert_eq!(
         lines,
@@ -89,7 +89,7 @@ fn text_begins_with_the_initial_state() {
 
 #[test]
 fn differences_are_written_with_the_larger_clock_first() {
-    let path = games().join("difference_that_grows.xta");
+    let path = game("difference_that_grows.xta");
     let text = text_of(&path, "control: A<> P.G");
     assert!(text.contains("(P.x-P.y==3 && P.x<4)"), "{text}");
 }

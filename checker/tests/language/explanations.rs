@@ -4,8 +4,10 @@
 use std::collections::BTreeSet;
 
 use checker::engine::format::explain::{Example, Role, examples, explanations};
-use checker::engine::{CodeEngine, LoadedModel, Options, Rejection};
+use checker::engine::{LoadedModel, Rejection};
 use checker::syntax::ast::QueryText;
+
+use crate::checks::interpreted;
 
 /// Codes that no short text can give: a file of 256 MiB, and a machine without compiler.
 const WITHOUT_EXAMPLE: [&str; 2] = ["E0129", "E0803"];
@@ -53,10 +55,7 @@ fn ask(
     let mut loaded = LoadedModel::load("example", model.text.as_bytes())?;
     // What a page about queries says is not about the model.
     let of_model = loaded.warnings.len();
-    let options = Options {
-        code: CodeEngine::Interpreter,
-        ..Options::default()
-    };
+    let options = interpreted();
     let mut warnings = Vec::new();
     for query in queries(&mut loaded)? {
         warnings.extend(loaded.check(&query, &options)?.warnings);

@@ -18,13 +18,15 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use checker::diagnostics::{Diagnostic, SourceMap};
 use checker::exec::{Context, Executor, Interpreter, RunTimeError};
 use checker::ir::{self, Network, Overflow, Predicate, QueryKind, SiteId};
 use checker::semantics::{self, Model};
 use checker::syntax;
+
+use crate::corpus;
 
 /// A model with its texts.
 struct Loaded {
@@ -276,14 +278,7 @@ fn check_file(path: &Path, is_legal: bool) -> String {
 }
 
 fn check_folder(folder: &str, is_legal: bool) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/language");
-    let entries = fs::read_dir(root.join(folder)).expect("the corpus is there");
-    let mut paths: Vec<PathBuf> = entries
-        .map(|entry| entry.expect("the corpus can be listed").path())
-        .collect();
-    paths.sort();
-    assert!(!paths.is_empty(), "the corpus is empty");
-    let problems: String = paths
+    let problems: String = corpus::files(folder)
         .iter()
         .map(|path| check_file(path, is_legal))
         .collect();
@@ -292,12 +287,12 @@ fn check_folder(folder: &str, is_legal: bool) {
 
 #[test]
 fn legal_models_are_accepted_and_mean_what_they_say() {
-    check_folder("ok", true);
+    check_folder("language/ok", true);
 }
 
 #[test]
 fn illegal_models_are_refused_with_all_their_mistakes() {
-    check_folder("err", false);
+    check_folder("language/err", false);
 }
 
 #[test]
@@ -320,9 +315,7 @@ const OUTSIDE_CORPUS: [&str; 7] = [
 fn every_code_has_a_line_in_the_corpus() {
     let mut paths = Vec::new();
     for folder in ["language/ok", "language/err", "syntax/ok", "syntax/err"] {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus");
-        let entries = fs::read_dir(root.join(folder)).expect("the corpus is there");
-        paths.extend(entries.map(|entry| entry.expect("the corpus can be listed").path()));
+        paths.extend(corpus::files(folder));
     }
     let texts = paths
         .iter()

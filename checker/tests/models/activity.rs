@@ -6,21 +6,13 @@
 //! beside them that could write the flags and take part in the synchronisations, as far as the
 //! analysis of a single process knows.
 
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Verdict};
 
+use crate::checks::{self, interpreted};
 use crate::random::{Random, networks};
 
 fn check(text: &str, query: &str) -> Answer {
-    let mut model = LoadedModel::load("activity.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    let query = model.add_query(query);
-    let options = Options {
-        code: CodeEngine::Interpreter,
-        ..Options::default()
-    };
-    model
-        .check(&query, &options)
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
+    checks::check(text, query, &interpreted())
 }
 
 /// A worker ticks every time unit until it starts the timer's clock `x`, and stops when it shows

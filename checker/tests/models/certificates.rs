@@ -2,9 +2,10 @@
 
 use checker::engine::answer::Certificate;
 use checker::engine::evidence::certificate::verify;
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
-use checker::ir::{Predicate, QueryKind};
+use checker::engine::{Answer, LoadedModel, Options, Verdict};
 use checker::verify::certificate::States;
+
+use crate::checks::{ask, goal_of, interpreted, load};
 
 /// Two trains share a crossing; the second one must wait outside for the first.
 const CROSSING: &str = "
@@ -25,28 +26,24 @@ system Train;
 const QUERY: &str = "A[] not (Train(0).On and Train(1).On)";
 
 fn certified(text: &str, query: &str) -> (LoadedModel, Answer) {
-    let mut model = LoadedModel::load("model.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-    let query_text = model.add_query(query);
+    let mut model = load(text);
     let options = Options {
-        code: CodeEngine::Interpreter,
         certificate: true,
-        ..Options::default()
+        ..interpreted()
     };
-    let answer = model
-        .check(&query_text, &options)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    let answer = ask(&mut model, query, &options);
     (model, answer)
 }
 
-fn avoided(model: &mut LoadedModel, query: &str) -> Predicate {
-    let text = model.add_query(query);
-    let (query, _) = model.compile(text.span).expect("the query is right");
-    match query.kind {
-        QueryKind::Reachable(goal) => goal,
-        QueryKind::Invariantly(keep) => Predicate::Not(Box::new(keep)),
-        other => panic!("{other:?}"),
-    }
+/// That the certificate of an answer holds.
+fn check_certificate(text: &str, query: &str) {
+    let (mut model, answer) = certified(text, query);
+    let Some(certificate) = answer.evidence.certificate else {
+        panic!("{query}: {:?}, {:?}", answer.verdict, answer.message);
+    };
+    let avoided = goal_of(&mut model, query);
+    let checked = verify(model.network(), &certificate.states, &avoided);
+    assert_eq!(checked.holds, Some(true), "{query}: {:?}", checked.lines);
 }
 
 /// What the check says of the certificate for the crossing after `mutate`; `None` if it holds.
@@ -54,7 +51,7 @@ fn violation(mutate: impl Fn(&mut Vec<States>)) -> Option<String> {
     let (mut model, answer) = certified(CROSSING, QUERY);
     let Certificate { mut states } = answer.evidence.certificate.expect("the query is satisfied");
     mutate(&mut states);
-    let avoided = avoided(&mut model, QUERY);
+    let avoided = goal_of(&mut model, QUERY);
     let checked = verify(model.network(), &states, &avoided);
     let holds = checked.holds.expect("the check covers the model");
     checked.lines.into_iter().next().filter(|_| !holds)
@@ -229,13 +226,7 @@ fn certificates_of_all_constructs_hold() {
         ),
     ];
     for (text, query) in models {
-        let (mut model, answer) = certified(text, query);
-        let Some(certificate) = answer.evidence.certificate else {
-            panic!("{query}: {:?}, {:?}", answer.verdict, answer.message);
-        };
-        let avoided = avoided(&mut model, query);
-        let checked = verify(model.network(), &certificate.states, &avoided);
-        assert_eq!(checked.holds, Some(true), "{query}: {:?}", checked.lines);
+        check_certificate(text, query);
     }
 }
 
@@ -272,21 +263,12 @@ system Caller, Listener;",
 #[test]
 fn receivers_of_a_broadcast_are_put_together_within_zones() {
     let query = "E<> Listener(20).Heard and Listener(3).Deaf";
-    let (mut model, answer) = certified(&listeners(30), query);
-    let Certificate { states } = answer.evidence.certificate.expect("it is not satisfied");
-    let avoided = avoided(&mut model, query);
-    let checked = verify(model.network(), &states, &avoided);
-    assert_eq!(checked.holds, Some(true), "{:?}", checked.lines);
+    check_certificate(&listeners(30), query);
 }
 
 #[test]
 fn many_clocks_are_checked() {
     let text = "clock x[200]; process P() { state A { x[199] <= 5 }, B { x[199] <= 5 }; init A;
         trans A -> B { guard x[199] >= 3; }; } system P;";
-    let query = "A[] x[199] <= 5";
-    let (mut model, answer) = certified(text, query);
-    let Certificate { states } = answer.evidence.certificate.expect("it is satisfied");
-    let avoided = avoided(&mut model, query);
-    let checked = verify(model.network(), &states, &avoided);
-    assert_eq!(checked.holds, Some(true), "{:?}", checked.lines);
+    check_certificate(text, "A[] x[199] <= 5");
 }

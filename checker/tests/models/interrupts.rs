@@ -7,9 +7,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::engine::{CodeEngine, Limits, Options, Verdict};
 use checker::game::Priorities;
 use checker::search::StopReason;
+
+use crate::checks::{ask, check, expect, interpreted, load};
 
 /// An update that runs for too many rounds.
 const BUSY: &str = "
@@ -51,15 +53,6 @@ const ENGINES: [CodeEngine; 2] = [
     #[cfg(not(feature = "jit"))]
     CodeEngine::Interpreter,
 ];
-
-fn check(text: &str, query: &str, options: &Options) -> Answer {
-    let mut model = LoadedModel::load("slow.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-    let query = model.add_query(query);
-    model
-        .check(&query, options)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
-}
 
 fn limits_of(stop: StopReason) -> Limits {
     match stop {
@@ -198,11 +191,10 @@ fn counters_go_on_being_shown_during_a_call() {
             })),
             ..Limits::default()
         },
-        code: CodeEngine::Interpreter,
-        ..Options::default()
+        ..interpreted()
     };
-    let answer = check(BUSY, "E<> P.T", &options);
-    assert_eq!(answer.verdict, Verdict::Unknown(StopReason::Interrupted));
+    let interrupted = Verdict::Unknown(StopReason::Interrupted);
+    expect(BUSY, "E<> P.T", &options, interrupted);
     assert_eq!(shown.load(std::sync::atomic::Ordering::Relaxed), 3);
 }
 
@@ -211,8 +203,7 @@ fn an_alarm_of_one_query_is_none_of_the_next() {
     let text =
         "bool slow(int[0,200000000] n) { int[0,200000000] i = 0; while (i < n) i++; return true; }
         process P() { state S; init S; } system P;";
-    let mut model = LoadedModel::load("slow.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    let mut model = load(text);
     let interrupted = Verdict::Unknown(StopReason::Interrupted);
     for (query, limits, verdict) in [
         (
@@ -224,13 +215,8 @@ fn an_alarm_of_one_query_is_none_of_the_next() {
     ] {
         let options = Options {
             limits,
-            code: CodeEngine::Interpreter,
-            ..Options::default()
+            ..interpreted()
         };
-        let query = model.add_query(query);
-        let answer = model
-            .check(&query, &options)
-            .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-        assert_eq!(answer.verdict, verdict);
+        assert_eq!(ask(&mut model, query, &options).verdict, verdict);
     }
 }

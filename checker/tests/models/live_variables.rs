@@ -9,14 +9,13 @@
 //! `NETWORKS=50000 cargo test --release --test models live_variables::` runs more of them than the
 //! usual number.
 
-use crate::searches;
 use std::fmt::Write as _;
 
-use checker::engine::evidence::witness::Proof;
 use checker::engine::{Answer, Options, Verdict};
-use checker::search::reachability::report::Order;
+use checker::search::reachability::report::Manner;
 
 use crate::random::{Random, networks};
+use crate::searches::{self, BREADTH_FIRST, Total, is_replayed_or_cut};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 200;
@@ -24,31 +23,18 @@ const NETWORKS: u64 = 200;
 /// Larger networks are left out.
 const MOST_STATES: u64 = 4000;
 
-fn answer(text: &str, query: &str, live_variables: bool, manner: (Order, usize)) -> Answer {
+fn answer(text: &str, query: &str, manner: Manner, live_variables: bool) -> Answer {
     let adjust = |options: &mut Options| {
         options.live_variables = live_variables;
         options.limits.states = Some(MOST_STATES);
     };
-    // The replay runs every move that is possible on the way, and some of those may fail.
-    let is_cut = |run: Option<&Proof>| format!("{run:?}").contains("NotCovered(RunTime(");
-    searches::answer_in(manner, (text, query), adjust, |run| {
-        matches!(run, Some(Proof::Replayed(..))) || is_cut(run)
-    })
+    searches::answer_in(manner, (text, query), adjust, is_replayed_or_cut)
 }
 
 /// How many states are stored without and with the reduction, which must agree in any manner of
 /// search.
 fn stored(text: &str, query: &str) -> (u64, u64) {
-    let one = (Order::BreadthFirst, 1);
-    let full = answer(text, query, false, one);
-    let manners = [
-        one,
-        (Order::DepthFirst, 1),
-        (Order::Random(7), 1),
-        (Order::BreadthFirst, 2),
-    ];
-    let reduced = manners.map(|manner| {
-        let reduced = answer(text, query, true, manner);
+    let compare = |manner: Manner, full: &Answer, reduced: &Answer| {
         let is_cut = |answer: &Answer| matches!(answer.verdict, Verdict::Unknown(_));
         // Where a failure can be met and what is looked for can be found, either may come first in
         // another manner.
@@ -57,18 +43,19 @@ fn stored(text: &str, query: &str) -> (u64, u64) {
             && format!("{:?}", full.value) == format!("{:?}", reduced.value);
         assert!(
             agree
-                || is_cut(&full)
-                || is_cut(&reduced)
-                || manner != one && is_end(&full) && is_end(&reduced),
+                || is_cut(full)
+                || is_cut(reduced)
+                || manner != BREADTH_FIRST && is_end(full) && is_end(reduced),
             "{:?} {:?} with all values, {:?} {:?} without, {manner:?}: {query}\n{text}",
             full.verdict,
             full.value,
             reduced.verdict,
             reduced.value,
         );
-        reduced.counters.stored
-    });
-    (full.counters.stored, reduced[0])
+    };
+    let answer = |manner, live_variables| answer(text, query, manner, live_variables);
+    let (full, reduced) = searches::answers(answer, compare);
+    (full.counters.stored, reduced.counters.stored)
 }
 
 /// A sender passes one of sixteen values by a variable in common; the receiver takes it over, looks
@@ -244,17 +231,13 @@ fn values_that_are_read_are_kept() {
              process Q() {{ state x, y, z; init x; {others} }}
              system P, Q;"
         );
-        for search in [false, true] {
-            let found = answer(
-                &text,
-                &format!("E<> {goal}"),
-                search,
-                (Order::BreadthFirst, 1),
-            );
+        let query = format!("E<> {goal}");
+        for live_variables in [false, true] {
+            let found = answer(&text, &query, BREADTH_FIRST, live_variables);
             assert_eq!(found.verdict, Verdict::Satisfied, "{goal}\n{text}");
         }
         stored(&text, "A[] !P.i");
-        stored(&text, &format!("E<> {goal}"));
+        stored(&text, &query);
     }
 }
 
@@ -382,7 +365,7 @@ const QUERIES: [&str; 12] = [
 #[test]
 fn answers_are_those_with_all_values() {
     let networks = networks(NETWORKS);
-    let (mut full_states, mut reduced_states, mut reduced_searches) = (0, 0, 0);
+    let mut total = Total::default();
     for seed in 1..=networks {
         let mut random = Random::of_network(seed);
         let count = 2 + random.below(2);
@@ -406,16 +389,14 @@ fn answers_are_those_with_all_values() {
         let _ = writeln!(text, "{variables}system {};", names.join(", "));
         for query in QUERIES {
             let (full, reduced) = stored(&text, query);
-            full_states += full;
-            reduced_states += reduced;
-            reduced_searches += u64::from(reduced < full);
+            total.add(full, reduced);
         }
         for query in GAMES {
             stored(&text, query);
         }
     }
     assert!(
-        reduced_states < full_states && reduced_searches > networks,
-        "{full_states} states, {reduced_states} without dead values, fewer in {reduced_searches} searches"
+        total.reduced < total.full && total.fewer > networks,
+        "without and with dead values forgotten: {total:?}"
     );
 }

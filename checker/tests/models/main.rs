@@ -3,6 +3,12 @@
 
 mod activity;
 mod certificates;
+#[path = "../common/checks.rs"]
+#[allow(dead_code, reason = "this program asks in some of the ways only")]
+mod checks;
+#[path = "../common/corpus.rs"]
+#[allow(dead_code, reason = "this program reads some of the files only")]
+mod corpus;
 mod interrupts;
 mod live_variables;
 mod option_sets;

@@ -9,13 +9,14 @@
 //! usual number.
 
 use std::fs;
-use std::path::Path;
 use std::time::Duration;
 
 use checker::engine::{Answer, CodeEngine, LoadedModel, Options, TraceWanted, Verdict};
 use checker::game::Nodes;
 use checker::search::reachability::report::Order;
 
+use crate::checks::try_ask;
+use crate::corpus;
 use crate::random::{Random, networks};
 
 /// A model of the corpus with its queries.
@@ -25,25 +26,14 @@ struct Model {
     queries: Vec<String>,
 }
 
-fn corpus() -> Vec<Model> {
+fn models() -> Vec<Model> {
     let mut models = Vec::new();
     for folder in ["verdicts", "games"] {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../tests/corpus")
-            .join(folder);
-        let entries = fs::read_dir(&folder).expect("the corpus is there");
-        let mut paths: Vec<_> = entries
-            .map(|entry| entry.expect("the corpus can be listed").path())
-            .collect();
-        paths.sort();
-        for path in paths {
+        for path in corpus::files(folder) {
             let text = fs::read_to_string(&path).expect("the corpus can be read");
-            let queries = text
-                .lines()
-                .filter_map(|line| line.strip_prefix("// query: "));
             models.push(Model {
                 name: path.display().to_string(),
-                queries: queries.map(str::to_owned).collect(),
+                queries: corpus::queries(&text),
                 text,
             });
         }
@@ -115,8 +105,7 @@ fn random_options(random: &mut Random) -> Options {
 
 fn answer(text: &str, query: &str, options: &Options) -> Option<Answer> {
     let mut model = LoadedModel::load("model.xta", text.as_bytes()).ok()?;
-    let query = model.add_query(query);
-    model.check(&query, options).ok()
+    try_ask(&mut model, query, options).ok()
 }
 
 /// What options may not change, if the answer is definite. Whether an error of the model is met
@@ -132,7 +121,7 @@ fn definite(answer: &Answer) -> Option<String> {
 
 #[test]
 fn options_do_not_change_answers() {
-    let corpus = corpus();
+    let corpus = models();
     let mut compared = 0;
     let mut failures = Vec::new();
     let pairs = networks(300);

@@ -9,28 +9,23 @@
 //! `NETWORKS=50000 cargo test --release --test models partial_order::` runs more of them than the
 //! usual number.
 
-use crate::searches;
 use std::fmt::Write as _;
 
-use checker::engine::evidence::witness::Proof;
 use checker::engine::{Answer, Options, Verdict};
-use checker::search::reachability::report::Order;
+use checker::search::reachability::report::Manner;
 
 use crate::random::{Random, networks};
+use crate::searches::{self, Total, is_replayed_or_cut};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 250;
 
-fn answer_in(manner: (Order, usize), text: &str, query: &str, partial_order: bool) -> Answer {
+fn answer(text: &str, query: &str, manner: Manner, partial_order: bool) -> Answer {
     let adjust = |options: &mut Options| {
         options.partial_order = partial_order;
         options.limits.states = Some(MOST_STATES);
     };
-    // The replay runs every move that is possible on the way, and some of those may fail.
-    let is_cut = |run: Option<&Proof>| format!("{run:?}").contains("NotCovered(RunTime(");
-    searches::answer_in(manner, (text, query), adjust, |run| {
-        matches!(run, Some(Proof::Replayed(..))) || is_cut(run)
-    })
+    searches::answer_in(manner, (text, query), adjust, is_replayed_or_cut)
 }
 
 /// Larger networks are left out.
@@ -50,21 +45,12 @@ fn agree(one: Verdict, other: Verdict, found: Verdict) -> bool {
 /// How many states are stored without and with the reduction, which must agree in any manner of
 /// search.
 fn stored(text: &str, query: &str) -> (u64, u64) {
-    let one = (Order::BreadthFirst, 1);
     let found = if query.starts_with("E<>") {
         Verdict::Satisfied
     } else {
         Verdict::NotSatisfied
     };
-    let full = answer_in(one, text, query, false);
-    let manners = [
-        one,
-        (Order::DepthFirst, 1),
-        (Order::Random(7), 1),
-        (Order::BreadthFirst, 2),
-    ];
-    let reduced = manners.map(|manner| {
-        let reduced = answer_in(manner, text, query, true);
+    let compare = |manner: Manner, full: &Answer, reduced: &Answer| {
         let is_cut = |verdict| matches!(verdict, Verdict::Error(_) | Verdict::Unknown(_));
         assert!(
             agree(full.verdict, reduced.verdict, found)
@@ -75,9 +61,10 @@ fn stored(text: &str, query: &str) -> (u64, u64) {
             full.verdict,
             reduced.verdict,
         );
-        reduced.counters.stored
-    });
-    (full.counters.stored, reduced[0])
+    };
+    let answer = |manner, partial_order| answer(text, query, manner, partial_order);
+    let (full, reduced) = searches::answers(answer, compare);
+    (full.counters.stored, reduced.counters.stored)
 }
 
 fn sensors(count: usize, urgency: &str) -> String {
@@ -462,7 +449,7 @@ const QUERIES: [&str; 14] = [
 #[test]
 fn verdicts_are_those_of_all_orders() {
     let networks = networks(NETWORKS);
-    let (mut full_states, mut reduced_states, mut reduced_searches) = (0, 0, 0);
+    let mut total = Total::default();
     for seed in 1..=networks {
         let mut random = Random::of_network(seed);
         let count = 4 + random.below(2);
@@ -478,13 +465,11 @@ fn verdicts_are_those_of_all_orders() {
         let _ = writeln!(text, "system {};", names.join(", "));
         for _ in 0..2 {
             let (full, reduced) = stored(&text, random.one_of(&QUERIES));
-            full_states += full;
-            reduced_states += reduced;
-            reduced_searches += u64::from(reduced < full);
+            total.add(full, reduced);
         }
     }
     assert!(
-        reduced_states < full_states && reduced_searches * 20 > networks,
-        "{full_states} states, {reduced_states} with the reduction, fewer in {reduced_searches} searches"
+        total.reduced < total.full && total.fewer * 20 > networks,
+        "without and with the reduction: {total:?}"
     );
 }

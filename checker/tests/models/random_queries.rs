@@ -13,10 +13,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use checker::engine::evidence::witness::Proof;
-use checker::engine::{CodeEngine, Limits, LoadedModel, Options, TraceWanted, Verdict};
+use checker::engine::{Limits, Options, TraceWanted, Verdict};
 use checker::search::optimum::extremum::Extreme;
 use checker::verify::replay::End;
 
+use crate::checks::{interpreted, load, try_ask};
 use crate::random::{Random, networks};
 
 /// No network needs so many states: a search that stores them does not end.
@@ -488,11 +489,8 @@ fn answer(text: &str, query: &str) -> checker::engine::Answer {
 }
 
 fn answer_with(text: &str, query: &str, trace: TraceWanted) -> checker::engine::Answer {
-    let mut model = LoadedModel::load("random.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    let query_text = model.add_query(query);
+    let mut model = load(text);
     let options = Options {
-        code: CodeEngine::Interpreter,
         limits: Limits {
             states: Some(MOST_STATES),
             ..Limits::default()
@@ -502,10 +500,9 @@ fn answer_with(text: &str, query: &str, trace: TraceWanted) -> checker::engine::
         trace,
         // One number of threads after the other.
         threads: [1, 2, 4][(text.len() + query.len()) % 3],
-        ..Options::default()
+        ..interpreted()
     };
-    let answer = model
-        .check(&query_text, &options)
+    let answer = try_ask(&mut model, query, &options)
         .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
     for witness in &answer.evidence.witnesses {
         assert!(

@@ -8,10 +8,12 @@
 
 use checker::engine::evidence::witness::Proof;
 use checker::engine::format::text;
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, LoadedModel, Options, Verdict};
 use checker::ir::{Predicate, QueryKind};
 use checker::verify::replay::{self, Claim, Coverage, Defect, End, Moment, Outcome, Run};
 use expect_test::{Expect, expect};
+
+use crate::checks::{ask, interpreted, load};
 
 /// A lamp that must burn for more than one and less than two units, and warms up before it can be
 /// dimmed.
@@ -31,21 +33,12 @@ process Hand() { state Idle; init Idle; trans Idle -> Idle { sync press?; }; }
 system Lamp, Hand;
 ";
 
-fn model(text: &str) -> LoadedModel {
-    LoadedModel::load("lamp.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
-}
-
 fn answer(model: &mut LoadedModel, query: &str) -> Answer {
-    let text = model.add_query(query);
     let options = Options {
-        code: CodeEngine::Interpreter,
         runs: true,
-        ..Options::default()
+        ..interpreted()
     };
-    model
-        .check(&text, &options)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
+    ask(model, query, &options)
 }
 
 /// The run of the only witness of an answer.
@@ -60,7 +53,7 @@ fn run_of(answer: &Answer) -> (Run, Coverage) {
 }
 
 fn check_text(query: &str, expected: &Expect) {
-    let mut model = model(LAMP);
+    let mut model = load(LAMP);
     let answer = answer(&mut model, query);
     let texts = answer.evidence.witnesses.iter();
     let text: String = texts
@@ -74,7 +67,7 @@ fn check_text(query: &str, expected: &Expect) {
 
 /// What the replay says of a run of the lamp after `mutate`; the claim is that of the query.
 fn defect(query: &str, mutate: impl Fn(&mut Run)) -> Option<Defect> {
-    let mut model = model(LAMP);
+    let mut model = load(LAMP);
     let (mut run, _) = run_of(&answer(&mut model, query));
     mutate(&mut run);
     let text = model.add_query(query);
@@ -197,7 +190,7 @@ fn values_come_with_the_state_that_has_them() {
 
 #[test]
 fn violated_leads_to_shows_the_moment_from_which_on_nothing_follows() {
-    let mut model = model(LAMP);
+    let mut model = load(LAMP);
     let answer = answer(&mut model, "y > 5 --> Lamp.Dim");
     let (run, _) = run_of(&answer);
     assert_eq!(run.from.state, 0);
@@ -206,7 +199,7 @@ fn violated_leads_to_shows_the_moment_from_which_on_nothing_follows() {
 
 #[test]
 fn replay_says_what_it_looked_at() {
-    let mut model = model(LAMP);
+    let mut model = load(LAMP);
     let (_, coverage) = run_of(&answer(&mut model, "E<> Lamp.Broken"));
     assert_eq!((coverage.states, coverage.moves), (4, 3));
 }
@@ -226,7 +219,7 @@ system P;
 
 #[test]
 fn stopped_clocks_have_exact_times() {
-    let mut model = model(WORK);
+    let mut model = load(WORK);
     for (query, verdict) in [
         ("E<> P.Done && t > 7 && t < 8", Verdict::Satisfied),
         ("E<> P.Paused && t == 3 && work == 1", Verdict::Satisfied),
@@ -245,7 +238,7 @@ fn stopped_clocks_have_exact_times() {
 /// counts only above a constant, does not keep it open.
 #[test]
 fn runs_without_end_and_values_are_sure_beside_stopped_clocks() {
-    let mut model = model(
+    let mut model = load(
         "clock x, y, z, total;
          process P() { state L { x < 3 && z' == 0 }, M { y <= 5 && x' == 0 }; init L;
            trans L -> L { guard x > 1; assign x = 0, y = 1; }, L -> M { guard y > 2 && total > 2; }, M -> L { assign x = 0, y = 0; }; }
@@ -275,7 +268,7 @@ fn runs_without_end_and_values_are_sure_beside_stopped_clocks() {
 /// one stands still at a time.
 #[test]
 fn what_only_too_large_zones_have_stays_a_maybe() {
-    let mut model = model(
+    let mut model = load(
         "clock a, b, t;
          process P() { state A { b' == 0 }, B { a' == 0 }, C; init A; trans A -> B { }, B -> C { }; }
          system P;",

@@ -2,39 +2,29 @@
 //! passes.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use checker::engine::Options;
 use checker::engine::format::json;
-use checker::engine::{LoadedModel, Options};
 use checker::game::{Forced, Priorities};
 use serde_json::Value as Json;
+
+use crate::checks::{load_file, try_ask};
+use crate::corpus;
 
 const RULES: (Forced, Priorities) = (Forced::Tiga, Priorities::Ignored);
 
 /// Leaves of a trace that are changed, at most.
 const MOST_CHANGES: usize = 24;
 
-fn queries(text: &str) -> Vec<String> {
-    let lines = text.lines().filter_map(|line| line.strip_prefix("// "));
-    let queries = lines.filter_map(|line| line.strip_prefix("query: "));
-    queries.map(str::to_owned).collect()
-}
-
-fn load(path: &Path) -> LoadedModel {
-    let bytes = fs::read(path).expect("the corpus can be read");
-    LoadedModel::load(&path.display().to_string(), &bytes)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
-}
-
 /// The file of the traces of an answer, if it has one with exact times.
 fn trace(path: &Path, query: &str) -> Option<Json> {
-    let mut model = load(path);
-    let text = model.add_query(query);
+    let mut model = load_file(path);
     let options = Options {
         runs: true,
         ..Options::default()
     };
-    let answer = model.check(&text, &options).ok()?;
+    let answer = try_ask(&mut model, query, &options).ok()?;
     let witnesses = &answer.evidence.witnesses;
     let is_exact = witnesses.iter().all(|one| one.run.is_some());
     (!witnesses.is_empty() && is_exact).then(|| json::witnesses(model.network(), witnesses, query))
@@ -90,26 +80,16 @@ fn changed(value: &Json) -> Json {
     }
 }
 
-fn paths() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/verdicts");
-    let entries = fs::read_dir(folder).expect("the corpus is there");
-    let mut paths: Vec<PathBuf> = entries
-        .map(|entry| entry.expect("the corpus can be listed").path())
-        .collect();
-    paths.sort();
-    paths
-}
-
 #[test]
 fn what_traces_show_is_checked() {
     let (mut traces, mut changes) = (0, 0);
-    for path in paths() {
+    for path in corpus::files("verdicts") {
         let text = fs::read_to_string(&path).expect("the corpus can be read");
-        for query in queries(&text) {
+        for query in corpus::queries(&text) {
             let Some(file) = trace(&path, &query) else {
                 continue;
             };
-            let mut model = load(&path);
+            let mut model = load_file(&path);
             let place = format!("{}: {query}", path.display());
             let mut holds = |file: &Json| {
                 let checked = model.verify_evidence("file", &file.to_string(), RULES);

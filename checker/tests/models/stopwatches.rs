@@ -15,12 +15,13 @@ use std::time::Duration;
 
 use checker::engine::evidence::certificate::verify;
 use checker::engine::evidence::witness::Proof;
-use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Verdict};
-use checker::ir::{Predicate, QueryKind};
+use checker::engine::{Answer, Limits, LoadedModel, Options, Verdict};
+use checker::ir::Predicate;
 use checker::search::optimum::extremum::{Extreme, Extremes};
 use checker::verify::certificate::States;
 use checker::verify::{Semantics, State};
 
+use crate::checks::{goal_of, interpreted, load, try_ask};
 use crate::random::{Random, networks};
 
 /// Networks without the environment variable `NETWORKS`.
@@ -228,15 +229,8 @@ fn is_inside(states: &[States], state: &State) -> bool {
     })
 }
 
-fn load(text: &str) -> LoadedModel {
-    LoadedModel::load("random.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
-}
-
 fn ask(model: &mut LoadedModel, text: &str, query: &str) -> Answer {
-    let query_text = model.add_query(query);
     let options = Options {
-        code: CodeEngine::Interpreter,
         limits: Limits {
             states: Some(MOST_STATES),
             // A greatest value beyond all constants is followed far.
@@ -245,20 +239,10 @@ fn ask(model: &mut LoadedModel, text: &str, query: &str) -> Answer {
         },
         runs: true,
         certificate: true,
-        ..Options::default()
+        ..interpreted()
     };
-    model
-        .check(&query_text, &options)
+    try_ask(model, query, &options)
         .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
-}
-
-fn goal_of(model: &mut LoadedModel, query: &str) -> Predicate {
-    let text = model.add_query(query);
-    let (query, _) = model.compile(text.span).expect("the query is right");
-    match query.kind {
-        QueryKind::Reachable(goal) => goal,
-        other => panic!("{other:?}"),
-    }
 }
 
 /// A certificate with something missing.

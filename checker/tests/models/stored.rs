@@ -10,7 +10,7 @@
 //! explained.
 
 use checker::analysis::{Abstraction, ClockBounds};
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, TraceWanted};
+use checker::engine::{Answer, Options, TraceWanted};
 use checker::exec::Interpreter;
 use checker::ir::Predicate;
 use checker::network::{Stepper, Symbolic};
@@ -19,22 +19,13 @@ use checker::search::reachability::report::Order;
 use checker::search::reachability::search;
 use checker::tuning::Tuning;
 
-fn load(text: &str) -> LoadedModel {
-    LoadedModel::load("model.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
-}
+use crate::checks::{self, interpreted, load};
+use crate::subsumption::collectors;
 
 fn check(text: &str, query: &str, adjust: impl FnOnce(&mut Options)) -> Answer {
-    let mut model = load(text);
-    let query = model.add_query(query);
-    let mut options = Options {
-        code: CodeEngine::Interpreter,
-        ..Options::default()
-    };
+    let mut options = interpreted();
     adjust(&mut options);
-    model
-        .check(&query, &options)
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
+    checks::check(text, query, &options)
 }
 
 /// How many states of a model are stored when all are explored.
@@ -156,27 +147,9 @@ fn what_all_partners_reset_does_not_matter_before() {
 
 #[test]
 fn states_are_left_out_where_another_can_do_as_much() {
-    let collectors = |users: u32| {
-        format!(
-            "process User(const int[1, {users}] pid) {{
-                clock certifying, collecting;
-                int[0, 2] certificates, policy;
-                state authenticating, access;
-                init authenticating;
-                trans
-                    authenticating -> authenticating {{ select p : int[1, 2]; guard policy == 0;
-                        assign policy = p, certificates = 0, certifying = 0, collecting = 0; }},
-                    authenticating -> authenticating {{ guard policy > 0 && certifying > 2 && certificates < 2;
-                        assign certificates = certificates + 1, certifying = 0; }},
-                    authenticating -> access {{ guard collecting < 10 && policy > 0 && certificates >= policy; }},
-                    access -> authenticating {{ assign policy = 0; }};
-             }}
-             system User;"
-        )
-    };
     // By inclusion of zones it is more than four times as many: how long ago the last certificate
     // came makes zones that do not contain each other.
-    assert_eq!(stored(&collectors(2)), 137);
+    assert_eq!(stored(&collectors(2, "")), 137);
 }
 
 #[test]

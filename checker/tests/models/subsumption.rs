@@ -1,13 +1,14 @@
 //! States are left out where a stored one can do all that they can do, though its zone does not
 //! contain theirs.
 
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Options, Verdict};
+
+use crate::checks::{self, interpreted};
 
 /// Users who collect certificates, each of which takes more than 2, for one of two policies, and
-/// have access if that took less than
-/// 10. How long ago the last certificate came hardly ever matters, but no two zones that differ in
-///     it contain each other.
-fn collectors(users: usize, further: &str) -> String {
+/// have access if that took less than ten. How long ago the last certificate came hardly ever
+/// matters, but no two zones that differ in it contain each other.
+pub(crate) fn collectors(users: usize, further: &str) -> String {
     format!(
         "const int N = {users};
 process User(const int[1, N] pid) {{
@@ -28,19 +29,13 @@ system User;"
 }
 
 fn check(text: &str, query: &str, threads: usize) -> Answer {
-    let mut model = LoadedModel::load("collectors.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-    let query = model.add_query(query);
     let options = Options {
         threads,
-        code: CodeEngine::Interpreter,
         verify: true,
         runs: true,
-        ..Options::default()
+        ..interpreted()
     };
-    model
-        .check(&query, &options)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
+    checks::check(text, query, &options)
 }
 
 #[test]

@@ -8,23 +8,24 @@
 //! `NETWORKS=50000 cargo test --release --test models symmetry::` runs more of them than the usual
 //! number.
 
-use crate::searches;
 use std::fmt::Write as _;
 
 use checker::engine::evidence::witness::Proof;
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
-use checker::search::reachability::report::Order;
+use checker::engine::{Answer, Options, Verdict};
+use checker::search::reachability::report::Manner;
 
+use crate::checks::{check, interpreted};
 use crate::random::{Random, networks};
+use crate::searches::{self, BREADTH_FIRST, Total};
 
 /// Networks without the environment variable `NETWORKS`.
 const NETWORKS: u64 = 120;
 
-fn answer_in(manner: (Order, usize), text: &str, query: &str, symmetry: bool) -> Answer {
+fn answer(text: &str, query: &str, manner: Manner, symmetry: bool) -> Answer {
     let adjust = |options: &mut Options| {
         options.symmetry = symmetry;
         // Where states are counted, symmetry alone is to be seen; the other searches do both.
-        options.live_variables = manner != (Order::BreadthFirst, 1);
+        options.live_variables = manner != BREADTH_FIRST;
     };
     searches::answer_in(manner, (text, query), adjust, |run| {
         matches!(run, Some(Proof::Replayed(..)))
@@ -33,21 +34,16 @@ fn answer_in(manner: (Order, usize), text: &str, query: &str, symmetry: bool) ->
 
 /// The answers without and with symmetry reduction, which must be the same.
 fn answers(text: &str, query: &str) -> (Answer, Answer) {
-    let one = (Order::BreadthFirst, 1);
-    let full = answer_in(one, text, query, false);
-    for manner in [(Order::DepthFirst, 1), (Order::BreadthFirst, 2)] {
-        let reduced = answer_in(manner, text, query, true);
-        assert_eq!(full.verdict, reduced.verdict, "{query}\n{text}");
-        assert_eq!(full.value, reduced.value, "{query}\n{text}");
+    let compare = |manner: Manner, full: &Answer, reduced: &Answer| {
+        assert_eq!(full.verdict, reduced.verdict, "{manner:?}: {query}\n{text}");
+        assert_eq!(full.value, reduced.value, "{manner:?}: {query}\n{text}");
         assert!(
             full.evidence.witnesses.is_empty() == reduced.evidence.witnesses.is_empty(),
-            "{query}\n{text}"
+            "{manner:?}: {query}\n{text}"
         );
-    }
-    let reduced = answer_in(one, text, query, true);
-    assert_eq!(full.verdict, reduced.verdict, "{query}\n{text}");
-    assert_eq!(full.value, reduced.value, "{query}\n{text}");
-    (full, reduced)
+    };
+    let answer = |manner, symmetry| answer(text, query, manner, symmetry);
+    searches::answers(answer, compare)
 }
 
 fn stored(text: &str, query: &str) -> (u64, u64) {
@@ -302,7 +298,7 @@ const QUERIES: [&str; 8] = [
 #[test]
 fn verdicts_are_those_of_all_states() {
     let networks = networks(NETWORKS);
-    let (mut full_states, mut reduced_states) = (0, 0);
+    let mut total = Total::default();
     for seed in 1..=networks {
         let mut random = Random::of_network(seed);
         let mut text = String::from(HEAD);
@@ -322,28 +318,21 @@ fn verdicts_are_those_of_all_states() {
             continue;
         }
         let (full, reduced) = answers(&text, query);
-        full_states += full.counters.stored;
-        reduced_states += reduced.counters.stored;
+        total.add(full.counters.stored, reduced.counters.stored);
     }
     assert!(
-        reduced_states * 4 < full_states * 3,
-        "{full_states} states, {reduced_states} with symmetry"
+        total.reduced * 4 < total.full * 3,
+        "without and with symmetry: {total:?}"
     );
 }
 
 /// Large networks are left out.
 fn answer_with_limit(text: &str, query: &str) -> Answer {
-    let mut model = LoadedModel::load("symmetric.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")));
-    let query_text = model.add_query(query);
     let mut options = Options {
-        code: CodeEngine::Interpreter,
         symmetry: false,
         live_variables: false,
-        ..Options::default()
+        ..interpreted()
     };
     options.limits.states = Some(800);
-    model
-        .check(&query_text, &options)
-        .unwrap_or_else(|rejection| panic!("{}\n{text}", rejection.rendered.join("\n")))
+    check(text, query, &options)
 }

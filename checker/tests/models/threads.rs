@@ -12,7 +12,7 @@ use std::thread::{self, ThreadId};
 use std::time::Duration;
 
 use checker::analysis::{Abstraction, ClockBounds};
-use checker::engine::{Answer, Limits, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, Limits, Options, Verdict};
 use checker::exec::Interpreter;
 use checker::network::{Failure, Stepper, Symbolic};
 use checker::search::StopReason;
@@ -22,6 +22,8 @@ use checker::search::reachability::report::{Manner, Order};
 use checker::search::reachability::search;
 use checker::tuning::Tuning;
 use checker::zones::Zone;
+
+use crate::checks::{check, load};
 
 const THREADS: [usize; 4] = [1, 2, 3, 4];
 
@@ -46,15 +48,6 @@ fn line(machines: usize, extra: &str, update: &str) -> String {
     let names: Vec<String> = (0..machines).map(|index| format!("M{index}")).collect();
     let _ = writeln!(text, "system {};", names.join(", "));
     text
-}
-
-fn check(text: &str, query: &str, options: &Options) -> Answer {
-    let mut model = LoadedModel::load("line.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-    let query = model.add_query(query);
-    model
-        .check(&query, options)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
 }
 
 fn options(threads: usize) -> Options {
@@ -240,10 +233,7 @@ impl SharedGoal for Panics {
 #[test]
 fn panic_of_a_thread_ends_the_search_with_it() {
     let text = line(5, "", "");
-    let model = LoadedModel::load("line.xta", text.as_bytes());
-    let Ok(model) = model else {
-        panic!("the model is accepted")
-    };
+    let model = load(&text);
     let network = model.network();
     let interpreter = Interpreter::new(&network.functions, &network.constants);
     let bounds = ClockBounds::new(network, &[], Abstraction::LowerUpper, Tuning::default());

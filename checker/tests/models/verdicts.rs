@@ -9,13 +9,16 @@
 //! and with the interpreter and compiled code, and must come out the same.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use checker::engine::answer::Values;
-use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{CodeEngine, Options, Verdict};
 use checker::game::{Forced, Priorities};
 use checker::search::optimum::extremum::Extreme;
 use checker::search::reachability::report::Order;
+
+use crate::checks::{ask, load, try_ask};
+use crate::corpus;
 
 type Rules = (Forced, Priorities);
 
@@ -85,16 +88,12 @@ fn engines() -> Vec<CodeEngine> {
     }
 }
 
-fn verdict_of(path: &Path, bytes: &[u8], case: &Case, options: &Options) -> String {
-    let mut model = LoadedModel::load(&path.display().to_string(), bytes)
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+fn verdict_of(text: &str, case: &Case, options: &Options) -> String {
+    let mut model = load(text);
     for given in &case.given {
-        let text = model.add_query(given);
-        let answer = model.check(&text, options);
-        answer.unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+        ask(&mut model, given, options);
     }
-    let text = model.add_query(&case.query);
-    match model.check(&text, options) {
+    match try_ask(&mut model, &case.query, options) {
         Err(_) => "rejected".to_owned(),
         Ok(answer) if answer.evidence.is_verified() == Some(false) => {
             let runs = answer.evidence.witnesses.iter().map(|one| &one.run);
@@ -152,7 +151,7 @@ const EVERY_MANNER: Manners<'_> = &[
 
 fn check_case(
     path: &Path,
-    bytes: &[u8],
+    text: &str,
     case: &Case,
     (codes, manners): (&[CodeEngine], Manners<'_>),
     failures: &mut Vec<String>,
@@ -171,7 +170,7 @@ fn check_case(
                     runs: true,
                     ..Options::default()
                 };
-                let found = verdict_of(path, bytes, case, &options);
+                let found = verdict_of(text, case, &options);
                 if &found != expected {
                     failures.push(format!(
                         "{}: {}\n  expected {expected} ({}), found {found} with {order:?}, {threads} threads, {code:?}, {rules:?}",
@@ -187,24 +186,16 @@ fn check_case(
 
 /// Checks the models of a folder, each behind some more text.
 fn check_folder(name: &str, before: &str, how: (&[CodeEngine], Manners<'_>)) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../tests/corpus")
-        .join(name);
-    let mut paths: Vec<PathBuf> = fs::read_dir(&folder)
-        .expect("the corpus is there")
-        .map(|entry| entry.expect("the corpus can be listed").path())
-        .collect();
-    paths.sort();
     let mut failures = Vec::new();
     let mut count = 0;
-    for path in &paths {
+    for path in &corpus::files(name) {
         let text = fs::read_to_string(path).expect("the corpus can be read");
         if !before.is_empty() && text.contains("' ==") {
             // Beside stopwatches each clock more can make zones too large.
             continue;
         }
         let cases = cases(path, &text);
-        let bytes = format!("{before}{text}").into_bytes();
+        let text = format!("{before}{text}");
         assert!(!cases.is_empty(), "{}: no query", path.display());
         for case in &cases {
             assert!(
@@ -219,7 +210,7 @@ fn check_folder(name: &str, before: &str, how: (&[CodeEngine], Manners<'_>)) {
                 path.display(),
                 case.query
             );
-            check_case(path, &bytes, case, how, &mut failures);
+            check_case(path, &text, case, how, &mut failures);
             count += 1;
         }
     }

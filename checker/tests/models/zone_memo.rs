@@ -2,7 +2,6 @@
 //! by the same steps.
 
 use checker::analysis::{Abstraction, ClockBounds};
-use checker::engine::LoadedModel;
 use checker::exec::Interpreter;
 use checker::network::{Failure, MemoLimits, Stepper, Symbolic};
 use checker::search::Outcome;
@@ -12,6 +11,8 @@ use checker::search::reachability::report::{Manner, Order};
 use checker::search::reachability::search;
 use checker::tuning::Tuning;
 use checker::zones::{Bound, Zone};
+
+use crate::checks::load;
 
 /// Workers who take turns at a machine, some with flags that updates set and guards ask for.
 const WORKSHOP: &str = "
@@ -84,8 +85,7 @@ impl SharedGoal for Wanted {
 type End = (bool, u64, u64, usize);
 
 fn end(wanted: &Wanted, abstraction: Abstraction, threads: usize, limits: MemoLimits) -> End {
-    let model = LoadedModel::load("workshop.xta", WORKSHOP.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
+    let model = load(WORKSHOP);
     let network = model.network();
     let interpreter = Interpreter::new(&network.functions, &network.constants);
     let bounds = ClockBounds::new(network, &[], abstraction, Tuning::default());

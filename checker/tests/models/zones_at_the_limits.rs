@@ -6,12 +6,14 @@
 //! as the engine makes sure of, and may end beyond it; no bound may wrap. Games with such bounds
 //! have the answers of those with small ones.
 
-use checker::engine::{LoadedModel, Options, Verdict};
+use checker::engine::{Options, Verdict};
 use checker::zones::clocks::Assignment;
 use checker::zones::dbm::{self, Constraint};
 use checker::zones::{Bound, ClockSet, Federation, Zone, past};
 use proptest::collection::vec;
 use proptest::prelude::*;
+
+use crate::checks::expect;
 
 /// A bound: the constant, and whether it is weak; `None` is none. Tighter ones are less.
 type Wide = Option<(i64, bool)>;
@@ -321,13 +323,7 @@ fn games_with_great_differences_end_as_those_with_small_ones() {
             ("control: A[] not Watch.Home", Verdict::NotSatisfied),
             ("control: A<> Watch.Asleep", Verdict::NotSatisfied),
         ] {
-            let mut model = LoadedModel::load("watch.xta", watch(length).as_bytes())
-                .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-            let text = model.add_query(query);
-            let answer = model.check(&text, &Options::default());
-            let answer =
-                answer.unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")));
-            assert_eq!(answer.verdict, expected, "{query} with {length}");
+            expect(&watch(length), query, &Options::default(), expected);
         }
     }
 }

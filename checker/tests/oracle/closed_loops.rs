@@ -19,8 +19,9 @@ use checker::zones::{Bound, Federation, Zone};
 use proptest::prop_assert_eq;
 use proptest::test_runner::TestCaseError;
 
+use crate::checks::{load, try_ask};
 use crate::compare::{self, Tally};
-use crate::explicit::Graph;
+use crate::explicit::{self, Graph};
 use crate::generate::{self, Formula, Network, Shape};
 use crate::random::Random;
 
@@ -315,15 +316,10 @@ fn close(semantics: &Semantics<'_>, regions: &Regions, strategy: &Strategy) -> O
 
 impl Loop {
     fn is_deadlock(&self, node: usize) -> bool {
-        let mut seen = vec![self.nodes[node].at_rest];
-        loop {
-            let current = &self.nodes[seen[seen.len() - 1]];
-            match current.later {
-                _ if !current.steps.is_empty() => return false,
-                Some(later) if !seen.contains(&later) => seen.push(later),
-                _ => return true,
-            }
-        }
+        explicit::is_deadlock(self.nodes[node].at_rest, |node| {
+            let node = &self.nodes[node];
+            (!node.steps.is_empty(), node.later)
+        })
     }
 
     fn labels(&self, network: &Network, formula: &Formula) -> Vec<bool> {
@@ -409,7 +405,7 @@ fn compare(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let features = &model.network().features;
     let has_deadlock = generate::has_deadlock(p) || generate::has_deadlock(q);
     if features.clock_guarded_urgent || features.priorities {
@@ -469,8 +465,7 @@ fn compare(
         ]);
     }
     for (query, expected) in queries {
-        let query_text = model.add_query(&format!("{query} under S"));
-        let answer = model.check(&query_text, &compare::options());
+        let answer = try_ask(&mut model, &format!("{query} under S"), &compare::options());
         if query.contains("-->")
             && answer
                 .as_ref()

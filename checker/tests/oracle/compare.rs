@@ -3,18 +3,18 @@
 use std::cell::Cell;
 use std::io::Write as _;
 
-use checker::engine::Verdict;
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::witness::Proof;
-use checker::engine::{Answer, CodeEngine, Limits, LoadedModel, Options, Rejection};
+use checker::engine::{Answer, Limits, LoadedModel, Options, Rejection, Verdict};
 use checker::search::limits::StopReason;
+use checker::verify::strategy::Outcome;
+use checker::verify::{Error, Regions, Semantics};
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
+use crate::checks::interpreted;
 use crate::explicit::{Graph, NoGraph, explore};
 use crate::generate::{self, Formula};
-use checker::verify::strategy::Outcome;
-use checker::verify::{Error, Regions, Semantics};
 
 /// Regions that brute force explores before it gives a case up.
 const MOST_REGIONS: usize = 30_000;
@@ -106,22 +106,15 @@ pub(crate) fn run<S: Strategy>(
     );
 }
 
-/// Loads a model that must be accepted.
-pub(crate) fn load(text: &str) -> LoadedModel {
-    LoadedModel::load("random.xta", text.as_bytes())
-        .unwrap_or_else(|rejection| panic!("{text}\n{}", rejection.rendered.join("\n")))
-}
-
 /// The options for a small case.
 pub(crate) fn options() -> Options {
     Options {
-        code: CodeEngine::Interpreter,
         limits: Limits {
             states: Some(MOST_STATES),
             ..Limits::default()
         },
         runs: true,
-        ..Options::default()
+        ..interpreted()
     }
 }
 

@@ -12,6 +12,7 @@ use proptest::collection::vec;
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
+use crate::checks::{load, try_ask};
 use crate::compare::{self, Tally};
 use crate::endless::Endless;
 use crate::explicit::Graph;
@@ -109,7 +110,7 @@ fn compare_liveness(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let Some(graph) = compare::regions_for(&model, (formulas, LIVENESS.constant), tally) else {
         return Ok(());
     };
@@ -129,8 +130,7 @@ fn compare_liveness(
         let expected = verdicts
             .map(|verdicts| verdicts[index])
             .map_err(|error| *error);
-        let query_text = model.add_query(query);
-        let answer = model.check(&query_text, &compare::options());
+        let answer = try_ask(&mut model, query, &compare::options());
         compare::check(&answer, expected, tally, || format!("{text}{query}"))?;
     }
     let Ok(graph) = graph else {
@@ -168,7 +168,7 @@ fn compare_values(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     // A network that fails has neither values nor traces that end.
     let Some(Ok(graph)) = compare::regions_for(&model, (formulas, TOP as i32), tally) else {
         return Ok(());
@@ -222,7 +222,7 @@ fn compare_clocks_in_step(
 ) -> Result<(), TestCaseError> {
     let text = network.text();
     let text = text.replacen("chan a;", "clock total, twin;\nchan a;", 1);
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let Some(Ok(graph)) = compare::regions_for(&model, (formulas, TOP as i32), tally) else {
         return Ok(());
     };
@@ -253,7 +253,7 @@ fn check_best_values(
     let text = network.text();
     let name = network.clock(clock);
     let query = format!("bounds{{{condition}}}: {name}");
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     for trace in [TraceWanted::Shortest, TraceWanted::Fastest] {
         let Some(answer) = answer(&mut model, &query, trace, tally)? else {
             continue;
@@ -301,7 +301,7 @@ fn check_time(text: &str, condition: &str, run: &Run, tally: &Tally) -> Result<(
     };
     let ticks = run.steps.iter().map(|step| step.wait).sum::<i64>() + last;
     let query = format!("inf{{{condition}}}: total");
-    let mut timed = compare::load(&format!("clock total;\n{text}"));
+    let mut timed = load(&format!("clock total;\n{text}"));
     let Some(answer) = answer(&mut timed, &query, TraceWanted::Any, tally)? else {
         return Ok(());
     };
@@ -336,7 +336,6 @@ fn answer(
     trace: TraceWanted,
     tally: &Tally,
 ) -> Result<Option<Answer>, TestCaseError> {
-    let query_text = model.add_query(query);
     let mut options = Options {
         trace,
         ..compare::options()
@@ -344,7 +343,7 @@ fn answer(
     // A clock without greatest value that is copied to and fro is followed up to the limit of clock
     // values.
     options.limits.timeout = Some(Duration::from_secs(1));
-    let answer = model.check(&query_text, &options);
+    let answer = try_ask(model, query, &options);
     let answer = answer.map_err(|rejection| TestCaseError::fail(rejection.rendered.join("\n")))?;
     if let Verdict::Unknown(StopReason::States | StopReason::Time) = answer.verdict {
         tally.count_stopped();

@@ -184,14 +184,22 @@ fn successors(
 impl Graph {
     /// Whether no move is possible in a node, now or after any delay.
     pub(crate) fn is_deadlock(&self, node: usize) -> bool {
-        let mut seen = vec![node];
-        loop {
-            let current = &self.nodes[seen[seen.len() - 1]];
-            match current.later {
-                _ if !current.steps.is_empty() => return false,
-                Some(later) if !seen.contains(&later) => seen.push(later),
-                _ => return true,
-            }
+        is_deadlock(node, |node| {
+            let node = &self.nodes[node];
+            (!node.steps.is_empty(), node.later)
+        })
+    }
+}
+
+/// Whether no move is possible in a node, now or after any delay; `look` says of a node whether
+/// there is a move, and where time leads.
+pub(crate) fn is_deadlock(node: usize, look: impl Fn(usize) -> (bool, Option<usize>)) -> bool {
+    let mut seen = vec![node];
+    loop {
+        match look(seen[seen.len() - 1]) {
+            (true, _) => return false,
+            (false, Some(later)) if !seen.contains(&later) => seen.push(later),
+            _ => return true,
         }
     }
 }

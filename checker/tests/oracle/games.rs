@@ -13,6 +13,7 @@ use proptest::strategy::Strategy;
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
+use crate::checks::{load, try_ask};
 use crate::compare::{self, Tally};
 use crate::explicit::{Graph, Objective, Rule, recurring, winning};
 use crate::generate::{self, Formula, Network, Shape};
@@ -45,7 +46,7 @@ pub(crate) fn seeded_games() -> impl Strategy<Value = (Network, Formula, Formula
 }
 
 /// A query for each objective that has a goal to reach, or something to keep, or both.
-fn objectives(goal_text: &str, keep_text: &str) -> [(String, Kind); 5] {
+pub(crate) fn objectives(goal_text: &str, keep_text: &str) -> [(String, Kind); 5] {
     [
         (format!("control: A<> {goal_text}"), Kind::Reach),
         (
@@ -69,7 +70,7 @@ fn compare(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let has_differences = generate::has_differences(goal) || generate::has_differences(keep);
     let constant = i64::from(SHAPE.constant);
     let graph = match compare::regions(&model, constant, has_differences, tally) {
@@ -106,17 +107,19 @@ fn compare(
                     verify: true,
                     ..compare::options()
                 };
-                let query_text = model.add_query(&query);
                 // Without a strategy games may end earlier.
                 let quick = Options {
                     verify: false,
                     threads: 2,
                     ..options.clone()
                 };
-                compare::check(&model.check(&query_text, &quick), expected, tally, || {
-                    format!("{text}{query}\n{forced:?} {nodes:?} without strategy")
-                })?;
-                let answer = model.check(&query_text, &options);
+                compare::check(
+                    &try_ask(&mut model, &query, &quick),
+                    expected,
+                    tally,
+                    || format!("{text}{query}\n{forced:?} {nodes:?} without strategy"),
+                )?;
+                let answer = try_ask(&mut model, &query, &options);
                 compare::check(&answer, expected, tally, || {
                     format!("{text}{query}\n{forced:?} {nodes:?}")
                 })?;
@@ -213,12 +216,11 @@ fn check_under(
         Some(strategy),
     ));
     let query = format!("{query} under S");
-    let text = model.add_query(&query);
     let options = Options {
         priorities: Priorities::Kept,
         ..compare::options()
     };
-    let answer = model.check(&text, &options);
+    let answer = try_ask(model, &query, &options);
     compare::check(&answer, Ok(true), tally, || query.clone())
 }
 
@@ -250,17 +252,14 @@ fn compare_times(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = format!("clock t;\n{}", network.text());
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let (goal, keep) = (network.formula(goal), network.formula(keep));
     let options = Options {
         priorities: Priorities::Kept,
         verify: true,
         ..compare::options()
     };
-    let ask = |model: &mut LoadedModel, query: &str| {
-        let query = model.add_query(query);
-        model.check(&query, &options)
-    };
+    let ask = |model: &mut LoadedModel, query: &str| try_ask(model, query, &options);
     for limit in ["", "(4)", "(3, 1)"] {
         let within = |value: i32| match limit {
             // One unit is to be left wherever the goal does not hold yet.
@@ -329,8 +328,7 @@ fn check_in_discrete_states(
         nodes: Nodes::Discrete,
         ..compare::options()
     };
-    let query = model.add_query(query);
-    let other = model.check(&query, &options);
+    let other = try_ask(model, query, &options);
     let is_known = |answer: &&Answer| !matches!(answer.verdict, Verdict::Unknown(_));
     let both = answer
         .filter(is_known)
@@ -393,13 +391,13 @@ fn compare_scaled(
 ) -> Result<(), TestCaseError> {
     let has_differences = generate::has_differences(goal) || generate::has_differences(keep);
     let constant = i64::from(SHAPE.constant);
-    let model = compare::load(&network.text());
+    let model = load(&network.text());
     let Ok(Some(graph)) = compare::regions(&model, constant, has_differences, tally) else {
         return Ok(());
     };
     let large = network.scaled(SCALE);
     let text = large.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let (goal_text, keep_text) = (large.formula(goal), large.formula(keep));
     let reached = labels(network, goal, &graph).contains(&true);
     let mut queries = vec![(format!("E<> {goal_text}"), reached, Forced::Tiga)];
@@ -411,7 +409,6 @@ fn compare_scaled(
         }
     }
     for (query, expected, forced) in queries {
-        let query_text = model.add_query(&query);
         let options = Options {
             forced,
             priorities: Priorities::Kept,
@@ -419,7 +416,7 @@ fn compare_scaled(
             runs: false,
             ..compare::options()
         };
-        let answer = model.check(&query_text, &options);
+        let answer = try_ask(&mut model, &query, &options);
         if answer
             .as_ref()
             .is_ok_and(|one| one.verdict == Verdict::Unknown(StopReason::Clocks))

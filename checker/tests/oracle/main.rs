@@ -7,6 +7,9 @@
 //!
 //! `NTAGEN_CASES` says how many networks each test tries, `NTAGEN_SEED` from which seed.
 
+#[path = "../common/checks.rs"]
+#[allow(dead_code, reason = "this program asks in some of the ways only")]
+mod checks;
 mod closed_loops;
 mod compare;
 mod endless;

@@ -5,15 +5,16 @@
 
 use std::sync::Arc;
 
-use checker::engine::LoadedModel;
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
+use checker::engine::{LoadedModel, Options};
 use checker::game::strategy::attractor::{Selection, Start, Strategy};
 use checker::game::{Forced, Player, Priorities};
 use checker::syntax::ast::QueryText;
 use checker::verify::strategy::{Decision, Decisions, Defect, Outcome};
 use checker::verify::{Effort, Part};
 
+use crate::checks::load;
 use crate::compare;
 
 const QUERY: &str = "control: A<> P.goal";
@@ -66,9 +67,9 @@ struct Solved {
 }
 
 fn solved(game: &str, query: &str) -> Solved {
-    let mut model = compare::load(game);
+    let mut model = load(game);
     let query = model.add_query(query);
-    let options = checker::engine::Options {
+    let options = Options {
         strategy: true,
         ..compare::options()
     };

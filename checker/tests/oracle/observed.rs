@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use checker::engine::format::machine_json;
 use checker::engine::query::partial_observation;
-use checker::engine::{LoadedModel, Verdict};
+use checker::engine::{LoadedModel, Options, Verdict};
 use checker::game::partial_observation::Machine;
 use checker::game::{Forced, Priorities};
 use checker::ir::QueryKind;
@@ -22,9 +22,10 @@ use proptest::collection::vec;
 use proptest::prelude::{Strategy, any};
 use proptest::test_runner::TestCaseError;
 
+use crate::checks::{load, try_ask};
 use crate::compare::{self, Tally};
 use crate::explicit::{self, Graph, Label, Objective, Rule, winning};
-use crate::games::RULES;
+use crate::games::{RULES, labels};
 use crate::generate::{self, Formula, Network, Shape};
 
 const SHAPE: Shape = Shape {
@@ -295,21 +296,14 @@ fn compare(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let has_differences = generate::has_differences(goal) || generate::has_differences(keep);
     let constant = i64::from(SHAPE.constant);
     let Ok(Some(graph)) = compare::regions(&model, constant, has_differences, tally) else {
         return Ok(());
     };
-    let labels = |formula: &Formula| -> Vec<bool> {
-        let nodes = graph.nodes.iter();
-        let holds = nodes.map(|node| {
-            let state = &node.state;
-            network.holds(formula, &state.words, &state.clocks, graph.ticks, &|| false)
-        });
-        holds.collect()
-    };
-    let columns: Vec<Vec<bool>> = observations.iter().map(&labels).collect();
+    let labels = |formula: &Formula| labels(network, formula, &graph);
+    let columns: Vec<Vec<bool>> = observations.iter().map(labels).collect();
     let seen: Vec<Vec<bool>> = (0..graph.nodes.len())
         .map(|node| columns.iter().map(|column| column[node]).collect())
         .collect();
@@ -382,13 +376,12 @@ impl Asked<'_> {
                     continue;
                 };
                 let query = format!("{{{observations}}} control: {query}");
-                let query_text = model.add_query(&query);
-                let options = checker::engine::Options {
+                let options = Options {
                     forced,
                     verify: true,
                     ..compare::options()
                 };
-                let answer = model.check(&query_text, &options);
+                let answer = try_ask(model, &query, &options);
                 let describe = || format!("{text}{query}\n{forced:?}");
                 compare::check(&answer, Ok(expected), tally, describe)?;
                 compare::check_strategy(model, &answer, tally, describe)?;
@@ -499,7 +492,7 @@ impl Rounds {
 
 fn compare_rounds(rounds: &Rounds, tally: &Tally) -> Result<(), TestCaseError> {
     let text = rounds.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let Ok(Some(graph)) = compare::regions(&model, 0, false, tally) else {
         return Ok(());
     };

@@ -16,9 +16,10 @@ use checker::verify::{Effort, Part, Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
+use crate::checks::load;
 use crate::compare::{self, Tally};
 use crate::explicit::{Graph, Node, Rule, Step, entry, is_forced};
-use crate::games::{Kind, RULES, SHAPE, labels, seeded_games};
+use crate::games::{Kind, RULES, SHAPE, labels, objectives, seeded_games};
 use crate::generate::{Formula, Network};
 use crate::random::Random;
 
@@ -361,7 +362,7 @@ fn compare(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let Ok(Some(graph)) = compare::regions(&model, CONSTANT, true, tally) else {
         return Ok(());
     };
@@ -370,31 +371,15 @@ fn compare(
     let all = vec![true; graph.nodes.len()];
     let none = vec![false; graph.nodes.len()];
     let (goals, kept) = (labels(network, goal, &graph), labels(network, keep, &graph));
-    for (query, kind, goal, keep) in [
-        (format!("A<> {goal_text}"), Kind::Reach, &goals, &all),
-        (format!("A[] {keep_text}"), Kind::Safe, &none, &kept),
-        (
-            format!("A[ {keep_text} U {goal_text} ]"),
-            Kind::Until,
-            &goals,
-            &kept,
-        ),
-        (
-            format!("A[ {keep_text} W {goal_text} ]"),
-            Kind::WeakUntil,
-            &goals,
-            &kept,
-        ),
-        (
-            format!("A[] ({keep_text} && A<> {goal_text})"),
-            Kind::Recur,
-            &goals,
-            &kept,
-        ),
-    ] {
+    for (query, kind) in objectives(&goal_text, &keep_text) {
+        let (goal, keep) = match kind {
+            Kind::Reach => (&goals, &all),
+            Kind::Safe => (&none, &kept),
+            Kind::Until | Kind::WeakUntil | Kind::Recur => (&goals, &kept),
+        };
         let rules = RULES[random.below(3)];
         for prefix in ["", "E<> "] {
-            let query = model.add_query(&format!("{prefix}control: {query}"));
+            let query = model.add_query(&format!("{prefix}{query}"));
             let game = |_: Option<i32>| {
                 Some(Game {
                     graph: &graph,
@@ -419,12 +404,12 @@ fn compare_times(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     // The clock of time is the last one.
     let Some(place) = text.rfind("clock x").map(|last| last + "clock x0;\n".len()) else {
         return Ok(());
     };
-    let timed = compare::load(&format!("{}clock t;\n{}", &text[..place], &text[place..]));
+    let timed = load(&format!("{}clock t;\n{}", &text[..place], &text[place..]));
     let constant = i64::from(MOST_TIME) + 1;
     let graph = compare::regions(&model, CONSTANT, true, tally);
     let graph_of_time = compare::regions(&timed, constant, true, tally);

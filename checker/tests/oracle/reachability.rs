@@ -5,6 +5,7 @@ use checker::search::reachability::report::Order;
 use proptest::collection::vec;
 use proptest::test_runner::TestCaseError;
 
+use crate::checks::{load, try_ask};
 use crate::compare::{self, Tally};
 use crate::explicit::Graph;
 use crate::generate::{self, Formula, Network, Shape};
@@ -24,7 +25,7 @@ fn compare(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let Some(graph) = compare::regions_for(&model, (formulas, SHAPE.constant), tally) else {
         return Ok(());
     };
@@ -41,8 +42,7 @@ fn compare(
                 order,
                 ..compare::options()
             };
-            let query_text = model.add_query(&query);
-            let answer = model.check(&query_text, &options);
+            let answer = try_ask(&mut model, &query, &options);
             compare::check(&answer, expected, tally, || {
                 format!("{text}{query}\n{order:?}")
             })?;

@@ -11,10 +11,11 @@ use checker::network::Part;
 use checker::verify::{Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 
+use crate::checks::{load, try_ask};
 use crate::closed_loops::{Said, own_moves};
 use crate::compare::{self, Tally};
 use crate::explicit::Graph;
-use crate::games::{Kind, RULES, SHAPE, check_file, seeded_games, wins};
+use crate::games::{Kind, RULES, SHAPE, check_file, objectives, seeded_games, wins};
 use crate::generate::{Formula, Network};
 use crate::random::Random;
 
@@ -36,7 +37,7 @@ fn compare(
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
     let text = network.text();
-    let mut model = compare::load(&text);
+    let mut model = load(&text);
     let Ok(Some(mut graph)) = compare::regions(&model, i64::from(SHAPE.constant), true, tally)
     else {
         return Ok(());
@@ -54,8 +55,7 @@ fn compare(
         let words = own_moves(&semantics, &graph, Player::Controller);
         random.strategy(Player::Controller, &words, ir.clocks.len().max(1))
     } else {
-        let query = model.add_query(&format!("control: A[] {keep_text}"));
-        let answer = model.check(&query, &options);
+        let answer = try_ask(&mut model, &format!("control: A[] {keep_text}"), &options);
         let strategy = answer.ok().and_then(|answer| answer.evidence.strategy);
         let Some(strategy) = strategy.filter(|one| one.owner == Player::Controller) else {
             return Ok(());
@@ -72,22 +72,12 @@ fn compare(
         "control: A[] true".to_owned(),
         Some(Arc::new(strategy)),
     ));
-    for (query, kind) in [
-        (format!("control: A<> {goal_text}"), Kind::Reach),
-        (
-            format!("control: A[ {keep_text} U {goal_text} ]"),
-            Kind::Until,
-        ),
-        (format!("control: A[] not ({goal_text})"), Kind::Safe),
-        (
-            format!("control: A[ {keep_text} W {goal_text} ]"),
-            Kind::WeakUntil,
-        ),
-        (
-            format!("control: A[] ({keep_text} && A<> {goal_text})"),
-            Kind::Recur,
-        ),
-    ] {
+    for (query, kind) in objectives(&goal_text, &keep_text) {
+        let query = match kind {
+            // What a most permissive strategy keeps would hold in any case.
+            Kind::Safe => format!("control: A[] not ({goal_text})"),
+            _ => query,
+        };
         for (rule, forced) in RULES {
             let expected = if kind == Kind::Safe {
                 let avoided = Formula::Not(Box::new(goal.clone()));
@@ -96,13 +86,12 @@ fn compare(
                 wins(network, (goal, keep), &graph, kind, rule)[0]
             };
             let query = format!("{query} under S");
-            let query_text = model.add_query(&query);
             let options = Options {
                 forced,
                 verify: true,
                 ..options.clone()
             };
-            let answer = model.check(&query_text, &options);
+            let answer = try_ask(&mut model, &query, &options);
             let describe = || format!("{text}{query}\n{forced:?}\n{description:#}");
             compare::check(&answer, Ok(expected), tally, describe)?;
             compare::check_strategy(&model, &answer, tally, describe)?;

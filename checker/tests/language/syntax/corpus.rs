@@ -8,24 +8,14 @@
 //!
 //! `UPDATE_EXPECT=1 cargo test --test language` rewrites the `expect:` lines.
 
-use crate::syntax::support::shown;
+use std::path::Path;
+
 use checker::diagnostics::SourceMap;
 use checker::syntax::ast::Document;
 use checker::syntax::{parse_query, read_model, read_queries};
-use std::path::{Path, PathBuf};
 
-fn files(folder: &str) -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../tests/corpus/syntax")
-        .join(folder);
-    let mut files: Vec<PathBuf> = std::fs::read_dir(&folder)
-        .expect("the corpus is part of the repository")
-        .map(|entry| entry.expect("the folder can be read").path())
-        .collect();
-    files.sort();
-    assert!(!files.is_empty(), "{} is empty", folder.display());
-    files
-}
+use crate::corpus;
+use crate::syntax::support::shown;
 
 /// The text of the directive that a line holds.
 fn directive(line: &str) -> Option<(&str, &str)> {
@@ -148,7 +138,7 @@ fn rewrite(path: &Path, text: &str, diagnostics: &[String]) {
 }
 
 fn check_folder(folder: &str, has_errors: bool) {
-    let failures: Vec<String> = files(folder)
+    let failures: Vec<String> = corpus::files(&format!("syntax/{folder}"))
         .iter()
         .filter_map(|path| {
             let failure = check_file(path, has_errors).err()?;

@@ -1,6 +1,7 @@
 //! Properties over generated texts: printing and parsing are inverse, and no text crashes a reader.
 
-use crate::syntax::support::{expression, shape};
+use std::sync::OnceLock;
+
 use checker::diagnostics::{Diagnostic, SourceMap, Span};
 use checker::syntax::ast::{
     BinaryOp, Expr, ExprKind, Name, Prefixes, Quantifier, TypeExpr, TypeKind, UnaryOp,
@@ -9,7 +10,9 @@ use checker::syntax::{add_query_text, parse_query, print_expr, read_model, read_
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
-use std::sync::OnceLock;
+
+use crate::corpus;
+use crate::syntax::support::{expression, shape};
 
 fn expr(kind: ExprKind) -> Expr {
     let span = Span::default();
@@ -193,13 +196,8 @@ fn seeds() -> &'static [Vec<u8>] {
 }
 
 fn read_seeds() -> Vec<Vec<u8>> {
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/corpus/syntax");
-    let mut paths: Vec<std::path::PathBuf> = ["ok", "err"]
-        .iter()
-        .flat_map(|folder| std::fs::read_dir(root.join(folder)).expect("the corpus exists"))
-        .map(|entry| entry.expect("the folder can be read").path())
-        .collect();
-    paths.sort();
+    let paths = ["ok", "err"].map(|folder| corpus::files(&format!("syntax/{folder}")));
+    let paths = paths.concat();
     paths
         .iter()
         .map(|path| std::fs::read(path).expect("the file can be read"))
