@@ -1,5 +1,7 @@
 //! The rules of `ARCHITECTURE.md`, read off the sources.
 
+mod circles;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -56,29 +58,41 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every source file with its room and its text without comments.
-fn files() -> Vec<(PathBuf, String, String)> {
+/// A file of the crate.
+struct Source {
+    path: PathBuf,
+    /// The parts of its module path, as in `network/discrete/stepper`.
+    module: String,
+    room: String,
+    /// Its text without comments.
+    code: String,
+}
+
+/// Every source file of the crate.
+fn sources_of_the_crate() -> Vec<Source> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut paths = Vec::new();
     sources(&root, &mut paths);
     paths.sort();
     let files = paths.into_iter().map(|path| {
-        let first = path
-            .strip_prefix(&root)
-            .ok()
-            .and_then(|path| path.components().next())
-            .expect("every source lies below the root");
-        let room = first
-            .as_os_str()
-            .to_string_lossy()
-            .trim_end_matches(".rs")
-            .to_owned();
+        let below = path.strip_prefix(&root).expect("it lies below the root");
+        let parts: Vec<_> = below
+            .with_extension("")
+            .iter()
+            .map(|part| part.to_string_lossy().into_owned())
+            .filter(|part| part != "mod")
+            .collect();
         let text = fs::read_to_string(&path).expect("the sources are text");
         let code: Vec<&str> = text
             .lines()
             .map(|line| line.split("//").next().unwrap_or(""))
             .collect();
-        (path, room, code.join("\n"))
+        Source {
+            room: parts[0].clone(),
+            module: parts.join("/"),
+            code: code.join("\n"),
+            path,
+        }
     });
     files.collect()
 }
@@ -94,7 +108,10 @@ fn used_rooms(code: &str) -> Vec<&'static str> {
 fn rooms_use_only_rooms_before_them() {
     let place = |room: &str| ROOMS.iter().position(|one| *one == room);
     let mut violations = Vec::new();
-    for (path, room, code) in files() {
+    for Source {
+        path, room, code, ..
+    } in sources_of_the_crate()
+    {
         let Some(own) = place(&room) else { continue };
         for used in used_rooms(&code) {
             let is_apart = APART.contains(&(room.as_str(), used));
@@ -108,17 +125,20 @@ fn rooms_use_only_rooms_before_them() {
 
 #[test]
 fn every_source_file_belongs_to_a_room() {
-    let strays: Vec<_> = files()
+    let strays: Vec<_> = sources_of_the_crate()
         .into_iter()
-        .filter(|(_, room, _)| room != "lib" && !ROOMS.contains(&room.as_str()))
-        .map(|(path, ..)| path)
+        .filter(|one| one.room != "lib" && !ROOMS.contains(&one.room.as_str()))
+        .map(|one| one.path)
         .collect();
     assert!(strays.is_empty(), "{strays:?}");
 }
 
 #[test]
 fn unsafe_stands_only_in_the_compiler() {
-    for (path, room, code) in files() {
+    for Source {
+        path, room, code, ..
+    } in sources_of_the_crate()
+    {
         let has_unsafe =
             code.contains("unsafe {") || code.contains("unsafe fn") || code.contains("unsafe impl");
         let is_allowed = room == "exec" && path.components().any(|part| part.as_os_str() == "jit");
@@ -132,7 +152,10 @@ fn unsafe_stands_only_in_the_compiler() {
 
 #[test]
 fn python_is_named_in_one_file() {
-    for (path, room, code) in files() {
+    for Source {
+        path, room, code, ..
+    } in sources_of_the_crate()
+    {
         assert!(
             !code.contains("pyo3") || room == "python",
             "{} names PyO3",
@@ -143,7 +166,7 @@ fn python_is_named_in_one_file() {
 
 #[test]
 fn nothing_prints_or_exits() {
-    for (path, _, code) in files() {
+    for Source { path, code, .. } in sources_of_the_crate() {
         for word in ["println!", "eprintln!", "print!(", "process::exit"] {
             assert!(!code.contains(word), "{} has {word}", path.display());
         }
