@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ntagen.scene import Limits, Needle, Pose, Region, Scene
 
@@ -36,3 +37,8 @@ def scene(*regions: Region, targets: Sequence[Region] = (TARGET,), name: str = "
 
 
 PAPER = scene(CRITICAL, DETECTION, name="paper")
+
+HIDDEN = replace(
+    PAPER, criticals=(*PAPER.criticals, sphere("C2", "critical", (0.0, -28.0, -8.0), 2.0))
+)
+"""The paper's scene with a region more, on its best plan and not in the way of all others."""

@@ -18,14 +18,9 @@ from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
 from tests.drive.runs import Diary, drive
 from tests.oracles.synthesiser import oracle_synthesis
-from tests.steering import PAPER, scene, sphere
+from tests.steering import HIDDEN, PAPER, scene, sphere
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-
-# Right on the best plan for the paper's scene, and not in the way of all others.
-HIDDEN = replace(
-    PAPER, criticals=(*PAPER.criticals, sphere("C2", "critical", (0.0, -28.0, -8.0), 2.0))
-)
 
 
 def check_reached(scene: Scene, known: str, noise_mm: float, seeds: range) -> None:
@@ -38,7 +33,7 @@ def check_reached(scene: Scene, known: str, noise_mm: float, seeds: range) -> No
 
 @pytest.mark.parametrize("noise_mm", [0.0, 0.1])
 def test_the_paper_instance_is_reached(noise_mm: float) -> None:
-    check_reached(PAPER, "all", noise_mm, range(1, 6))
+    check_reached(PAPER, "all", noise_mm, range(1, 3))
 
 
 @pytest.mark.slow
@@ -98,6 +93,7 @@ def test_no_region_is_ever_pierced_whatever_is_known(name: str) -> None:
         assert result.clearance_mm > 0.0, (seed, result.ended)
 
 
+@pytest.mark.slow
 def test_roll_errors_are_seen_and_driven_around() -> None:
     deviations = 0
     for seed in range(1, 9):

@@ -11,7 +11,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -29,13 +28,15 @@ from ntagen.needle.virtual import Errors, VirtualNeedle
 from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
 from tests.oracles.synthesiser import oracle_synthesis
-from tests.steering import PAPER, sphere
+from tests.steering import HIDDEN
 
 ROOT = Path(__file__).parents[2]
 TRIES = int(os.environ.get("NTAGEN_INTERRUPTIONS", "8"))
-HIDDEN = replace(
-    PAPER, criticals=(*PAPER.criticals, sphere("C2", "critical", (0.0, -28.0, -8.0), 2.0))
-)
+
+
+def slow(share: float) -> object:
+    """A share of a run that takes seconds to drive and to decide again."""
+    return pytest.param(share, marks=pytest.mark.slow)
 
 
 class Impatient:
@@ -92,7 +93,7 @@ def count(tmp_path_factory: pytest.TempPathFactory) -> int:
     return len(read_log(path).records)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.02, 0.25, 0.5, 0.9])
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.25, slow(0.5), slow(0.9)])
 def test_a_run_that_is_ended_anywhere_is_decided_again(
     tmp_path: Path, count: int, share: float
 ) -> None:

@@ -24,12 +24,9 @@ from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
 from tests.drive.runs import Diary
 from tests.oracles.synthesiser import oracle_synthesis
-from tests.steering import PAPER, sphere
+from tests.steering import HIDDEN
 
 ROOT = Path(__file__).parents[2]
-HIDDEN = replace(
-    PAPER, criticals=(*PAPER.criticals, sphere("C2", "critical", (0.0, -28.0, -8.0), 2.0))
-)
 
 
 def logged(path: Path, settings: Settings | None = None, noise_mm: float = 0.1) -> RunLog:
@@ -40,15 +37,28 @@ def logged(path: Path, settings: Settings | None = None, noise_mm: float = 0.1) 
     return read_log(path)
 
 
+@pytest.fixture(scope="module")
+def usual_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a run with the usual settings."""
+    path = tmp_path_factory.mktemp("usual") / "run.mcap"
+    logged(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def usual(usual_path: Path) -> RunLog:
+    """A run with the usual settings."""
+    return read_log(usual_path)
+
+
 def check_same(comparison: Comparison, *, complete: bool) -> None:
     assert comparison.is_same, comparison
     assert comparison.complete is complete
 
 
-def test_a_run_is_decided_again_in_the_same_way(tmp_path: Path) -> None:
-    run = logged(tmp_path / "run.mcap")
-    assert Event.FORCE.value in [r.event for r in run.records if isinstance(r, Transition)]
-    check_same(replay(run, oracle_synthesis), complete=True)
+def test_a_run_is_decided_again_in_the_same_way(usual: RunLog) -> None:
+    assert Event.FORCE.value in [r.event for r in usual.records if isinstance(r, Transition)]
+    check_same(replay(usual, oracle_synthesis), complete=True)
 
 
 @pytest.mark.parametrize("settings", [Settings(timeout_s=20.0), Settings(initial_push_mm=2.0)])
@@ -59,9 +69,10 @@ def test_runs_with_other_settings_and_ends_are_decided_again(
 
 
 @pytest.mark.parametrize("share", [0.1, 0.4, 0.6])
-def test_a_torn_log_is_decided_again_up_to_the_tear(tmp_path: Path, share: float) -> None:
-    logged(tmp_path / "run.mcap")
-    data = (tmp_path / "run.mcap").read_bytes()
+def test_a_torn_log_is_decided_again_up_to_the_tear(
+    tmp_path: Path, usual_path: Path, share: float
+) -> None:
+    data = usual_path.read_bytes()
     (tmp_path / "torn.mcap").write_bytes(data[: int(len(data) * share)])
     check_same(replay(read_log(tmp_path / "torn.mcap"), oracle_synthesis), complete=False)
 
@@ -83,29 +94,29 @@ def test_an_interrupted_run_is_decided_again(
     check_same(replay(run, oracle_synthesis), complete=True)
 
 
-def test_a_changed_measurement_is_noticed(tmp_path: Path) -> None:
-    run = logged(tmp_path / "run.mcap")
-    place = next(i for i, r in enumerate(run.records) if isinstance(r, Measured) and r.time_s > 4.0)
-    measured = run.records[place]
+def test_a_changed_measurement_is_noticed(usual: RunLog) -> None:
+    place = next(
+        i for i, r in enumerate(usual.records) if isinstance(r, Measured) and r.time_s > 4.0
+    )
+    measured = usual.records[place]
     assert isinstance(measured, Measured)
     x, y, z = measured.position_mm
     changed = replace(measured, position_mm=(x + 0.5, y, z))
-    records = (*run.records[:place], changed, *run.records[place + 1 :])
-    comparison = replay(replace(run, records=records), oracle_synthesis)
+    records = (*usual.records[:place], changed, *usual.records[place + 1 :])
+    comparison = replay(replace(usual, records=records), oracle_synthesis)
     assert isinstance(comparison.logged, Estimated)
     assert isinstance(comparison.decided, Estimated)
 
 
-def test_another_choice_of_plan_is_noticed(tmp_path: Path) -> None:
+def test_another_choice_of_plan_is_noticed(usual: RunLog) -> None:
     def other(scene: Scene) -> Synthesis:
         synthesis = oracle_synthesis(scene)
         return replace(synthesis, candidates=rank(synthesis.candidates, ("length",)))
 
-    assert not replay(logged(tmp_path / "run.mcap"), other).is_same
+    assert not replay(usual, other).is_same
 
 
-def test_each_synthesis_is_attached_with_its_scene_model_and_plans(tmp_path: Path) -> None:
-    run = logged(tmp_path / "run.mcap")
+def test_each_synthesis_is_attached_with_its_scene_model_and_plans(usual: RunLog) -> None:
     diary = Diary()
     simulate(
         HIDDEN,
@@ -118,12 +129,12 @@ def test_each_synthesis_is_attached_with_its_scene_model_and_plans(tmp_path: Pat
     )
     for number, synthesis in enumerate(diary.syntheses, start=1):
         folder = f"rebuild-{number:04d}"
-        assert {f"{folder}/scene.json", f"{folder}/model.xml"} <= set(run.attachments)
-        plans = json.loads(run.attachments[f"{folder}/plans.json"])["plans"]
+        assert {f"{folder}/scene.json", f"{folder}/model.xml"} <= set(usual.attachments)
+        plans = json.loads(usual.attachments[f"{folder}/plans.json"])["plans"]
         assert len(plans) == min(200, len(synthesis.candidates))
 
 
-@pytest.mark.parametrize("after", [1, 30, 333])
+@pytest.mark.parametrize("after", [1, 30, pytest.param(333, marks=pytest.mark.slow)])
 def test_a_killed_writer_loses_nothing_that_was_acknowledged(tmp_path: Path, after: int) -> None:
     path = tmp_path / "run.mcap"
     command = [sys.executable, "-m", "tests.drive.victim", str(path)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.rank import DEFAULT_RANKING
 from ntagen.plan.synthesise import Margins, Synthesis, select
@@ -21,11 +23,17 @@ def oracle_synthesis(scene: Scene) -> Synthesis:
     )
 
 
+@lru_cache(maxsize=1000)
+def _plans(scene: Scene) -> tuple[planner.Steps, ...]:
+    """The plans to the first target; the same scenes come in many runs, and in their replays."""
+    return tuple(planner.plans(scene))
+
+
 def _chained(scene: Scene) -> list[Plan]:
     """Plans through the targets in order: the best few to the first, each continued to the next."""
     first = [
         Plan.of(Push(value) if kind == "push" else Roll(value) for kind, value in steps)
-        for steps in planner.plans(scene)
+        for steps in _plans(scene)
     ]
     if len(scene.targets) == 1:
         return first

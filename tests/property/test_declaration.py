@@ -63,6 +63,7 @@ def test_ten_thousand_paths_of_the_paper_scene() -> None:
         walk()
 
 
+@pytest.mark.slow
 @settings(max_examples=SCENES, deadline=None, suppress_health_check=list(HealthCheck))
 @given(scenes(), st.lists(choices(), min_size=PATHS_A_SCENE // 2, max_size=PATHS_A_SCENE))
 def test_paths_of_any_scene(scene: Scene, paths: list[list[int]]) -> None:

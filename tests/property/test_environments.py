@@ -10,6 +10,8 @@ import random
 import re
 from pathlib import Path
 
+import pytest
+
 from ntagen import checker, nsl
 from ntagen.render import render, render_queries
 
@@ -68,6 +70,7 @@ def check_text(text: str) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_changed_environments_are_models_or_get_diagnostics() -> None:
     chance = random.Random(SEED)
     accepted = 0

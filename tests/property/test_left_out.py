@@ -15,6 +15,8 @@ import re
 from collections import Counter
 from string import Template
 
+import pytest
+
 from ntagen import checker
 
 MODELS = int(os.environ.get("NTAGEN_MODELS", "150"))
@@ -199,6 +201,7 @@ def check_model(model: Template, unknown: str) -> Counter[str]:
     return Counter(accepted=1, compared=len(pairs), stopped=len(QUERIES) - len(pairs))
 
 
+@pytest.mark.slow
 def test_what_is_left_out_decides_nothing() -> None:
     chance = random.Random(SEED)
     counts: Counter[str] = Counter()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pytest
 from hypothesis import given, settings
 
 from ntagen.render.values import model_values
@@ -49,6 +50,7 @@ def exact_tip(needle: Needle, yaw: int) -> list[float]:
     ]
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(scenes(), choices())
 def test_rounded_positions_stay_within_the_margin_of_the_arc(

@@ -229,6 +229,7 @@ def bomb(path: Path, compression: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="measured as Linux does it")
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 def test_a_log_that_unpacks_to_gigabytes_is_refused_in_little_memory(

@@ -19,11 +19,7 @@ from ntagen.plot.run import picture_of_plans, picture_of_run
 from ntagen.plot.save import save
 from ntagen.scene import Pose
 from tests.oracles.synthesiser import oracle_synthesis
-from tests.steering import PAPER, scene, sphere
-
-HIDDEN = replace(
-    PAPER, criticals=(*PAPER.criticals, sphere("C2", "critical", (0.0, -28.0, -8.0), 2.0))
-)
+from tests.steering import HIDDEN, PAPER, scene, sphere
 
 
 def plans_picture(shown: int) -> Picture:
@@ -98,7 +94,7 @@ def test_insertion_goes_down_the_page(sign: float) -> None:
     assert sign * bottom > sign * top
 
 
-@pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
+@pytest.mark.parametrize("ending", ["png", pytest.param("pdf", marks=pytest.mark.slow), "svg"])
 def test_equal_pictures_are_equal_files(tmp_path: Path, ending: str) -> None:
     paths = [tmp_path / f"{name}.{ending}" for name in "ab"]
     for path in paths:
