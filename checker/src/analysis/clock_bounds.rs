@@ -36,7 +36,8 @@ const NONE: i32 = i32::MIN;
 pub enum Abstraction {
     /// None: the zone graph may be infinite.
     Exact,
-    /// Extra-M+: keeps what comparisons with the greatest constant can tell.
+    /// Extra-LU+ with L = U = M, which is coarser than Extra-M+: keeps what comparisons with the
+    /// greatest constant can tell.
     Maximum,
     /// Extra-LU+: keeps what reachability of locations needs.
     LowerUpper,

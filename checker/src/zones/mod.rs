@@ -14,7 +14,7 @@
 //!   update;
 //! * [`zone`]: one zone that owns its matrix;
 //! * [`zone_table`]: zones, each stored once;
-//! * [`minimal`]: zones stored by their fewest constraints;
+//! * [`minimal`]: the fewest constraints that make a zone;
 //! * [`extrapolate`]: the abstractions that make the zone graph finite;
 //! * [`simulation`]: inclusion up to what comparisons can tell;
 //! * [`federation`]: finite unions of zones, with exact subtraction and inclusion;

@@ -2,8 +2,8 @@
 //! holds?
 //!
 //! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one
-//! with the same words contains its zone, and stored ones that a new one contains are dropped from
-//! the waiting list. Which committed states are stored is told in [`super::expand`].
+//! with the same words contains its zone, and the passed list forgets stored ones that a new one
+//! contains. Which committed states are stored is told in [`super::expand`].
 //!
 //! Each stored state remembers its parent and the moves from it, so that a trace is found by taking
 //! the moves again.
