@@ -36,10 +36,10 @@ const NONE: i32 = i32::MIN;
 pub enum Abstraction {
     /// None: the zone graph may be infinite.
     Exact,
-    /// Extra-LU+ with L = U = M, which is coarser than Extra-M+: keeps what comparisons with the
-    /// greatest constant can tell.
+    /// Extra-M+, and a little further ([`crate::zones::extrapolate::lu_plus`]): keeps what
+    /// comparisons with the greatest constant can tell.
     Maximum,
-    /// Extra-LU+: keeps what reachability of locations needs.
+    /// Extra-LU+, and a little further: keeps what reachability of locations needs.
     LowerUpper,
     /// Extra-M on the parts of a zone on either side of every comparison of two clocks: see
     /// [`ClockBounds::split`].
