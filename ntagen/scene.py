@@ -121,7 +121,7 @@ class Needle:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the controller may do between two syntheses.
+    """The limits of the controller: its steps and its rolls.
 
     Attributes:
         step_s: Duration of one model step (`dt`).

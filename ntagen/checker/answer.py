@@ -148,7 +148,7 @@ class Answer:
 
     @property
     def machine(self) -> Machine | None:
-        """How the controller wins a game with observations.
+        """The controller's strategy in a game with observations.
 
         ``None`` if no strategy was asked for or found.
         """

@@ -54,7 +54,7 @@ class MachineState:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """How the controller wins a game in which it sees only some predicates.
+    """The controller's strategy in a game in which it sees only some predicates.
 
     ``machine[0]`` is its first state. It has no states if play is won before it begins.
     """

@@ -1,4 +1,4 @@
-"""What the commands on models share: loading with warnings, and pointing to `ntagen explain`."""
+"""Shared by the commands on models: loading with warnings, and pointing to `ntagen explain`."""
 
 from __future__ import annotations
 

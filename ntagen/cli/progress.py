@@ -13,7 +13,7 @@ from ntagen.cli.terminal import echo
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """What a search has done so far."""
+    """The counters of a search until now."""
 
     explored: int
     stored: int

@@ -22,7 +22,7 @@ NOT_COVERED: Final = 3
 """Exit code where the check does not cover the model or the query."""
 
 _WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certificate)"')
-"""How a file begins whose check does not depend on the rules of games."""
+"""The start of a file whose check does not depend on the rules of games."""
 
 
 @click.command(

@@ -147,7 +147,7 @@ class Ended(Record):
 
     Attributes:
         outcome: The value of `State` at the end.
-        reason: The reason, in words.
+        reason: The reason, in words. A replay compares them, so new words make old logs differ.
         depth_mm: The insertion depth at the end.
         adjustments: The number of times that the needle was pulled back.
         syntheses: The number of syntheses.

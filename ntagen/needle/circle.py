@@ -190,8 +190,8 @@ def _in_space(
     curvature = max(curvature, _SMALLEST_CURVATURE_PER_MM)
     to_center = math.cos(direction) * axes[0] + math.sin(direction) * axes[1]
     center = centroid + (offset + 1.0 / curvature) * to_center
-    # The area that the ray from the centre sweeps has the sign of the motion, on more than half a
-    # turn too.
+    # The sign of the area that the ray from the centre sweeps is that of the motion, also for more
+    # than half a turn.
     swept = np.cross(points[:-1] - center, np.diff(points, axis=0)).sum(axis=0)
     normal = axes[2] if float(np.dot(swept, axes[2])) >= 0.0 else -axes[2]
     in_plane = _residuals(

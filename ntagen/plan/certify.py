@@ -22,7 +22,7 @@ from ntagen.scene import Region, RegionKind, Scene, Vector
 
 @dataclass(frozen=True, slots=True)
 class Clearance:
-    """How near a path comes to a region.
+    """The smallest distance of a path to a region.
 
     Attributes:
         region: The region's name.
@@ -39,7 +39,7 @@ class Clearance:
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """How a path meets a target.
+    """Where a path enters a target, and how deep it gets.
 
     Attributes:
         region: The target's name.
@@ -121,7 +121,7 @@ def certify(plan: Plan, scene: Scene) -> Certificate:
 
 
 def clearance(arcs: tuple[Arc, ...], entry_mm: Vector, region: Region) -> Clearance:
-    """How near a chain of arcs that begins at a point comes to a region."""
+    """The smallest distance of a chain of arcs to a region; it begins at `entry_mm`."""
     nearest = nearest_on(arcs, entry_mm, region.center_mm)
     return Clearance(
         region.name, region.kind, nearest.distance_mm - region.radius_mm, nearest.at_mm

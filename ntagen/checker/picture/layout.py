@@ -364,7 +364,7 @@ def _routed(edge: Edge, chain: list[int], boxes: list[_Box], *, upwards: bool) -
     """The edge through its places, with its labels at the place that was made for them."""
     nails: list[Point] = []
     for box in chain:
-        # Along its labels the line is upright, so that it does not run through them.
+        # Beside its labels the line is vertical, so that it does not cross them.
         ends = sorted({-boxes[box].half, boxes[box].half}, reverse=upwards)
         nails += [(round(boxes[box].x), round(boxes[box].y + end)) for end in ends]
     stack = labels_of(edge)
