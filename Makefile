@@ -92,6 +92,10 @@ bench-limits: $(INSTALLED) ## Measure whether the limits of time and memory hold
 bench-games: $(INSTALLED) ## Measure how far the solver of games gets: seven families, up to 60 s or 4 GiB
 	$(BIN)/python tests/benchmarks/games.py
 
+.PHONY: ablation
+ablation: $(INSTALLED) ## Measure what each heuristic of the engine gains (about 20 minutes; MODELS=FOLDER adds models)
+	$(BIN)/python tests/benchmarks/ablation.py $(if $(MODELS),--models $(MODELS))
+
 .PHONY: clean
 clean: ## Remove everything that was built, also .venv
 	rm -rf .venv build dist demo checker/target ntagen/_checker*.so

@@ -375,3 +375,115 @@ process Centre() {{
 }}
 system Sensor, Centre;
 """
+
+
+def beacons(processes: int) -> str:
+    """Processes that broadcast to all others, each of whom listens while its clock allows."""
+    return f"""
+const int N = {processes};
+broadcast chan flash;
+process Beacon(const int[1, N] pid) {{
+    clock x;
+    state dark {{ x <= 10 + pid }}, lit {{ x <= 3 }};
+    init dark;
+    trans
+        dark -> lit {{ guard x >= 8; sync flash!; assign x = 0; }},
+        dark -> dark {{ guard x >= 4; sync flash?; assign x = 6; }},
+        lit -> dark {{ guard x >= 1; assign x = 0; }};
+}}
+system Beacon;
+"""
+
+
+def couriers(people: int) -> str:
+    """People who hand a parcel on to whom they like, by channels of pairs that they compute."""
+    return f"""
+const int N = {people};
+const int M = 4;
+chan hand[N * N];
+int[0, M] parcels[N];
+int[0, 3] mood[N];
+process Person(const int[0, N - 1] pid) {{
+    state here;
+    init here;
+    trans
+        here -> here {{ select to : int[0, N - 1];
+            guard to != pid && parcels[pid] > 0 && mood[to] != 3;
+            sync hand[pid * N + to]!; assign parcels[pid] = parcels[pid] - 1; }},
+        here -> here {{ select by : int[0, N - 1]; guard parcels[pid] < M;
+            sync hand[by * N + pid]?; assign parcels[pid] = parcels[pid] + 1; }},
+        here -> here {{ select m : int[0, 3]; guard m == (mood[pid] + 1) % 4;
+            assign mood[pid] = m; }},
+        here -> here {{ guard pid == 0 && parcels[0] == 0; assign parcels[0] = 2; }};
+}}
+system Person;
+"""
+
+
+def lamps(count: int) -> str:
+    """Lamps with a flag of their own that says whether their clock still matters."""
+    return f"""
+const int N = {count};
+process Lamp(const int[1, N] pid) {{
+    clock x;
+    bool running;
+    state one {{ !running || x <= 20 + pid }};
+    init one;
+    trans
+        one -> one {{ guard !running; assign running = true, x = 0; }},
+        one -> one {{ guard running && x >= 10 + pid; assign running = false; }};
+}}
+system Lamp;
+"""
+
+
+def relays(count: int) -> str:
+    """Pairs of which the one that is woken needs a clock that the one that wakes it sets."""
+    return f"""
+const int N = {count};
+chan wake[N], done[N];
+clock x[N];
+process Caller(const int[0, N - 1] pid) {{
+    clock y;
+    state calm {{ y <= 9 + pid }}, calling;
+    init calm;
+    trans
+        calm -> calling {{ guard y >= 4; sync wake[pid]!; assign x[pid] = 0; }},
+        calling -> calm {{ sync done[pid]?; assign y = 0; }};
+}}
+process Sleeper(const int[0, N - 1] pid) {{
+    state asleep, awake {{ x[pid] <= 5 }};
+    init asleep;
+    trans
+        asleep -> awake {{ sync wake[pid]?; }},
+        awake -> asleep {{ guard x[pid] >= 2; sync done[pid]!; }};
+}}
+system Caller, Sleeper;
+"""
+
+
+def sorters(count: int, length: int = 8) -> str:
+    """Processes that reverse parts of an array, which is judged by loops in functions."""
+    order = ", ".join(str((5 * index + 3) % length) for index in range(length))
+    return f"""
+const int N = {length};
+int[0, N - 1] row[N] = {{ {order} }};
+void turn(int[0, N - 1] from, int[0, N - 1] to) {{
+    int kept[N];
+    for (i : int[0, N - 1]) kept[i] = row[i];
+    for (i : int[0, N - 1]) if (i >= from && i <= to) row[i] = kept[from + to - i];
+}}
+int inversions() {{
+    int found = 0;
+    for (i : int[0, N - 1]) for (j : int[0, N - 1])
+        if (i < j && row[i] > row[j]) found = found + 1;
+    return found;
+}}
+process Sorter(const int[1, {count}] pid) {{
+    state here;
+    init here;
+    trans here -> here {{ select i : int[0, N - 2], j : int[1, N - 1];
+        guard i < j && (i + j + pid) % 2 == 0 && inversions() > j - i; assign turn(i, j); }};
+}}
+system Sorter;
+"""
