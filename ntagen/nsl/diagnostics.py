@@ -148,6 +148,7 @@ KINDS: Final = _kinds(
         "error",
         "With `safety swept`, a step goes less than half round the circle.",
     ),
+    ("N085", "uppaal-model", "error", "The file is a UPPAAL model, and not an environment."),
 )
 """All kinds of mistakes by name, in the order of their codes."""
 

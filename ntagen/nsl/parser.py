@@ -62,8 +62,21 @@ def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -
     Returns:
         The tree of all that could be read.
     """
+    if _is_uppaal_model(source):
+        reporter.report_file(
+            "uppaal-model",
+            source.path,
+            "this is a UPPAAL model, and not an environment",
+            hint="`ntagen check` answers its queries, and `ntagen info` shows what is in it",
+        )
+        return tree.File(source, ())
     tokens = [t for t in tokenise(source) if isinstance(t, Token)]
     return _Parser(source, tokens, reporter).file(kind)
+
+
+def _is_uppaal_model(source: Source) -> bool:
+    """Whether a text is XML, or the name of its file says that it is a UPPAAL model."""
+    return source.text.lstrip().startswith("<") or source.path.lower().endswith((".xta", ".ta"))
 
 
 class _Parser:

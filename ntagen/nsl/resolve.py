@@ -151,7 +151,7 @@ class _Resolver:
             )
             return None
         self._statements(file.statements, Scope(), "file")
-        if self._draft is None:
+        if self._draft is None and file.statements:
             self._reporter.report_file(
                 "environment-missing",
                 source.path,
