@@ -30,15 +30,73 @@ pub enum TraceWanted {
     Fastest,
 }
 
+/// The rules by which games are played, and strategies checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Rules {
+    /// The rule for forced moves of the environment.
+    pub forced: Forced,
+    /// Whether priorities count.
+    pub priorities: Priorities,
+}
+
+/// Which reductions searches may make. Verdicts, values and traces do not depend on them; how many
+/// states are stored does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reductions {
+    /// Whether a search may take states that differ only in which member of a scalar set is which
+    /// for the same.
+    pub symmetry: bool,
+    /// Whether a search for a state need not take independent moves in every order where time
+    /// stands still.
+    pub partial_order: bool,
+    /// Whether a search for states or values, and a game of which only the winner is asked, may
+    /// take states for the same that differ only in variables that are not live.
+    pub live_variables: bool,
+}
+
+impl Reductions {
+    /// All of them.
+    pub const ALL: Reductions = Reductions {
+        symmetry: true,
+        partial_order: true,
+        live_variables: true,
+    };
+
+    /// None of them.
+    pub const NONE: Reductions = Reductions {
+        symmetry: false,
+        partial_order: false,
+        live_variables: false,
+    };
+
+    /// Adds the reduction with this name; returns false if there is none.
+    #[must_use]
+    pub fn add(&mut self, name: &str) -> bool {
+        match name {
+            "symmetry" => self.symmetry = true,
+            "partial-order" => self.partial_order = true,
+            "live-variables" => self.live_variables = true,
+            _ => return false,
+        }
+        true
+    }
+}
+
+impl Default for Reductions {
+    fn default() -> Reductions {
+        Reductions::ALL
+    }
+}
+
 /// How a query is to be answered.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent wish")]
 pub struct Options {
     /// In which order states are explored.
     pub order: Order,
-    /// How many threads share the work, from 1 to [`MOST_THREADS`]. More than one share searches
-    /// for a reachable state and for values, breadth first, and compute what is won in games; other
-    /// searches take one.
+    /// How many threads share the work, at most [`MOST_THREADS`]; 0 counts as 1. More than one
+    /// share searches for a reachable state and for values, breadth first, and compute what is won
+    /// in games; other searches take one.
     pub threads: usize,
     /// The rule for forced moves of the environment.
     pub forced: Forced,
@@ -68,52 +126,31 @@ pub struct Options {
     pub certificate: bool,
     /// What happens where results of integer arithmetic do not fit into 32 bits.
     pub overflow: Overflow,
-    /// Whether a search may take states that differ only in which member of a scalar set is which
-    /// for the same.
-    pub symmetry: bool,
-    /// Whether a search for a state need not take independent moves in every order where time
-    /// stands still.
-    pub partial_order: bool,
-    /// Whether a search for states or values, and a game of which only the winner is asked, may
-    /// take states for the same that differ only in variables that are not live.
-    pub live_variables: bool,
+    /// Which reductions searches may make.
+    pub reductions: Reductions,
     /// Which heuristics are used.
     pub tuning: Tuning,
 }
 
 impl Options {
+    /// The rules of games.
+    pub fn rules(&self) -> Rules {
+        Rules {
+            forced: self.forced,
+            priorities: self.priorities,
+        }
+    }
+
+    /// How many threads share the work, at least one.
+    pub(crate) fn thread_count(&self) -> usize {
+        self.threads.clamp(1, MOST_THREADS)
+    }
+
     /// How searches are done that threads can share.
     pub(crate) fn manner(&self) -> Manner {
         Manner {
             order: self.order,
-            threads: self.threads.clamp(1, MOST_THREADS),
-        }
-    }
-}
-
-impl Default for Options {
-    fn default() -> Options {
-        Options {
-            order: Order::BreadthFirst,
-            threads: 1,
-            forced: Forced::default(),
-            priorities: Priorities::default(),
-            nodes: Nodes::default(),
-            code: CodeEngine::default(),
-            limits: Limits::default(),
-            plans: None,
-            strategy: false,
-            verify: false,
-            runs: false,
-            folder: None,
-            allow_write: Vec::new(),
-            trace: TraceWanted::default(),
-            certificate: false,
-            overflow: Overflow::default(),
-            symmetry: true,
-            partial_order: true,
-            live_variables: true,
-            tuning: Tuning::default(),
+            threads: self.thread_count(),
         }
     }
 }

@@ -6,7 +6,9 @@ use pyo3::exceptions::{PyIndexError, PyLookupError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use super::{Answer, FailedError, Model, forced_rule, priority_rule, rejected};
+use super::answer::Answer;
+use super::convert::{FailedError, priority_rule, rejected, rules};
+use super::model::Model;
 use crate::diagnostics::Span;
 use crate::engine::evidence::named_strategies::unnamed;
 use crate::engine::evidence::strategy_check;
@@ -176,7 +178,7 @@ impl Strategy {
         priorities: &str,
         states: Option<u64>,
     ) -> PyResult<(Option<bool>, Vec<String>)> {
-        let rules = (forced_rule(forced)?, priority_rule(priorities)?);
+        let rules = rules(forced, priorities)?;
         let most = states.unwrap_or(strategy_check::MOST_REGIONS);
         let model = self.model.get();
         let inner = &self.inner;
@@ -207,7 +209,7 @@ impl Strategy {
 
     /// Begins a play against it.
     fn play(&self, py: Python<'_>, query: &str, forced: &str, priorities: &str) -> PyResult<Play> {
-        let rules = (forced_rule(forced)?, priority_rule(priorities)?);
+        let rules = rules(forced, priorities)?;
         let inner = self.model.get().with(|model| {
             let play = model.play(Arc::clone(&self.inner), query, rules);
             let play = play.map_err(rejected)?;

@@ -4,11 +4,11 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use super::{FailedError, Model, StepEntry, rejected, step_entry};
+use super::convert::{FailedError, StepEntry, code_engine, rejected, step_entry};
+use super::model::{Model, failed};
+use crate::engine::LoadedModel;
 use crate::engine::format::{json, text};
 use crate::engine::session::walk::{Point, SIMULATED_TICKS_PER_UNIT};
-use crate::engine::{CodeEngine, LoadedModel};
-use crate::network::Failure;
 use crate::verify::timed::{Timed, least_multiple};
 
 /// A walk through a model.
@@ -18,24 +18,18 @@ pub(super) struct Simulation {
     point: Point,
 }
 
-impl Simulation {
-    /// A walk from the initial state.
-    pub(super) fn start(model: &Bound<'_, Model>, code: CodeEngine) -> PyResult<Simulation> {
-        let point = model.get().with(|model| {
-            model.prepare_simulation(code).map_err(rejected)?;
-            model
-                .start()
-                .map_err(|failure| Simulation::failed(model, failure))
-        })?;
-        Ok(Simulation {
-            model: model.clone().unbind(),
-            point,
-        })
-    }
-
-    pub(super) fn failed(model: &LoadedModel, failure: Failure) -> PyErr {
-        FailedError::new_err(text::failure_text(model, failure))
-    }
+/// A walk through a model from its initial state.
+#[pyfunction]
+pub(super) fn simulate(model: &Bound<'_, Model>, engine: &str) -> PyResult<Simulation> {
+    let code = code_engine(engine)?;
+    let point = model.get().with(|model| {
+        model.prepare_simulation(code).map_err(rejected)?;
+        model.start().map_err(|failure| failed(model, failure))
+    })?;
+    Ok(Simulation {
+        model: model.clone().unbind(),
+        point,
+    })
 }
 
 #[pymethods]
@@ -80,7 +74,7 @@ impl Simulation {
         self.model.get().with(|model| {
             let successors = model
                 .successors(&self.point)
-                .map_err(|failure| Simulation::failed(model, failure))?;
+                .map_err(|failure| failed(model, failure))?;
             let entries = successors
                 .iter()
                 .map(|(parts, _)| step_entry(model.network(), parts));
@@ -93,7 +87,7 @@ impl Simulation {
         let point = self.model.get().with(|model| {
             let successors = model
                 .successors(&self.point)
-                .map_err(|failure| Simulation::failed(model, failure))?;
+                .map_err(|failure| failed(model, failure))?;
             let count = successors.len();
             let chosen = successors.into_iter().nth(index);
             chosen.map(|(_, point)| point).ok_or_else(|| {
@@ -109,7 +103,7 @@ impl Simulation {
         let point = self.model.get().with(|model| {
             model
                 .settle(self.point.clone())
-                .map_err(|failure| Simulation::failed(model, failure))
+                .map_err(|failure| failed(model, failure))
         })?;
         self.point = point;
         Ok(())
@@ -123,27 +117,26 @@ pub(super) struct ExactWalk {
     timed: Timed,
 }
 
-impl ExactWalk {
-    /// A run from the initial state.
-    pub(super) fn start(model: &Bound<'_, Model>) -> PyResult<ExactWalk> {
-        let ticks_per_unit = SIMULATED_TICKS_PER_UNIT;
-        let state = model.get().with(|model| {
-            let choices = model.choices(ticks_per_unit);
-            let start = choices.and_then(|choices| choices.initial());
-            start.map_err(|error| ExactWalk::failed(model, error))
-        })?;
-        Ok(ExactWalk {
-            model: model.clone().unbind(),
-            timed: Timed {
-                state,
-                ticks_per_unit,
-            },
-        })
-    }
+/// A run with exact times from the initial state of a model.
+#[pyfunction]
+pub(super) fn walk_exactly(model: &Bound<'_, Model>) -> PyResult<ExactWalk> {
+    let ticks_per_unit = SIMULATED_TICKS_PER_UNIT;
+    let state = model.get().with(|model| {
+        let choices = model.choices(ticks_per_unit);
+        let start = choices.and_then(|choices| choices.initial());
+        start.map_err(|error| failed_exactly(model, error))
+    })?;
+    Ok(ExactWalk {
+        model: model.clone().unbind(),
+        timed: Timed {
+            state,
+            ticks_per_unit,
+        },
+    })
+}
 
-    fn failed(model: &LoadedModel, error: crate::verify::Error) -> PyErr {
-        FailedError::new_err(text::error_text(model, error))
-    }
+fn failed_exactly(model: &LoadedModel, error: crate::verify::Error) -> PyErr {
+    FailedError::new_err(text::error_text(model, error))
 }
 
 #[pymethods]
@@ -182,7 +175,7 @@ impl ExactWalk {
         self.model.get().with(|model| {
             let choices = model.choices(self.timed.ticks_per_unit);
             let found = choices.and_then(|choices| choices.of(&self.timed.state));
-            let (choices, longest) = found.map_err(|error| ExactWalk::failed(model, error))?;
+            let (choices, longest) = found.map_err(|error| failed_exactly(model, error))?;
             Ok((
                 json::choices(model.network(), &choices).to_string(),
                 longest,
@@ -202,7 +195,7 @@ impl ExactWalk {
                     None => Ok(None),
                 }
             });
-            taken.map_err(|error| ExactWalk::failed(model, error))
+            taken.map_err(|error| failed_exactly(model, error))
         })?;
         let impossible =
             || PyIndexError::new_err(format!("choice {index} after {wait} ticks is not possible"));

@@ -9,8 +9,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use checker::engine::format::{json, machine_json, strategy_json};
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Verdict};
-use checker::game::{Forced, Priorities};
+use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Rules, Verdict};
 use serde_json::Value as Json;
 
 /// Larger models take too long to be worth it.
@@ -52,7 +51,7 @@ impl Evidence {
         let number: usize = number.parse().unwrap_or(0);
         let bytes = &self.models[number % self.models.len()];
         let mut model = load(bytes).expect("models that do not load are left out");
-        let rules = (Forced::Tiga, Priorities::Ignored);
+        let rules = Rules::default();
         let Ok(checked) = model.verify_evidence("evidence", file, rules) else {
             return;
         };

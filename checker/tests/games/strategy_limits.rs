@@ -67,7 +67,7 @@ fn a_check_of_a_strategy_ends_when_it_is_to() {
     let strategy = answer.evidence.strategy.expect("it is wanted");
     let decisions = strategy_check::decisions(model.network(), &strategy);
     let played = Played::new(&strategy, &decisions);
-    let rules = (options.forced, options.priorities);
+    let rules = options.rules();
     let mut check = |effort: &mut Effort<'_>| {
         let outcome = model.verify_strategy(&query, played, rules, effort);
         outcome.expect("the query is right").expect("it is covered")

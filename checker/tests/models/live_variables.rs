@@ -25,7 +25,7 @@ const MOST_STATES: u64 = 4000;
 
 fn answer(text: &str, query: &str, manner: Manner, live_variables: bool) -> Answer {
     let adjust = |options: &mut Options| {
-        options.live_variables = live_variables;
+        options.reductions.live_variables = live_variables;
         options.limits.states = Some(MOST_STATES);
     };
     searches::answer_in(manner, (text, query), adjust, is_replayed_or_cut)

@@ -11,7 +11,7 @@
 use std::fs;
 use std::time::Duration;
 
-use checker::engine::{Answer, CodeEngine, LoadedModel, Options, TraceWanted, Verdict};
+use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Reductions, TraceWanted, Verdict};
 use checker::game::Nodes;
 use checker::search::reachability::report::Order;
 
@@ -93,9 +93,11 @@ fn random_options(random: &mut Random) -> Options {
             TraceWanted::Fastest,
         ][random.below(3)],
         certificate: random.chance(30),
-        symmetry: random.chance(50),
-        partial_order: random.chance(50),
-        live_variables: random.chance(50),
+        reductions: Reductions {
+            symmetry: random.chance(50),
+            partial_order: random.chance(50),
+            live_variables: random.chance(50),
+        },
         ..Options::default()
     };
     options.limits.states = Some(3_000);

@@ -22,7 +22,7 @@ const NETWORKS: u64 = 250;
 
 fn answer(text: &str, query: &str, manner: Manner, partial_order: bool) -> Answer {
     let adjust = |options: &mut Options| {
-        options.partial_order = partial_order;
+        options.reductions.partial_order = partial_order;
         options.limits.states = Some(MOST_STATES);
     };
     searches::answer_in(manner, (text, query), adjust, is_replayed_or_cut)

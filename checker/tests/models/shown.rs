@@ -4,15 +4,12 @@
 use std::fs;
 use std::path::Path;
 
-use checker::engine::Options;
 use checker::engine::format::json;
-use checker::game::{Forced, Priorities};
+use checker::engine::{Options, Rules};
 use serde_json::Value as Json;
 
 use crate::checks::{load_file, try_ask};
 use crate::corpus;
-
-const RULES: (Forced, Priorities) = (Forced::Tiga, Priorities::Ignored);
 
 /// Leaves of a trace that are changed, at most.
 const MOST_CHANGES: usize = 24;
@@ -92,7 +89,7 @@ fn what_traces_show_is_checked() {
             let mut model = load_file(&path);
             let place = format!("{}: {query}", path.display());
             let mut holds = |file: &Json| {
-                let checked = model.verify_evidence("file", &file.to_string(), RULES);
+                let checked = model.verify_evidence("file", &file.to_string(), Rules::default());
                 checked.map(|checked| (checked.holds, checked.lines))
             };
             match holds(&file) {

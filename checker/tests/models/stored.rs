@@ -177,7 +177,7 @@ fn variables_that_nothing_reads_again_are_forgotten() {
         system Sender, Receiver;";
     assert_eq!(stored(text), 34);
     assert_eq!(
-        stored_with(text, |options| options.live_variables = false),
+        stored_with(text, |options| options.reductions.live_variables = false),
         64
     );
 }
@@ -192,7 +192,10 @@ fn states_that_differ_by_exchanged_members_are_stored_once() {
             waits -> inside { guard x > 2 && !free && id == me; }, inside -> idle { assign free = true; }; }
         system P;";
     assert_eq!(stored(text), 34);
-    assert_eq!(stored_with(text, |options| options.symmetry = false), 308);
+    assert_eq!(
+        stored_with(text, |options| options.reductions.symmetry = false),
+        308
+    );
 }
 
 const SENSORS: &str = "broadcast chan tick; int[0, 3] level[4];
@@ -205,9 +208,11 @@ const SENSORS: &str = "broadcast chan tick; int[0, 3] level[4];
 fn independent_moves_are_taken_in_one_order_where_time_stands_still() {
     for query in ["E<> false", "A[] not deadlock"] {
         let count = |reduced: bool| {
-            check(SENSORS, query, |options| options.partial_order = reduced)
-                .counters
-                .stored
+            check(SENSORS, query, |options| {
+                options.reductions.partial_order = reduced
+            })
+            .counters
+            .stored
         };
         assert_eq!((count(true), count(false)), (18, 162), "{query}");
     }

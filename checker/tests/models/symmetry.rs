@@ -11,7 +11,7 @@
 use std::fmt::Write as _;
 
 use checker::engine::evidence::witness::Proof;
-use checker::engine::{Answer, Options, Verdict};
+use checker::engine::{Answer, Options, Reductions, Verdict};
 use checker::search::reachability::report::Manner;
 
 use crate::checks::{check, interpreted};
@@ -23,9 +23,9 @@ const NETWORKS: u64 = 120;
 
 fn answer(text: &str, query: &str, manner: Manner, symmetry: bool) -> Answer {
     let adjust = |options: &mut Options| {
-        options.symmetry = symmetry;
+        options.reductions.symmetry = symmetry;
         // Where states are counted, symmetry alone is to be seen; the other searches do both.
-        options.live_variables = manner != BREADTH_FIRST;
+        options.reductions.live_variables = manner != BREADTH_FIRST;
     };
     searches::answer_in(manner, (text, query), adjust, |run| {
         matches!(run, Some(Proof::Replayed(..)))
@@ -329,8 +329,11 @@ fn verdicts_are_those_of_all_states() {
 /// Large networks are left out.
 fn answer_with_limit(text: &str, query: &str) -> Answer {
     let mut options = Options {
-        symmetry: false,
-        live_variables: false,
+        reductions: Reductions {
+            symmetry: false,
+            live_variables: false,
+            ..Reductions::ALL
+        },
         ..interpreted()
     };
     options.limits.states = Some(800);

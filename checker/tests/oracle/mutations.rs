@@ -7,9 +7,8 @@ use std::sync::Arc;
 
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
-use checker::engine::{LoadedModel, Options};
+use checker::engine::{LoadedModel, Options, Rules};
 use checker::game::strategy::attractor::{Selection, Start, Strategy};
-use checker::game::{Forced, Player, Priorities};
 use checker::syntax::ast::QueryText;
 use checker::verify::strategy::{Decision, Decisions, Defect, Outcome};
 use checker::verify::{Effort, Part};
@@ -103,7 +102,7 @@ fn defect_of_state(
         .verify_strategy(
             &solved.query,
             played,
-            (Forced::Tiga, Priorities::Ignored),
+            Rules::default(),
             &mut Effort::up_to(10_000),
         )
         .expect("the query is right");

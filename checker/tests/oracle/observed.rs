@@ -10,10 +10,10 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use checker::engine::format::machine_json;
-use checker::engine::query::partial_observation;
-use checker::engine::{LoadedModel, Options, Verdict};
+use checker::engine::query::partial_observation::{self, ObservedGame};
+use checker::engine::{LoadedModel, Options, Rules, Verdict};
+use checker::game::Forced;
 use checker::game::partial_observation::Machine;
-use checker::game::{Forced, Priorities};
 use checker::ir::QueryKind;
 use checker::verify::Effort;
 use checker::verify::observed::{Action, MachineState};
@@ -254,8 +254,14 @@ fn check_machine(
             let Some(expected) = wins(game, &states) else {
                 continue;
             };
-            let asked = (objective, &observations[..]);
-            let rules = (forced, Priorities::Ignored);
+            let asked = ObservedGame {
+                objective,
+                observations: &observations[..],
+            };
+            let rules = Rules {
+                forced,
+                ..Rules::default()
+            };
             let checked = partial_observation::verify(
                 network,
                 asked,

@@ -5,7 +5,7 @@
 
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
-use checker::engine::{LoadedModel, Options};
+use checker::engine::{LoadedModel, Options, Rules};
 use checker::game::strategy::attractor::{Selection, Start, Way};
 use checker::game::{Forced, Player, Priorities};
 use checker::ir;
@@ -332,7 +332,10 @@ fn compare_query<'g>(
             None => !wins.contains(&false),
         };
         let played = Played::new(&strategy, &decisions);
-        let rules = (forced, Priorities::Kept);
+        let rules = Rules {
+            forced,
+            priorities: Priorities::Kept,
+        };
         let result = model.verify_strategy(query, played, rules, &mut Effort::up_to(100_000));
         let holds = match result.expect("the query is right") {
             Ok(Outcome::Verified(_)) => true,

@@ -4,7 +4,6 @@
 use serde_json::Value as Json;
 
 use crate::game::strategy::attractor::Strategy;
-use crate::game::{Forced, Priorities};
 use crate::ir::{Network, QueryKind};
 use crate::verify::Effort;
 
@@ -14,7 +13,8 @@ use super::{certificate, trace_file};
 use crate::engine::format::json_reader::MACHINE_FORMAT;
 use crate::engine::format::{json, machine_json, strategy_json};
 use crate::engine::loaded_model::LoadedModel;
-use crate::engine::query::partial_observation;
+use crate::engine::options::Rules;
+use crate::engine::query::partial_observation::{self, ObservedGame};
 use crate::engine::rejection::Rejection;
 
 /// What a file of evidence is.
@@ -28,7 +28,7 @@ impl LoadedModel {
         &mut self,
         path: &str,
         text: &str,
-        rules: (Forced, Priorities),
+        rules: Rules,
     ) -> Result<Checked, Rejection> {
         let unreadable = |why: Unreadable| Rejection {
             diagnostics: Vec::new(),
@@ -76,7 +76,7 @@ fn check_strategy(
     network: &Network,
     query: &QueryKind,
     strategy: &Strategy,
-    rules: (Forced, Priorities),
+    rules: Rules,
 ) -> Result<Checked, Unreadable> {
     let Some(asked) = Asked::of(query) else {
         return Err("the query of a strategy over states begins with control:".to_owned());
@@ -93,7 +93,7 @@ fn check_machine(
     network: &Network,
     query: &QueryKind,
     file: &Json,
-    rules: (Forced, Priorities),
+    rules: Rules,
 ) -> Result<Checked, Unreadable> {
     let QueryKind::Control {
         objective,
@@ -105,7 +105,10 @@ fn check_machine(
     };
     let machine = machine_json::read(network, file, observations.len())
         .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))?;
-    let asked = (objective, &observations[..]);
+    let asked = ObservedGame {
+        objective,
+        observations: &observations[..],
+    };
     let effort = &mut Effort::up_to(strategy_check::MOST_REGIONS);
     let result = partial_observation::verify(network, asked, &machine, rules, effort);
     Ok(Checked::of_strategy(network, &result)

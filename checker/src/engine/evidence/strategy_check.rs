@@ -18,6 +18,7 @@ use crate::zones::{Bound, Federation, minimal};
 use crate::engine::answer::Verification;
 use crate::engine::format::text;
 use crate::engine::loaded_model::LoadedModel;
+use crate::engine::options::Rules;
 use crate::engine::query::time_clock;
 use crate::engine::rejection::Rejection;
 use crate::syntax::ast::QueryText;
@@ -102,7 +103,7 @@ pub fn verify(
     network: &Network,
     asked: Asked<'_>,
     played: Played<'_>,
-    rules: (Forced, Priorities),
+    rules: Rules,
     effort: &mut Effort<'_>,
 ) -> Verification {
     let violated_at_once = |defect| {
@@ -125,7 +126,7 @@ pub fn verify(
     let start = match played.start {
         Start::Initial => Origin::Initial,
         Start::Anywhere => Origin::Anywhere,
-        Start::After(way) => match follow(network, way, rules.1)? {
+        Start::After(way) => match follow(network, way, rules.priorities)? {
             Some((_, mut states)) => {
                 let state = states.pop().expect("a run has a state");
                 Origin::State(Timed {
@@ -137,7 +138,7 @@ pub fn verify(
         },
     };
     let game = asked.game(network, played.time_limit);
-    let mut claim = claim(&game.objective, (played.owner, played.selection), rules);
+    let mut claim = claim(&game.objective, played.owner, played.selection, rules);
     let allowed = played
         .under
         .map(|under| decisions(network, &under.strategy));
@@ -153,7 +154,7 @@ impl LoadedModel {
         &mut self,
         text: &QueryText,
         strategy: Played<'_>,
-        rules: (Forced, Priorities),
+        rules: Rules,
         effort: &mut Effort<'_>,
     ) -> Result<Verification, Rejection> {
         let (query, _) = self.compile(text.span)?;
@@ -252,8 +253,9 @@ fn is_for_time(
 /// What is claimed of a strategy for an objective.
 pub(crate) fn claim(
     objective: &Objective,
-    (owner, selection): (Player, Selection),
-    (forced, priorities): (Forced, Priorities),
+    owner: Player,
+    selection: Selection,
+    rules: Rules,
 ) -> Claim<'_> {
     let (goal, keep, aim) = match objective {
         Objective::Reach(goal) => (Some(goal), None, Aim::Reach),
@@ -272,13 +274,13 @@ pub(crate) fn claim(
         aim,
         goal,
         keep,
-        forcing: match forced {
+        forcing: match rules.forced {
             Forced::Tiga => Forcing::Component,
             Forced::Product => Forcing::Network,
             Forced::Neutral => Forcing::Always,
         },
         under: None,
-        has_priorities: priorities == Priorities::Kept,
+        has_priorities: rules.priorities == Priorities::Kept,
         constant,
         has_differences,
     }

@@ -15,6 +15,7 @@ use crate::zones::Bound;
 
 use super::extremum::extremum;
 use super::liveness::{always, leads_to};
+use super::partial_observation::ObservedGame;
 use super::reachable::reachable;
 use super::subject::Subject;
 use super::time_optimal::{Race, fastest};
@@ -164,7 +165,10 @@ fn answer_within(
             observations: Some(observations),
             ..
         } => {
-            let asked = (objective, &observations[..]);
+            let asked = ObservedGame {
+                objective,
+                observations: &observations[..],
+            };
             partial_observation::game(network, executor, asked, options, watch)
         }
         QueryKind::Control {
@@ -191,7 +195,7 @@ fn reduced(
     options: &Options,
     mut answer: impl FnMut(Option<&Arc<Symmetry>>) -> Answer,
 ) -> Answer {
-    let is_allowed = options.symmetry && subject.under.is_none();
+    let is_allowed = options.reductions.symmetry && subject.under.is_none();
     let symmetry = is_allowed
         .then(|| Symmetry::of_network(subject.network))
         .flatten();

@@ -29,7 +29,7 @@ use super::subject::has_differences;
 use crate::engine::answer::{Answer, Verdict, Verification};
 use crate::engine::evidence::strategy_check::{self, Asked, Played};
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
-use crate::engine::{MOST_THREADS, Options};
+use crate::engine::options::Options;
 /// What is said of a game whose model has priorities.
 pub(super) const IGNORED_PRIORITIES: &str =
     "games ignore the priorities of the model, unless they are told to keep them";
@@ -233,7 +233,7 @@ fn played(
             && (!is_strategy_wanted || (seeker == Player::Controller && !is_cooperative)),
     };
     // A strategy says what to do in states with all their values, and plans have such states.
-    let forgets = options.live_variables
+    let forgets = options.reductions.live_variables
         && !is_strategy_wanted
         && options.plans.is_none()
         && within.is_none();
@@ -254,7 +254,7 @@ fn played(
         Err(failure) => return plain(Verdict::Error(failure), Counters::default()),
     };
     let mut solver = Solver::new(&mut graph, seeker, options.forced);
-    solver.share_among(options.threads.clamp(1, MOST_THREADS));
+    solver.share_among(options.thread_count());
     solver.give_up_beyond(allowance);
     if nodes == Nodes::Automatic {
         solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD);
@@ -387,7 +387,7 @@ pub(super) fn verified(
     let mut ends = || watch.look(&Counters::default()).is_some();
     let decisions = strategy_check::decisions(network, strategy);
     let played = Played::new(strategy, &decisions);
-    let rules = (options.forced, options.priorities);
+    let rules = options.rules();
     let effort = &mut effort_of(options).unless(&mut ends);
     strategy_check::verify(network, asked, played, rules, effort)
 }

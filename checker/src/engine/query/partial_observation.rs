@@ -6,7 +6,7 @@ use crate::analysis::{Abstraction, ClockBounds};
 use crate::exec::Executor;
 use crate::game::partial_observation::{Answer as GameAnswer, Question, Solver};
 use crate::game::strategy::attractor::Selection;
-use crate::game::{Forced, Player, Priorities};
+use crate::game::{Player, Priorities};
 use crate::ir::{ClockAtom, Network, Objective, Predicate};
 use crate::network::symbolic::predicate;
 use crate::search::limits::{Counters, Watch};
@@ -15,20 +15,33 @@ use crate::verify::observed::{self, MachineState};
 
 use super::game::{self, objective_atoms, zones_of};
 use super::subject::has_differences;
-use crate::engine::Options;
 use crate::engine::answer::{Answer, Verdict, Verification};
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::machine_json;
 use crate::engine::limits::LimitWatch;
+use crate::engine::options::{Options, Rules};
+
+/// What a game query with observations asks for.
+#[derive(Clone, Copy, Debug)]
+pub struct ObservedGame<'q> {
+    /// What the controller is to enforce.
+    pub objective: &'q Objective,
+    /// What it sees.
+    pub observations: &'q [Predicate],
+}
 
 /// Answers a game query with observations.
 pub(super) fn game(
     network: &Network,
     executor: &dyn Executor,
-    (objective, observations): (&Objective, &[Predicate]),
+    asked: ObservedGame<'_>,
     options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
+    let ObservedGame {
+        objective,
+        observations,
+    } = asked;
     let observed = observations.iter().flat_map(predicate::atoms);
     let atoms: Vec<ClockAtom> = objective_atoms(objective)
         .into_iter()
@@ -82,8 +95,7 @@ pub(super) fn game(
             let machine = solver.machine();
             if options.verify {
                 let machine = machine_json::to_check(&machine);
-                let asked = (objective, observations);
-                let rules = (options.forced, options.priorities);
+                let rules = options.rules();
                 let mut ends = || watch.look(&Counters::default()).is_some();
                 let effort = &mut game::effort_of(options).unless(&mut ends);
                 let result = verify(network, asked, &machine, rules, effort);
@@ -104,17 +116,17 @@ pub(super) fn game(
 /// the query.
 pub fn verify(
     network: &Network,
-    (objective, observations): (&Objective, &[Predicate]),
+    asked: ObservedGame<'_>,
     machine: &[MachineState],
-    rules: (Forced, Priorities),
+    rules: Rules,
     effort: &mut Effort<'_>,
 ) -> Verification {
-    let owner = (Player::Controller, Selection::First);
-    let mut claim = strategy_check::claim(objective, owner, rules);
-    let (constant, has_differences) = strategy_check::constants(observations.iter());
+    let (owner, selection) = (Player::Controller, Selection::First);
+    let mut claim = strategy_check::claim(asked.objective, owner, selection, rules);
+    let (constant, has_differences) = strategy_check::constants(asked.observations.iter());
     claim.constant = claim.constant.max(constant);
     claim.has_differences |= has_differences;
-    observed::verify(network, machine, observations, &claim, effort)
+    observed::verify(network, machine, asked.observations, &claim, effort)
 }
 
 /// Names what a model has that there is no algorithm for under partial observation.

@@ -29,7 +29,7 @@ pub(super) fn reachable<'a>(
     watch: &mut LimitWatch,
 ) -> Answer {
     // A strategy may forbid moves in one order and allow them in another.
-    let is_ordered = options.partial_order && subject.under.is_none();
+    let is_ordered = options.reductions.partial_order && subject.under.is_none();
     let order = is_ordered
         .then(|| PartialOrder::new(subject.network, goal, options.tuning))
         .flatten();

@@ -44,7 +44,7 @@ pub(super) fn live_variables(
     options: &Options,
     symmetry: Option<&Arc<Symmetry>>,
 ) -> Option<Arc<LiveVariables>> {
-    if !options.live_variables || subject.under.is_some() {
+    if !options.reductions.live_variables || subject.under.is_some() {
         return None;
     }
     // An initial value is the same member for all, so that states would no longer be each other's

@@ -38,7 +38,7 @@ use super::time_clock::{TIME, with_time};
 use crate::engine::answer::{Answer, Values, Verdict};
 use crate::engine::evidence::strategy_check::Asked;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
-use crate::engine::{MOST_THREADS, Options};
+use crate::engine::options::Options;
 
 /// The limit to start from if the query has none.
 const FIRST_LIMIT: i32 = 16;
@@ -317,7 +317,7 @@ impl Timed<'_, '_> {
             _ => Graph::new(&mut symbolic, wanted),
         }?;
         let mut solver = Solver::new(&mut graph, Player::Controller, self.options.forced);
-        solver.share_among(self.options.threads.clamp(1, MOST_THREADS));
+        solver.share_among(self.options.thread_count());
         match nodes {
             Some(Nodes::Automatic) => solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD),
             Some(Nodes::Discrete) => solver.give_up_beyond(Some(Allowance {

@@ -15,7 +15,7 @@ use serde_json::{Map, Value as Json, json};
 
 use crate::game::strategy::attractor::{Selection, Start, Strategy};
 use crate::game::strategy::closed_loop;
-use crate::game::{Forced, Player, Priorities};
+use crate::game::{Player, Priorities};
 use crate::ir::{Network, Query};
 use crate::verify::play::{self, Ending, Gap, Next, Situation, Timing, Window};
 use crate::verify::replay::{End, Moment, Run, Step};
@@ -27,6 +27,7 @@ use crate::engine::evidence::strategy_check::{self, Asked, Played};
 use crate::engine::format::json_reader::Mismatch;
 use crate::engine::format::{json, strategy_json};
 use crate::engine::loaded_model::LoadedModel;
+use crate::engine::options::Rules;
 use crate::engine::query::time_clock;
 use crate::engine::rejection::Rejection;
 
@@ -202,7 +203,7 @@ impl Follower {
     pub fn verify(
         &self,
         model: &mut LoadedModel,
-        rules: (Forced, Priorities),
+        rules: Rules,
         effort: &mut Effort<'_>,
     ) -> Result<(Option<bool>, Vec<String>), Rejection> {
         let text = model.add_query(&self.query);
@@ -323,7 +324,7 @@ pub struct Play {
     under: Option<Follower>,
     query: Query,
     query_text: String,
-    rules: (Forced, Priorities),
+    rules: Rules,
     /// How many steps lead to where it begins.
     start: usize,
     states: Vec<Timed>,
@@ -339,7 +340,7 @@ impl LoadedModel {
         &mut self,
         follower: Arc<Follower>,
         query: &str,
-        rules: (Forced, Priorities),
+        rules: Rules,
     ) -> Result<Result<Play, verify::Error>, Rejection> {
         let text = self.add_query(query);
         let (query, _) = self.compile(text.span)?;
@@ -366,7 +367,7 @@ impl LoadedModel {
             Err(error) => return Ok(Err(error)),
         }
         let network = time_clock::network_of(self.network(), strategy);
-        let (states, steps) = match beginning(&network, &strategy.start, rules.1) {
+        let (states, steps) = match beginning(&network, &strategy.start, rules.priorities) {
             Ok(Some(beginning)) => beginning,
             Ok(None) => {
                 let message = "error: the way to where the strategy begins is not possible";
@@ -438,9 +439,9 @@ impl Play {
 
     fn look(&self, network: &Network, timed: &Timed) -> Result<Situation, verify::Error> {
         let strategy = &self.follower.strategy;
-        let played = (strategy.owner, strategy.selection);
+        let (owner, selection) = (strategy.owner, strategy.selection);
         let game = self.game(network);
-        let claim = strategy_check::claim(&game.objective, played, self.rules);
+        let claim = strategy_check::claim(&game.objective, owner, selection, self.rules);
         let part = self.follower.at(network, &timed.state.words);
         let decisions = strategy_check::decisions(network, &part);
         let mut claim = claim;
@@ -657,7 +658,7 @@ impl Play {
             "query": self.query_text,
             "kind": "play",
             "winner": winner.map(owner_name),
-            "priorities": match self.rules.1 {
+            "priorities": match self.rules.priorities {
                 Priorities::Ignored => "ignore",
                 Priorities::Kept => "keep",
             },

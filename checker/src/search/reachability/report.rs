@@ -7,9 +7,10 @@ use crate::search::outcome::{Outcome, Trace};
 use super::tree::MOST_SHARDS;
 
 /// In which order states are explored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Order {
     /// Breadth first: traces are shortest in stored states.
+    #[default]
     BreadthFirst,
     /// Depth first.
     DepthFirst,

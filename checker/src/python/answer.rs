@@ -1,0 +1,315 @@
+//! Queries are answered, and answers taken apart.
+
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+
+use super::convert::{RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal};
+use super::model::Model;
+use super::options;
+use crate::engine::evidence::strategy_check;
+use crate::engine::format::{
+    json, machine_c, machine_json, strategy_c, strategy_json, strategy_text, text,
+};
+use crate::engine::{self, LoadedModel, Options, Verdict};
+use crate::search::limits::StopReason;
+
+/// Answers a query; `options` is an `Options` of `ntagen.checker.options`.
+#[pyfunction]
+pub(super) fn check(
+    model: &Bound<'_, Model>,
+    query: &str,
+    options: &Bound<'_, PyAny>,
+) -> PyResult<Answer> {
+    let options = options::read(options)?;
+    let inner = model.get();
+    let answer = model.py().detach(|| {
+        inner.with(|model| {
+            let text = model.add_query(query);
+            let overflow = model.network().overflow;
+            let options = Options {
+                overflow,
+                ..options
+            };
+            model.check(&text, &options)
+        })
+    });
+    let answer = answer.map_err(rejected)?;
+    if answer.verdict == Verdict::Unknown(StopReason::Interrupted) {
+        return Err(PyKeyboardInterrupt::new_err(()));
+    }
+    Ok(Answer {
+        model: model.clone().unbind(),
+        query: query.to_owned(),
+        inner: answer,
+    })
+}
+
+/// The answer to a query.
+#[pyclass(frozen, module = "ntagen._checker")]
+pub(super) struct Answer {
+    pub(super) model: Py<Model>,
+    pub(super) query: String,
+    pub(super) inner: engine::Answer,
+}
+
+#[pymethods]
+impl Answer {
+    /// "satisfied", "not satisfied", "maybe", "unknown" or "error".
+    #[getter]
+    fn verdict(&self) -> &'static str {
+        match self.inner.verdict {
+            Verdict::Satisfied => "satisfied",
+            Verdict::NotSatisfied => "not satisfied",
+            Verdict::Maybe => "maybe",
+            Verdict::Unknown(_) => "unknown",
+            Verdict::Error(_) => "error",
+        }
+    }
+
+    /// The values of a query for them as JSON; `None` for other queries.
+    fn value_json(&self) -> Option<String> {
+        let values = self.inner.value.as_ref()?;
+        Some(json::values(values).to_string())
+    }
+
+    /// "states", "memory" or "time" if a limit stopped the search.
+    #[getter]
+    fn stop(&self) -> Option<&'static str> {
+        match self.inner.verdict {
+            Verdict::Unknown(reason) => stop_name(reason),
+            _ => None,
+        }
+    }
+
+    /// A remark, or what went wrong in the model.
+    #[getter]
+    fn message(&self) -> Option<String> {
+        match self.inner.verdict {
+            Verdict::Error(failure) => Some(
+                self.model
+                    .get()
+                    .with(|model| text::failure_text(model, failure)),
+            ),
+            _ => self.inner.message.clone(),
+        }
+    }
+
+    /// Warnings about the query.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.inner.warnings.clone()
+    }
+
+    #[getter]
+    fn explored(&self) -> u64 {
+        self.inner.counters.explored
+    }
+
+    #[getter]
+    fn stored(&self) -> u64 {
+        self.inner.counters.stored
+    }
+
+    /// The first place where a result wrapped round, and the expression.
+    #[getter]
+    fn wrapped(&self) -> Option<(String, String)> {
+        let site = self.inner.wrapped?;
+        let place =
+            |model: &mut LoadedModel| model.place(model.network().sites[site.0 as usize].span);
+        Some(self.model.get().with(place))
+    }
+
+    #[getter]
+    fn seconds(&self) -> f64 {
+        self.inner.seconds
+    }
+
+    #[getter]
+    fn load_seconds(&self) -> f64 {
+        self.inner.load_seconds
+    }
+
+    #[getter]
+    fn peak_bytes(&self) -> u64 {
+        self.inner.peak_bytes
+    }
+
+    /// How many plans there are; `None` if none were asked for or there is no list of plans.
+    #[getter]
+    fn plan_count(&self) -> Option<usize> {
+        self.inner.evidence.plans.as_ref().map(Vec::len)
+    }
+
+    /// Whether there are more plans than were asked for.
+    #[getter]
+    fn has_more_plans(&self) -> bool {
+        self.inner.evidence.has_more_plans
+    }
+
+    /// The plans: of each, the steps that leave a state without committed locations.
+    fn plans(&self) -> Vec<Vec<StepEntry>> {
+        self.model.get().with(|model| {
+            let network = model.network();
+            let plans = self.inner.evidence.plans.iter().flatten().map(|plan| {
+                let steps = plan
+                    .steps
+                    .iter()
+                    .filter(|step| !step.was_committed)
+                    .map(|step| step_entry(network, &step.parts));
+                steps.collect()
+            });
+            plans.collect()
+        })
+    }
+
+    /// The plans as JSON; `None` without plans.
+    fn plans_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.plans_json_or_none())
+    }
+
+    /// The traces in UPPAAL's form, with the runs with exact times; `None` without a trace.
+    fn trace_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.trace_text_or_none())
+    }
+
+    /// The traces as JSON; `None` without a trace.
+    fn trace_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.trace_json_or_none())
+    }
+
+    /// The certificate as a file; `None` without one.
+    fn certificate_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.certificate_text_or_none())
+    }
+
+    /// Whether the strategy and the traces passed their checks; `None` if none was made or one came
+    /// to no end.
+    #[getter]
+    fn verified(&self) -> Option<bool> {
+        self.inner.evidence.is_verified()
+    }
+
+    /// What the checks of strategy and traces covered, or what is wrong, line by line; empty
+    /// without a check.
+    fn verification(&self) -> Vec<String> {
+        let evidence = &self.inner.evidence;
+        let runs = evidence.witnesses.iter().filter_map(|one| one.run.as_ref());
+        let mut lines: Vec<String> = runs.flat_map(text::proof_lines).collect();
+        if let Some(result) = &evidence.verification {
+            lines.extend(
+                self.model
+                    .get()
+                    .with(|model| strategy_check::describe(model.network(), result)),
+            );
+        }
+        lines
+    }
+
+    /// The strategy, or the machine of a game with observations, as JSON; `None` without any.
+    fn strategy_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.strategy_json_or_none())
+    }
+
+    /// The strategy, or the machine of a game with observations, as a controller in C; `None`
+    /// without any.
+    fn controller_c(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let text = until_signal(py, || self.controller_c_or_reason())?;
+        text.map_err(|reason| RejectedError::new_err((vec![format!("error: {reason}")],)))
+    }
+
+    /// The strategy as text in TIGA's form, or the machine of a game with observations; `None`
+    /// without any.
+    fn strategy_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        until_signal(py, || self.strategy_text_or_none())
+    }
+}
+
+impl Answer {
+    fn plans_json_or_none(&self) -> Option<String> {
+        let evidence = &self.inner.evidence;
+        let plans = evidence.plans.as_ref()?;
+        let more = evidence.has_more_plans;
+        Some(
+            self.model
+                .get()
+                .with(|model| json::plans(model.network(), plans, &self.query, more).to_string()),
+        )
+    }
+
+    fn trace_text_or_none(&self) -> Option<String> {
+        let witnesses = &self.inner.evidence.witnesses;
+        if witnesses.is_empty() {
+            return None;
+        }
+        let texts: Vec<String> = self.model.get().with(|model| {
+            let texts = witnesses.iter();
+            texts
+                .map(|one| text::witness_text(model.network(), one))
+                .collect()
+        });
+        Some(texts.join("\n"))
+    }
+
+    fn trace_json_or_none(&self) -> Option<String> {
+        let witnesses = &self.inner.evidence.witnesses;
+        if witnesses.is_empty() {
+            return None;
+        }
+        Some(
+            self.model
+                .get()
+                .with(|model| json::witnesses(model.network(), witnesses, &self.query).to_string()),
+        )
+    }
+
+    fn certificate_text_or_none(&self) -> Option<String> {
+        let certificate = self.inner.evidence.certificate.as_ref()?;
+        Some(
+            self.model
+                .get()
+                .with(|model| certificate.text(model.network(), &self.query)),
+        )
+    }
+
+    fn strategy_json_or_none(&self) -> Option<String> {
+        if let Some(machine) = &self.inner.evidence.machine {
+            let write = |model: &mut LoadedModel| {
+                machine_json::write(model.network(), machine, &self.query).to_string()
+            };
+            return Some(self.model.get().with(write));
+        }
+        let strategy = self.inner.evidence.strategy.as_ref()?;
+        Some(
+            self.model
+                .get()
+                .with(|model| strategy_json::text(model.network(), strategy, &self.query)),
+        )
+    }
+
+    fn strategy_text_or_none(&self) -> Option<String> {
+        if let Some(machine) = &self.inner.evidence.machine {
+            let write =
+                |model: &mut LoadedModel| machine_json::text(model.network(), machine, &self.query);
+            return Some(self.model.get().with(write));
+        }
+        let strategy = self.inner.evidence.strategy.as_ref()?;
+        let write = |model: &mut LoadedModel| strategy_text::write(model.network(), strategy);
+        Some(self.model.get().with(write))
+    }
+
+    fn controller_c_or_reason(&self) -> Result<Option<String>, strategy_c::NoController> {
+        if let Some(machine) = &self.inner.evidence.machine {
+            let write =
+                |model: &mut LoadedModel| machine_c::write(model.network(), machine, &self.query);
+            return Ok(Some(self.model.get().with(write)));
+        }
+        let Some(strategy) = self.inner.evidence.strategy.as_ref() else {
+            return Ok(None);
+        };
+        let text = self
+            .model
+            .get()
+            .with(|model| strategy_c::write(model.network(), strategy, &self.query));
+        text.map(Some)
+    }
+}

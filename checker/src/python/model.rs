@@ -1,0 +1,204 @@
+//! Models: what is in them, and the check of files of evidence.
+
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use super::convert::{
+    FailedError, StepEntry, code_engine, observer, overflow_rule, rejected, rules, step_entry,
+    stop_name, time_limit, until_signal,
+};
+use crate::engine::format::{json, model_json, text};
+use crate::engine::{Limits, LoadedModel};
+use crate::ir::{Network, Overflow};
+use crate::network::Failure;
+use crate::search::limits::StopReason;
+use crate::search::optimum::best_first::Met;
+
+/// A loaded model.
+#[pyclass(frozen, module = "ntagen._checker")]
+pub(super) struct Model {
+    pub(super) inner: Mutex<LoadedModel>,
+}
+
+impl Model {
+    pub(super) fn with<T>(&self, action: impl FnOnce(&mut LoadedModel) -> T) -> T {
+        action(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// An edge as it stands in the model: process, source, targets of the branches, select names,
+/// synchronisation, whether controllable.
+type EdgeEntry = (String, String, Vec<String>, Vec<String>, String, bool);
+
+/// A row of a matrix of bounds: of each the value and whether it is strict, `None` for one that is
+/// infinite.
+type BoundRow = Vec<Option<(i32, bool)>>;
+
+/// A reached state: locations and variables as JSON, the constraints, the matrix, and the state and
+/// move that led to it.
+type ReachedEntry = (
+    String,
+    Vec<String>,
+    Vec<BoundRow>,
+    Option<(usize, StepEntry)>,
+);
+
+fn reached_entry(network: &Network, met: Met) -> ReachedEntry {
+    let clocks = 0..met.zone.dimension();
+    let bound = |left: usize, right: usize| {
+        let bound = met.zone.bound(left, right);
+        (!bound.is_infinite()).then(|| (bound.value(), bound.is_strict()))
+    };
+    let row = |left: usize| clocks.clone().map(|right| bound(left, right)).collect();
+    (
+        json::discrete(network, &met.words).to_string(),
+        text::minimal_constraints(network, &met.zone),
+        clocks.clone().map(row).collect(),
+        met.from
+            .map(|(source, parts)| (source, step_entry(network, &parts))),
+    )
+}
+
+fn json_list(entries: Vec<serde_json::Value>) -> String {
+    serde_json::Value::Array(entries).to_string()
+}
+
+/// What went wrong in the model.
+pub(super) fn failed(model: &LoadedModel, failure: Failure) -> PyErr {
+    FailedError::new_err(text::failure_text(model, failure))
+}
+
+#[pymethods]
+impl Model {
+    /// The warnings of loading.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.with(|model| model.warnings.clone())
+    }
+
+    /// What happens where results of integer arithmetic do not fit: "wrap" or "error".
+    #[getter]
+    fn overflow(&self) -> &'static str {
+        self.with(|model| match model.network().overflow {
+            Overflow::Wrap => "wrap",
+            Overflow::Error => "error",
+        })
+    }
+
+    fn set_overflow(&self, rule: &str) -> PyResult<()> {
+        let overflow = overflow_rule(rule)?;
+        self.with(|model| model.set_overflow(overflow));
+        Ok(())
+    }
+
+    /// The seconds that loading took.
+    #[getter]
+    fn load_seconds(&self) -> f64 {
+        self.with(|model| model.load_seconds)
+    }
+
+    /// What is in the model, as JSON; see `engine::facts`.
+    fn facts_json(&self) -> String {
+        self.with(|model| model_json::facts(model).to_string())
+    }
+
+    /// The queries of the file, as JSON.
+    fn queries_json(&self) -> String {
+        self.with(|model| json_list(model_json::queries(&model.queries)))
+    }
+
+    /// By process: its edges.
+    fn edges(&self) -> Vec<Vec<EdgeEntry>> {
+        self.with(|model| {
+            let processes = model.network().processes.iter().map(|process| {
+                let location = |index: u32| process.locations[index as usize].name.clone();
+                let edges = process.edges.iter().map(|edge| {
+                    let targets = edge
+                        .branches
+                        .iter()
+                        .map(|branch| location(branch.target.0))
+                        .collect();
+                    let selects = edge
+                        .select
+                        .iter()
+                        .map(|select| select.name.clone())
+                        .collect();
+                    let sync = edge.labels.sync.clone();
+                    (
+                        process.name.clone(),
+                        location(edge.source.0),
+                        targets,
+                        selects,
+                        sync,
+                        edge.controllable,
+                    )
+                });
+                edges.collect()
+            });
+            processes.collect()
+        })
+    }
+
+    /// The reachable symbolic states, and "states", "memory" or "time" if a limit stopped the
+    /// search.
+    #[pyo3(signature = (engine, *, states, memory_bytes, timeout_s))]
+    fn states(
+        slf: &Bound<'_, Self>,
+        engine: &str,
+        states: Option<u64>,
+        memory_bytes: Option<u64>,
+        timeout_s: Option<f64>,
+    ) -> PyResult<(Vec<ReachedEntry>, Option<&'static str>)> {
+        let code = code_engine(engine)?;
+        let limits = Limits {
+            states,
+            memory_bytes,
+            timeout: time_limit(timeout_s)?,
+            observer: Some(observer(None)),
+        };
+        let model = slf.get();
+        let found = slf.py().detach(|| {
+            model.with(|model| {
+                model.prepare_simulation(code).map_err(rejected)?;
+                let (met, stop) = model
+                    .reached(limits)
+                    .map_err(|failure| failed(model, failure))?;
+                let network = model.network();
+                let states = met.into_iter().map(|one| reached_entry(network, one));
+                Ok::<_, PyErr>((states.collect(), stop))
+            })
+        });
+        let (states, stop): (Vec<ReachedEntry>, _) = found?;
+        match stop {
+            Some(StopReason::Interrupted) => Err(PyKeyboardInterrupt::new_err(())),
+            stop => Ok((states, stop.and_then(stop_name))),
+        }
+    }
+
+    /// Reads the queries of a `.q` file, as JSON.
+    fn read_queries_json(&self, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<String> {
+        let queries = self
+            .with(|model| model.read_queries(path, data.as_bytes()))
+            .map_err(rejected)?;
+        Ok(json_list(model_json::queries(&queries)))
+    }
+
+    /// Checks a file with a certificate, a trace or a strategy: whether it holds (`None` if the
+    /// check does not cover it), and what was looked at.
+    fn verify(
+        slf: &Bound<'_, Self>,
+        path: &str,
+        text: &str,
+        forced: &str,
+        priorities: &str,
+    ) -> PyResult<(Option<bool>, Vec<String>)> {
+        let rules = rules(forced, priorities)?;
+        let model = slf.get();
+        let verify = || model.with(|model| model.verify_evidence(path, text, rules));
+        let checked = until_signal(slf.py(), verify)?.map_err(rejected)?;
+        Ok((checked.holds, checked.lines))
+    }
+}

@@ -1,0 +1,95 @@
+//! The options of a query, read from an `Options` of `ntagen.checker.options`: a row for each.
+
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::convert::{
+    code_engine, forced_rule, observer, priority_rule, thread_count, time_limit, unknown,
+};
+use crate::engine::{Limits, Options, Reductions, TraceWanted};
+use crate::search::reachability::report::Order;
+use crate::tuning::Tuning;
+
+/// The options that a Python value holds.
+pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
+    let text = |name| field::<String>(given, name);
+    Ok(Options {
+        order: order(&text("search")?, field(given, "seed")?)?,
+        threads: thread_count(field(given, "threads")?)?,
+        forced: forced_rule(&text("forced")?)?,
+        priorities: priority_rule(&text("priorities")?)?,
+        code: code_engine(&text("engine")?)?,
+        limits: Limits {
+            states: field(given, "states")?,
+            memory_bytes: field(given, "memory_bytes")?,
+            timeout: time_limit(field(given, "timeout_s")?)?,
+            observer: Some(observer(field(given, "progress")?)),
+        },
+        plans: plans(&text("plans")?, field(given, "max_plans")?)?,
+        strategy: field(given, "strategy")?,
+        verify: field(given, "verify")?,
+        runs: field(given, "trace")?,
+        trace: trace_wanted(&text("wanted_trace")?)?,
+        certificate: field(given, "certificate")?,
+        reductions: reductions(&text("reductions")?)?,
+        tuning: tuning(field(given, "without")?)?,
+        folder: field(given, "folder")?,
+        allow_write: field(given, "allow_write")?,
+        ..Options::default()
+    })
+}
+
+/// An attribute.
+fn field<'py, T: FromPyObjectOwned<'py>>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<T> {
+    given.getattr(name)?.extract().map_err(Into::into)
+}
+
+fn order(name: &str, seed: u64) -> PyResult<Order> {
+    match name {
+        "bfs" => Ok(Order::BreadthFirst),
+        "dfs" => Ok(Order::DepthFirst),
+        "random" => Ok(Order::Random(seed)),
+        other => Err(unknown("search order", other)),
+    }
+}
+
+fn plans(wanted: &str, most: usize) -> PyResult<Option<usize>> {
+    match wanted {
+        "none" => Ok(None),
+        "all" => Ok(Some(most)),
+        other => Err(unknown("choice of plans", other)),
+    }
+}
+
+fn trace_wanted(name: &str) -> PyResult<TraceWanted> {
+    match name {
+        "any" => Ok(TraceWanted::Any),
+        "shortest" => Ok(TraceWanted::Shortest),
+        "fastest" => Ok(TraceWanted::Fastest),
+        other => Err(unknown("trace", other)),
+    }
+}
+
+/// `all`, `none`, or names with commas between them.
+fn reductions(names: &str) -> PyResult<Reductions> {
+    let mut reductions = match names {
+        "all" => return Ok(Reductions::ALL),
+        "none" => return Ok(Reductions::NONE),
+        _ => Reductions::NONE,
+    };
+    for name in names.split(',').map(str::trim) {
+        if !reductions.add(name) {
+            return Err(PyValueError::new_err(format!(
+                "unknown reduction: {name}; write all, none, or some of symmetry, partial-order \
+                 and live-variables with commas between them"
+            )));
+        }
+    }
+    Ok(reductions)
+}
+
+/// All heuristics but these.
+fn tuning(without: Vec<String>) -> PyResult<Tuning> {
+    Tuning::without(without).map_err(|error| PyValueError::new_err(error.to_string()))
+}
