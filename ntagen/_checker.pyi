@@ -1,7 +1,8 @@
-"""Stub of the Rust engine's Python module; see ``checker/src/python.rs``."""
+"""Stub of the Rust engine's Python module; see ``checker/src/python.rs`` and the files below it."""
 
-from collections.abc import Callable, Sequence
 from typing import Literal, final
+
+from ntagen.checker.options import Options
 
 __all__ = [
     "PARTS",
@@ -13,8 +14,12 @@ __all__ = [
     "RejectedError",
     "Simulation",
     "Strategy",
+    "check",
     "explanations",
+    "form_of_query",
     "load",
+    "simulate",
+    "walk_exactly",
 ]
 
 PARTS: list[tuple[str, str]]
@@ -34,7 +39,6 @@ class Model:
     def facts_json(self) -> str: ...
     def queries_json(self) -> str: ...
     def edges(self) -> list[list[tuple[str, str, list[str], list[str], str, bool]]]: ...
-    def simulate(self, engine: str) -> Simulation: ...
     def states(
         self,
         engine: str,
@@ -53,38 +57,10 @@ class Model:
         ],
         Literal["states", "memory", "time"] | None,
     ]: ...
-    def walk_exactly(self) -> ExactWalk: ...
     def read_queries_json(self, path: str, data: bytes) -> str: ...
     def verify(
         self, path: str, text: str, forced: str, priorities: str
     ) -> tuple[bool | None, list[str]]: ...
-    def check(
-        self,
-        query: str,
-        *,
-        search: str,
-        threads: int,
-        seed: int,
-        forced: str,
-        priorities: str,
-        engine: str,
-        states: int | None,
-        memory_bytes: int | None,
-        timeout_s: float | None,
-        max_plans: int | None,
-        strategy: bool,
-        verify: bool,
-        trace: bool,
-        wanted_trace: str,
-        certificate: bool,
-        symmetry: bool,
-        partial_order: bool,
-        live_variables: bool,
-        without: Sequence[str],
-        folder: str | None,
-        allow_write: Sequence[str],
-        progress: Callable[[int, int, int, int], object] | None,
-    ) -> Answer: ...
 
 @final
 class Answer:
@@ -183,5 +159,9 @@ class Play:
     def undo(self, length: int) -> None: ...
     def trace_json(self) -> str | None: ...
 
+def check(model: Model, query: str, options: Options) -> Answer: ...
+def simulate(model: Model, engine: str) -> Simulation: ...
+def walk_exactly(model: Model) -> ExactWalk: ...
+def form_of_query(text: str) -> tuple[str, str | None, str | None, bool] | None: ...
 def explanations() -> list[tuple[str, str, str, str]]: ...
 def load(path: str, data: bytes) -> Model: ...

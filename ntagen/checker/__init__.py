@@ -11,23 +11,29 @@ from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
 from ntagen.checker.model import (
     HEURISTICS,
-    MAX_PLANS,
-    CodeEngine,
     Model,
     OverflowRule,
-    PlansWanted,
-    Progress,
-    SearchOrder,
-    TraceWanted,
     diagnostic_pages,
     load,
     load_file,
 )
+from ntagen.checker.options import (
+    MAX_PLANS,
+    REDUCTIONS,
+    CodeEngine,
+    Options,
+    PlansWanted,
+    Progress,
+    SearchOrder,
+    TraceWanted,
+)
+from ntagen.checker.query_form import QueryForm, form_of
 from ntagen.checker.states import Simulation, SymbolicState
 
 __all__ = [
     "HEURISTICS",
     "MAX_PLANS",
+    "REDUCTIONS",
     "Answer",
     "CodeEngine",
     "EngineEdge",
@@ -35,10 +41,12 @@ __all__ = [
     "EngineStep",
     "Extreme",
     "Model",
+    "Options",
     "OverflowRule",
     "Place",
     "PlansWanted",
     "Progress",
+    "QueryForm",
     "RejectedError",
     "SearchOrder",
     "Simulation",
@@ -47,6 +55,7 @@ __all__ = [
     "Value",
     "Verdict",
     "diagnostic_pages",
+    "form_of",
     "load",
     "load_file",
 ]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -25,29 +25,18 @@ from ntagen.checker.facts import (
     Variable,
     queries_from,
 )
+from ntagen.checker.options import CodeEngine, Options, by_keywords
+from ntagen.checker.query_form import form_of
 from ntagen.checker.runs import Choose, Run, simulated
 from ntagen.checker.states import Simulation, SymbolicState, symbolic_states
 from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
 from ntagen.errors import InputError, LimitError, ModelError, NtagenError
 from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file
 
-SearchOrder = Literal["bfs", "dfs", "random"]
-CodeEngine = Literal["jit", "interpreter"]
-PlansWanted = Literal["none", "all"]
 OverflowRule = Literal["wrap", "error"]
-TraceWanted = Literal["any", "shortest", "fastest"]
-
-Progress = Callable[[int, int, int, int], object]
-"""Is called with the numbers of explored, stored and waiting states, and of bytes."""
-
-MAX_PLANS = 1_000_000
-"""The default maximum of plans that are listed."""
 
 HEURISTICS: dict[str, str] = dict(_checker.PARTS)
 """The heuristics that can be switched off, each with what it does."""
-
-_GAME = re.compile(r"\s*(strategy\s+\w+\s*=\s*)?(\{[^{}]*\}\s*)?(E\s*<>\s*)?control(_t\*|\b)")
-"""The start of a query that asks for a strategy."""
 
 _PROCESSES_SHOWN = 5
 """The short text of a model names at most this many processes."""
@@ -179,35 +168,9 @@ class Model:
             entries = self._raw.read_queries_json(str(path), read_file(path, MODEL_BYTES))
         return queries_from(json.loads(entries))
 
-    def check(
-        self,
-        query: str,
-        *,
-        search: SearchOrder = "bfs",
-        threads: int | Literal["all"] = 1,
-        seed: int = 0,
-        forced: ForcedRule = "tiga",
-        priorities: PriorityRule = "ignore",
-        engine: CodeEngine = "jit",
-        states: int | None = None,
-        memory_bytes: int | None = None,
-        timeout_s: float | None = None,
-        plans: PlansWanted = "none",
-        max_plans: int = MAX_PLANS,
-        strategy: bool = False,
-        verify: bool = False,
-        trace: bool = True,
-        wanted_trace: TraceWanted = "any",
-        certificate: bool = False,
-        symmetry: bool = True,
-        partial_order: bool = True,
-        live_variables: bool = True,
-        without: Sequence[str] = (),
-        folder: Path | None = None,
-        allow_write: Sequence[str | Path] = (),
-        progress: Progress | None = None,
-    ) -> Answer:
-        """Answers a query.
+    @by_keywords(Options)
+    def check(self, query: str, options: Options) -> Answer:
+        """Answers a query; the keywords are the fields of `Options`.
 
         The strategy of ``strategy S = control: …`` is kept under its name: later queries of the
         same model may be asked ``under S``. Unless it is wanted with the answer, it is made when it
@@ -215,126 +178,33 @@ class Model:
 
         Args:
             query: The query in UPPAAL's language.
-            search: The order of the search; verdicts do not depend on it.
-            threads: The number of threads; ``"all"`` (or 0) is one for each core. They share the
-                breadth-first search for a reachable state (``E<>``, ``A[]``) or for values, and the
-                computation of winning states in games; other searches use one thread. The same
-                number gives the same counts and traces. The verdict can depend on the number only
-                if the model has a run-time error, because the search may or may not meet it before
-                its goal. In games nothing depends on the number.
-            seed: For ``search="random"``.
-            forced: When the environment must move at a moment at which time cannot pass: if the
-                process that stops time has no controllable move (``tiga``), if no process has one
-                (``product``), or always (``neutral``).
-            priorities: Whether priorities of channels and processes count in games and under
-                strategies; in all other queries they do.
-            engine: How the code of the model runs; answers do not depend on it.
-            states: The search stops after this many stored states.
-            memory_bytes: The search stops when its states take this many bytes.
-            timeout_s: The search stops after this time, in seconds.
-            plans: Which winning sequences to list.
-            max_plans: At most this many plans are listed; with 1 the search stops at the first.
-            strategy: Whether to make the strategy of the player who wins.
-            verify: Whether to check the strategy against every move of the opponent.
-            trace: Whether witnesses and counterexamples get exact times, which an independent
-                replay checks. For ``sup``, ``inf`` and ``bounds`` this takes a second search.
-            wanted_trace: ``shortest``: traces have the fewest transitions; if a run never ends, its
-                loop counts once. ``fastest``: traces take the least time; not for ``E[]``, ``A<>``
-                and ``-->``, whose runs do not end. Both take a second search.
-            certificate: Whether to keep the set of reached states if ``E<>`` is not satisfied or
-                ``A[]`` is. This takes a second search, in which states are different if they
-                differ only in ``meta`` variables.
-            symmetry: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may treat states as
-                one if they differ only by exchanged members of scalar sets. Verdicts, values and
-                traces do not depend on it; counts do.
-            partial_order: Whether ``E<>`` and ``A[]`` may take independent moves in one order only
-                while time cannot pass. Verdicts do not depend on it; counts do.
-            live_variables: Whether ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` may treat
-                states as one if they differ only in variables that are written before they are
-                read again; games may too, if neither a strategy nor plans are asked for. Verdicts,
-                values and traces do not depend on it; counts do.
-            without: Heuristics of `HEURISTICS` that are not used; verdicts and values do not
-                depend on them, time and counts do.
-            folder: The folder of the files of ``saveStrategy`` and ``loadStrategy``; by default the
-                folder of the model.
-            allow_write: Folders below which ``saveStrategy`` may write, besides the current one. It
-                replaces no files but strategies.
-            progress: Is called about twenty times per second with the numbers of explored,
-                stored and waiting states and of bytes.
+            options: How it is to be answered, given as keywords.
 
         Returns:
             The answer. If a limit was reached, the answer says so.
 
         Raises:
-            ValueError: `max_plans` is less than 1, or `without` has an unknown name.
+            ValueError: A keyword has a value that it cannot have.
             RejectedError: The query is wrong or of a kind that is not supported.
-            ValueError: `threads` is negative or more than 2048.
             KeyboardInterrupt: The user interrupted.
         """
-        if threads != "all" and threads < 0:
-            raise ValueError(f"{threads} threads: there must be at least 1, or 'all'")
-        if max_plans < 1:
-            raise ValueError(f"max_plans is {max_plans}, but must be at least 1")
-        wanted = {"none": None, "all": max_plans}[plans]
-        with rejecting():
-            raw = self._raw.check(
-                query,
-                search=search,
-                threads=0 if threads == "all" else threads,
-                seed=seed,
-                forced=forced,
-                priorities=priorities,
-                engine=engine,
-                states=states,
-                memory_bytes=memory_bytes,
-                timeout_s=timeout_s,
-                max_plans=wanted,
-                strategy=strategy,
-                verify=verify,
-                trace=trace,
-                wanted_trace=wanted_trace,
-                certificate=certificate,
-                symmetry=symmetry,
-                partial_order=partial_order,
-                live_variables=live_variables,
-                without=without,
-                folder=None if folder is None else str(folder),
-                allow_write=[os.fspath(one) for one in allow_write],
-                progress=progress,
-            )
-        return Answer(raw, query, self._edge_table(), (forced, priorities))
+        return self.answer(query, options)
 
-    def synthesize(
-        self,
-        query: str,
-        *,
-        search: SearchOrder = "bfs",
-        seed: int = 0,
-        forced: ForcedRule = "tiga",
-        priorities: PriorityRule = "ignore",
-        engine: CodeEngine = "jit",
-        states: int | None = None,
-        memory_bytes: int | None = None,
-        timeout_s: float | None = None,
-        verify: bool = False,
-        progress: Progress | None = None,
-    ) -> Strategy:
+    def answer(self, query: str, options: Options) -> Answer:
+        """Answers a query as `check` does, with all options as one value."""
+        with rejecting():
+            raw = _checker.check(self._raw, query, options)
+        return Answer(raw, query, self._edge_table(), (options.forced, options.priorities))
+
+    @by_keywords(Options)
+    def synthesize(self, query: str, options: Options) -> Strategy:
         """Solves a game and gives the strategy of the player who wins.
 
         If the controller cannot win, it is the environment's strategy; `Strategy.winning` tells.
 
         Args:
             query: A control query, such as ``control: A<> Gate.Open``.
-            search: As in `check`, like all that follow.
-            seed: For ``search="random"``.
-            forced: When the environment must move because time cannot pass.
-            priorities: Whether priorities of channels and processes count.
-            engine: What runs the code of the model.
-            states: The search stops after this many stored states.
-            memory_bytes: The search stops when its states take this much.
-            timeout_s: The search stops after this time.
-            verify: Whether the strategy is to be checked against every move of the opponent.
-            progress: Is called now and then.
+            options: How it is to be answered, given as keywords: the fields of `Options`.
 
         Raises:
             RejectedError: The query is wrong or of a kind that is not supported.
@@ -344,25 +214,13 @@ class Model:
             ModelError: The model fails.
             KeyboardInterrupt: The user interrupted.
         """
-        if not _GAME.match(query):
+        form = form_of(query)
+        if form is None or not form.is_game:
             raise InputError(
                 f"{query.strip()} is not a control query, so it has no strategy\n"
                 "hint: begin the query with control: — control: A<> p, control: A[] p, …"
             )
-        answer = self.check(
-            query,
-            search=search,
-            seed=seed,
-            forced=forced,
-            priorities=priorities,
-            engine=engine,
-            states=states,
-            memory_bytes=memory_bytes,
-            timeout_s=timeout_s,
-            strategy=True,
-            verify=verify,
-            progress=progress,
-        )
+        answer = self.answer(query, replace(options, strategy=True))
         if answer.verified is False:
             raise NtagenError("\n".join(answer.verification))
         if answer.verdict == "error":
@@ -452,7 +310,7 @@ class Model:
             ModelError: The model has a run-time error.
         """
         with failing():
-            return simulated(self._raw.walk_exactly(), steps, seed, choose)
+            return simulated(_checker.walk_exactly(self._raw), steps, seed, choose)
 
     def states(
         self,
@@ -504,7 +362,7 @@ class Model:
             ModelError: The initial state cannot be computed.
         """
         with failing():
-            return Simulation(self._raw.simulate(engine), self._edge_table())
+            return Simulation(_checker.simulate(self._raw, engine), self._edge_table())
 
     def _edge_table(self) -> list[list[EdgeEntry]]:
         if self._edges is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,7 +13,6 @@ import click
 
 from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
-from ntagen.cli.limits import limit_options, limits
 from ntagen.cli.models import (
     include_option,
     load_model,
@@ -21,14 +20,15 @@ from ntagen.cli.models import (
     show_warnings,
     with_pointer,
 )
+from ntagen.cli.options import engine_options
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
+from ntagen.cli.rules import overflow_rule
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart, write_files
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer, Model
+    from ntagen.checker import Answer, Model, QueryForm
     from ntagen.checker.facts import Query
     from ntagen.scene import Scene
 
@@ -51,49 +51,15 @@ REJECTED_MARK: Final = ("refused", "red")
 """The mark of a query that is rejected while others are answered."""
 
 
-class _Threads(click.ParamType[int]):
-    """A number of threads; ``all`` is 0, one for each core."""
-
-    name = "threads"
-    most = 2048
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> int:
-        text = str(value).strip().lower()
-        if text == "all":
-            return 0
-        if not re.fullmatch(r"[0-9]{1,6}", text) or int(text) > self.most:
-            self.fail(
-                f"{value!r} is not a number of threads; write 1 to {self.most}, or all", param, ctx
-            )
-        return int(text)
-
-
-class _Heuristics(click.ParamType[tuple[str, ...]]):
-    """Names of heuristics, separated by commas."""
-
-    name = "heuristics"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
-        from ntagen import checker
-
-        names = tuple(name.strip() for name in str(value).split(",") if name.strip())
-        for name in names:
-            if name not in checker.HEURISTICS:
-                known = "".join(f"\n  {one}: {does}" for one, does in checker.HEURISTICS.items())
-                self.fail(f"{name!r} is not a heuristic. The heuristics are:{known}", param, ctx)
-        return names
-
-
 @dataclass(frozen=True, slots=True)
 class _Asked:
     """A query to be answered."""
 
     name: str | None
     text: str
+    form: QueryForm | None
+    """What it asks for; ``None`` if the text is no query."""
+
     folder: Path | None = None
     """The folder of files that the query names; ``None`` is that of the model."""
 
@@ -194,12 +160,6 @@ class _Outputs:
     help="Write the same strategy as a controller in C99, in one file without dependencies.",
 )
 @click.option(
-    "--verify",
-    is_flag=True,
-    help="Check each strategy against every move of the opponent, and replay each trace with its "
-    "exact times. The check does not use the solver's code.",
-)
-@click.option(
     "--plans",
     metavar="FILE.json",
     type=click.Path(path_type=Path),
@@ -215,88 +175,8 @@ class _Outputs:
     help="How plans of an environment are ranked, the most important criterion first: clearance, "
     "rolls, length, target.",
 )
-@click.option(
-    "--max-plans",
-    metavar="N",
-    type=click.IntRange(min=1),
-    default=1_000_000,
-    show_default=True,
-    help="Write at most N plans. With 1, the search stops at the first plan.",
-)
-@click.option(
-    "--search",
-    type=click.Choice(["bfs", "dfs", "random"]),
-    default="bfs",
-    help="The order of the search: breadth first, depth first or random. Verdicts do not depend "
-    "on it.  [default: bfs]",
-)
-@click.option(
-    "--threads",
-    metavar="N",
-    type=_Threads(),
-    default="1",
-    help="The number of threads, or `all` for one per core. Threads share the breadth-first search "
-    "of E<>, A[], sup, inf and bounds, and the computation with zones in games. Liveness, partial "
-    "observation, --shortest, --fastest and --certificate use one thread.  [default: 1]",
-)
-@click.option(
-    "--seed",
-    type=int,
-    default=0,
-    help="For --search random: the same seed gives the same search.  [default: 0]",
-)
-@click.option(
-    "--symmetry",
-    type=click.Choice(["on", "off"]),
-    default="on",
-    help="Treat states as one if they differ only by exchanged members of scalar sets, and the "
-    "model cannot tell these apart. For E<>, A[], sup, inf and bounds.  [default: on]",
-)
-@click.option(
-    "--partial-order",
-    type=click.Choice(["on", "off"]),
-    default="on",
-    help="While time cannot pass, take independent moves in one order only. For E<> and A[].  "
-    "[default: on]",
-)
-@click.option(
-    "--live-variables",
-    type=click.Choice(["on", "off"]),
-    default="on",
-    help="Treat states as one if they differ only in variables that are written before they are "
-    "read again. For E<>, A[], sup, inf and bounds, and for games if neither a strategy nor plans "
-    "are asked for.  [default: on]",
-)
-@click.option(
-    "--without",
-    metavar="NAME[,NAME…]",
-    type=_Heuristics(),
-    default="",
-    help="For experiments: switch these heuristics of the engine off. Verdicts do not depend on "
-    "them; time and counts do. A wrong name lists all names.",
-)
-@forced_rule()
-@priority_rule(
-    "Whether priorities of channels and processes count in games and in queries under a strategy. "
-    "In all other queries they count.  [default: ignore, as TIGA does]"
-)
+@engine_options
 @overflow_rule()
-@click.option(
-    "--engine",
-    type=click.Choice(["jit", "interpreter"]),
-    default="jit",
-    help="How the code of the model runs: compiled to machine code (jit), or interpreted, which is "
-    "slower. Answers do not depend on it.  [default: jit]",
-)
-@limit_options()
-@click.option(
-    "--allow-write",
-    metavar="DIR",
-    multiple=True,
-    type=click.Path(path_type=Path),
-    help="Allow saveStrategy in queries to write below this folder too, not only below the current "
-    "one. You can give this option several times. saveStrategy replaces no files but strategies.",
-)
 @include_option()
 def command(
     model_path: Path,
@@ -309,25 +189,10 @@ def command(
     certificate: Path | None,
     strategy: str | None,
     controller: Path | None,
-    verify: bool,
     plans: Path | None,
     ranking: str,
-    max_plans: int,
-    search: Any,  # noqa: ANN401
-    threads: int,
-    symmetry: str,
-    partial_order: str,
-    live_variables: str,
-    without: tuple[str, ...],
-    seed: int,
-    forced: Any,  # noqa: ANN401
-    priorities: Any,  # noqa: ANN401
-    engine: Any,  # noqa: ANN401
+    given: dict[str, Any],
     overflow: Any,  # noqa: ANN401
-    states: int | None,
-    memory: float | None,
-    timeout: float | None,
-    allow_write: tuple[Path, ...],
     include: tuple[Path, ...],
 ) -> int:
     """Answer the queries of a model or an environment.
@@ -358,6 +223,8 @@ def command(
     state satisfies the condition. If a clock comes near the value but never reaches it, the message
     says so.
     """  # noqa: D301  click wants the control character
+    from ntagen.checker import Options
+
     if as_json and strategy == "-":
         raise click.UsageError(
             "--json and --strategy - both write to standard output; give --strategy a FILE"
@@ -369,42 +236,37 @@ def command(
     query_path = query_file or second_path
     inputs = {"model": model_path} | ({"queries": query_path} if query_path else {})
     require_apart(outputs.wanted(), inputs)
+    verify = given["verify"]
+    options = Options(
+        plans="all" if plans else "none",
+        trace=verify or trace is not None or wanted_trace is not None,
+        wanted_trace=wanted_trace or "any",
+        certificate=certificate is not None,
+        **given,
+    )
     worst = 0
     with pointing_to_explanations(not as_json):
         loaded = load_model(model_path, include, overflow)
         shown_already = len(loaded.model.warnings)
         todo = _queries(loaded.model, asked, query_path)
         show_warnings(loaded.model.warnings[shown_already:])
-        _say_idle_options([query.text for query in todo], is_environment=loaded.scene is not None)
+        _say_idle_options(
+            [query.form for query in todo if query.form], is_environment=loaded.scene is not None
+        )
         if not as_json:
             _header(model_path, loaded.model)
         for number, query in enumerate(todo):
             is_used = _is_used(query, todo[number + 1 :])
             try:
                 with shown_progress(query.text, quiet=as_json) as report:
-                    answer = loaded.model.check(
+                    answer = loaded.model.answer(
                         query.text,
-                        search=search,
-                        threads=threads,
-                        seed=seed,
-                        forced=forced,
-                        priorities=priorities,
-                        engine=engine,
-                        **limits(states, memory, timeout),
-                        plans="all" if plans else "none",
-                        max_plans=max_plans,
-                        strategy=is_used or strategy is not None or controller is not None,
-                        verify=verify,
-                        trace=verify or trace is not None or wanted_trace is not None,
-                        wanted_trace=wanted_trace or "any",
-                        certificate=certificate is not None,
-                        symmetry=symmetry == "on",
-                        partial_order=partial_order == "on",
-                        live_variables=live_variables == "on",
-                        without=without,
-                        folder=query.folder,
-                        allow_write=allow_write,
-                        progress=report,
+                        replace(
+                            options,
+                            strategy=is_used or strategy is not None or controller is not None,
+                            folder=query.folder,
+                            progress=report,
+                        ),
                     )
             except InputError as error:
                 if len(todo) == 1:
@@ -436,7 +298,7 @@ def _check_ranking(text: str) -> None:
     parse_ranking(text)
 
 
-def _say_idle_options(queries: Sequence[str], *, is_environment: bool) -> None:
+def _say_idle_options(queries: Sequence[QueryForm], *, is_environment: bool) -> None:
     """Says which options of the command line have no effect."""
     values = click.get_current_context().params
     say(idle_options(given_options(), values, queries, ranks=is_environment))
@@ -467,24 +329,25 @@ def _queries(model: Model, asked: Sequence[str], file: Path | None) -> list[_Ask
 
 def _is_used(query: _Asked, later: Sequence[_Asked]) -> bool:
     """Whether the strategy that a query defines is used by those after it."""
-    named = re.match(r"\s*strategy\s+(\w+)\s*=", query.text)
-    if not named:
-        return False
-    use = re.compile(rf"\b(under\s+|saveStrategy\s*\(.*,\s*){named[1]}\b")
-    return any(use.search(other.text) for other in later)
+    name = query.form and query.form.defines
+    return name is not None and any(other.form and other.form.uses == name for other in later)
 
 
 def _asked(query: Query, folder: Path | None = None) -> _Asked:
     """A query of a file, named by the first line of its comment or by its strategy."""
+    from ntagen.checker import form_of
+
     first_line = query.comment.strip().splitlines()[0].strip() if query.comment.strip() else ""
-    strategy = re.match(r"strategy\s+(\w+)\s*=", query.text)
+    form = form_of(query.text)
     if re.fullmatch(r"[A-Za-z_]\w*", first_line):
-        return _Asked(first_line, query.text, folder)
-    return _Asked(strategy[1] if strategy else None, query.text, folder)
+        return _Asked(first_line, query.text, form, folder)
+    return _Asked(form.defines if form else None, query.text, form, folder)
 
 
 def _find(text: str, named: dict[str, _Asked]) -> _Asked:
     """The query with this name, or the text itself as a query."""
+    from ntagen.checker import form_of
+
     stripped = text.strip()
     if stripped in named:
         return named[stripped]
@@ -493,7 +356,7 @@ def _find(text: str, named: dict[str, _Asked]) -> _Asked:
         raise InputError(
             f"there is no query with the name {stripped}\nhint: queries with a name: {names}"
         )
-    return _Asked(None, stripped)
+    return _Asked(None, stripped, form_of(stripped))
 
 
 def _record(answer: Answer, query: _Asked) -> dict[str, object]:
@@ -649,14 +512,12 @@ def _write_plans(answer: Answer, path: Path, ranking: str, scene: Scene | None) 
     if scene is None:
         write_files({path: f"{answer.plans_json()}\n"})
         return [f"{answer.plan_count} plans written to {path}"]
-    from ntagen.plan.certify import certify
     from ntagen.plan.document import document
     from ntagen.plan.extract import extract
-    from ntagen.plan.rank import Candidate, parse_ranking, rank
+    from ntagen.plan.rank import certified, parse_ranking
 
     criteria = parse_ranking(ranking)
-    found = [Candidate(plan, certify(plan, scene)) for plan in extract(answer.plans, scene)]
-    ranked = rank(found, criteria)
+    ranked = certified(extract(answer.plans, scene), scene, criteria)
     write_files({path: json.dumps(document(scene, ranked, criteria), indent=1) + "\n"})
     holding = [candidate for candidate in ranked if candidate.certificate.holds()]
     written = "1 plan" if len(ranked) == 1 else f"{len(ranked)} plans"

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from ntagen.cli.terminal import echo
 
+if TYPE_CHECKING:
+    from ntagen.checker import QueryForm
+
 _SYMBOLIC_ONLY: Final = {
-    "symmetry": "--symmetry has no effect here: games tell all members of scalar sets apart",
-    "partial_order": "--partial-order has no effect here: games take moves in all orders",
     "search": "--search has no effect here: games are explored in an order of their own",
     "wanted_trace": "--shortest and --fastest have no effect here: they choose among the runs of "
     "symbolic queries",
@@ -39,28 +39,29 @@ _NOTHING_WRITTEN: Final = {
 """For each option, why there may be nothing to write."""
 
 
-def is_game(query: str) -> bool:
-    """Whether a query asks who wins a game."""
-    return re.search(r"\bcontrol(_t\s*\*\s*(\([^:]*\))?)?\s*:", query) is not None
-
-
 def idle_options(
-    given: Collection[str], values: Mapping[str, object], queries: Sequence[str], *, ranks: bool
+    given: Collection[str],
+    values: Mapping[str, object],
+    queries: Sequence[QueryForm],
+    *,
+    ranks: bool,
 ) -> list[str]:
     """A note for each option on the command line that has no effect.
 
     Args:
         given: The names of the parameters that stand on the command line.
         values: All parameters by name.
-        queries: The queries that are answered.
+        queries: What the queries ask for that are answered; those that are wrong are left out.
         ranks: Whether plans are ranked, as those of environments are.
     """
+    if not queries:
+        return []
     notes = []
-    if all(is_game(query) and not query.lstrip().startswith("E") for query in queries):
+    if all(query.kind in ("control", "control_t*") for query in queries):
         notes += [note for name, note in _SYMBOLIC_ONLY.items() if name in given]
     elif values["wanted_trace"] and not (values["trace"] or values["verify"]):
         notes.append("--shortest and --fastest have no effect without --trace")
-    if not any(is_game(query) or re.search(r"\bunder\b", query) for query in queries):
+    if not any(query.is_game or query.uses for query in queries):
         notes += [note for name, note in _GAMES_ONLY.items() if name in given]
     if "threads" in given and not any(_takes_threads(query, values) for query in queries):
         notes.append(
@@ -68,14 +69,14 @@ def idle_options(
             "do E[], A<> and -->, and searches that are not breadth first"
         )
     keeps_values = any(values[name] for name in ("strategy", "controller", "plans", "verify"))
-    if "live_variables" in given and keeps_values and all(is_game(query) for query in queries):
+    if "reductions" in given and keeps_values and all(query.is_game for query in queries):
         notes.append(
-            "--live-variables has no effect here: strategies and plans are about states with all "
-            "their values"
+            "--reductions has no effect here: of the reductions games make live-variables only, "
+            "and strategies and plans are about states with all their values"
         )
     if "seed" in given and values["search"] != "random":
         notes.append("--seed has no effect without --search random")
-    if "allow_write" in given and not any("saveStrategy" in query for query in queries):
+    if "allow_write" in given and not any(query.kind == "saveStrategy" for query in queries):
         notes.append("--allow-write has no effect here: no query saves a strategy")
     if "max_plans" in given and not values["plans"]:
         notes.append("--max-plans has no effect without --plans")
@@ -86,12 +87,11 @@ def idle_options(
     return notes
 
 
-def _takes_threads(query: str, values: Mapping[str, object]) -> bool:
+def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:
     """Whether more than one thread can share the work of a query."""
-    if is_game(query):
-        return not query.lstrip().startswith("{")
-    is_liveness = re.match(r"\s*(E\s*\[|A\s*<)", query) or "-->" in query
-    return values["search"] == "bfs" and not is_liveness
+    if query.is_game:
+        return not query.is_observed
+    return values["search"] == "bfs" and query.kind not in ("E[]", "A<>", "-->")
 
 
 def given_options() -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypedDict
+from typing import Final
 
 import click
 
@@ -11,43 +11,53 @@ from ntagen.cli.quantities import SIZE, TIME
 from ntagen.cli.rules import Decorator
 
 
-class Limits(TypedDict):
-    """The limits of a search as the engine takes them; ``None`` is no limit."""
-
-    states: int | None
-    memory_bytes: int | None
-    timeout_s: float | None
+def _whole(_ctx: click.Context, _param: click.Parameter, value: float | None) -> int | None:
+    return None if value is None else int(value)
 
 
-def limit_options(of: str = "") -> Decorator:
-    """The options ``--states``, ``--memory`` and ``--timeout``; `of` is what they are limits of."""
-    about = {
-        "--states": "Stop a search after this many stored states.  [default: no limit]",
-        "--memory": "Stop a search that takes this much memory, for example 4GiB; a number without "
-        "a unit is in bytes.  [default: no limit]",
-        "--timeout": "Stop a search after this time, for example 60s or 2min; a number without a "
-        "unit is in seconds.  [default: no limit]",
+def _limits(about: Callable[[str], str]) -> dict[str, Decorator]:
+    """The options by their fields of `ntagen.checker.Options`; `about` makes their help."""
+    return {
+        "states": click.option(
+            "--states",
+            type=click.IntRange(1),
+            help=about("Stop a search after this many stored states.  [default: no limit]"),
+        ),
+        "memory_bytes": click.option(
+            "--memory",
+            "memory_bytes",
+            metavar="SIZE",
+            type=SIZE,
+            callback=_whole,
+            help=about(
+                "Stop a search that takes this much memory, for example 4GiB; a number without a "
+                "unit is in bytes.  [default: no limit]"
+            ),
+        ),
+        "timeout_s": click.option(
+            "--timeout",
+            "timeout_s",
+            metavar="TIME",
+            type=TIME,
+            help=about(
+                "Stop a search after this time, for example 60s or 2min; a number without a unit "
+                "is in seconds.  [default: no limit]"
+            ),
+        ),
     }
-    if of:
-        about = {name: f"For {of}: {text[0].lower()}{text[1:]}" for name, text in about.items()}
-    options = (
-        click.option("--states", type=click.IntRange(1), help=about["--states"]),
-        click.option("--memory", metavar="SIZE", type=SIZE, help=about["--memory"]),
-        click.option("--timeout", metavar="TIME", type=TIME, help=about["--timeout"]),
-    )
+
+
+LIMITS: Final = _limits(lambda text: text)
+"""The options ``--states``, ``--memory`` and ``--timeout``."""
+
+
+def limit_options(of: str) -> Decorator:
+    """The same options where they are limits of one thing of several; `of` says of which."""
 
     def decorate(command: Callable[..., int | None]) -> Callable[..., int | None]:
-        for option in reversed(options):
+        options = _limits(lambda text: f"For {of}: {text[0].lower()}{text[1:]}")
+        for option in reversed(options.values()):
             command = option(command)
         return command
 
     return decorate
-
-
-def limits(states: int | None, memory: float | None, timeout: float | None) -> Limits:
-    """The values of the options as limits."""
-    return Limits(
-        states=states,
-        memory_bytes=None if memory is None else int(memory),
-        timeout_s=timeout,
-    )

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, ParamSpec
 import click
 
 from ntagen.cli.effects import say_idle
-from ntagen.cli.limits import limit_options, limits
+from ntagen.cli.limits import limit_options
 from ntagen.cli.models import include_option, load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
@@ -109,8 +109,8 @@ def command(
     priorities: Any,  # noqa: ANN401
     overflow: Any,  # noqa: ANN401
     states: int | None,
-    memory: float | None,
-    timeout: float | None,
+    memory_bytes: int | None,
+    timeout_s: float | None,
     include: tuple[Path, ...],
 ) -> int:
     """Play a timed game against a strategy.
@@ -144,7 +144,11 @@ def command(
     if steps is None:
         say_idle({"seed": "--seed"}, "without --auto")
     if strategy_path:
-        idle = {"states": "--states", "memory": "--memory", "timeout": "--timeout"}
+        idle = {
+            "states": "--states",
+            "memory_bytes": "--memory",
+            "timeout_s": "--timeout",
+        }
         say_idle(idle, "with --strategy: there is no search")
     inputs = {"model": model_path} | ({"strategy": strategy_path} if strategy_path else {})
     require_apart({"--log": log}, inputs)
@@ -159,7 +163,9 @@ def command(
                     query,
                     forced=forced,
                     priorities=priorities,
-                    **limits(states, memory, timeout),
+                    states=states,
+                    memory_bytes=memory_bytes,
+                    timeout_s=timeout_s,
                     progress=report,
                 )
         session = _Session(strategy)

@@ -13,7 +13,8 @@ from typing import Final
 
 from ntagen.errors import InputError
 from ntagen.plan.actions import Plan
-from ntagen.plan.certify import Certificate
+from ntagen.plan.certify import Certificate, certify
+from ntagen.scene import Scene
 
 USEFUL_CLEARANCE_MM: Final = 5.0
 """More clearance is not better: this is twice the error of a needle in a phantom (2 to 3 mm)."""
@@ -64,6 +65,13 @@ def parse_ranking(text: str) -> tuple[str, ...]:
         if names.count(name) > 1:
             raise InputError(f"ranking criterion '{name}' is given twice\nhint: name each once")
     return names
+
+
+def certified(
+    plans: Iterable[Plan], scene: Scene, ranking: Sequence[str] = DEFAULT_RANKING
+) -> tuple[Candidate, ...]:
+    """The plans with their certificates, best first, whether they hold or not."""
+    return rank((Candidate(plan, certify(plan, scene)) for plan in plans), ranking)
 
 
 def rank(

@@ -13,9 +13,8 @@ from typing import Final, Protocol
 
 from ntagen.errors import LimitError, ModelError
 from ntagen.plan.actions import Plan
-from ntagen.plan.certify import certify
 from ntagen.plan.extract import extract
-from ntagen.plan.rank import DEFAULT_RANKING, Candidate, rank
+from ntagen.plan.rank import DEFAULT_RANKING, Candidate, certified
 from ntagen.scene import Scene
 
 STRATEGY_QUERY: Final = "control: A<> Checker.Final_TR_Reached"
@@ -73,10 +72,10 @@ def select(
     ranking: Sequence[str] = DEFAULT_RANKING,
 ) -> tuple[Candidate, ...]:
     """The plans that hold with these margins, best first."""
-    candidates = (Candidate(plan, certify(plan, scene)) for plan in plans)
-    return rank(
-        (c for c in candidates if c.certificate.holds(margins.clearance_mm, margins.depth_mm)),
-        ranking,
+    return tuple(
+        candidate
+        for candidate in certified(plans, scene, ranking)
+        if candidate.certificate.holds(margins.clearance_mm, margins.depth_mm)
     )
 
 

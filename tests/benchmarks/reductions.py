@@ -24,12 +24,18 @@ from ntagen import checker
 Ask: TypeAlias = Callable[[checker.Model, float, bool], checker.Answer]
 
 
+def _without(reduction: str) -> str:
+    return ",".join(one for one in checker.REDUCTIONS if one != reduction)
+
+
 def _partial_orders(model: checker.Model, limit_s: float, reduced: bool) -> checker.Answer:
-    return model.check("E<> false", timeout_s=limit_s, partial_order=reduced)
+    reductions = "all" if reduced else _without("partial-order")
+    return model.check("E<> false", timeout_s=limit_s, reductions=reductions)
 
 
 def _live_variables(model: checker.Model, limit_s: float, reduced: bool) -> checker.Answer:
-    return model.check("E<> false", timeout_s=limit_s, live_variables=reduced)
+    reductions = "all" if reduced else _without("live-variables")
+    return model.check("E<> false", timeout_s=limit_s, reductions=reductions)
 
 
 WITHOUT_GAIN = {

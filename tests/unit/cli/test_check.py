@@ -297,17 +297,31 @@ system P;
 """
 
 
-@pytest.mark.parametrize(("symmetry", "stored"), [("on", 5), ("off", 33)])
+@pytest.mark.parametrize(
+    ("reductions", "stored"), [("all", 5), ("symmetry", 5), ("partial-order,live-variables", 33)]
+)
 def test_members_of_scalar_sets_are_told_apart_only_if_asked(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], symmetry: str, stored: int
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], reductions: str, stored: int
 ) -> None:
     model = tmp_path / "turns.xta"
     model.write_text(TAKING_TURNS)
-    options = ("--symmetry", symmetry, "--json")
+    options = ("--reductions", reductions, "--json")
     query = "E<> forall (i : member) P(i).Idle && last == i"
     out, _ = check_run(capsys, 1, model, "--query", query, *options)
     answer = json.loads(out)
     assert (answer["verdict"], answer["stored"]) == ("not satisfied", stored)
+
+
+def test_an_unknown_reduction_is_refused_with_the_known_ones(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "turns.xta"
+    model.write_text(TAKING_TURNS)
+    _, err = check_run(capsys, 2, model, "--reductions", "symmetry,orbits")
+    assert "'orbits' is not a reduction" in err
+    assert "symmetry, partial-order and live-variables" in err
+    with pytest.raises(ValueError, match="unknown reduction: orbits"):
+        ntagen.load(TAKING_TURNS).check("E<> false", reductions="orbits")
 
 
 LOOP = """
@@ -365,13 +379,13 @@ system A, B, C;
 """
 
 
-@pytest.mark.parametrize(("order", "stored"), [("on", 7), ("off", 27)])
+@pytest.mark.parametrize(("reductions", "stored"), [("all", 7), ("none", 27)])
 def test_independent_urgent_moves_are_interleaved_only_if_asked(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], order: str, stored: int
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], reductions: str, stored: int
 ) -> None:
     model = tmp_path / "side_by_side.xta"
     model.write_text(SIDE_BY_SIDE)
-    options = ("--partial-order", order, "--json")
+    options = ("--reductions", reductions, "--json")
     out, _ = check_run(capsys, 1, model, "--query", "E<> false", *options)
     answer = json.loads(out)
     assert (answer["verdict"], answer["stored"]) == ("not satisfied", stored)
@@ -563,7 +577,6 @@ system P;
             ["--threads", "2"],
             "--threads has no effect here: games under partial observation",
         ),
-        ("control: A<> P.There", ["--symmetry", "off"], "--symmetry has no effect here: games"),
         ("control: A<> P.There", ["--search", "dfs"], "--search has no effect here: games"),
         ("control: A<> P.There", ["--shortest"], "--shortest and --fastest have no effect here"),
         ("E<> P.There", ["--shortest"], "--shortest and --fastest have no effect without --trace"),
@@ -574,8 +587,8 @@ system P;
         ("E[] not P.Lost", ["--threads", "2"], "--threads has no effect here"),
         (
             "control: A<> P.There",
-            ["--verify", "--live-variables", "off"],
-            "--live-variables has no effect here: strategies",
+            ["--verify", "--reductions", "none"],
+            "--reductions has no effect here: of the reductions games make live-variables only",
         ),
         ("control: A<> P.There", ["--max-plans", "3"], "--max-plans has no effect without"),
         ("control: A<> P.There", ["--rank", "rolls"], "--rank has no effect without --plans"),

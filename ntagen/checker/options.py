@@ -1,0 +1,176 @@
+"""The options of a query: every option with its meaning and its default, in one table.
+
+`Model.check` takes them as keywords, `Model.answer` as one value. To add an option, add a field
+here, a field to ``Options`` in ``checker/src/engine/options.rs``, and a row to
+``checker/src/python/options.rs``; for the command line, a row to ``ntagen/cli/options.py``.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Concatenate, Literal, ParamSpec, TypeVar
+
+from ntagen.checker.strategy import ForcedRule, PriorityRule
+
+SearchOrder = Literal["bfs", "dfs", "random"]
+CodeEngine = Literal["jit", "interpreter"]
+PlansWanted = Literal["none", "all"]
+TraceWanted = Literal["any", "shortest", "fastest"]
+
+Progress = Callable[[int, int, int, int], object]
+"""Is called with the numbers of explored, stored and waiting states, and of bytes."""
+
+MAX_PLANS = 1_000_000
+"""The default maximum of plans that are listed."""
+
+REDUCTIONS = ("symmetry", "partial-order", "live-variables")
+"""The reductions that a search may make."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """How a query is to be answered.
+
+    Raises:
+        ValueError: `threads` is negative, or `max_plans` less than 1.
+    """
+
+    search: SearchOrder = "bfs"
+    """The order of the search; verdicts do not depend on it."""
+
+    threads: int | Literal["all"] = 1
+    """The number of threads; ``"all"`` (or 0) is one for each core.
+
+    They share the breadth-first search for a reachable state (``E<>``, ``A[]``) or for values, and
+    the computation of winning states in games; other searches use one thread. The same number gives
+    the same counts and traces. The verdict can depend on the number only if the model has a
+    run-time error, because the search may or may not meet it before its goal. In games nothing
+    depends on the number.
+    """
+
+    seed: int = 0
+    """For ``search="random"``: the same seed gives the same search."""
+
+    forced: ForcedRule = "tiga"
+    """When the environment must move at a moment at which time cannot pass: if the process that
+    stops time has no controllable move (``tiga``), if no process has one (``product``), or always
+    (``neutral``)."""
+
+    priorities: PriorityRule = "ignore"
+    """Whether priorities of channels and processes count in games and under strategies; in all
+    other queries they do."""
+
+    engine: CodeEngine = "jit"
+    """How the code of the model runs; answers do not depend on it."""
+
+    states: int | None = None
+    """The search stops after this many stored states."""
+
+    memory_bytes: int | None = None
+    """The search stops when its states take this many bytes."""
+
+    timeout_s: float | None = None
+    """The search stops after this time, in seconds."""
+
+    plans: PlansWanted = "none"
+    """Which winning sequences to list."""
+
+    max_plans: int = MAX_PLANS
+    """At most this many plans are listed; with 1 the search stops at the first."""
+
+    strategy: bool = False
+    """Whether to make the strategy of the player who wins."""
+
+    verify: bool = False
+    """Whether to check the strategy against every move of the opponent."""
+
+    trace: bool = True
+    """Whether witnesses and counterexamples get exact times, which an independent replay checks.
+
+    For ``sup``, ``inf`` and ``bounds`` this takes a second search.
+    """
+
+    wanted_trace: TraceWanted = "any"
+    """``shortest``: traces have the fewest transitions; if a run never ends, its loop counts once.
+    ``fastest``: traces take the least time; not for ``E[]``, ``A<>`` and ``-->``, whose runs do not
+    end. Both take a second search."""
+
+    certificate: bool = False
+    """Whether to keep the set of reached states if ``E<>`` is not satisfied or ``A[]`` is.
+
+    This takes a second search, in which states are different if they differ only in ``meta``
+    variables.
+    """
+
+    reductions: str = "all"
+    """Which reductions the search may make: ``all``, ``none``, or some of `REDUCTIONS` with commas
+    between them. Verdicts, values and traces do not depend on them; counts do.
+
+    ``symmetry``: ``E<>``, ``A[]``, ``sup``, ``inf`` and ``bounds`` treat states as one if they
+    differ only by exchanged members of scalar sets. ``partial-order``: ``E<>`` and ``A[]`` take
+    independent moves in one order only while time cannot pass. ``live-variables``: ``E<>``,
+    ``A[]``, ``sup``, ``inf`` and ``bounds``, and games if neither a strategy nor plans are asked
+    for, treat states as one if they differ only in variables that are written before they are read
+    again.
+    """
+
+    without: Sequence[str] = ()
+    """Heuristics of `HEURISTICS` that are not used; verdicts and values do not depend on them, time
+    and counts do."""
+
+    folder: Path | None = None
+    """The folder of the files of ``saveStrategy`` and ``loadStrategy``; by default the folder of
+    the model."""
+
+    allow_write: Sequence[str | Path] = ()
+    """Folders below which ``saveStrategy`` may write, besides the current one. It replaces no files
+    but strategies."""
+
+    progress: Progress | None = None
+    """Is called about twenty times per second with the numbers of explored, stored and waiting
+    states and of bytes."""
+
+    def __post_init__(self) -> None:
+        if self.threads != "all" and self.threads < 0:
+            raise ValueError(f"{self.threads} threads: there must be at least 1, or 'all'")
+        if self.max_plans < 1:
+            raise ValueError(f"max_plans is {self.max_plans}, but must be at least 1")
+
+
+Keywords = ParamSpec("Keywords")
+Asked = TypeVar("Asked")
+Result = TypeVar("Result")
+
+
+def by_keywords(
+    options: Callable[Keywords, Options],
+) -> Callable[
+    [Callable[[Asked, str, Options], Result]], Callable[Concatenate[Asked, str, Keywords], Result]
+]:
+    """Lets a method about a query take the fields of its options as keywords.
+
+    Args:
+        options: `Options`, whose fields become the keywords.
+    """
+
+    def decorate(
+        method: Callable[[Asked, str, Options], Result],
+    ) -> Callable[Concatenate[Asked, str, Keywords], Result]:
+        @functools.wraps(method)
+        def with_keywords(
+            asked: Asked, query: str, /, *args: Keywords.args, **keywords: Keywords.kwargs
+        ) -> Result:
+            return method(asked, query, options(*args, **keywords))
+
+        first = list(inspect.signature(method).parameters.values())[:2]
+        fields = inspect.signature(options).parameters.values()
+        shown = inspect.Signature([*first, *fields])
+        # What `help` shows.
+        with_keywords.__dict__["__signature__"] = shown
+        return with_keywords
+
+    return decorate
