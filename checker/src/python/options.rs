@@ -16,7 +16,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
     let text = |name| field::<String>(given, name);
     Ok(Options {
         order: order(&text("search")?, field(given, "seed")?)?,
-        threads: thread_count(field(given, "threads")?)?,
+        threads: threads(given)?,
         forced: forced_rule(&text("forced")?)?,
         priorities: priority_rule(&text("priorities")?)?,
         code: code_engine(&text("engine")?)?,
@@ -43,6 +43,12 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
 /// An attribute.
 fn field<'py, T: FromPyObjectOwned<'py>>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<T> {
     given.getattr(name)?.extract().map_err(Into::into)
+}
+
+/// A number of threads, or `all` for one for each core.
+fn threads(given: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let is_all = field::<String>(given, "threads").is_ok_and(|text| text == "all");
+    thread_count(if is_all { 0 } else { field(given, "threads")? })
 }
 
 fn order(name: &str, seed: u64) -> PyResult<Order> {
