@@ -36,11 +36,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
     | {"checker.strategy", "_checker"},
+    "checker.options": {"checker.strategy"},
+    "checker.query_form": {"_checker"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
-    | {"checker.states", "checker.strategy"},
+    | {"checker.options", "checker.query_form", "checker.states", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
-    | {"checker.states"},
+    | {"checker.options", "checker.query_form", "checker.states"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "needle": BASE,
@@ -225,7 +227,7 @@ def test_only_the_command_line_prints_or_exits() -> None:
 def test_the_compiled_engine_has_one_door(module: str) -> None:
     users = {item.room for item in imports() if item.module.startswith(module)}
     doors = {"checker.answer", "checker.errors", "checker.model", "checker.states"}
-    assert users <= doors | {"checker.play", "checker.strategy"}
+    assert users <= doors | {"checker.play", "checker.query_form", "checker.strategy"}
 
 
 def test_commands_print_by_the_terminal_module_only() -> None:
