@@ -2,7 +2,7 @@
 
 use checker::engine::answer::Certificate;
 use checker::engine::evidence::certificate::verify;
-use checker::engine::{Answer, LoadedModel, Options, Verdict};
+use checker::engine::{Answer, LoadedModel, Options, Rules, Verdict};
 use checker::verify::certificate::States;
 
 use crate::checks::{ask, goal_of, interpreted, load};
@@ -161,23 +161,23 @@ fn file_is_checked() {
     let certificate = answer.evidence.certificate.expect("it is satisfied");
     let text = certificate.text(model.network(), QUERY);
     let checked = model
-        .verify_evidence("safe.jsonl", &text, Default::default())
+        .verify_evidence("safe.jsonl", &text, Rules::default())
         .expect("it is one");
     assert_eq!(checked.holds, Some(true), "{:?}", checked.lines);
     let shorter: Vec<&str> = text.lines().take(3).collect();
     assert!(
         model
-            .verify_evidence("safe.jsonl", &shorter.join("\n"), Default::default())
+            .verify_evidence("safe.jsonl", &shorter.join("\n"), Rules::default())
             .is_err()
     );
     assert!(
         model
-            .verify_evidence("safe.jsonl", "{}", Default::default())
+            .verify_evidence("safe.jsonl", "{}", Rules::default())
             .is_err()
     );
     assert!(
         model
-            .verify_evidence("safe.jsonl", "no json", Default::default())
+            .verify_evidence("safe.jsonl", "no json", Rules::default())
             .is_err()
     );
 }

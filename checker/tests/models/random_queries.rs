@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use checker::engine::evidence::witness::Proof;
-use checker::engine::{Limits, Options, TraceWanted, Verdict};
+use checker::engine::{Limits, Options, Rules, TraceWanted, Verdict};
 use checker::search::optimum::extremum::Extreme;
 use checker::verify::replay::End;
 
@@ -514,7 +514,7 @@ fn answer_with(text: &str, query: &str, trace: TraceWanted) -> checker::engine::
     }
     if let Some(certificate) = &answer.evidence.certificate {
         let certificate = certificate.text(model.network(), query);
-        let checked = model.verify_evidence("certificate", &certificate, Default::default());
+        let checked = model.verify_evidence("certificate", &certificate, Rules::default());
         let checked = checked.expect("the file is one of this model");
         let is_covered = !query.contains("deadlock") || !text.contains("urgent ");
         let expected = if is_covered {

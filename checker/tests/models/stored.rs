@@ -209,7 +209,7 @@ fn independent_moves_are_taken_in_one_order_where_time_stands_still() {
     for query in ["E<> false", "A[] not deadlock"] {
         let count = |reduced: bool| {
             check(SENSORS, query, |options| {
-                options.reductions.partial_order = reduced
+                options.reductions.partial_order = reduced;
             })
             .counters
             .stored

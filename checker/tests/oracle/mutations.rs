@@ -8,6 +8,7 @@ use std::sync::Arc;
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
 use checker::engine::{LoadedModel, Options, Rules};
+use checker::game::Player;
 use checker::game::strategy::attractor::{Selection, Start, Strategy};
 use checker::syntax::ast::QueryText;
 use checker::verify::strategy::{Decision, Decisions, Defect, Outcome};
