@@ -47,6 +47,9 @@ pub mod instants;
 pub mod past;
 pub mod patience;
 
+#[cfg(test)]
+mod tests;
+
 pub use bound::Bound;
 pub use clock_set::ClockSet;
 pub use dbm::Relation;

@@ -9,11 +9,11 @@ mod checks;
 #[path = "../common/corpus.rs"]
 #[allow(dead_code, reason = "this program reads some of the files only")]
 mod corpus;
+mod great_differences;
 mod interrupts;
 mod live_variables;
 mod option_sets;
 mod partial_order;
-mod patience;
 #[path = "../common/random.rs"]
 mod random;
 mod random_queries;
@@ -28,5 +28,3 @@ mod symmetry;
 mod threads;
 mod verdicts;
 mod zone_memo;
-mod zones;
-mod zones_at_the_limits;

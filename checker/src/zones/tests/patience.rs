@@ -1,7 +1,7 @@
 //! Operations on large federations end when they are told to, and only then do they give less than
 //! all.
 
-use checker::zones::{Bound, ClockSet, Federation, Patience, Zone, past};
+use crate::zones::{Bound, ClockSet, Federation, Patience, Zone, past};
 
 /// What gives a federation within some patience.
 type Operation = Box<dyn Fn(&mut Patience<'_>) -> Federation>;

@@ -6,18 +6,17 @@
 //! about a set is asked point by point, and every zone that comes out must be closed, consistent
 //! and positive, which makes its matrix unique.
 
-#![expect(clippy::unwrap_used, reason = "a helper that panics is a failed test")]
-
 use std::collections::BTreeSet;
 
-use checker::zones::clocks::{self, Assignment};
-use checker::zones::dbm::{self, Constraint};
-use checker::zones::extrapolate::{self, Ceilings};
-use checker::zones::{
-    Bound, ClockSet, Federation, Relation, Zone, instants, minimal, past, simulation,
-};
 use proptest::prelude::*;
 use proptest::test_runner::FileFailurePersistence;
+
+use crate::zones::clocks::{self, Assignment};
+use crate::zones::dbm::{self, Constraint};
+use crate::zones::extrapolate::{self, Ceilings};
+use crate::zones::{
+    Bound, ClockSet, Federation, Relation, Zone, instants, minimal, past, simulation,
+};
 
 /// The greatest constant in generated constraints.
 const CONSTANT: i32 = 4;
@@ -284,7 +283,7 @@ fn lower_and_upper(dimension: usize) -> impl Strategy<Value = (Constants, Consta
 }
 
 fn configuration() -> ProptestConfig {
-    let seeds = FileFailurePersistence::Direct("tests/regressions/zones.txt");
+    let seeds = FileFailurePersistence::Direct("src/zones/tests/regressions.txt");
     ProptestConfig {
         cases: 96,
         failure_persistence: Some(Box::new(seeds)),
