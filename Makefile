@@ -46,7 +46,15 @@ test: $(INSTALLED) ## Run all tests, Rust and Python
 	source $(RUST) && $(BIN)/python -m pytest
 
 .PHONY: quick
-quick: $(INSTALLED) ## Run the Python tests that take at most a few seconds each
+quick: $(INSTALLED) ## Run the tests that take at most a few seconds each, Rust and Python side by side
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target quick-rust quick-python
+
+.PHONY: quick-rust
+quick-rust: $(RUST)
+	source $(RUST) && cd checker && cargo test --locked --quiet --lib --test language --test architecture
+
+.PHONY: quick-python
+quick-python: $(INSTALLED)
 	$(BIN)/python -m pytest -m 'not slow'
 
 .PHONY: lint

@@ -157,7 +157,14 @@ QUERIES = [
 ]
 
 
-@pytest.mark.parametrize("channel", ["chan", "urgent chan", "urgent broadcast chan"])
+@pytest.mark.parametrize(
+    "channel",
+    [
+        "chan",
+        pytest.param("urgent chan", marks=pytest.mark.slow),
+        pytest.param("urgent broadcast chan", marks=pytest.mark.slow),
+    ],
+)
 def test_strategies_of_random_games_win(channel: str) -> None:
     won = {"controller": 0, "environment": 0}
     for seed in range(RANDOM_GAMES):

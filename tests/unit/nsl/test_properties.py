@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -109,6 +110,7 @@ def test_any_words_are_answered(chosen: list[str], separator: str) -> None:
     check_layout(text)
 
 
+@pytest.mark.slow
 @given(st.data())
 @settings(deadline=None, max_examples=250)
 def test_changed_files_are_answered(data: st.DataObject) -> None:

@@ -22,6 +22,11 @@ from tests.oracles.synthesiser import oracle_synthesis
 from tests.steering import HIDDEN, PAPER, scene, sphere
 
 
+def slow(ending: str) -> object:
+    """A kind of file that takes a second to write."""
+    return pytest.param(ending, marks=pytest.mark.slow)
+
+
 def plans_picture(shown: int) -> Picture:
     return picture_of_plans(PAPER, oracle_synthesis(PAPER).candidates, shown)
 
@@ -94,7 +99,7 @@ def test_insertion_goes_down_the_page(sign: float) -> None:
     assert sign * bottom > sign * top
 
 
-@pytest.mark.parametrize("ending", ["png", pytest.param("pdf", marks=pytest.mark.slow), "svg"])
+@pytest.mark.parametrize("ending", [slow("png"), slow("pdf"), "svg"])
 def test_equal_pictures_are_equal_files(tmp_path: Path, ending: str) -> None:
     paths = [tmp_path / f"{name}.{ending}" for name in "ab"]
     for path in paths:
