@@ -6,6 +6,8 @@
 
 pub mod cancellation;
 pub mod diagnostics;
+
+mod builtins;
 pub mod syntax;
 pub mod tuning;
 

@@ -4,6 +4,7 @@
 //! Invariant: nothing here panics or wraps silently: whether a result wrapped round is said with
 //! it, and whatever has no result is a [`RunTimeErrorKind`].
 
+use crate::builtins::canonical;
 use crate::ir::{DoubleOperator, IntegerOperator, Relation, RunTimeErrorKind};
 
 /// The result of integer arithmetic, and whether it wrapped round: the true result is another one
@@ -49,11 +50,6 @@ pub(crate) fn fitting(operator: IntegerOperator, left: i32, right: i32) -> Optio
 pub(crate) fn power(base: i32, exponent: i32) -> Result<Wrapping, RunTimeErrorKind> {
     let exponent = u32::try_from(exponent).map_err(|_| RunTimeErrorKind::NegativeExponent)?;
     Ok(base.overflowing_pow(exponent))
-}
-
-/// The absolute value; that of -2^31 wraps round to itself.
-pub(crate) fn absolute(value: i32) -> Wrapping {
-    value.overflowing_abs()
 }
 
 fn shift_distance(bits: i32) -> Result<u32, RunTimeErrorKind> {
@@ -110,12 +106,6 @@ pub(crate) fn truncate(value: f64) -> Result<i32, RunTimeErrorKind> {
     } else {
         Err(RunTimeErrorKind::NotAnInteger)
     }
-}
-
-/// The value, with one NaN for all: the IEEE leaves sign and payload of a NaN open, processors and
-/// compilers differ in them, and they must not leak into states.
-pub(crate) fn canonical(value: f64) -> f64 {
-    if value.is_nan() { f64::NAN } else { value }
 }
 
 /// The words of a double, low word first.

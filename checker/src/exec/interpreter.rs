@@ -11,6 +11,7 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 
+use crate::builtins::Number;
 use crate::cancellation;
 use crate::ir::{
     Address, Base, Block, CLOCK_LIMIT, ClockId, ClockOperand, Function, FunctionId, Instruction,
@@ -18,7 +19,6 @@ use crate::ir::{
 };
 
 use super::arithmetic::Wrapping;
-use super::math::{self, MathCode};
 use super::rounds::{ROUND_LIMIT, count_rounds};
 use super::{
     Context, EmittedAssignment, EmittedConstraint, Executor, ROUNDS_BETWEEN_LOOKS, RunTimeError,
@@ -196,13 +196,6 @@ impl Place {
             ..self
         }
     }
-}
-
-/// What a function of the mathematical library gives.
-#[derive(Clone, Copy, Debug)]
-enum Value {
-    Integer(i32),
-    Double(f64),
 }
 
 /// A call from outside.
@@ -512,23 +505,21 @@ impl<'run> Run<'run, '_> {
         arguments: &[Register],
         site: SiteId,
     ) -> Result<(), RunTimeErrorKind> {
-        let double = |index: usize| self.double(active, arguments[index]);
-        let integer = |index: usize| self.integer(active, arguments[index]);
-        let value = match math::code_of(function) {
-            MathCode::Abs => {
-                let result = arithmetic::absolute(integer(0));
-                Value::Integer(self.wrapped(result, site)?)
+        // No function has more than three parameters.
+        let mut numbers = [Number::Integer(0); 3];
+        for (number, &argument) in numbers.iter_mut().zip(arguments) {
+            *number = match self.type_of(active, argument) {
+                RegisterType::Double => Number::Double(self.double(active, argument)),
+                _ => Number::Integer(self.integer(active, argument)),
+            };
+        }
+        match function.evaluate(&numbers[..arguments.len()]) {
+            None => return Err(RunTimeErrorKind::NotAnInteger),
+            Some((Number::Integer(value), has_wrapped)) => {
+                let value = self.wrapped((value, has_wrapped), site)?;
+                self.set_integer(active, target, value);
             }
-            MathCode::Ilogb => Value::Integer(math::ilogb(double(0))?),
-            MathCode::Classify(code) => Value::Integer(code(double(0))),
-            MathCode::Unary(code) => Value::Double(code(double(0))),
-            MathCode::Binary(code) => Value::Double(code(double(0), double(1))),
-            MathCode::Scale(code) => Value::Double(code(double(0), integer(1))),
-            MathCode::Ternary(code) => Value::Double(code(double(0), double(1), double(2))),
-        };
-        match value {
-            Value::Integer(value) => self.set_integer(active, target, value),
-            Value::Double(value) => self.set_double(active, target, value),
+            Some((Number::Double(value), _)) => self.set_double(active, target, value),
         }
         Ok(())
     }

@@ -5,7 +5,6 @@
 //! are collected in the context for whoever called.
 
 pub(crate) mod arithmetic;
-pub(crate) mod math;
 
 mod rounds;
 mod wraps;

@@ -13,6 +13,9 @@
 //!   alike, so that the two agree bit for bit.
 //! * Functions never call themselves, directly or indirectly.
 
+use crate::builtins::Code;
+pub use crate::builtins::MathFunction;
+
 /// The greatest absolute value of a clock bound and of a value that a clock is set to; beyond it is
 /// a [`RunTimeErrorKind::ClockValue`]. The limit of zones, whose operations add several bounds
 /// before they check.
@@ -331,102 +334,26 @@ pub enum Relation {
     NotEqual,
 }
 
-/// Functions of the mathematical library, with the meaning that C gives them (`Log` is base 10,
-/// `Ln` is natural).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "the names are those of the language")]
-pub enum MathFunction {
-    /// int → int; `-2^31` wraps round to itself.
-    Abs,
-    Fabs,
-    Exp,
-    Exp2,
-    Expm1,
-    Ln,
-    Log,
-    Log10,
-    Log2,
-    Log1p,
-    Sqrt,
-    Cbrt,
-    Sin,
-    Cos,
-    Tan,
-    Asin,
-    Acos,
-    Atan,
-    Sinh,
-    Cosh,
-    Tanh,
-    Asinh,
-    Acosh,
-    Atanh,
-    Erf,
-    Erfc,
-    Tgamma,
-    Lgamma,
-    Ceil,
-    Floor,
-    Trunc,
-    Round,
-    Logb,
-    /// double → int: an error where the C function has no integer result.
-    Ilogb,
-    Fmod,
-    Fmax,
-    Fmin,
-    Fdim,
-    Pow,
-    Hypot,
-    Atan2,
-    Nextafter,
-    Copysign,
-    /// (double, int) → double
-    Ldexp,
-    /// Three doubles.
-    Fma,
-    /// double → 0 or 1
-    IsFinite,
-    IsInfinite,
-    IsNan,
-    IsNormal,
-    SignBit,
-    IsUnordered,
-}
-
 impl MathFunction {
     /// The types of the parameters.
     pub fn parameters(self) -> &'static [RegisterType] {
         use RegisterType::{Double, Integer};
-        match self {
-            MathFunction::Abs => &[Integer],
-            MathFunction::Fmod
-            | MathFunction::Fmax
-            | MathFunction::Fmin
-            | MathFunction::Fdim
-            | MathFunction::Pow
-            | MathFunction::Hypot
-            | MathFunction::Atan2
-            | MathFunction::Nextafter
-            | MathFunction::Copysign => &[Double, Double],
-            MathFunction::Ldexp => &[Double, Integer],
-            MathFunction::Fma => &[Double, Double, Double],
-            _ => &[Double],
+        match self.code() {
+            Code::Integer(_) => &[Integer],
+            Code::Unary(_) | Code::Classify(_) | Code::ToInteger(_) => &[Double],
+            Code::Binary(_) => &[Double, Double],
+            Code::Scale(_) => &[Double, Integer],
+            Code::Ternary(_) => &[Double, Double, Double],
         }
     }
 
     /// The type of the result.
     pub fn result(self) -> RegisterType {
-        match self {
-            MathFunction::Abs
-            | MathFunction::Ilogb
-            | MathFunction::IsFinite
-            | MathFunction::IsInfinite
-            | MathFunction::IsNan
-            | MathFunction::IsNormal
-            | MathFunction::SignBit
-            | MathFunction::IsUnordered => RegisterType::Integer,
-            _ => RegisterType::Double,
+        match self.code() {
+            Code::Integer(_) | Code::ToInteger(_) | Code::Classify(_) => RegisterType::Integer,
+            Code::Unary(_) | Code::Binary(_) | Code::Scale(_) | Code::Ternary(_) => {
+                RegisterType::Double
+            }
         }
     }
 }

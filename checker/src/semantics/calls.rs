@@ -8,9 +8,9 @@ use super::expressions::entity_kind;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Parameter, Signature};
 use super::types::Type;
+use crate::builtins::{self, Builtin, Code, Number};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
-use crate::exec::math::{self, MathCode};
 use crate::ir::{FunctionId, MathFunction, RegisterType};
 use crate::syntax::ast::{self, ExprKind};
 
@@ -213,15 +213,16 @@ impl Checker<'_> {
         span: Span,
     ) -> Expr {
         let arguments = self.check_all(arguments);
-        if name == "fint" {
-            return self.truncation(arguments, span);
-        }
-        let Some(function) = math_function(name) else {
-            if is_random(name) {
+        let function = match builtins::named(name) {
+            Some(Builtin::Math(function)) => function,
+            Some(Builtin::Truncation) => return self.truncation(arguments, span),
+            Some(Builtin::Random | Builtin::OldRandom) => {
                 return self.random(name, name_span, arguments);
             }
-            self.unknown_name(name, name_span);
-            return Expr::error(span);
+            None | Some(Builtin::Missing) => {
+                self.unknown_name(name, name_span);
+                return Expr::error(span);
+            }
         };
         let parameters = function.parameters();
         if arguments.len() != parameters.len() {
@@ -291,35 +292,30 @@ impl Checker<'_> {
 
 /// A function of the mathematical library, evaluated if its arguments are known.
 pub(super) fn folded_math(function: MathFunction, arguments: Vec<Expr>, span: Span) -> Expr {
-    let ty = match function {
-        MathFunction::Abs | MathFunction::Ilogb => Type::ANY_INT,
-        _ if function.result() == RegisterType::Integer => Type::Bool,
-        _ => Type::Double,
+    let ty = match function.code() {
+        Code::Integer(_) | Code::ToInteger(_) => Type::ANY_INT,
+        Code::Classify(_) => Type::Bool,
+        Code::Unary(_) | Code::Binary(_) | Code::Scale(_) | Code::Ternary(_) => Type::Double,
     };
-    let doubles: Vec<f64> = arguments
-        .iter()
-        .filter_map(|argument| match argument.kind {
-            Kind::Double(value) => Some(value),
-            _ => None,
-        })
-        .collect();
-    let double = |value: f64| Expr::new(Kind::Double(value), Type::Double, span);
-    match (math::code_of(function), doubles.as_slice()) {
-        (MathCode::Abs, _) => absolute(arguments, span),
-        (MathCode::Unary(code), &[x]) => double(code(x)),
-        (MathCode::Binary(code), &[x, y]) => double(code(x, y)),
-        (MathCode::Ternary(code), &[x, y, z]) => double(code(x, y, z)),
+    let known: Option<Vec<Number>> = arguments.iter().map(number).collect();
+    match known.and_then(|known| function.evaluate(&known)) {
+        Some((Number::Integer(value), false)) => Expr::int(value, ty, span),
+        Some((Number::Double(value), false)) => Expr::new(Kind::Double(value), ty, span),
+        _ if function == MathFunction::Abs => absolute(arguments, span),
         _ => Expr::new(Kind::Math(function, arguments), ty, span),
     }
 }
 
+fn number(argument: &Expr) -> Option<Number> {
+    match argument.kind {
+        Kind::Double(value) => Some(Number::Double(value)),
+        _ => argument.constant().map(Number::Integer),
+    }
+}
+
+/// The absolute value of what is not known, but for its range.
 fn absolute(arguments: Vec<Expr>, span: Span) -> Expr {
     let (low, high) = arguments[0].interval;
-    if let Some(value) = arguments[0].constant()
-        && let (value, false) = arithmetic::absolute(value)
-    {
-        return Expr::int(value, Type::ANY_INT, span);
-    }
     let least = if low <= 0 && 0 <= high {
         0
     } else {
@@ -330,65 +326,4 @@ fn absolute(arguments: Vec<Expr>, span: Span) -> Expr {
     let least = if low == i32::MIN { low } else { least };
     let kind = Kind::Math(MathFunction::Abs, arguments);
     Expr::new(kind, Type::ANY_INT, span).within((least, most))
-}
-
-fn is_random(name: &str) -> bool {
-    name == "random" || name == "normal" || name.starts_with("random_")
-}
-
-fn math_function(name: &str) -> Option<MathFunction> {
-    Some(match name {
-        "abs" => MathFunction::Abs,
-        "fabs" => MathFunction::Fabs,
-        "exp" => MathFunction::Exp,
-        "exp2" => MathFunction::Exp2,
-        "expm1" => MathFunction::Expm1,
-        "ln" => MathFunction::Ln,
-        "log" => MathFunction::Log,
-        "log10" => MathFunction::Log10,
-        "log2" => MathFunction::Log2,
-        "log1p" => MathFunction::Log1p,
-        "sqrt" => MathFunction::Sqrt,
-        "cbrt" => MathFunction::Cbrt,
-        "sin" => MathFunction::Sin,
-        "cos" => MathFunction::Cos,
-        "tan" => MathFunction::Tan,
-        "asin" => MathFunction::Asin,
-        "acos" => MathFunction::Acos,
-        "atan" => MathFunction::Atan,
-        "sinh" => MathFunction::Sinh,
-        "cosh" => MathFunction::Cosh,
-        "tanh" => MathFunction::Tanh,
-        "asinh" => MathFunction::Asinh,
-        "acosh" => MathFunction::Acosh,
-        "atanh" => MathFunction::Atanh,
-        "erf" => MathFunction::Erf,
-        "erfc" => MathFunction::Erfc,
-        "tgamma" => MathFunction::Tgamma,
-        "lgamma" => MathFunction::Lgamma,
-        "ceil" => MathFunction::Ceil,
-        "floor" => MathFunction::Floor,
-        "trunc" => MathFunction::Trunc,
-        "round" => MathFunction::Round,
-        "logb" => MathFunction::Logb,
-        "ilogb" => MathFunction::Ilogb,
-        "fmod" => MathFunction::Fmod,
-        "fmax" => MathFunction::Fmax,
-        "fmin" => MathFunction::Fmin,
-        "fdim" => MathFunction::Fdim,
-        "pow" => MathFunction::Pow,
-        "hypot" => MathFunction::Hypot,
-        "atan2" => MathFunction::Atan2,
-        "nextafter" => MathFunction::Nextafter,
-        "copysign" => MathFunction::Copysign,
-        "ldexp" => MathFunction::Ldexp,
-        "fma" => MathFunction::Fma,
-        "isfinite" => MathFunction::IsFinite,
-        "isinf" => MathFunction::IsInfinite,
-        "isnan" => MathFunction::IsNan,
-        "isnormal" => MathFunction::IsNormal,
-        "signbit" => MathFunction::SignBit,
-        "isunordered" => MathFunction::IsUnordered,
-        _ => return None,
-    })
 }

@@ -5,6 +5,7 @@
 //! (with a warning), because models older than UPPAAL 4.1.20 use them as names.
 
 use super::parser::Dialect;
+use crate::builtins::{self, Builtin};
 
 const OLD: u8 = 1;
 const NEW: u8 = 2;
@@ -42,68 +43,5 @@ pub(super) fn is_reserved(word: &str, dialect: Dialect) -> bool {
 
 /// Whether `word` is the name of a function that UPPAAL 5 defines.
 pub(super) fn is_built_in_function(word: &str) -> bool {
-    matches!(
-        word,
-        "abs"
-            | "fabs"
-            | "fmod"
-            | "fma"
-            | "fmax"
-            | "fmin"
-            | "fdim"
-            | "exp"
-            | "exp2"
-            | "expm1"
-            | "ln"
-            | "log"
-            | "log10"
-            | "log2"
-            | "log1p"
-            | "pow"
-            | "sqrt"
-            | "cbrt"
-            | "hypot"
-            | "sin"
-            | "cos"
-            | "tan"
-            | "asin"
-            | "acos"
-            | "atan"
-            | "atan2"
-            | "sinh"
-            | "cosh"
-            | "tanh"
-            | "asinh"
-            | "acosh"
-            | "atanh"
-            | "erf"
-            | "erfc"
-            | "tgamma"
-            | "lgamma"
-            | "ceil"
-            | "floor"
-            | "trunc"
-            | "round"
-            | "fint"
-            | "ldexp"
-            | "ilogb"
-            | "logb"
-            | "nextafter"
-            | "copysign"
-            | "fpclassify"
-            | "isfinite"
-            | "isinf"
-            | "isnan"
-            | "isnormal"
-            | "signbit"
-            | "isunordered"
-            | "random"
-            | "random_arcsine"
-            | "random_beta"
-            | "random_gamma"
-            | "random_normal"
-            | "random_poisson"
-            | "random_tri"
-            | "random_weibull"
-    )
+    !matches!(builtins::named(word), None | Some(Builtin::OldRandom))
 }

@@ -5,10 +5,11 @@
 //! bits), else the integer that the function returned, or 0. A double or an address is returned
 //! beside the status.
 
+use crate::builtins::IntegerResult;
 use crate::cancellation;
 use crate::exec::{
     Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, ROUNDS_BETWEEN_LOOKS, RunTimeError,
-    Wraps, arithmetic, math,
+    Wraps, arithmetic,
 };
 use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
 
@@ -94,23 +95,11 @@ pub(super) extern "C" fn more_rounds(context: &mut NativeContext<'_>, site: u32)
     0
 }
 
-/// What a called-back function gives where there is no result.
-const NO_RESULT: i64 = -1;
-
-/// The bit of [`power`] that says that the result wrapped round.
-pub(super) const HAS_WRAPPED: i64 = 1 << 32;
-
-/// `base ** exponent` as an unsigned word, with [`HAS_WRAPPED`] if it wrapped round; the exponent
-/// is not negative.
-pub(super) extern "C" fn power(base: i32, exponent: i32) -> i64 {
-    arithmetic::power(base, exponent).map_or(NO_RESULT, |(power, has_wrapped)| {
-        i64::from(power as u32) | if has_wrapped { HAS_WRAPPED } else { 0 }
+/// `base ** exponent`; the exponent is not negative.
+pub(super) extern "C" fn power(base: i32, exponent: i32) -> IntegerResult {
+    arithmetic::power(base, exponent).map_or(IntegerResult::NONE, |(power, has_wrapped)| {
+        IntegerResult::new(power, has_wrapped)
     })
-}
-
-/// The binary exponent as an unsigned word; negative if there is none.
-pub(super) extern "C" fn ilogb(value: f64) -> i64 {
-    math::ilogb(value).map_or(NO_RESULT, |exponent| i64::from(exponent as u32))
 }
 
 /// Emits a clock constraint.

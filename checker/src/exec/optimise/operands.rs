@@ -1,6 +1,6 @@
 //! Which registers instructions and terminators read and write.
 
-use crate::ir::{Address, Base, ClockOperand, Instruction, MathFunction, Register, Terminator};
+use crate::ir::{Address, Base, ClockOperand, Instruction, Register, Terminator};
 
 /// The register that an instruction writes.
 pub(super) fn target_mut(instruction: &mut Instruction) -> Option<&mut Register> {
@@ -178,9 +178,7 @@ pub(super) fn terminator_use_mut(terminator: &mut Terminator) -> Option<&mut Reg
 /// Whether an instruction does nothing but write its target, and cannot fail.
 pub(super) fn is_pure(instruction: &Instruction) -> bool {
     match instruction {
-        Instruction::Math { function, .. } => {
-            !matches!(function, MathFunction::Abs | MathFunction::Ilogb)
-        }
+        Instruction::Math { function, .. } => !function.may_fail_or_wrap(),
         Instruction::Integer { .. }
         | Instruction::Double { .. }
         | Instruction::Copy { .. }

@@ -4,8 +4,8 @@ use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::types::{F64, I32, I64};
 use cranelift_codegen::ir::{InstBuilder, InstructionData, Opcode, Value};
 
+use crate::builtins::{Code, IntegerResult};
 use crate::exec::jit::runtime;
-use crate::exec::math::{self, MathCode};
 use crate::ir::{
     DoubleOperator, Instruction, IntegerOperator, MathFunction, Register, Relation,
     RunTimeErrorKind, SiteId,
@@ -251,22 +251,17 @@ impl Translator<'_> {
         self.fail_if(negative, RunTimeErrorKind::NegativeExponent, site);
         let code = runtime::power as *const () as usize;
         let power = self.call_back(code, Some(I64), &[base, exponent]);
-        let has_wrapped = self.builder.ins().icmp_imm_s(
-            IntCC::SignedGreaterThanOrEqual,
-            power,
-            runtime::HAS_WRAPPED,
-        );
-        self.overflow_if(has_wrapped, site);
-        self.builder.ins().ireduce(I32, power)
+        self.unwrapped(power, site)
     }
 
-    /// The integer that a called-back function gave; fails if it gave none.
-    pub(super) fn word_of(&mut self, result: Value, kind: RunTimeErrorKind, site: SiteId) -> Value {
-        let none = self
-            .builder
-            .ins()
-            .icmp_imm_s(IntCC::SignedLessThan, result, 0);
-        self.fail_if(none, kind, site);
+    /// The integer of an [`IntegerResult`] that is one.
+    fn unwrapped(&mut self, result: Value, site: SiteId) -> Value {
+        let has_wrapped = self.builder.ins().icmp_imm_s(
+            IntCC::SignedGreaterThanOrEqual,
+            result,
+            IntegerResult::HAS_WRAPPED,
+        );
+        self.overflow_if(has_wrapped, site);
         self.builder.ins().ireduce(I32, result)
     }
 
@@ -287,32 +282,37 @@ impl Translator<'_> {
             .map(|&register| self.get(register))
             .collect();
         let ins = self.builder.ins();
-        // These are exact in IEEE arithmetic, so that the processor's instruction gives what the
-        // library gives.
+        // Where the processor has an instruction that gives what the library gives, it is taken.
         match function {
             MathFunction::Fabs => return ins.fabs(arguments[0]),
             MathFunction::Sqrt => return ins.sqrt(arguments[0]),
-            _ => {}
-        }
-        let (code, result) = match math::code_of(function) {
-            MathCode::Abs => {
+            MathFunction::Abs => {
                 let least = i64::from(i32::MIN);
                 let is_least = ins.icmp_imm_s(IntCC::Equal, arguments[0], least);
                 self.overflow_if(is_least, site);
                 return self.builder.ins().iabs(arguments[0]);
             }
-            MathCode::Ilogb => {
-                let code = runtime::ilogb as *const () as usize;
-                let exponent = self.call_back(code, Some(I64), &arguments);
-                return self.word_of(exponent, RunTimeErrorKind::NotAnInteger, site);
-            }
-            MathCode::Unary(code) => (code as usize, F64),
-            MathCode::Binary(code) => (code as usize, F64),
-            MathCode::Scale(code) => (code as usize, F64),
-            MathCode::Ternary(code) => (code as usize, F64),
-            MathCode::Classify(code) => (code as usize, I32),
+            _ => {}
+        }
+        let (code, result) = match function.code() {
+            Code::Integer(code) => (code as usize, I64),
+            Code::ToInteger(code) => (code as usize, I64),
+            Code::Classify(code) => (code as usize, I32),
+            Code::Unary(code) => (code as usize, F64),
+            Code::Binary(code) => (code as usize, F64),
+            Code::Scale(code) => (code as usize, F64),
+            Code::Ternary(code) => (code as usize, F64),
         };
-        self.call_back(code, Some(result), &arguments)
+        let result = self.call_back(code, Some(result), &arguments);
+        if !function.may_fail_or_wrap() {
+            return result;
+        }
+        let is_none = self
+            .builder
+            .ins()
+            .icmp_imm_s(IntCC::SignedLessThan, result, 0);
+        self.fail_if(is_none, RunTimeErrorKind::NotAnInteger, site);
+        self.unwrapped(result, site)
     }
 
     /// A condition as 0 or 1.

@@ -4,13 +4,6 @@ use crate::ir::{
     Address, DoubleOperator, Instruction, IntegerOperator, MathFunction, Register, Relation, SiteId,
 };
 
-/// A constant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Literal {
-    Integer(i32),
-    Double(f64),
-}
-
 /// An expression over values.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Expression {
@@ -86,8 +79,8 @@ pub(super) fn expression_of(instruction: &Instruction) -> Option<Expression> {
             site,
             ..
         } => {
-            let may_wrap = *function == MathFunction::Abs;
-            Expression::Math(*function, arguments.clone(), may_wrap.then_some(*site))
+            let site = function.may_fail_or_wrap().then_some(*site);
+            Expression::Math(*function, arguments.clone(), site)
         }
         &Instruction::AddressOf { address, .. } => Expression::Address(address),
         &Instruction::ScaleIndex {

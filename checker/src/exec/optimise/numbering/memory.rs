@@ -3,10 +3,10 @@
 //! Invariant: a word is forgotten with every write that may concern it, so that what is remembered
 //! holds.
 
+use crate::builtins::Number;
 use crate::exec::arithmetic;
 use crate::ir::{Address, Base, Instruction, Register, RegisterType};
 
-use super::expressions::Literal;
 use super::{Numbering, Simplified};
 
 /// So many words of memory are remembered.
@@ -117,11 +117,11 @@ impl Numbering<'_> {
         if address.base == Base::Constants && address.index.is_none() {
             let offset = address.offset as usize;
             return Simplified::Literal(match kind {
-                RegisterType::Double => Literal::Double(arithmetic::double_of_words(
+                RegisterType::Double => Number::Double(arithmetic::double_of_words(
                     self.constants[offset],
                     self.constants[offset + 1],
                 )),
-                _ => Literal::Integer(self.constants[offset]),
+                _ => Number::Integer(self.constants[offset]),
             });
         }
         Simplified::Instruction(instruction)

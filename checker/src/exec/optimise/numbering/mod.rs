@@ -24,6 +24,7 @@ mod simplify;
 
 use rustc_hash::FxHashMap;
 
+use crate::builtins::Number;
 use crate::exec::rounds::successors;
 use crate::ir::{
     Address, Base, Block, BlockId, Function, Instruction, IntegerOperator, Register, RegisterType,
@@ -35,7 +36,7 @@ use super::operands::{
     each_address_mut, each_clock_mut, each_use_mut, target, target_mut, terminator_use_mut,
 };
 
-use expressions::{Expression, Literal, expression_of};
+use expressions::{Expression, expression_of};
 use memory::MAX_WORDS_TO_EXPAND;
 
 /// In larger functions nothing is handed on to blocks with several predecessors.
@@ -101,7 +102,7 @@ impl Known {
 enum Simplified {
     Nothing,
     Value(Register),
-    Literal(Literal),
+    Literal(Number),
     Instruction(Instruction),
 }
 
@@ -113,7 +114,7 @@ struct Numbering<'a> {
     /// The registers that are written several times.
     is_rewritten: Vec<bool>,
     /// The values that are constants.
-    literals: FxHashMap<Register, Literal>,
+    literals: FxHashMap<Register, Number>,
     /// The values that are known addresses.
     addresses: FxHashMap<Register, Address>,
     /// The values that are an index and a constant.
@@ -187,7 +188,7 @@ impl Numbering<'_> {
             *register = self.value(*register);
         }
         if let Terminator::Branch(condition, then, otherwise) = terminator
-            && let Some(Literal::Integer(condition)) = self.literal(condition)
+            && let Some(Number::Integer(condition)) = self.literal(condition)
         {
             terminator = Terminator::Jump(if condition != 0 { then } else { otherwise });
             self.has_decided = true;
@@ -268,20 +269,20 @@ impl Numbering<'_> {
         }
     }
 
-    fn literal(&self, value: Register) -> Option<Literal> {
+    fn literal(&self, value: Register) -> Option<Number> {
         self.literals.get(&value).copied()
     }
 
     fn integer(&self, value: Register) -> Option<i32> {
         match self.literal(value) {
-            Some(Literal::Integer(value)) => Some(value),
+            Some(Number::Integer(value)) => Some(value),
             _ => None,
         }
     }
 
     fn double(&self, value: Register) -> Option<f64> {
         match self.literal(value) {
-            Some(Literal::Double(value)) => Some(value),
+            Some(Number::Double(value)) => Some(value),
             _ => None,
         }
     }
@@ -332,18 +333,18 @@ impl Numbering<'_> {
     }
 
     /// The value of a constant.
-    fn literal_value(&mut self, literal: Literal) -> Register {
+    fn literal_value(&mut self, literal: Number) -> Register {
         let (kind, expression) = match literal {
-            Literal::Integer(value) => (RegisterType::Integer, Expression::Integer(value)),
-            Literal::Double(value) => (RegisterType::Double, Expression::Double(value.to_bits())),
+            Number::Integer(value) => (RegisterType::Integer, Expression::Integer(value)),
+            Number::Double(value) => (RegisterType::Double, Expression::Double(value.to_bits())),
         };
         if let Some(&value) = self.known.expressions.get(&expression) {
             return value;
         }
         let target = self.new_register(kind);
         self.output.push(match literal {
-            Literal::Integer(value) => Instruction::Integer { target, value },
-            Literal::Double(value) => Instruction::Double { target, value },
+            Number::Integer(value) => Instruction::Integer { target, value },
+            Number::Double(value) => Instruction::Double { target, value },
         });
         self.literals.insert(target, literal);
         self.known.expressions.insert(expression, target);

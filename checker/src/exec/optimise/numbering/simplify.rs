@@ -1,17 +1,16 @@
 //! What an instruction comes down to, from what is known of its operands.
 
+use crate::builtins::Number;
 use crate::exec::arithmetic;
-use crate::exec::math::{self, MathCode};
 use crate::ir::{Instruction, IntegerOperator, Register, Relation};
 
-use super::expressions::Literal;
 use super::{Numbering, Simplified};
 
 impl Numbering<'_> {
     pub(super) fn simplify(&mut self, instruction: Instruction) -> Simplified {
         match instruction {
-            Instruction::Integer { value, .. } => Simplified::Literal(Literal::Integer(value)),
-            Instruction::Double { value, .. } => Simplified::Literal(Literal::Double(value)),
+            Instruction::Integer { value, .. } => Simplified::Literal(Number::Integer(value)),
+            Instruction::Double { value, .. } => Simplified::Literal(Number::Double(value)),
             Instruction::Copy { source, .. } => Simplified::Value(source),
             Instruction::Arithmetic { .. } => self.simplify_arithmetic(instruction),
             Instruction::CompareIntegers {
@@ -20,7 +19,7 @@ impl Numbering<'_> {
                 right,
                 ..
             } => match self.relate(relation, left, right) {
-                Some(holds) => Simplified::Literal(Literal::Integer(holds.into())),
+                Some(holds) => Simplified::Literal(Number::Integer(holds.into())),
                 None => Simplified::Instruction(instruction),
             },
             Instruction::CheckRange {
@@ -44,7 +43,7 @@ impl Numbering<'_> {
             Instruction::AddIndices { left, right, .. } => {
                 match (self.integer(left), self.integer(right)) {
                     (Some(left), Some(right)) => {
-                        Simplified::Literal(Literal::Integer(left.wrapping_add(right)))
+                        Simplified::Literal(Number::Integer(left.wrapping_add(right)))
                     }
                     (Some(0), _) => Simplified::Value(right),
                     (_, Some(0)) => Simplified::Value(left),
@@ -63,7 +62,7 @@ impl Numbering<'_> {
                     .and_then(|index| arithmetic::scale_index(index, first, length, stride).ok());
                 let (low, high) = self.range(index);
                 match value {
-                    Some(value) => Simplified::Literal(Literal::Integer(value)),
+                    Some(value) => Simplified::Literal(Number::Integer(value)),
                     None if first == 0 && stride == 1 && low >= 0 && (high as u32) < length => {
                         Simplified::Value(index)
                     }
@@ -84,11 +83,11 @@ impl Numbering<'_> {
     }
 
     /// The value of an expression over constants.
-    fn fold(&self, instruction: &Instruction) -> Option<Literal> {
+    fn fold(&self, instruction: &Instruction) -> Option<Number> {
         let integer = |register: &Register| self.integer(*register);
         let double = |register: &Register| self.double(*register);
         Some(match instruction {
-            Instruction::Not { source, .. } => Literal::Integer((integer(source)? == 0).into()),
+            Instruction::Not { source, .. } => Number::Integer((integer(source)? == 0).into()),
             Instruction::CompareDoubles {
                 relation,
                 left,
@@ -96,44 +95,32 @@ impl Numbering<'_> {
                 ..
             } => {
                 let holds = arithmetic::doubles_relate(*relation, double(left)?, double(right)?);
-                Literal::Integer(holds.into())
+                Number::Integer(holds.into())
             }
             Instruction::DoubleArithmetic {
                 operator,
                 left,
                 right,
                 ..
-            } => Literal::Double(arithmetic::double(*operator, double(left)?, double(right)?)),
+            } => Number::Double(arithmetic::double(*operator, double(left)?, double(right)?)),
             Instruction::IntegerToDouble { source, .. } => {
-                Literal::Double(f64::from(integer(source)?))
+                Number::Double(f64::from(integer(source)?))
             }
             Instruction::DoubleToInteger { source, .. } => {
-                Literal::Integer(arithmetic::truncate(double(source)?).ok()?)
+                Number::Integer(arithmetic::truncate(double(source)?).ok()?)
             }
             Instruction::Math {
                 function,
                 arguments,
                 ..
-            } => match math::code_of(*function) {
-                MathCode::Abs => match arithmetic::absolute(integer(&arguments[0])?) {
-                    (value, false) => Literal::Integer(value),
+            } => {
+                let known = arguments.iter().map(|&argument| self.literal(argument));
+                let known: Vec<Number> = known.collect::<Option<_>>()?;
+                match function.evaluate(&known)? {
+                    (value, false) => value,
                     (_, true) => return None,
-                },
-                MathCode::Ilogb => Literal::Integer(math::ilogb(double(&arguments[0])?).ok()?),
-                MathCode::Classify(code) => Literal::Integer(code(double(&arguments[0])?)),
-                MathCode::Unary(code) => Literal::Double(code(double(&arguments[0])?)),
-                MathCode::Binary(code) => {
-                    Literal::Double(code(double(&arguments[0])?, double(&arguments[1])?))
                 }
-                MathCode::Scale(code) => {
-                    Literal::Double(code(double(&arguments[0])?, integer(&arguments[1])?))
-                }
-                MathCode::Ternary(code) => Literal::Double(code(
-                    double(&arguments[0])?,
-                    double(&arguments[1])?,
-                    double(&arguments[2])?,
-                )),
-            },
+            }
             _ => return None,
         })
     }
@@ -152,7 +139,7 @@ impl Numbering<'_> {
         };
         match (operator, self.integer(left), self.integer(right)) {
             (_, Some(left), Some(right)) => match arithmetic::fitting(operator, left, right) {
-                Some(value) => Simplified::Literal(Literal::Integer(value)),
+                Some(value) => Simplified::Literal(Number::Integer(value)),
                 None => Simplified::Instruction(instruction),
             },
             (Add | Subtract, _, Some(0)) | (Multiply | Divide, _, Some(1)) => {
