@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use crate::exec::target;
-use crate::ir::{Address, Base, Function, FunctionId, Instruction, Network, Register};
+use crate::ir::{
+    Access, Address, Base, Function, FunctionId, Instruction, Network, Operand, Register,
+};
 
 /// The words that functions may read, calls included, ascending; `None` if that is not known, or
 /// they are more than `most`.
@@ -18,25 +19,26 @@ pub(crate) fn read_words(
     while let Some(&function) = open.get(seen) {
         seen += 1;
         let code = &network.functions[function.0 as usize];
-        for instruction in code.blocks.iter().flat_map(|block| &block.instructions) {
-            let mut add = |address, count| add(code, address, count, most, &mut words);
-            let is_known = match *instruction {
-                Instruction::LoadInteger { address, .. } => add(address, 1),
-                Instruction::LoadDouble { address, .. } => add(address, 2),
-                Instruction::CopyWords { source, words, .. } => add(source, words),
-                Instruction::EqualWords {
-                    left, right, words, ..
-                } => add(left, words) && add(right, words),
-                // Who uses the address is not followed.
-                Instruction::AddressOf { address, .. } => address.base != Base::State,
-                Instruction::Call { function, .. } => {
-                    if !open.contains(&function) {
-                        open.push(function);
+        for instruction in code.instructions() {
+            let mut is_known = true;
+            instruction.each_operand(&mut |operand| {
+                is_known &= match operand {
+                    Operand::Memory(&address, Access::Read(count)) => {
+                        let touched = state_words(code, address, count, most);
+                        let is_known = touched.is_some();
+                        words.extend(touched.into_iter().flatten());
+                        is_known
                     }
-                    true
-                }
-                _ => true,
-            };
+                    // Who uses the address is not followed.
+                    Operand::Memory(address, Access::Take) => address.base != Base::State,
+                    _ => true,
+                };
+            });
+            if let Instruction::Call { function, .. } = *instruction
+                && !open.contains(&function)
+            {
+                open.push(function);
+            }
             if !is_known {
                 return None;
             }
@@ -45,13 +47,6 @@ pub(crate) fn read_words(
         words.dedup();
     }
     (words.len() <= most).then_some(words)
-}
-
-fn add(code: &Function, address: Address, count: u32, most: usize, words: &mut Vec<u32>) -> bool {
-    let touched = state_words(code, address, count, most);
-    let is_known = touched.is_some();
-    words.extend(touched.into_iter().flatten());
-    is_known
 }
 
 /// The words of the state that an access to so many words may touch; `None` if that is not known,
@@ -83,7 +78,7 @@ const MOST_STEPS: u32 = 8;
 fn greatest_index(code: &Function, index: Register, steps: u32) -> Option<u32> {
     let steps = steps.checked_sub(1)?;
     let mut greatest = None;
-    for instruction in code.blocks.iter().flat_map(|block| &block.instructions) {
+    for instruction in code.instructions() {
         let value = match *instruction {
             Instruction::ScaleIndex {
                 target,
@@ -108,7 +103,7 @@ fn greatest_index(code: &Function, index: Register, steps: u32) -> Option<u32> {
             Instruction::Integer { target, value } if target == index => {
                 u32::try_from(value).ok()?
             }
-            ref other if target(other) == Some(index) => return None,
+            ref other if other.target() == Some(index) => return None,
             _ => continue,
         };
         greatest = greatest.max(Some(value));

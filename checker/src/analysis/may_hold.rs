@@ -4,7 +4,7 @@
 //! frames and references hold counts as unknown. The answer errs towards "it can": a way that ends
 //! in a run-time error, and whatever takes too many steps, counts as holding.
 
-use crate::exec::{arithmetic, target};
+use crate::exec::arithmetic;
 use crate::ir::{
     Address, Base, FunctionId, Instruction, LocationId, Network, Predicate, ProcessId, Register,
     Terminator,
@@ -162,7 +162,7 @@ impl<'a> Possibility<'a> {
             return Onward::Here;
         }
         let value = self.value_of(active, instruction);
-        if let Some(target) = target(instruction) {
+        if let Some(target) = instruction.target() {
             active.registers[target.0 as usize] = value;
         }
         Onward::Here
@@ -188,7 +188,7 @@ impl<'a> Possibility<'a> {
                     return Onward::Returned(value);
                 };
                 let code = &self.network.functions[caller.function.0 as usize].blocks[caller.block];
-                if let Some(target) = target(&code.instructions[caller.next - 1]) {
+                if let Some(target) = code.instructions[caller.next - 1].target() {
                     caller.registers[target.0 as usize] = value;
                 }
             }
@@ -200,34 +200,8 @@ impl<'a> Possibility<'a> {
     fn value_of(&self, active: &Call, instruction: &Instruction) -> Option<i32> {
         let value = |register| active.value(register);
         match *instruction {
-            Instruction::Integer { value, .. } => Some(value),
-            Instruction::Copy { source, .. } => value(source),
-            Instruction::Not { source, .. } => Some(i32::from(value(source)? == 0)),
-            Instruction::Arithmetic {
-                operator,
-                left,
-                right,
-                ..
-            } => arithmetic::fitting(operator, value(left)?, value(right)?),
-            Instruction::CompareIntegers {
-                relation,
-                left,
-                right,
-                ..
-            } => {
-                let holds = arithmetic::integers_relate(relation, value(left)?, value(right)?);
-                Some(i32::from(holds))
-            }
-            Instruction::ScaleIndex {
-                index,
-                first,
-                length,
-                stride,
-                ..
-            } => arithmetic::scale_index(value(index)?, first, length, stride).ok(),
-            Instruction::AddIndices { left, right, .. } => value(left)?.checked_add(value(right)?),
             Instruction::LoadInteger { address, .. } => self.loaded(active, address),
-            _ => None,
+            _ => arithmetic::value_of(instruction, value),
         }
     }
 

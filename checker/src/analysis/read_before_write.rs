@@ -7,7 +7,9 @@
 //!
 //! Cost: the instructions of the functions, a few times, and two bits for each function and word.
 
-use crate::ir::{Address, Base, BlockId, Function, FunctionId, Instruction, Network, Terminator};
+use crate::ir::{
+    Access, Base, BlockId, Function, FunctionId, Instruction, Network, Operand, Terminator,
+};
 
 use super::function_reads::state_words;
 
@@ -116,7 +118,7 @@ impl<'n> Exposures<'n> {
             let before = open.len();
             if self.known[one.0 as usize].is_none() {
                 let is_unknown = |callee: &FunctionId| self.known[callee.0 as usize].is_none();
-                open.extend(callees(code).filter(is_unknown));
+                open.extend(code.callees().filter(is_unknown));
             }
             if open.len() == before {
                 if self.known[one.0 as usize].is_none() {
@@ -165,12 +167,7 @@ impl<'n> Exposures<'n> {
             for instruction in &block.instructions {
                 self.add_writes(instruction, &mut written);
             }
-            let successors = match block.terminator {
-                Terminator::Jump(next) => [Some(next), None],
-                Terminator::Branch(_, yes, no) => [Some(yes), Some(no)],
-                Terminator::Return(_) | Terminator::Fail(..) => [None, None],
-            };
-            for next in successors.into_iter().flatten() {
+            for next in block.terminator.successors() {
                 let entry = &mut entries[next.0 as usize];
                 let narrowed = match &*entry {
                     None => written.clone(),
@@ -190,55 +187,40 @@ impl<'n> Exposures<'n> {
     }
 
     fn add_reads(&self, code: &Function, instruction: &Instruction, reads: &mut WordSet) {
-        let mut add = |address: Address, count: u32| match state_words(
-            code,
-            address,
-            count,
-            self.numbers.len(),
-        ) {
-            Some(words) => self.numbered(words).for_each(|number| reads.insert(number)),
-            None => *reads = WordSet::full(self.count),
-        };
-        match *instruction {
-            Instruction::LoadInteger { address, .. } => add(address, 1),
-            Instruction::LoadDouble { address, .. } => add(address, 2),
-            Instruction::CopyWords { source, words, .. } => add(source, words),
-            Instruction::EqualWords {
-                left, right, words, ..
-            } => {
-                add(left, words);
-                add(right, words);
-            }
-            // Who uses the address is not followed.
-            Instruction::AddressOf { address, .. } if address.base == Base::State => {
-                *reads = WordSet::full(self.count);
-            }
-            Instruction::Call { function, .. } => {
-                if let Some(callee) = &self.known[function.0 as usize] {
-                    reads.unite(&callee.reads);
+        instruction.each_operand(&mut |operand| match operand {
+            Operand::Memory(&address, Access::Read(count)) => {
+                match state_words(code, address, count, self.numbers.len()) {
+                    Some(words) => self.numbered(words).for_each(|number| reads.insert(number)),
+                    None => *reads = WordSet::full(self.count),
                 }
             }
+            // Who uses the address is not followed.
+            Operand::Memory(address, Access::Take) if address.base == Base::State => {
+                *reads = WordSet::full(self.count);
+            }
             _ => {}
+        });
+        if let Instruction::Call { function, .. } = instruction
+            && let Some(callee) = &self.known[function.0 as usize]
+        {
+            reads.unite(&callee.reads);
         }
     }
 
     fn add_writes(&self, instruction: &Instruction, written: &mut WordSet) {
-        let (address, count) = match *instruction {
-            Instruction::StoreInteger { address, .. } => (address, 1),
-            Instruction::StoreDouble { address, .. } => (address, 2),
-            Instruction::CopyWords { target, words, .. } => (target, words),
-            Instruction::Call { function, .. } => {
-                if let Some(callee) = &self.known[function.0 as usize] {
-                    written.unite(&callee.writes);
-                }
-                return;
+        instruction.each_operand(&mut |operand| {
+            if let Operand::Memory(address, Access::Write(count)) = operand
+                && address.base == Base::State
+                && address.index.is_none()
+            {
+                self.numbered(address.offset..address.offset + count)
+                    .for_each(|number| written.insert(number));
             }
-            _ => return,
-        };
-        if address.base == Base::State && address.index.is_none() {
-            let words = address.offset..address.offset + count;
-            self.numbered(words)
-                .for_each(|number| written.insert(number));
+        });
+        if let Instruction::Call { function, .. } = instruction
+            && let Some(callee) = &self.known[function.0 as usize]
+        {
+            written.unite(&callee.writes);
         }
     }
 
@@ -251,12 +233,4 @@ impl<'n> Exposures<'n> {
             .flatten()
             .map(|&number| number as usize)
     }
-}
-
-fn callees(code: &Function) -> impl Iterator<Item = FunctionId> {
-    let instructions = code.blocks.iter().flat_map(|block| &block.instructions);
-    instructions.filter_map(|instruction| match instruction {
-        Instruction::Call { function, .. } => Some(*function),
-        _ => None,
-    })
 }

@@ -5,7 +5,9 @@
 //! it, and whatever has no result is a [`RunTimeErrorKind`].
 
 use crate::builtins::canonical;
-use crate::ir::{DoubleOperator, IntegerOperator, Relation, RunTimeErrorKind};
+use crate::ir::{
+    DoubleOperator, Instruction, IntegerOperator, Register, Relation, RunTimeErrorKind,
+};
 
 /// The result of integer arithmetic, and whether it wrapped round: the true result is another one
 /// modulo 2^32.
@@ -43,6 +45,41 @@ pub(crate) fn fitting(operator: IntegerOperator, left: i32, right: i32) -> Optio
     match integer(operator, left, right) {
         Ok((value, false)) => Some(value),
         Ok((_, true)) | Err(_) => None,
+    }
+}
+
+/// The integer that an instruction computes from registers alone, if those are known and it fits.
+pub(crate) fn value_of(
+    instruction: &Instruction,
+    known: impl Fn(Register) -> Option<i32>,
+) -> Option<i32> {
+    match *instruction {
+        Instruction::Integer { value, .. } => Some(value),
+        Instruction::Copy { source, .. } => known(source),
+        Instruction::Not { source, .. } => Some(i32::from(known(source)? == 0)),
+        Instruction::Arithmetic {
+            operator,
+            left,
+            right,
+            ..
+        } => fitting(operator, known(left)?, known(right)?),
+        Instruction::CompareIntegers {
+            relation,
+            left,
+            right,
+            ..
+        } => Some(integers_relate(relation, known(left)?, known(right)?).into()),
+        Instruction::ScaleIndex {
+            index,
+            first,
+            length,
+            stride,
+            ..
+        } => scale_index(known(index)?, first, length, stride).ok(),
+        Instruction::AddIndices { left, right, .. } => {
+            Some(known(left)?.wrapping_add(known(right)?))
+        }
+        _ => None,
     }
 }
 

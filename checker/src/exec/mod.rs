@@ -21,7 +21,6 @@ pub use interpreter::Interpreter;
 #[cfg(feature = "jit")]
 pub use jit::{Jit, JitError};
 pub use optimise::optimise;
-pub(crate) use optimise::target;
 pub use rounds::ROUND_LIMIT;
 pub use validate::{Flaw, validate};
 pub use wraps::Wraps;

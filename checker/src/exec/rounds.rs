@@ -5,7 +5,7 @@
 //! call each other twice run as long as any loop. All engines run the counted code, so that they
 //! stop at the same round.
 
-use crate::ir::{BlockId, Function, Instruction, SiteId, Terminator};
+use crate::ir::{BlockId, Function, Instruction, SiteId};
 
 /// How many rounds a call from outside may take.
 pub const ROUND_LIMIT: u64 = 100_000_000;
@@ -59,7 +59,7 @@ fn uncounted_cycle_heads(function: &Function) -> Vec<usize> {
         visits[root] = Visit::Open;
         let mut path = vec![(root, 0)];
         while let Some((block, next)) = path.last_mut() {
-            let successor = successors(function.blocks[*block].terminator).nth(*next);
+            let successor = function.blocks[*block].terminator.successors().nth(*next);
             *next += 1;
             let Some(BlockId(successor)) = successor else {
                 visits[*block] = Visit::Done;
@@ -82,16 +82,6 @@ fn uncounted_cycle_heads(function: &Function) -> Vec<usize> {
     heads
 }
 
-/// The blocks that a terminator leads to.
-pub(crate) fn successors(terminator: Terminator) -> impl Iterator<Item = BlockId> {
-    let (first, second) = match terminator {
-        Terminator::Jump(target) => (Some(target), None),
-        Terminator::Branch(_, then, otherwise) => (Some(then), Some(otherwise)),
-        Terminator::Return(_) | Terminator::Fail(..) => (None, None),
-    };
-    first.into_iter().chain(second)
-}
-
 /// The first site at or after a block, else the first of the function; blocks stand in the order of
 /// the text.
 fn nearest_site(function: &Function, block: usize) -> SiteId {
@@ -100,23 +90,6 @@ fn nearest_site(function: &Function, block: usize) -> SiteId {
         .iter()
         .chain(before)
         .flat_map(|block| &block.instructions)
-        .find_map(site_of)
+        .find_map(Instruction::site)
         .unwrap_or(SiteId(0))
-}
-
-/// Where the instruction reports its errors, if it can have any.
-pub(crate) fn site_of(instruction: &Instruction) -> Option<SiteId> {
-    match *instruction {
-        Instruction::Arithmetic { site, .. }
-        | Instruction::DoubleToInteger { site, .. }
-        | Instruction::Math { site, .. }
-        | Instruction::CheckRange { site, .. }
-        | Instruction::ScaleIndex { site, .. }
-        | Instruction::CountRound { site }
-        | Instruction::Constrain { site, .. }
-        | Instruction::SetClock { site, .. }
-        | Instruction::CopyClock { site, .. }
-        | Instruction::Require { site, .. } => Some(site),
-        _ => None,
-    }
 }

@@ -18,8 +18,8 @@
 use std::fmt;
 
 use crate::ir::{
-    Address, Base, Block, BlockId, ClockOperand, Function, FunctionId, Instruction, Register,
-    RegisterType, Terminator,
+    Access, Address, Base, Block, BlockId, ClockOperand, Function, FunctionId, Instruction,
+    Operand, Register, RegisterType, Terminator,
 };
 
 use RegisterType::{Double, Integer};
@@ -157,28 +157,28 @@ impl Check<'_> {
     }
 
     fn instruction(&mut self, instruction: &Instruction) -> Verdict {
+        self.registers(instruction)?;
+        let mut verdict = Ok(());
+        instruction.each_operand(&mut |operand| {
+            if verdict.is_ok() {
+                verdict = match operand {
+                    Operand::Memory(&address, access) => self.access(address, access),
+                    Operand::Clock(ClockOperand {
+                        index: Some(index), ..
+                    }) => self.wants(*index, Integer),
+                    Operand::Target(_) | Operand::Source(_) | Operand::Clock(_) => Ok(()),
+                };
+            }
+        });
+        verdict
+    }
+
+    /// The types of the registers that are operands themselves.
+    fn registers(&self, instruction: &Instruction) -> Verdict {
+        use Instruction as I;
         match *instruction {
-            Instruction::Integer { target, .. } => self.wants(target, Integer),
-            Instruction::Double { target, .. } => self.wants(target, Double),
-            Instruction::Copy { target, source } => self.wants(target, self.kind(source)?),
-            Instruction::Arithmetic {
-                target,
-                left,
-                right,
-                ..
-            }
-            | Instruction::CompareIntegers {
-                target,
-                left,
-                right,
-                ..
-            }
-            | Instruction::AddIndices {
-                target,
-                left,
-                right,
-            } => self.all(&[target, left, right], Integer),
-            Instruction::CompareDoubles {
+            I::Copy { target, source } => self.wants(target, self.kind(source)?),
+            I::CompareDoubles {
                 target,
                 left,
                 right,
@@ -187,22 +187,15 @@ impl Check<'_> {
                 self.wants(target, Integer)?;
                 self.all(&[left, right], Double)
             }
-            Instruction::Not { target, source } => self.all(&[target, source], Integer),
-            Instruction::DoubleArithmetic {
-                target,
-                left,
-                right,
-                ..
-            } => self.all(&[target, left, right], Double),
-            Instruction::IntegerToDouble { target, source } => {
+            I::IntegerToDouble { target, source } => {
                 self.wants(target, Double)?;
                 self.wants(source, Integer)
             }
-            Instruction::DoubleToInteger { target, source, .. } => {
+            I::DoubleToInteger { target, source, .. } => {
                 self.wants(target, Integer)?;
                 self.wants(source, Double)
             }
-            Instruction::Math {
+            I::Math {
                 function,
                 target,
                 ref arguments,
@@ -211,83 +204,46 @@ impl Check<'_> {
                 self.wants(target, function.result())?;
                 self.arguments(arguments, function.parameters())
             }
-            Instruction::Call {
+            I::Call {
                 target,
                 function,
                 ref arguments,
             } => self.call(target, function, arguments),
-            Instruction::CheckRange { value, .. } => self.wants(value, Integer),
-            Instruction::ScaleIndex { target, index, .. } => self.all(&[target, index], Integer),
-            Instruction::Require { condition, .. } => self.wants(condition, Integer),
-            Instruction::CountRound { .. } => Ok(()),
-            Instruction::Constrain {
-                left, right, bound, ..
-            } => {
-                self.clock(left)?;
-                self.clock(right)?;
-                self.wants(bound, Integer)
-            }
-            Instruction::SetClock { clock, value, .. } => {
-                self.clock(clock)?;
-                self.wants(value, Integer)
-            }
-            Instruction::CopyClock {
-                clock,
-                source,
-                increment,
-                ..
-            } => {
-                self.clock(clock)?;
-                self.clock(source)?;
-                increment.map_or(Ok(()), |register| self.wants(register, Integer))
-            }
-            _ => self.memory(instruction),
+            I::AddressOf { target, .. } => self.wants(target, RegisterType::Address),
+            I::Double { .. }
+            | I::DoubleArithmetic { .. }
+            | I::LoadDouble { .. }
+            | I::StoreDouble { .. } => self.all_operands(instruction, Double),
+            I::Integer { .. }
+            | I::Arithmetic { .. }
+            | I::CompareIntegers { .. }
+            | I::AddIndices { .. }
+            | I::Not { .. }
+            | I::CheckRange { .. }
+            | I::ScaleIndex { .. }
+            | I::Require { .. }
+            | I::CountRound { .. }
+            | I::LoadInteger { .. }
+            | I::StoreInteger { .. }
+            | I::CopyWords { .. }
+            | I::EqualWords { .. }
+            | I::Constrain { .. }
+            | I::SetClock { .. }
+            | I::CopyClock { .. } => self.all_operands(instruction, Integer),
         }
     }
 
-    /// The instructions that read and write memory.
-    fn memory(&mut self, instruction: &Instruction) -> Verdict {
-        match *instruction {
-            Instruction::LoadInteger { target, address } => {
-                self.wants(target, Integer)?;
-                self.access(address, 1, false)
+    /// All registers that are operands themselves are of one type.
+    fn all_operands(&self, instruction: &Instruction, wanted: RegisterType) -> Verdict {
+        let mut verdict = Ok(());
+        instruction.each_operand(&mut |operand| {
+            if let (true, Operand::Target(&register) | Operand::Source(&register)) =
+                (verdict.is_ok(), operand)
+            {
+                verdict = self.wants(register, wanted);
             }
-            Instruction::LoadDouble { target, address } => {
-                self.wants(target, Double)?;
-                self.access(address, 2, false)
-            }
-            Instruction::StoreInteger { address, source } => {
-                self.wants(source, Integer)?;
-                self.access(address, 1, true)
-            }
-            Instruction::StoreDouble { address, source } => {
-                self.wants(source, Double)?;
-                self.access(address, 2, true)
-            }
-            Instruction::CopyWords {
-                target,
-                source,
-                words,
-            } => {
-                self.access(target, words, true)?;
-                self.access(source, words, false)
-            }
-            Instruction::EqualWords {
-                target,
-                left,
-                right,
-                words,
-            } => {
-                self.wants(target, Integer)?;
-                self.access(left, words, false)?;
-                self.access(right, words, false)
-            }
-            Instruction::AddressOf { target, address } => {
-                self.wants(target, RegisterType::Address)?;
-                self.access(address, 0, false)
-            }
-            _ => Ok(()),
-        }
+        });
+        verdict
     }
 
     fn arguments(&self, arguments: &[Register], wanted: &[RegisterType]) -> Verdict {
@@ -314,14 +270,13 @@ impl Check<'_> {
         }
     }
 
-    fn clock(&self, clock: ClockOperand) -> Verdict {
-        clock
-            .index
-            .map_or(Ok(()), |register| self.wants(register, Integer))
-    }
-
-    /// An access to so many words from an address on.
-    fn access(&mut self, address: Address, words: u32, writes: bool) -> Verdict {
+    /// An access to the words from an address on.
+    fn access(&mut self, address: Address, access: Access) -> Verdict {
+        let (words, writes) = match access {
+            Access::Read(words) => (words, false),
+            Access::Write(words) => (words, true),
+            Access::Take => (0, false),
+        };
         let mut end = u64::from(address.offset) + u64::from(words);
         if let Some(index) = address.index {
             self.wants(index, Integer)?;
@@ -369,7 +324,7 @@ fn index_limits(function: &Function) -> Vec<Option<u64>> {
 /// limit.
 fn raise_limits(function: &Function, limits: &mut [Option<u64>], give_up: bool) -> bool {
     let mut has_risen = false;
-    for instruction in function.blocks.iter().flat_map(|block| &block.instructions) {
+    for instruction in function.instructions() {
         let (Register(target), limit) = match *instruction {
             Instruction::ScaleIndex {
                 target,
@@ -394,7 +349,7 @@ fn raise_limits(function: &Function, limits: &mut [Option<u64>], give_up: bool) 
                         .map(|(a, b)| a.saturating_add(b)),
                 )
             }
-            _ => match super::optimise::target(instruction) {
+            _ => match instruction.target() {
                 Some(target) => (target, None),
                 None => continue,
             },
@@ -418,33 +373,26 @@ fn recursive(functions: &[Function]) -> Option<FunctionId> {
         Open,
         Done,
     }
-    let callees = |function: &Function| -> Vec<usize> {
-        let instructions = function.blocks.iter().flat_map(|block| &block.instructions);
-        instructions
-            .filter_map(|instruction| match instruction {
-                Instruction::Call { function, .. } => Some(function.0 as usize),
-                _ => None,
-            })
-            .collect()
-    };
+    let callees = |index: usize| functions[index].callees().collect::<Vec<_>>();
     let mut visits = vec![Visit::New; functions.len()];
     for root in 0..functions.len() {
         if visits[root] != Visit::New {
             continue;
         }
         visits[root] = Visit::Open;
-        let mut path = vec![(root, callees(&functions[root]))];
+        let mut path = vec![(root, callees(root))];
         while let Some((function, pending)) = path.last_mut() {
-            let Some(callee) = pending.pop() else {
+            let Some(FunctionId(callee)) = pending.pop() else {
                 visits[*function] = Visit::Done;
                 path.pop();
                 continue;
             };
+            let callee = callee as usize;
             match visits[callee] {
                 Visit::Open => return Some(FunctionId(callee as u32)),
                 Visit::New => {
                     visits[callee] = Visit::Open;
-                    path.push((callee, callees(&functions[callee])));
+                    path.push((callee, callees(callee)));
                 }
                 Visit::Done => {}
             }

@@ -19,9 +19,11 @@
 
 mod accesses;
 mod code;
+mod operands;
 mod print;
 
 pub use code::*;
+pub(crate) use operands::{Access, Operand};
 
 use crate::diagnostics::Span;
 

@@ -20,7 +20,7 @@ use crate::ir::{Function, FunctionId, Overflow, RegisterType};
 use crate::tuning::Tuning;
 
 use super::JitError;
-use super::needs::{AllNeeds, callees};
+use super::needs::AllNeeds;
 use super::translate::{entry_signature, native_signature, translate, translate_entry};
 
 /// A compiled function as it is called from outside.
@@ -152,7 +152,7 @@ impl Compiler {
         while let Some(index) = pending.pop() {
             if self.declared[index].is_none() && !std::mem::replace(&mut found[index], true) {
                 order.push(index);
-                pending.extend(callees(&functions[index]));
+                pending.extend(functions[index].callees().map(|callee| callee.0 as usize));
             }
         }
         order

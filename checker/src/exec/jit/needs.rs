@@ -1,6 +1,6 @@
 //! What functions need while they run natively, so that what needs too much is interpreted instead.
 
-use crate::ir::{Function, Instruction, Terminator};
+use crate::ir::{BlockId, Function, FunctionId};
 
 /// Compiling larger functions would take longer than most runs.
 const MAX_INSTRUCTIONS: usize = 20_000;
@@ -92,7 +92,8 @@ impl AllNeeds {
             }
             let before = pending.len();
             let mut calls = Needs::default();
-            for callee in callees(&functions[index]) {
+            for FunctionId(callee) in functions[index].callees() {
+                let callee = callee as usize;
                 match self.known[callee] {
                     None => pending.push(callee),
                     Some(needs) => calls = calls.then(needs),
@@ -111,21 +112,8 @@ impl AllNeeds {
 /// for loops.
 fn has_loop(function: &Function) -> bool {
     let mut blocks = function.blocks.iter().enumerate();
-    blocks.any(|(index, block)| match block.terminator {
-        Terminator::Jump(target) => target.0 as usize <= index,
-        Terminator::Branch(_, one, other) => one.0.min(other.0) as usize <= index,
-        Terminator::Return(_) | Terminator::Fail(..) => false,
+    blocks.any(|(index, block)| {
+        let mut next = block.terminator.successors();
+        next.any(|BlockId(target)| target as usize <= index)
     })
-}
-
-/// The functions that a function calls, once for every call.
-pub(super) fn callees(function: &Function) -> impl Iterator<Item = usize> {
-    function
-        .blocks
-        .iter()
-        .flat_map(|block| &block.instructions)
-        .filter_map(|instruction| match instruction {
-            Instruction::Call { function, .. } => Some(function.0 as usize),
-            _ => None,
-        })
 }

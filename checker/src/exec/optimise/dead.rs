@@ -1,8 +1,6 @@
 //! Removes instructions whose results nobody reads, and registers that nobody uses.
 
-use crate::ir::{Function, Register};
-
-use super::operands::{each_use_mut, is_pure, target, target_mut, terminator_use_mut};
+use crate::ir::{Function, Instruction, Register};
 
 /// Removes dead instructions, and numbers the remaining registers afresh.
 pub(super) fn remove_dead_code(function: &mut Function) {
@@ -10,36 +8,38 @@ pub(super) fn remove_dead_code(function: &mut Function) {
     for block in &mut function.blocks {
         block.instructions.retain(|instruction| {
             !is_pure(instruction)
-                || target(instruction).is_none_or(|target| needed[target.0 as usize])
+                || instruction
+                    .target()
+                    .is_none_or(|target| needed[target.0 as usize])
         });
     }
     compact_registers(function);
 }
 
 /// The registers that something with an effect reads, directly or through others.
-fn needed_registers(function: &mut Function) -> Vec<bool> {
+fn needed_registers(function: &Function) -> Vec<bool> {
     let mut writers = vec![Vec::new(); function.registers.len()];
     let mut needed = vec![false; function.registers.len()];
     let mut pending = Vec::new();
-    for (index, block) in function.blocks.iter_mut().enumerate() {
-        for (position, instruction) in block.instructions.iter_mut().enumerate() {
+    for (index, block) in function.blocks.iter().enumerate() {
+        for (position, instruction) in block.instructions.iter().enumerate() {
             if is_pure(instruction) {
-                if let Some(target) = target(instruction) {
+                if let Some(target) = instruction.target() {
                     writers[target.0 as usize].push((index, position));
                 }
             } else {
-                each_use_mut(instruction, &mut |register| pending.push(*register));
+                instruction.each_use(&mut |register| pending.push(register));
             }
         }
-        pending.extend(terminator_use_mut(&mut block.terminator).copied());
+        pending.extend(block.terminator.used());
     }
     while let Some(Register(register)) = pending.pop() {
         if std::mem::replace(&mut needed[register as usize], true) {
             continue;
         }
         for &(block, position) in &writers[register as usize] {
-            let instruction = &mut function.blocks[block].instructions[position];
-            each_use_mut(instruction, &mut |register| pending.push(*register));
+            let instruction = &function.blocks[block].instructions[position];
+            instruction.each_use(&mut |register| pending.push(register));
         }
     }
     needed
@@ -67,13 +67,34 @@ fn compact_registers(function: &mut Function) {
 fn each_register_mut(function: &mut Function, visit: &mut dyn FnMut(&mut Register)) {
     for block in &mut function.blocks {
         for instruction in &mut block.instructions {
-            each_use_mut(instruction, visit);
-            if let Some(target) = target_mut(instruction) {
+            instruction.each_use_mut(visit);
+            if let Some(target) = instruction.target_mut() {
                 visit(target);
             }
         }
-        if let Some(register) = terminator_use_mut(&mut block.terminator) {
+        if let Some(register) = block.terminator.used_mut() {
             visit(register);
         }
+    }
+}
+
+/// Whether an instruction does nothing but write its target, and cannot fail.
+fn is_pure(instruction: &Instruction) -> bool {
+    match instruction {
+        Instruction::Math { function, .. } => !function.may_fail_or_wrap(),
+        Instruction::Integer { .. }
+        | Instruction::Double { .. }
+        | Instruction::Copy { .. }
+        | Instruction::CompareIntegers { .. }
+        | Instruction::CompareDoubles { .. }
+        | Instruction::Not { .. }
+        | Instruction::DoubleArithmetic { .. }
+        | Instruction::IntegerToDouble { .. }
+        | Instruction::LoadInteger { .. }
+        | Instruction::LoadDouble { .. }
+        | Instruction::EqualWords { .. }
+        | Instruction::AddressOf { .. }
+        | Instruction::AddIndices { .. } => true,
+        _ => false,
     }
 }

@@ -1,6 +1,5 @@
 //! The blocks of a function as a graph: cleaning it up, predecessors, dominators.
 
-use crate::exec::rounds::successors;
 use crate::ir::{Block, BlockId, Function, Terminator};
 
 /// The targets of a terminator, to be redirected.
@@ -15,7 +14,10 @@ pub(super) fn targets_mut(terminator: &mut Terminator) -> impl Iterator<Item = &
 
 /// The successors of a block.
 pub(super) fn successors_of(function: &Function, block: usize) -> impl Iterator<Item = usize> {
-    successors(function.blocks[block].terminator).map(|BlockId(target)| target as usize)
+    function.blocks[block]
+        .terminator
+        .successors()
+        .map(|BlockId(target)| target as usize)
 }
 
 /// The predecessors of every block, in order, one entry an edge.

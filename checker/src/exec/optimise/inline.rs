@@ -1,11 +1,10 @@
 //! Puts the code of called functions in the place of calls.
 
 use crate::ir::{
-    Address, Base, Block, BlockId, Function, FunctionId, Instruction, Register, Terminator,
+    Address, Base, Block, BlockId, Function, FunctionId, Instruction, Operand, Register, Terminator,
 };
 
 use super::graph::targets_mut;
-use super::operands::{each_address_mut, each_use_mut, target_mut, terminator_use_mut};
 use super::size_of;
 
 /// Larger frames are not taken over: every call would zero them word by word.
@@ -117,17 +116,14 @@ fn zero_frame(function: &mut Function, block: usize, first: u32, words: u32) {
 /// Renumbers what a block refers to.
 fn shift(block: &mut Block, registers: u32, blocks: u32, frame: u32) {
     for instruction in &mut block.instructions {
-        each_use_mut(instruction, &mut |register| register.0 += registers);
-        each_address_mut(instruction, &mut |address| {
-            if address.base == Base::Frame {
-                address.offset += frame;
-            }
+        instruction.each_use_mut(&mut |register| register.0 += registers);
+        instruction.each_operand_mut(&mut |operand| match operand {
+            Operand::Target(target) => target.0 += registers,
+            Operand::Memory(address, _) if address.base == Base::Frame => address.offset += frame,
+            _ => {}
         });
-        if let Some(target) = target_mut(instruction) {
-            target.0 += registers;
-        }
     }
-    if let Some(register) = terminator_use_mut(&mut block.terminator) {
+    if let Some(register) = block.terminator.used_mut() {
         register.0 += registers;
     }
     for target in targets_mut(&mut block.terminator) {

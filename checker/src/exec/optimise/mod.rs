@@ -15,10 +15,7 @@ mod dead;
 mod graph;
 mod inline;
 mod numbering;
-mod operands;
 mod unroll;
-
-pub(crate) use operands::target;
 
 use std::collections::BTreeMap;
 
@@ -231,8 +228,8 @@ fn known_integers(function: &Function) -> Vec<Option<i32>> {
     let mut writes = vec![0; function.registers.len()];
     writes[..function.parameters as usize].fill(1);
     let mut integers = vec![None; function.registers.len()];
-    for instruction in function.blocks.iter().flat_map(|block| &block.instructions) {
-        if let Some(Register(target)) = operands::target(instruction) {
+    for instruction in function.instructions() {
+        if let Some(Register(target)) = instruction.target() {
             writes[target as usize] += 1;
             if let Instruction::Integer { value, .. } = instruction {
                 integers[target as usize] = Some(*value);

@@ -12,7 +12,6 @@ use crate::exec::arithmetic;
 use crate::ir::{Block, BlockId, Function, Instruction, Register, Terminator};
 
 use super::graph::{dominates, dominators, predecessors, successors_of, targets_mut};
-use super::operands::target;
 use super::size_of_blocks;
 
 /// Loops of more rounds are left alone.
@@ -121,7 +120,7 @@ fn find_end(function: &Function, found: &Loop, dominators: &[usize]) -> Option<E
         .iter()
         .filter(|block| !always.contains(block))
         .flat_map(|&block| &function.blocks[block].instructions)
-        .filter_map(target)
+        .filter_map(Instruction::target)
         .collect();
     let mut integers = integers_at_entry(function, found, dominators);
     for rounds in 1..=MAX_ROUNDS {
@@ -161,8 +160,8 @@ fn integers_at_entry(function: &Function, found: &Loop, dominators: &[usize]) ->
     // Only registers that are written once, or in the block before the loop, are sure to hold their
     // constant still.
     let mut writes: FxHashMap<Register, u32> = FxHashMap::default();
-    for instruction in function.blocks.iter().flat_map(|block| &block.instructions) {
-        if let Some(target) = target(instruction) {
+    for instruction in function.instructions() {
+        if let Some(target) = instruction.target() {
             *writes.entry(target).or_default() += 1;
         }
     }
@@ -180,35 +179,10 @@ fn integers_at_entry(function: &Function, found: &Loop, dominators: &[usize]) ->
 
 /// Does what an instruction does, as far as it is known.
 fn evaluate(instruction: &Instruction, integers: &mut Integers) {
-    let Some(target) = target(instruction) else {
+    let Some(target) = instruction.target() else {
         return;
     };
-    let known = |register: &Register| integers.get(register).copied();
-    let value = match instruction {
-        Instruction::Integer { value, .. } => Some(*value),
-        Instruction::Copy { source, .. } => known(source),
-        Instruction::Not { source, .. } => known(source).map(|value| (value == 0).into()),
-        Instruction::Arithmetic {
-            operator,
-            left,
-            right,
-            ..
-        } => known(left)
-            .zip(known(right))
-            .and_then(|(left, right)| arithmetic::fitting(*operator, left, right)),
-        Instruction::AddIndices { left, right, .. } => known(left)
-            .zip(known(right))
-            .map(|(left, right)| left.wrapping_add(right)),
-        Instruction::CompareIntegers {
-            relation,
-            left,
-            right,
-            ..
-        } => known(left)
-            .zip(known(right))
-            .map(|(left, right)| arithmetic::integers_relate(*relation, left, right).into()),
-        _ => None,
-    };
+    let value = arithmetic::value_of(instruction, |register| integers.get(&register).copied());
     match value {
         Some(value) => integers.insert(target, value),
         None => integers.remove(&target),

@@ -382,22 +382,14 @@ fn open_block() -> Block {
     }
 }
 
-fn successors(terminator: Terminator) -> [Option<BlockId>; 2] {
-    match terminator {
-        Terminator::Jump(block) => [Some(block), None],
-        Terminator::Branch(_, yes, no) => [Some(yes), Some(no)],
-        Terminator::Return(_) | Terminator::Fail(..) => [None, None],
-    }
-}
-
 /// Leaves out the blocks that are never reached and numbers the others anew.
 fn reachable_blocks(blocks: Vec<Block>) -> Vec<Block> {
     let mut reached = vec![false; blocks.len()];
     let mut open = vec![0];
     while let Some(block) = open.pop() {
         if !std::mem::replace(&mut reached[block], true) {
-            let next = successors(blocks[block].terminator);
-            open.extend(next.into_iter().flatten().map(|b| b.0 as usize));
+            let next = blocks[block].terminator.successors();
+            open.extend(next.map(|BlockId(next)| next as usize));
         }
     }
     let mut numbers = Vec::with_capacity(blocks.len());

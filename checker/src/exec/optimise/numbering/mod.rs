@@ -25,16 +25,12 @@ mod simplify;
 use rustc_hash::FxHashMap;
 
 use crate::builtins::Number;
-use crate::exec::rounds::successors;
 use crate::ir::{
-    Address, Base, Block, BlockId, Function, Instruction, IntegerOperator, Register, RegisterType,
-    Terminator,
+    Address, Base, Block, BlockId, Function, Instruction, IntegerOperator, Operand, Register,
+    RegisterType, Terminator,
 };
 
 use super::graph::{dominators, predecessors, targets_mut};
-use super::operands::{
-    each_address_mut, each_clock_mut, each_use_mut, target, target_mut, terminator_use_mut,
-};
 
 use expressions::{Expression, expression_of};
 use memory::MAX_WORDS_TO_EXPAND;
@@ -67,8 +63,8 @@ pub(super) fn number_values(function: &mut Function, constants: &[i32]) -> bool 
 fn count_writes(function: &Function) -> Vec<u32> {
     let mut writes = vec![0; function.registers.len()];
     writes[..function.parameters as usize].fill(1);
-    for instruction in function.blocks.iter().flat_map(|block| &block.instructions) {
-        if let Some(Register(target)) = target(instruction) {
+    for instruction in function.instructions() {
+        if let Some(Register(target)) = instruction.target() {
             writes[target as usize] += 1;
         }
     }
@@ -160,12 +156,12 @@ impl Numbering<'_> {
                 known
             };
             self.block(function, block, &is_join);
-            for BlockId(target) in successors(function.blocks[block].terminator) {
+            for BlockId(target) in function.blocks[block].terminator.successors() {
                 // Blocks beyond the old ones are edges that were split for their copies.
                 match function.blocks.get(target as usize) {
                     Some(_) if (target as usize) < count => reached[target as usize] = true,
                     Some(split) => {
-                        for BlockId(target) in successors(split.terminator) {
+                        for BlockId(target) in split.terminator.successors() {
                             reached[target as usize] = true;
                         }
                     }
@@ -184,7 +180,7 @@ impl Numbering<'_> {
             self.instruction(instruction);
         }
         let mut terminator = function.blocks[index].terminator;
-        if let Some(register) = terminator_use_mut(&mut terminator) {
+        if let Some(register) = terminator.used_mut() {
             *register = self.value(*register);
         }
         if let Terminator::Branch(condition, then, otherwise) = terminator
@@ -296,15 +292,16 @@ impl Numbering<'_> {
     }
 
     fn instruction(&mut self, mut instruction: Instruction) {
-        each_use_mut(&mut instruction, &mut |register| {
-            *register = self.value(*register);
-        });
-        each_address_mut(&mut instruction, &mut |address| self.resolve(address));
-        each_clock_mut(&mut instruction, &mut |clock| {
-            if let Some(index) = clock.index.and_then(|index| self.integer(index)) {
-                clock.first.0 = clock.first.0.wrapping_add(index as u32);
-                clock.index = None;
+        instruction.each_use_mut(&mut |register| *register = self.value(*register));
+        instruction.each_operand_mut(&mut |operand| match operand {
+            Operand::Memory(address, _) => self.resolve(address),
+            Operand::Clock(clock) => {
+                if let Some(index) = clock.index.and_then(|index| self.integer(index)) {
+                    clock.first.0 = clock.first.0.wrapping_add(index as u32);
+                    clock.index = None;
+                }
             }
+            Operand::Target(_) | Operand::Source(_) => {}
         });
         if let Instruction::CopyWords {
             target,
@@ -316,7 +313,7 @@ impl Numbering<'_> {
             self.expand_copy(target, source, words);
             return;
         }
-        let target = target(&instruction);
+        let target = instruction.target();
         let simplified = self.simplify(instruction);
         let value = match simplified {
             Simplified::Nothing => return,
@@ -359,7 +356,7 @@ impl Numbering<'_> {
         {
             return Some(value);
         }
-        let value = target_mut(&mut instruction).map(|target| {
+        let value = instruction.target_mut().map(|target| {
             let index = target.0 as usize;
             if self.is_rewritten.get(index) == Some(&true) {
                 *target = Register(self.registers.len() as u32);
