@@ -8,7 +8,7 @@
 //! Two functions see the sign of a NaN, which IEEE arithmetic leaves open: `signbit` and the second
 //! argument of `copysign`. Here every NaN counts as positive there.
 
-use super::IntegerResult;
+use super::integer_result::IntegerResult;
 
 /// The squares of whole numbers up to this one are exact in doubles.
 const WHOLE_ROOT: f64 = 67_108_864.0;

@@ -19,10 +19,10 @@ use crate::ir::{
 };
 
 use super::arithmetic::Wrapping;
+use super::executor::ROUNDS_BETWEEN_LOOKS;
 use super::rounds::{ROUND_LIMIT, count_rounds};
 use super::{
-    Context, EmittedAssignment, EmittedConstraint, Executor, ROUNDS_BETWEEN_LOOKS, RunTimeError,
-    Wraps, arithmetic,
+    Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError, Wraps, arithmetic,
 };
 
 /// Runs functions by walking over their instructions.

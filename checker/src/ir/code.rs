@@ -13,6 +13,7 @@
 //!   alike, so that the two agree bit for bit.
 //! * Functions never call themselves, directly or indirectly.
 
+use super::ids::{ClockId, FunctionId, SiteId};
 use crate::builtins::Code;
 pub use crate::builtins::MathFunction;
 
@@ -21,10 +22,6 @@ pub use crate::builtins::MathFunction;
 /// before they check.
 pub const CLOCK_LIMIT: i32 = (1 << 27) - 1;
 
-/// Index of a function in [`super::Network::functions`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct FunctionId(pub u32);
-
 /// Index of a virtual register in its function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Register(pub u32);
@@ -32,10 +29,6 @@ pub struct Register(pub u32);
 /// Index of a block in its function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BlockId(pub u32);
-
-/// Index of a site in [`super::Network::sites`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct SiteId(pub u32);
 
 /// What happens where the result of integer arithmetic does not fit into 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -126,7 +119,7 @@ pub enum Base {
 pub struct ClockOperand {
     /// The first clock; 0 where the register holds the clock itself (a clock parameter of a
     /// function).
-    pub first: super::ClockId,
+    pub first: ClockId,
     /// A computed offset.
     pub index: Option<Register>,
 }

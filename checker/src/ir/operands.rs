@@ -3,10 +3,10 @@
 //! One walk over all kinds of instructions tells everybody who asks, for reading and for changing
 //! alike. A new kind of instruction has one row here.
 
-use super::{
-    Address, Base, BlockId, ClockOperand, Function, FunctionId, Instruction, Register, SiteId,
-    Terminator,
+use super::code::{
+    Address, Base, BlockId, ClockOperand, Function, Instruction, Register, Terminator,
 };
+use super::ids::{FunctionId, SiteId};
 
 /// What an instruction does at an address.
 #[derive(Clone, Copy, Debug, PartialEq)]

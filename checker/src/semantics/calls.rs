@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use super::checker::Checker;
 use super::codes;
-use super::expressions::entity_kind;
+use super::operators::folded_math;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Parameter, Signature};
 use super::types::Type;
-use crate::builtins::{self, Builtin, Code, Number};
+use crate::builtins::{self, Builtin};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
-use crate::ir::{FunctionId, MathFunction, RegisterType};
+use crate::ir::{FunctionId, RegisterType};
 use crate::syntax::ast::{self, ExprKind};
 
 impl Checker<'_> {
@@ -43,7 +43,7 @@ impl Checker<'_> {
                 self.error(
                     codes::CALL_OF_NO_FUNCTION,
                     callee.span,
-                    format!("'{name}' is {}, not a function", entity_kind(&entity)),
+                    format!("'{name}' is {}, not a function", entity.kind()),
                     "only functions can be called",
                 );
                 Expr::error(span)
@@ -288,42 +288,4 @@ impl Checker<'_> {
         }
         Expr::new(Kind::ToInteger(Box::new(argument)), Type::ANY_INT, span)
     }
-}
-
-/// A function of the mathematical library, evaluated if its arguments are known.
-pub(super) fn folded_math(function: MathFunction, arguments: Vec<Expr>, span: Span) -> Expr {
-    let ty = match function.code() {
-        Code::Integer(_) | Code::ToInteger(_) => Type::ANY_INT,
-        Code::Classify(_) => Type::Bool,
-        Code::Unary(_) | Code::Binary(_) | Code::Scale(_) | Code::Ternary(_) => Type::Double,
-    };
-    let known: Option<Vec<Number>> = arguments.iter().map(number).collect();
-    match known.and_then(|known| function.evaluate(&known)) {
-        Some((Number::Integer(value), false)) => Expr::int(value, ty, span),
-        Some((Number::Double(value), false)) => Expr::new(Kind::Double(value), ty, span),
-        _ if function == MathFunction::Abs => absolute(arguments, span),
-        _ => Expr::new(Kind::Math(function, arguments), ty, span),
-    }
-}
-
-fn number(argument: &Expr) -> Option<Number> {
-    match argument.kind {
-        Kind::Double(value) => Some(Number::Double(value)),
-        _ => argument.constant().map(Number::Integer),
-    }
-}
-
-/// The absolute value of what is not known, but for its range.
-fn absolute(arguments: Vec<Expr>, span: Span) -> Expr {
-    let (low, high) = arguments[0].interval;
-    let least = if low <= 0 && 0 <= high {
-        0
-    } else {
-        low.saturating_abs().min(high.saturating_abs())
-    };
-    let most = low.saturating_abs().max(high.saturating_abs());
-    // The least integer wraps round to itself.
-    let least = if low == i32::MIN { low } else { least };
-    let kind = Kind::Math(MathFunction::Abs, arguments);
-    Expr::new(kind, Type::ANY_INT, span).within((least, most))
 }

@@ -83,7 +83,7 @@ pub(super) struct World {
     /// The scopes that queries see: prelude, globals, system.
     pub(super) query_scopes: Vec<Scope>,
     /// The processes by the name in the system line.
-    pub(super) processes: super::instantiate::Processes,
+    pub(super) processes: super::processes::Processes,
 }
 
 impl<'a> Checker<'a> {

@@ -9,7 +9,7 @@
 
 use super::checker::Checker;
 use super::codes;
-use super::expressions::known_offset;
+use super::offsets::known_offset;
 use super::operators::{integer_operation, is_clock_term};
 use super::typed::{ClockRelation, ClockSum, Expr, Kind, Root};
 use super::types::{Class, Memory, Type};

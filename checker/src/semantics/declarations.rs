@@ -383,11 +383,7 @@ impl Checker<'_> {
                 self.error(
                     codes::TYPE_EXPECTED,
                     name.span,
-                    format!(
-                        "'{}' is {}, not a type",
-                        name.text,
-                        super::expressions::entity_kind(&entity)
-                    ),
+                    format!("'{}' is {}, not a type", name.text, entity.kind()),
                     "name types with typedef",
                 );
                 Type::Error

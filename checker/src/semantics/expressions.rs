@@ -2,6 +2,7 @@
 
 use super::checker::Checker;
 use super::codes;
+use super::offsets::{known_offset, possible_offsets};
 use super::operators::{as_truth, integer_operator, is_clock_term, to_double, truth_interval};
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Place, Root};
@@ -10,9 +11,6 @@ use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::syntax::ast::{self, BinaryOp, ExprKind, Name, Quantifier, TypeExpr, UnaryOp};
 use std::ops::Range;
-
-/// So many parts of constant arrays are looked at for the interval of their values.
-const MOST_VALUES: usize = 4096;
 
 impl Checker<'_> {
     /// Checks an expression.
@@ -101,7 +99,7 @@ impl Checker<'_> {
                 self.error(
                     codes::NAME_WITHOUT_VALUE,
                     span,
-                    format!("'{name}' is {}, not a value", entity_kind(&entity)),
+                    format!("'{name}' is {}, not a value", entity.kind()),
                     "use a variable, a constant or a call",
                 );
                 Expr::error(span)
@@ -690,82 +688,11 @@ impl Checker<'_> {
     }
 }
 
-/// What an entity that is no value is.
-pub(super) fn entity_kind(entity: &Entity) -> &'static str {
-    match entity {
-        Entity::Type(..) => "a type",
-        Entity::Function(..) | Entity::OpenFunction => "a function",
-        Entity::Template(_) => "a template",
-        Entity::Instantiation(_) => "a process",
-        Entity::Chart => "a live sequence chart",
-        Entity::Location(_) => "a location",
-        Entity::Constant { .. } => "a constant",
-        Entity::Variable { .. } => "a variable",
-        Entity::Broken => "unknown",
-    }
-}
-
 /// The integer type of a choice between two.
 fn joined(left: &Type, right: &Type) -> Type {
     let ((a, b), (c, d)) = (left.bounds(), right.bounds());
     Type::Int {
         low: a.min(c),
         high: b.max(d),
-    }
-}
-
-/// Where in the constant memory a place may lie, wherever its indices are inside; `None` if these
-/// are too many.
-fn possible_offsets(expr: &Expr) -> Option<Vec<u32>> {
-    match &expr.kind {
-        Kind::Variable(place) => Some(vec![place.base.of(Memory::Words)]),
-        Kind::Field { record, offset } => {
-            let mut offsets = possible_offsets(record)?;
-            for base in &mut offsets {
-                *base += offset.of(Memory::Words);
-            }
-            Some(offsets)
-        }
-        Kind::Index {
-            array,
-            index,
-            first,
-            length,
-            stride,
-        } => {
-            let position = |index: i32| {
-                let position = i64::from(index) - i64::from(*first);
-                position.clamp(-1, i64::from(*length)) as i32
-            };
-            let (low, high) = index.interval;
-            let positions = position(low).max(0)..=position(high).min(*length as i32 - 1);
-            let bases = possible_offsets(array)?;
-            let count = positions.clone().count().saturating_mul(bases.len());
-            let stride = stride.of(Memory::Words);
-            let each = |base: u32| positions.clone().map(move |at| base + at as u32 * stride);
-            (count <= MOST_VALUES).then(|| bases.into_iter().flat_map(each).collect())
-        }
-        _ => None,
-    }
-}
-
-/// Where a place lies in its memory, if all indices are known and inside.
-pub(super) fn known_offset(expr: &Expr, memory: Memory) -> Option<u32> {
-    match &expr.kind {
-        Kind::Variable(place) => Some(place.base.of(memory)),
-        Kind::Field { record, offset } => Some(known_offset(record, memory)? + offset.of(memory)),
-        Kind::Index {
-            array,
-            index,
-            first,
-            length,
-            stride,
-        } => {
-            let position = i64::from(index.constant()?) - i64::from(*first);
-            let inside = (0..i64::from(*length)).contains(&position);
-            let offset = known_offset(array, memory)?;
-            inside.then(|| offset + position as u32 * stride.of(memory))
-        }
-        _ => None,
     }
 }

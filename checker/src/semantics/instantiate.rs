@@ -4,14 +4,13 @@
 //! combination of their values, the first parameter changing slowest. Arguments by value are
 //! constants; arguments by reference stand for the very variable, clock or channel.
 
-use std::collections::HashMap;
-
 use crate::cancellation;
 
 use super::assigned::assigned_names;
 use super::checker::Checker;
 use super::codes;
-use super::expressions::known_offset;
+use super::offsets::known_offset;
+use super::processes::{Group, parameter_count};
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{DEFAULT_INT, Memory, Size, Type};
@@ -22,39 +21,6 @@ use crate::syntax::ast::{self, Document, Name, Parameter, SystemItem, Unsupporte
 
 /// The most processes of a network.
 const PROCESS_LIMIT: u64 = 1 << 16;
-
-/// The processes of a network as queries name them.
-#[derive(Debug, Default)]
-pub(super) struct Processes {
-    /// By the name in the system line.
-    pub(super) groups: HashMap<String, Group>,
-    /// The names that each process declares.
-    pub(super) scopes: Vec<Scope>,
-}
-
-/// What a name in the system line stands for.
-#[derive(Clone, Debug)]
-pub(super) struct Group {
-    /// The first process.
-    pub(super) first: u32,
-    /// The types of the free parameters; a single process has none.
-    pub(super) parameters: Vec<Type>,
-}
-
-impl Group {
-    /// How many processes it has.
-    pub(super) fn count(&self) -> u32 {
-        self.parameters.iter().map(parameter_count).product()
-    }
-}
-
-fn parameter_count(ty: &Type) -> u32 {
-    let (low, high) = ty.bounds();
-    if low > high {
-        return 0;
-    }
-    high.abs_diff(low).saturating_add(1)
-}
 
 /// What is instantiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,11 +160,7 @@ impl Checker<'_> {
                 self.error(
                     codes::TEMPLATE_EXPECTED,
                     name.span,
-                    format!(
-                        "'{}' is {}, not a template",
-                        name.text,
-                        super::expressions::entity_kind(&entity)
-                    ),
+                    format!("'{}' is {}, not a template", name.text, entity.kind()),
                     "name a template or an instantiation",
                 );
                 None

@@ -4,9 +4,8 @@
 use super::checker::Checker;
 use super::codes;
 use super::layout::merge_ranges;
-use super::lower::{bound_range, comparisons};
-use super::templates::conjuncts;
-use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId};
+use super::lower::clocks::{bound_range, comparisons};
+use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId, conjuncts};
 use super::types::{Class, Type};
 use crate::ir::{
     self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, ClockRange,

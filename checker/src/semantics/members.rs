@@ -6,8 +6,8 @@
 
 use super::checker::Checker;
 use super::codes;
-use super::instantiate::Group;
 use super::operators::compare_integers;
+use super::processes::Group;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, LOCATION_WORDS, Place, Root};
 use super::types::{Size, Type};

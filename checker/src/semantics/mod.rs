@@ -30,6 +30,10 @@ mod typed;
 
 mod scope;
 
+mod processes;
+
+mod offsets;
+
 mod layout;
 
 mod checker;

@@ -1,11 +1,11 @@
 //! Typing of operators on integers, truth values and doubles; folding of constants; intervals of
 //! results.
 
-use super::calls::folded_math;
 use super::checker::Checker;
 use super::codes;
 use super::typed::{Expr, Kind};
 use super::types::{Class, Type};
+use crate::builtins::{Code, Number};
 use crate::diagnostics::Span;
 use crate::exec::arithmetic;
 use crate::ir::{DoubleOperator, IntegerOperator, MathFunction, Relation};
@@ -424,4 +424,42 @@ fn double_operator(operator: BinaryOp) -> Option<DoubleOperator> {
         BinaryOp::Maximum => DoubleOperator::Maximum,
         _ => return None,
     })
+}
+
+/// A function of the mathematical library, evaluated if its arguments are known.
+pub(super) fn folded_math(function: MathFunction, arguments: Vec<Expr>, span: Span) -> Expr {
+    let ty = match function.code() {
+        Code::Integer(_) | Code::ToInteger(_) => Type::ANY_INT,
+        Code::Classify(_) => Type::Bool,
+        Code::Unary(_) | Code::Binary(_) | Code::Scale(_) | Code::Ternary(_) => Type::Double,
+    };
+    let known: Option<Vec<Number>> = arguments.iter().map(number).collect();
+    match known.and_then(|known| function.evaluate(&known)) {
+        Some((Number::Integer(value), false)) => Expr::int(value, ty, span),
+        Some((Number::Double(value), false)) => Expr::new(Kind::Double(value), ty, span),
+        _ if function == MathFunction::Abs => absolute(arguments, span),
+        _ => Expr::new(Kind::Math(function, arguments), ty, span),
+    }
+}
+
+fn number(argument: &Expr) -> Option<Number> {
+    match argument.kind {
+        Kind::Double(value) => Some(Number::Double(value)),
+        _ => argument.constant().map(Number::Integer),
+    }
+}
+
+/// The absolute value of what is not known, but for its range.
+fn absolute(arguments: Vec<Expr>, span: Span) -> Expr {
+    let (low, high) = arguments[0].interval;
+    let least = if low <= 0 && 0 <= high {
+        0
+    } else {
+        low.saturating_abs().min(high.saturating_abs())
+    };
+    let most = low.saturating_abs().max(high.saturating_abs());
+    // The least integer wraps round to itself.
+    let least = if low == i32::MIN { low } else { least };
+    let kind = Kind::Math(MathFunction::Abs, arguments);
+    Expr::new(kind, Type::ANY_INT, span).within((least, most))
 }

@@ -39,6 +39,23 @@ pub(super) enum Entity {
     Broken,
 }
 
+impl Entity {
+    /// What it is, for messages.
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Entity::Type(..) => "a type",
+            Entity::Function(..) | Entity::OpenFunction => "a function",
+            Entity::Template(_) => "a template",
+            Entity::Instantiation(_) => "a process",
+            Entity::Chart => "a live sequence chart",
+            Entity::Location(_) => "a location",
+            Entity::Constant { .. } => "a constant",
+            Entity::Variable { .. } => "a variable",
+            Entity::Broken => "unknown",
+        }
+    }
+}
+
 /// The prefixes that a name given by `typedef` passes on to what is declared with it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Carried {

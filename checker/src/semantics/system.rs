@@ -3,8 +3,8 @@
 
 use super::checker::Checker;
 use super::codes;
-use super::expressions::known_offset;
 use super::layout::Relocation;
+use super::offsets::known_offset;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Root};
 use super::types::Memory;

@@ -6,7 +6,7 @@ use super::checker::Checker;
 use super::codes;
 use super::labels::Select;
 use super::scope::{Entity, Scope};
-use super::typed::{Expr, Kind, LocalId, Place, Root};
+use super::typed::{Expr, Kind, LocalId, Place, Root, conjuncts};
 use super::types::{Class, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationId, Urgency};
@@ -476,18 +476,6 @@ fn node_name<'t>(
         _ => None,
     };
     name.map_or(id, |name| name.text.as_str())
-}
-
-/// Splits a conjunction into its parts, from left to right.
-pub(super) fn conjuncts(expr: Expr, parts: &mut Vec<Expr>) {
-    match expr.kind {
-        Kind::And(left, right) => {
-            conjuncts(*left, parts);
-            conjuncts(*right, parts);
-        }
-        Kind::Int(value) if value != 0 => {}
-        _ => parts.push(expr),
-    }
 }
 
 /// Whether a comparison bounds a clock, or a difference of clocks, strictly from above.

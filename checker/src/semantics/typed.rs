@@ -575,3 +575,15 @@ impl Statement {
         }
     }
 }
+
+/// Splits a conjunction into its parts, from left to right.
+pub(super) fn conjuncts(expr: Expr, parts: &mut Vec<Expr>) {
+    match expr.kind {
+        Kind::And(left, right) => {
+            conjuncts(*left, parts);
+            conjuncts(*right, parts);
+        }
+        Kind::Int(value) if value != 0 => {}
+        _ => parts.push(expr),
+    }
+}

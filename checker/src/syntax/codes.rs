@@ -72,3 +72,6 @@ codes! {
     /// An expected verdict that is written in no known way.
     UNKNOWN_EXPECTATION = "W0105" "unknown-expectation";
 }
+
+/// After this many mistakes the rest of a text is left unread.
+pub(super) const MOST_MISTAKES: usize = 100;

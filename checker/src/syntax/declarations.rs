@@ -6,8 +6,9 @@ use super::ast::{
     Variable,
 };
 use super::codes;
+use super::keywords::Dialect;
 use super::lexer::TokenKind;
-use super::parser::{Dialect, Parser};
+use super::parser::Parser;
 use crate::diagnostics::Diagnostic;
 
 /// Where a declaration stands.

@@ -12,20 +12,20 @@ use super::ast::{
     BinaryOp, Expr, ExprKind, Name, Quantifier, UnaryOp, Unsupported, UnsupportedPart,
 };
 use super::codes;
-use super::keywords;
+use super::keywords::{self, Dialect};
 use super::lexer::TokenKind;
-use super::parser::{Dialect, MAX_HEIGHT, Parser};
+use super::parser::{MAX_HEIGHT, Parser};
 use crate::diagnostics::{Diagnostic, Span};
 
 /// Levels of precedence; an operator of a higher level binds tighter.
 pub(super) mod level {
-    pub(in crate::syntax) const ASSIGNMENT: u8 = 1;
-    pub(in crate::syntax) const TERNARY: u8 = 2;
-    pub(in crate::syntax) const OR: u8 = 3;
-    pub(in crate::syntax) const AND: u8 = 4;
-    pub(in crate::syntax) const POWER: u8 = 14;
-    pub(in crate::syntax) const PREFIX: u8 = 15;
-    pub(in crate::syntax) const POSTFIX: u8 = 16;
+    pub(crate) const ASSIGNMENT: u8 = 1;
+    pub(crate) const TERNARY: u8 = 2;
+    pub(crate) const OR: u8 = 3;
+    pub(crate) const AND: u8 = 4;
+    pub(crate) const POWER: u8 = 14;
+    pub(crate) const PREFIX: u8 = 15;
+    pub(crate) const POSTFIX: u8 = 16;
 }
 
 /// The level of a binary operator; all of them associate to the left.

@@ -4,8 +4,18 @@
 //! where. Where we differ: names of built-in functions are not reserved, a declaration hides them
 //! (with a warning), because models older than UPPAAL 4.1.20 use them as names.
 
-use super::parser::Dialect;
 use crate::builtins::{self, Builtin};
+
+/// The languages that share the expression grammar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Dialect {
+    /// Declarations and labels of UPPAAL 4 and 5.
+    New,
+    /// The syntax of the `.ta` files of UPPAAL 3.
+    Old,
+    /// Properties.
+    Query,
+}
 
 const OLD: u8 = 1;
 const NEW: u8 = 2;

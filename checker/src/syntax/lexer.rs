@@ -150,7 +150,7 @@ impl Lexer<'_> {
     }
 
     fn report(&mut self, diagnostic: Diagnostic) {
-        if self.diagnostics.len() < super::MOST_MISTAKES {
+        if self.diagnostics.len() < codes::MOST_MISTAKES {
             self.diagnostics.push(diagnostic);
         }
     }

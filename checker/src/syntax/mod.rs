@@ -51,14 +51,13 @@ mod prelude;
 
 mod print;
 
+use codes::MOST_MISTAKES;
+
 use crate::diagnostics::{Diagnostic, Source, SourceMap, Span};
 
 pub use prelude::prelude;
 pub use print::{print_dimension, print_expr, print_type};
 pub use queries::{add_query_text, parse_query};
-
-/// After this many mistakes the rest of a text is left unread.
-const MOST_MISTAKES: usize = 100;
 
 /// A model as read: the tree is complete where no diagnostic says otherwise.
 pub struct Parsed {

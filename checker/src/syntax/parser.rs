@@ -11,7 +11,7 @@
 
 use super::ast::{Expr, ExprKind, Name, Unsupported};
 use super::codes;
-use super::keywords;
+use super::keywords::{self, Dialect};
 use super::lexer::{Token, TokenKind, lex};
 use crate::diagnostics::{Code, Diagnostic, SourceId, SourceMap, Span};
 
@@ -20,17 +20,6 @@ pub(super) const MAX_NESTING: u32 = 256;
 
 /// How many levels an expression's tree may have, chains of operators included.
 pub(super) const MAX_HEIGHT: u32 = 500;
-
-/// The languages that share the expression grammar.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Dialect {
-    /// Declarations and labels of UPPAAL 4 and 5.
-    New,
-    /// The syntax of the `.ta` files of UPPAAL 3.
-    Old,
-    /// Properties.
-    Query,
-}
 
 /// The state of reading one text.
 pub(super) struct Parser<'a> {
@@ -228,7 +217,7 @@ impl<'a> Parser<'a> {
         if self.gave_up {
             return;
         }
-        if self.diagnostics.len() <= super::MOST_MISTAKES {
+        if self.diagnostics.len() <= codes::MOST_MISTAKES {
             self.diagnostics.push(diagnostic);
         } else {
             self.give_up();

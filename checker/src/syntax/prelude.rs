@@ -2,7 +2,8 @@
 //! mathematics.
 
 use super::ast::Declaration;
-use super::parser::{Dialect, Parser};
+use super::keywords::Dialect;
+use super::parser::Parser;
 use crate::diagnostics::{Source, SourceMap, Span};
 
 /// The declarations that UPPAAL puts before every model. `UINT8_MAX` is 255; the reference manual's

@@ -8,8 +8,9 @@ use super::ast::{
 use super::codes;
 use super::declarations::Scope;
 use super::expressions::join_all;
+use super::keywords::Dialect;
 use super::lexer::TokenKind;
-use super::parser::{Dialect, Parser};
+use super::parser::Parser;
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
 use std::collections::HashMap;
 

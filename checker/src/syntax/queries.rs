@@ -4,8 +4,9 @@
 use super::ast::{Control, Expr, ExprKind, Extremum, Name, Objective, Query, QueryKind};
 use super::codes;
 use super::expressions::{join_all, level};
+use super::keywords::Dialect;
 use super::lexer::TokenKind;
-use super::parser::{Dialect, Parser};
+use super::parser::Parser;
 use crate::diagnostics::{Diagnostic, Source, SourceMap, Span};
 
 /// Parses the query formula that stands at `span`; there is no tree if anything was wrong.

@@ -3,8 +3,9 @@
 use super::ast::{Block, Expr, Statement};
 use super::codes;
 use super::declarations::Scope;
+use super::keywords::Dialect;
 use super::lexer::TokenKind;
-use super::parser::{Dialect, Parser};
+use super::parser::Parser;
 use crate::diagnostics::Diagnostic;
 
 impl Parser<'_> {

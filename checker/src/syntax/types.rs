@@ -1,9 +1,9 @@
 //! Types, declared names with dimensions, parameters.
 
 use super::ast::{Dimension, Name, Parameter, Prefixes, StructField, TypeExpr, TypeKind};
-use super::keywords;
+use super::keywords::{self, Dialect};
 use super::lexer::TokenKind;
-use super::parser::{Dialect, Parser};
+use super::parser::Parser;
 use crate::diagnostics::Span;
 
 impl Parser<'_> {

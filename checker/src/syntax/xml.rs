@@ -9,9 +9,10 @@
 
 use super::ast::{Document, Expectation, Name, QueryText, Unsupported, UnsupportedPart};
 use super::codes;
+use super::keywords::Dialect;
 use super::keywords::is_reserved;
 use super::lexer::{end_of_word, lex, to_u32};
-use super::parser::{Dialect, Parser};
+use super::parser::Parser;
 use super::processes::{Part, query_texts};
 use super::q_file::{collapsed, expectation_in, trimmed};
 use super::xml_text::{XmlFile, end_of_tag};

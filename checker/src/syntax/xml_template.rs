@@ -10,9 +10,10 @@
 
 use super::ast::{Branchpoint, Edge, LabelKind, Location, Name, Point, Template, UnsupportedPart};
 use super::codes;
+use super::keywords::Dialect;
 use super::keywords::{is_built_in_function, is_reserved};
 use super::lexer::to_u32;
-use super::parser::Dialect;
+
 use super::xml::{Reader, child, is_element};
 use crate::diagnostics::{Diagnostic, Span};
 use roxmltree::Node;

@@ -2,9 +2,9 @@
 
 use super::ast::Document;
 use super::codes;
-use super::keywords;
+use super::keywords::{self, Dialect};
 use super::lexer::{Token, TokenKind, lex};
-use super::parser::{Dialect, Parser};
+use super::parser::Parser;
 use super::processes::{Part, query_texts};
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
 

@@ -29,7 +29,7 @@ use crate::exec::EmittedAssignment;
 use crate::ir::{ClockChoice, ClockId, FixedConstraint, Network, Predicate, Urgency};
 
 use super::code::{Candidate, Code, Combination};
-use super::concrete::{Error, Part};
+use super::moves::{Error, Part};
 use super::strategy::Constraint;
 use super::zone::{Comparison, Zone, is_exact};
 

@@ -5,8 +5,9 @@
 
 use crate::ir::Network;
 
-use super::concrete::{Error, Part, Semantics, State};
+use super::concrete::Semantics;
 use super::moments::Moments;
+use super::moves::{Error, Part, State};
 
 /// A move and when it can happen.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -20,7 +20,7 @@ use crate::exec::{
 };
 use crate::ir::{ClockId, Edge, FixedConstraint, FunctionId, Guard, Network, Update, Urgency};
 
-use super::concrete::{Error, Part};
+use super::moves::{Error, Part};
 
 /// What it takes to look at the edges of a process: see [`cancellation::work`].
 const UNITS_FOR_PROCESS: usize = 1 << 10;

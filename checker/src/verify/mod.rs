@@ -18,6 +18,7 @@ mod code;
 pub mod concrete;
 mod effort;
 mod moments;
+mod moves;
 pub mod observed;
 pub mod play;
 pub mod regions;
@@ -27,7 +28,8 @@ pub mod strategy;
 pub mod timed;
 mod zone;
 
-pub use concrete::{Error, Move, Part, Semantics, State};
+pub use concrete::Semantics;
 pub use effort::{Effort, GivenUp};
+pub use moves::{Error, Move, Part, State};
 pub use regions::Regions;
 pub use replay::Violation;

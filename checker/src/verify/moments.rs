@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 
 use crate::ir::{AssignedValue, ClockAtom, ClockChoice, ClockRange, Network, Predicate};
 
-use super::concrete::{Error, State};
+use super::moves::{Error, State};
 use super::regions;
 
 /// Values of an expression that are tried one by one; with more of them every integer counts as a

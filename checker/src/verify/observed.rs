@@ -22,8 +22,8 @@ use std::collections::HashMap;
 
 use crate::ir::{Network, Predicate};
 
-use super::concrete::{Error, Move, State};
 use super::effort::Effort;
+use super::moves::{Error, Move, State};
 use super::regions::Regions;
 use super::rules::{Aim, Claim, Owner, Rest, Rules};
 use super::strategy::{Coverage, Defect, Outcome, Step, Violation};

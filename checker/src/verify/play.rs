@@ -10,8 +10,9 @@ use std::cmp::Ordering;
 
 use crate::ir::{Network, Predicate};
 
-use super::concrete::{Error, Part, Semantics, State};
+use super::concrete::Semantics;
 use super::moments::{Moments, Stretch};
+use super::moves::{Error, Part, State};
 use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules, is_same_entry};
 use super::timed::Timed;
 

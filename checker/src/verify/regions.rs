@@ -24,7 +24,7 @@
 
 use crate::ir::{AssignedValue, ClockAssignment, ClockAtom, Edge, Network, Update};
 
-use super::concrete::{Error, State};
+use super::moves::{Error, State};
 
 /// What keeps the set of representatives finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

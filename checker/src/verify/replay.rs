@@ -19,8 +19,9 @@ use std::collections::HashMap;
 
 use crate::ir::{ClockChoice, Measure, Network, Predicate};
 
-use super::concrete::{Error, Move, Part, Semantics, State};
+use super::concrete::Semantics;
 use super::moments::{self, Moments};
+use super::moves::{Error, Move, Part, State};
 use super::regions::{Bounding, Regions};
 
 /// A wait and the move after it.

@@ -8,7 +8,8 @@ use std::collections::HashMap;
 
 use crate::ir::{Network, Predicate};
 
-use super::concrete::{Error, Move, Part, Semantics, State};
+use super::concrete::Semantics;
+use super::moves::{Error, Move, Part, State};
 
 /// `left - right < bound`, or `<=` if not strict; clocks by index, 0 for the reference clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

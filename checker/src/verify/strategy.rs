@@ -32,8 +32,8 @@ use std::collections::{HashMap, HashSet};
 
 use crate::ir::Network;
 
-use super::concrete::{Error, Move, State};
 use super::effort::{Effort, GivenUp};
+use super::moves::{Error, Move, State};
 use super::regions::Regions;
 use super::rules::Rules;
 use super::timed::{Timed, least_multiple};

@@ -1,7 +1,7 @@
 //! States together with the resolution of their clock values, so that every fraction of a unit can
 //! be waited.
 
-use super::concrete::State;
+use super::moves::State;
 
 /// The finest resolution: constants of clocks stay far from the ends of the integers in it.
 pub const MOST_TICKS_PER_UNIT: i64 = 1 << 30;

@@ -6,6 +6,7 @@
 //!
 //! Cost: some 10 to 50 µs, and then about 1 µs an instruction.
 
+use std::fmt;
 use std::mem::ManuallyDrop;
 
 use cranelift_codegen::isa::CallConv;
@@ -19,9 +20,26 @@ use crate::exec::optimise::Optimiser;
 use crate::ir::{Function, FunctionId, Overflow, RegisterType};
 use crate::tuning::Tuning;
 
-use super::JitError;
 use super::needs::AllNeeds;
 use super::translate::{entry_signature, native_signature, translate, translate_entry};
+
+/// Why there is no native code.
+#[derive(Clone, Debug)]
+pub struct JitError(String);
+
+impl JitError {
+    pub(super) fn new(cause: impl fmt::Display) -> JitError {
+        JitError(cause.to_string())
+    }
+}
+
+impl fmt::Display for JitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cannot generate native code: {}", self.0)
+    }
+}
+
+impl std::error::Error for JitError {}
 
 /// A compiled function as it is called from outside.
 #[derive(Clone, Copy, Debug)]

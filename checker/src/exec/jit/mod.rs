@@ -33,6 +33,8 @@ use crate::tuning::Tuning;
 
 use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, validate};
 
+pub use compiler::JitError;
+
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};
 
@@ -43,24 +45,6 @@ const HOT_INSTRUCTIONS: u64 = 20_000;
 const MOST_PREPARED: usize = 6_000;
 /// The heat of a function that is not to be compiled.
 const NEVER: u64 = u64::MAX;
-
-/// Why there is no native code.
-#[derive(Clone, Debug)]
-pub struct JitError(String);
-
-impl JitError {
-    fn new(cause: impl fmt::Display) -> JitError {
-        JitError(cause.to_string())
-    }
-}
-
-impl fmt::Display for JitError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "cannot generate native code: {}", self.0)
-    }
-}
-
-impl std::error::Error for JitError {}
 
 /// Runs functions natively once they are worth compiling.
 pub struct Jit {

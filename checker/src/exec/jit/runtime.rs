@@ -7,9 +7,9 @@
 
 use crate::builtins::IntegerResult;
 use crate::cancellation;
+use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
 use crate::exec::{
-    Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, ROUNDS_BETWEEN_LOOKS, RunTimeError,
-    Wraps, arithmetic,
+    Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, RunTimeError, Wraps, arithmetic,
 };
 use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
 

@@ -12,12 +12,10 @@
 //!   the first clock. A returned array or struct is written to an address that comes as last
 //!   parameter.
 
-mod clocks;
+pub(super) mod clocks;
 mod expressions;
 mod places;
 mod statements;
-
-pub(super) use clocks::{bound_range, comparisons};
 
 use std::collections::HashMap;
 

@@ -1,0 +1,78 @@
+//! What all engines that run code have in common: one trait, and what a call reads and writes.
+
+use super::Wraps;
+use crate::ir::{ClockId, FixedConstraint, FunctionId, RunTimeErrorKind, SiteId};
+
+/// What a call reads and writes beside its arguments.
+#[derive(Debug)]
+pub struct Context<'a> {
+    /// The words of the state; updates change them in place.
+    pub state: &'a mut [i32],
+    /// The clock constraints that the call emitted, appended in order.
+    pub constraints: &'a mut Vec<EmittedConstraint>,
+    /// The clock assignments that the call emitted, appended in order.
+    pub assignments: &'a mut Vec<EmittedAssignment>,
+}
+
+/// `left - right < bound`, or `<=` if not strict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+#[expect(missing_docs, reason = "the formula says it")]
+pub struct EmittedConstraint {
+    pub left: ClockId,
+    pub right: ClockId,
+    pub bound: i32,
+    pub strict: bool,
+}
+
+impl From<FixedConstraint> for EmittedConstraint {
+    fn from(fixed: FixedConstraint) -> EmittedConstraint {
+        EmittedConstraint {
+            left: fixed.left,
+            right: fixed.right,
+            bound: fixed.bound,
+            strict: fixed.strict,
+        }
+    }
+}
+
+/// `target := value`, or `target := source + value` if the source is not the reference clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+#[expect(missing_docs, reason = "the formula says it")]
+pub struct EmittedAssignment {
+    pub target: ClockId,
+    pub source: ClockId,
+    pub value: i32,
+}
+
+/// A run-time error of the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RunTimeError {
+    /// What went wrong.
+    pub kind: RunTimeErrorKind,
+    /// Where.
+    pub site: SiteId,
+}
+
+/// Something that runs functions.
+///
+/// `function` must be one of the functions that the executor was made from; its parameters must all
+/// be integers, as many as `arguments`, and its result an integer or nothing. Every other use of
+/// functions is between functions.
+pub trait Executor: Send + Sync {
+    /// Runs a function and returns its result; 0 for a function that returns nothing.
+    fn call(
+        &self,
+        function: FunctionId,
+        arguments: &[i32],
+        context: &mut Context<'_>,
+    ) -> Result<i32, RunTimeError>;
+
+    /// Where results wrapped round since this was cleared.
+    fn wraps(&self) -> &Wraps;
+}
+
+/// Rounds of loops between two looks whether to end ([`crate::cancellation::is_due`]); a call that
+/// is ended so fails with [`crate::ir::RunTimeErrorKind::Interrupted`].
+pub(super) const ROUNDS_BETWEEN_LOOKS: u64 = 1 << 16;

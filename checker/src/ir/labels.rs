@@ -1,0 +1,114 @@
+//! What guards ask and updates do, as far as it is known without running code.
+
+use super::ids::{ClockId, FunctionId};
+
+/// A condition on words and clocks: a guard or an invariant. It holds if `function` returns 1, and
+/// then on the clock values that satisfy `fixed` and all constraints that the function emitted.
+#[derive(Clone, Debug, Default)]
+pub struct Guard {
+    /// Decides the part on the words and emits clock constraints ([`Instruction::Constrain`]);
+    /// `None` is true. Its parameters are the edge's select values; it returns an integer.
+    pub function: Option<FunctionId>,
+    /// Clock constraints with constant bounds that hold whatever the words say.
+    pub fixed: Vec<FixedConstraint>,
+    /// Whether `function` may emit constraints.
+    pub emits: bool,
+    /// All clock comparisons in it that can matter, fixed ones included: for static analysis.
+    pub atoms: Vec<ClockAtom>,
+    /// Whether it is known to fail in every state, if it does not end in a run-time error.
+    pub never_holds: bool,
+}
+
+impl Guard {
+    /// Whether it is the condition true.
+    pub fn is_trivial(&self) -> bool {
+        self.function.is_none() && self.fixed.is_empty()
+    }
+}
+
+/// `left - right < bound`, or `<=` if not strict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the formula says it")]
+pub struct FixedConstraint {
+    pub left: ClockId,
+    pub right: ClockId,
+    pub bound: i32,
+    pub strict: bool,
+}
+
+/// A comparison `left - right ≺ bound` as static analysis sees it: which clocks it may concern, and
+/// how large the bound may be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClockAtom {
+    /// The clocks that may stand at the left (one, or all of an array indexed at run time), the
+    /// reference clock included.
+    pub left: ClockRange,
+    /// The same at the right.
+    pub right: ClockRange,
+    /// The least value that the bound may take.
+    pub low: i32,
+    /// The greatest value that the bound may take.
+    pub high: i32,
+    /// Whether the comparison is strict.
+    pub strict: bool,
+}
+
+impl ClockAtom {
+    /// Whether the comparison concerns two clocks.
+    pub fn is_difference(&self) -> bool {
+        let is_clock = |range: ClockRange| range.first.0 != 0 || range.count > 1;
+        is_clock(self.left) && is_clock(self.right)
+    }
+}
+
+/// Consecutive clocks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ClockRange {
+    /// The first.
+    pub first: ClockId,
+    /// How many, at least 1.
+    pub count: u32,
+}
+
+/// What happens to words and clocks. First `function` runs; then the clocks of `fixed` are set.
+#[derive(Clone, Debug, Default)]
+pub struct Update {
+    /// Changes words and emits clock assignments ([`Instruction::SetClock`],
+    /// [`Instruction::CopyClock`]); `None` changes nothing.
+    pub function: Option<FunctionId>,
+    /// Clocks that are set to constants. Used only where the order against `function` does not
+    /// matter.
+    pub fixed: Vec<(ClockId, i32)>,
+    /// Whether `function` may emit clock assignments.
+    pub emits: bool,
+    /// All assignments to clocks in it, fixed ones included: for static analysis.
+    pub assignments: Vec<ClockAssignment>,
+    /// The words that `function` may write, as ascending disjoint ranges (first, count); for static
+    /// analysis.
+    pub writes: Vec<(u32, u32)>,
+}
+
+impl Update {
+    /// Whether it changes nothing.
+    pub fn is_trivial(&self) -> bool {
+        self.function.is_none() && self.fixed.is_empty()
+    }
+}
+
+/// An assignment to a clock as static analysis sees it.
+#[derive(Clone, Debug)]
+pub struct ClockAssignment {
+    /// The clocks that may be assigned.
+    pub target: ClockRange,
+    /// What is assigned.
+    pub value: AssignedValue,
+}
+
+/// What a clock is set to.
+#[derive(Clone, Debug)]
+pub enum AssignedValue {
+    /// An integer between the two values.
+    Integer(i32, i32),
+    /// The value of one of these clocks plus an integer between the two values.
+    Clock(ClockRange, i32, i32),
+}

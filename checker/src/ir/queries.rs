@@ -1,0 +1,158 @@
+//! Compiled queries.
+
+use super::ids::{ClockId, FunctionId, LocationId, ProcessId};
+use super::labels::ClockRange;
+use crate::diagnostics::Span;
+
+/// A query, compiled.
+#[derive(Clone, Debug)]
+pub struct Query {
+    /// The text, blanks collapsed.
+    pub text: String,
+    /// `strategy name = …`
+    pub strategy: Option<String>,
+    /// `under name`
+    pub under: Option<String>,
+    /// What is asked.
+    pub kind: QueryKind,
+    /// The whole query.
+    pub span: Span,
+}
+
+/// The kinds of queries.
+#[derive(Clone, Debug)]
+pub enum QueryKind {
+    /// `E<> p`
+    Reachable(Predicate),
+    /// `A[] p`
+    Invariantly(Predicate),
+    /// `E[] p`
+    PotentiallyAlways(Predicate),
+    /// `A<> p`
+    Eventually(Predicate),
+    /// `p --> q`
+    LeadsTo(Predicate, Predicate),
+    /// `sup`, `inf`, `bounds`
+    Extremum {
+        /// Whether the least value is wanted.
+        least: bool,
+        /// Whether the greatest value is wanted.
+        greatest: bool,
+        /// The states that count.
+        predicate: Predicate,
+        /// What is measured, with its text.
+        items: Vec<(Measure, String)>,
+    },
+    /// `control: …`
+    Control {
+        /// The objective.
+        objective: Objective,
+        /// `E<> control: …`
+        cooperative: bool,
+        /// `control_t*(u, g)`.
+        time_optimal: Option<(Option<FunctionId>, Option<FunctionId>)>,
+        /// `{…} control: …`
+        observations: Option<Vec<Predicate>>,
+    },
+    /// `saveStrategy`
+    SaveStrategy {
+        /// The file.
+        file: String,
+        /// The strategy.
+        strategy: String,
+    },
+    /// `loadStrategy`
+    LoadStrategy {
+        /// The file.
+        file: String,
+    },
+}
+
+/// What `sup` and `inf` measure.
+#[derive(Clone, Debug)]
+pub enum Measure {
+    /// An integer expression on the words.
+    Integer(FunctionId),
+    /// A clock.
+    Clock(ClockChoice),
+}
+
+/// What a controller is to enforce.
+#[derive(Clone, Debug)]
+pub enum Objective {
+    /// `A<> p`
+    Reach(Predicate),
+    /// `A[] p`
+    Safe(Predicate),
+    /// `A[p U q]`
+    Until(Predicate, Predicate),
+    /// `A[p W q]`
+    WeakUntil(Predicate, Predicate),
+    /// `A[] (p && A<> q)`
+    Buchi(Predicate, Predicate),
+}
+
+/// A state predicate of a query. Quantifiers whose body mentions clocks, and process sets, are
+/// unrolled.
+#[derive(Clone, Debug)]
+pub enum Predicate {
+    /// A condition on the words alone: a function without parameters that returns 0 or 1.
+    Data(FunctionId),
+    /// Always this.
+    Constant(bool),
+    /// The process is in the location.
+    Location(ProcessId, LocationId),
+    /// A clock comparison.
+    Clock(ClockPredicate),
+    /// `deadlock`
+    Deadlock,
+    /// Not.
+    Not(Box<Predicate>),
+    /// All of them; true if empty.
+    And(Vec<Predicate>),
+    /// One of them; false if empty.
+    Or(Vec<Predicate>),
+}
+
+impl Predicate {
+    /// The opposite.
+    #[must_use]
+    pub fn negated(&self) -> Predicate {
+        Predicate::Not(Box::new(self.clone()))
+    }
+
+    /// Whether the words of a state alone decide it.
+    pub fn is_of_words(&self) -> bool {
+        match self {
+            Predicate::Data(_) | Predicate::Constant(_) | Predicate::Location(..) => true,
+            Predicate::Clock(_) | Predicate::Deadlock => false,
+            Predicate::Not(one) => one.is_of_words(),
+            Predicate::And(all) | Predicate::Or(all) => all.iter().all(Predicate::is_of_words),
+        }
+    }
+}
+
+/// `left - right ≺ bound` in a query, for a relation ≺ out of `<` and `<=` (the others are written
+/// with `Not` and `And`).
+#[derive(Clone, Debug)]
+pub struct ClockPredicate {
+    /// The left clock.
+    pub left: ClockChoice,
+    /// The right clock; the reference clock for `x < c`.
+    pub right: ClockChoice,
+    /// Whether the comparison is strict.
+    pub strict: bool,
+    /// The bound: a function without parameters that returns an integer.
+    pub bound: FunctionId,
+    /// The least and greatest value that the bound may take; for static analysis.
+    pub range: (i32, i32),
+}
+
+/// A clock in a query: known, or chosen by the words.
+#[derive(Clone, Copy, Debug)]
+pub enum ClockChoice {
+    /// This clock.
+    Fixed(ClockId),
+    /// One of consecutive clocks: the function returns the offset from the first.
+    Indexed(ClockRange, FunctionId),
+}
