@@ -44,36 +44,36 @@ fn count_at(function: &mut Function, block: usize, site: SiteId) {
 /// without a count.
 fn uncounted_cycle_heads(function: &Function) -> Vec<usize> {
     #[derive(Clone, Copy, PartialEq)]
-    enum Visit {
+    enum BlockVisit {
         New,
         Open,
         Done,
     }
     let counted = |block: usize| function.blocks[block].instructions.iter().any(is_count);
-    let mut visits = vec![Visit::New; function.blocks.len()];
+    let mut visits = vec![BlockVisit::New; function.blocks.len()];
     let mut heads = Vec::new();
     for root in 0..function.blocks.len() {
-        if visits[root] != Visit::New || counted(root) {
+        if visits[root] != BlockVisit::New || counted(root) {
             continue;
         }
-        visits[root] = Visit::Open;
+        visits[root] = BlockVisit::Open;
         let mut path = vec![(root, 0)];
         while let Some((block, next)) = path.last_mut() {
             let successor = function.blocks[*block].terminator.successors().nth(*next);
             *next += 1;
             let Some(BlockId(successor)) = successor else {
-                visits[*block] = Visit::Done;
+                visits[*block] = BlockVisit::Done;
                 path.pop();
                 continue;
             };
             let successor = successor as usize;
             match visits[successor] {
-                Visit::Open => heads.push(successor),
-                Visit::New if !counted(successor) => {
-                    visits[successor] = Visit::Open;
+                BlockVisit::Open => heads.push(successor),
+                BlockVisit::New if !counted(successor) => {
+                    visits[successor] = BlockVisit::Open;
                     path.push((successor, 0));
                 }
-                Visit::New | Visit::Done => {}
+                BlockVisit::New | BlockVisit::Done => {}
             }
         }
     }

@@ -51,7 +51,7 @@ impl fmt::Display for Flaw {
 pub fn validate(functions: &[Function], first: usize, constants: usize) -> Result<usize, Flaw> {
     let mut state_words = 0;
     for (index, function) in functions.iter().enumerate().skip(first) {
-        let mut check = Check {
+        let mut check = FunctionCheck {
             functions,
             function,
             constants,
@@ -78,7 +78,7 @@ pub fn validate(functions: &[Function], first: usize, constants: usize) -> Resul
 type Verdict = Result<(), &'static str>;
 
 /// The check of one function.
-struct Check<'a> {
+struct FunctionCheck<'a> {
     functions: &'a [Function],
     function: &'a Function,
     constants: usize,
@@ -87,7 +87,7 @@ struct Check<'a> {
     state_words: usize,
 }
 
-impl Check<'_> {
+impl FunctionCheck<'_> {
     fn function(&mut self) -> Result<(), ((usize, usize), &'static str)> {
         let function = self.function;
         if function.parameters as usize > function.registers.len() || function.blocks.is_empty() {
@@ -368,33 +368,33 @@ fn raise_limits(function: &Function, limits: &mut [Option<u64>], give_up: bool) 
 /// A function that calls itself, directly or indirectly.
 fn recursive(functions: &[Function]) -> Option<FunctionId> {
     #[derive(Clone, Copy, PartialEq)]
-    enum Visit {
+    enum Progress {
         New,
         Open,
         Done,
     }
     let callees = |index: usize| functions[index].callees().collect::<Vec<_>>();
-    let mut visits = vec![Visit::New; functions.len()];
+    let mut visits = vec![Progress::New; functions.len()];
     for root in 0..functions.len() {
-        if visits[root] != Visit::New {
+        if visits[root] != Progress::New {
             continue;
         }
-        visits[root] = Visit::Open;
+        visits[root] = Progress::Open;
         let mut path = vec![(root, callees(root))];
         while let Some((function, pending)) = path.last_mut() {
             let Some(FunctionId(callee)) = pending.pop() else {
-                visits[*function] = Visit::Done;
+                visits[*function] = Progress::Done;
                 path.pop();
                 continue;
             };
             let callee = callee as usize;
             match visits[callee] {
-                Visit::Open => return Some(FunctionId(callee as u32)),
-                Visit::New => {
-                    visits[callee] = Visit::Open;
+                Progress::Open => return Some(FunctionId(callee as u32)),
+                Progress::New => {
+                    visits[callee] = Progress::Open;
                     path.push((callee, callees(callee)));
                 }
-                Visit::Done => {}
+                Progress::Done => {}
             }
         }
     }

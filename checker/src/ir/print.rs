@@ -156,9 +156,9 @@ impl Display for DoubleOperator {
 }
 
 /// Registers with commas between them.
-struct List<'a>(&'a [Register]);
+struct RegisterList<'a>(&'a [Register]);
 
-impl Display for List<'_> {
+impl Display for RegisterList<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         for (index, register) in self.0.iter().enumerate() {
             let separator = if index == 0 { "" } else { ", " };
@@ -215,7 +215,7 @@ impl Display for Instruction {
                 site,
             } => {
                 let name = format!("{function:?}").to_lowercase();
-                write!(f, "{target} = {name}({})  {site}", List(arguments))
+                write!(f, "{target} = {name}({})  {site}", RegisterList(arguments))
             }
             Instruction::AddIndices {
                 target,
@@ -253,7 +253,7 @@ impl Display for Instruction {
                 if let Some(target) = target {
                     write!(f, "{target} = ")?;
                 }
-                write!(f, "{function}({})", List(arguments))
+                write!(f, "{function}({})", RegisterList(arguments))
             }
             Instruction::LoadInteger { .. }
             | Instruction::LoadDouble { .. }

@@ -257,7 +257,7 @@ impl Checker<'_> {
         &mut self,
         variable: &ast::Variable,
         ty: Type,
-        parts: Vec<super::declarations::InitialPart>,
+        parts: Vec<super::initialisers::InitialPart>,
     ) -> Statement {
         // Without a value, a scalar is the first member; in a list of values, the first comes
         // first.
@@ -497,7 +497,7 @@ impl Checker<'_> {
 }
 
 /// The assignment that gives a part of a local its initial value.
-fn initial_assignment(root: Root, part: super::declarations::InitialPart) -> Expr {
+fn initial_assignment(root: Root, part: super::initialisers::InitialPart) -> Expr {
     let place = Place {
         root,
         base: part.offset,

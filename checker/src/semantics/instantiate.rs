@@ -24,7 +24,7 @@ const PROCESS_LIMIT: u64 = 1 << 16;
 
 /// What is instantiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Target {
+enum Instantiated {
     Template(usize),
     Instantiation(usize),
 }
@@ -106,7 +106,7 @@ impl Checker<'_> {
 
     /// Checks an instantiation without knowing the values of its parameters; returns what it
     /// instantiates.
-    fn check_instantiation(&mut self, document: &Document, item: usize) -> Option<Target> {
+    fn check_instantiation(&mut self, document: &Document, item: usize) -> Option<Instantiated> {
         let SystemItem::Instantiation {
             parameters,
             template,
@@ -151,10 +151,10 @@ impl Checker<'_> {
     }
 
     /// The template or instantiation with a name.
-    fn target(&mut self, name: &Name) -> Option<Target> {
+    fn target(&mut self, name: &Name) -> Option<Instantiated> {
         match self.lookup(&name.text) {
-            Some(Entity::Template(i)) => Some(Target::Template(i)),
-            Some(Entity::Instantiation(i)) => Some(Target::Instantiation(i)),
+            Some(Entity::Template(i)) => Some(Instantiated::Template(i)),
+            Some(Entity::Instantiation(i)) => Some(Instantiated::Instantiation(i)),
             Some(Entity::Broken | Entity::Chart) => None,
             Some(entity) => {
                 self.error(
@@ -250,7 +250,7 @@ impl Checker<'_> {
         &mut self,
         formals: &[Parameter],
         name: &Name,
-        target: Target,
+        target: Instantiated,
     ) -> Option<Vec<Type>> {
         let mut types = Vec::new();
         for formal in formals {
@@ -282,10 +282,15 @@ impl Checker<'_> {
 
     /// The type of a formal parameter, seen from where it is declared; earlier parameters may stand
     /// in it.
-    fn formal_type(&mut self, formal: &Parameter, target: Target, earlier: &mut Scope) -> Type {
+    fn formal_type(
+        &mut self,
+        formal: &Parameter,
+        target: Instantiated,
+        earlier: &mut Scope,
+    ) -> Type {
         let hidden = std::mem::replace(
             &mut self.hides_system,
-            matches!(target, Target::Template(_)),
+            matches!(target, Instantiated::Template(_)),
         );
         self.scopes.push(std::mem::take(earlier));
         let ty = self.dimensioned(&formal.ty, &formal.dimensions);
@@ -298,7 +303,7 @@ impl Checker<'_> {
     fn make_process(
         &mut self,
         document: &Document,
-        (name, target, formals): (&Name, Target, &[Parameter]),
+        (name, target, formals): (&Name, Instantiated, &[Parameter]),
         (types, values): (&[Type], &[i32]),
         level: u32,
     ) {
@@ -367,12 +372,12 @@ impl Checker<'_> {
     fn bind(
         &mut self,
         document: &Document,
-        target: Target,
+        target: Instantiated,
         scope: Scope,
     ) -> Option<(usize, Scope)> {
         let item = match target {
-            Target::Template(i) => return Some((i, scope)),
-            Target::Instantiation(item) => item,
+            Instantiated::Template(i) => return Some((i, scope)),
+            Instantiated::Instantiation(item) => item,
         };
         let SystemItem::Instantiation {
             template,
@@ -609,10 +614,10 @@ fn is_fixed_place(expr: &Expr) -> bool {
         && !matches!(expr.kind, Kind::Error)
 }
 
-fn formal_parameters(document: &Document, target: Target) -> &[Parameter] {
+fn formal_parameters(document: &Document, target: Instantiated) -> &[Parameter] {
     match target {
-        Target::Template(i) => &document.templates[i].parameters,
-        Target::Instantiation(i) => match &document.system.items[i] {
+        Instantiated::Template(i) => &document.templates[i].parameters,
+        Instantiated::Instantiation(i) => match &document.system.items[i] {
             SystemItem::Instantiation { parameters, .. } => parameters,
             SystemItem::Declaration(_) => &[],
         },
@@ -620,10 +625,15 @@ fn formal_parameters(document: &Document, target: Target) -> &[Parameter] {
 }
 
 /// Notes the template that an instantiation comes down to.
-fn mark_used(document: &Document, checker: &mut Checker<'_>, target: Target, used: &mut [bool]) {
+fn mark_used(
+    document: &Document,
+    checker: &mut Checker<'_>,
+    target: Instantiated,
+    used: &mut [bool],
+) {
     match target {
-        Target::Template(i) => used[i] = true,
-        Target::Instantiation(i) => {
+        Instantiated::Template(i) => used[i] = true,
+        Instantiated::Instantiation(i) => {
             if let SystemItem::Instantiation { template, .. } = &document.system.items[i]
                 && let Some(next) = checker.target(template)
                 && next != target

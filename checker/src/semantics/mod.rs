@@ -46,9 +46,17 @@ mod left_out;
 
 mod expressions;
 
+mod assignments;
+
+mod quantifiers;
+
 mod calls;
 
 mod constants;
+
+mod type_expressions;
+
+mod initialisers;
 
 mod declarations;
 

@@ -20,7 +20,7 @@ const SELECT_LIMIT: u64 = 1 << 20;
 
 /// What an edge can lead to.
 #[derive(Clone, Copy, Debug)]
-enum Node {
+enum Endpoint {
     Location(u32),
     Branchpoint(usize),
 }
@@ -44,7 +44,7 @@ impl Checker<'_> {
             .collect();
         let mut edges = Vec::new();
         for edge in &template.edges {
-            let Some(Node::Location(source)) = self.node(&nodes, &edge.source) else {
+            let Some(Endpoint::Location(source)) = self.node(&nodes, &edge.source) else {
                 continue;
             };
             let edge = self.edge(template, edge, &nodes, LocationId(source));
@@ -62,8 +62,8 @@ impl Checker<'_> {
             .as_ref()
             .map(|name| self.node(&nodes, name));
         let initial = match initial.flatten() {
-            Some(Node::Location(i)) => LocationId(i),
-            Some(Node::Branchpoint(_)) => {
+            Some(Endpoint::Location(i)) => LocationId(i),
+            Some(Endpoint::Branchpoint(_)) => {
                 self.error(
                     codes::INITIAL_LOCATION,
                     template.name.span,
@@ -112,7 +112,7 @@ impl Checker<'_> {
         }
     }
 
-    fn node(&mut self, nodes: &FxHashMap<&str, Node>, name: &ast::Name) -> Option<Node> {
+    fn node(&mut self, nodes: &FxHashMap<&str, Endpoint>, name: &ast::Name) -> Option<Endpoint> {
         let node = nodes.get(name.text.as_str()).copied();
         if node.is_none() {
             self.error(
@@ -237,7 +237,7 @@ impl Checker<'_> {
         &mut self,
         template: &ast::Template,
         edge: &ast::Edge,
-        nodes: &FxHashMap<&str, Node>,
+        nodes: &FxHashMap<&str, Endpoint>,
         source: LocationId,
     ) -> ir::Edge {
         self.locals.clear();
@@ -327,19 +327,19 @@ impl Checker<'_> {
         &mut self,
         template: &ast::Template,
         edge: &ast::Edge,
-        nodes: &FxHashMap<&str, Node>,
+        nodes: &FxHashMap<&str, Endpoint>,
         parameters: usize,
         place: &str,
     ) -> Vec<ir::Branch> {
         let branchpoint = match self.node(nodes, &edge.target) {
             None => return Vec::new(),
-            Some(Node::Location(target)) => {
+            Some(Endpoint::Location(target)) => {
                 return vec![ir::Branch {
                     target: LocationId(target),
                     update: ir::Update::default(),
                 }];
             }
-            Some(Node::Branchpoint(i)) => &template.branchpoints[i],
+            Some(Endpoint::Branchpoint(i)) => &template.branchpoints[i],
         };
         let mut branches = Vec::new();
         for leg in template
@@ -347,7 +347,7 @@ impl Checker<'_> {
             .iter()
             .filter(|leg| leg.source.text == branchpoint.id)
         {
-            let Some(Node::Location(target)) = self.node(nodes, &leg.target) else {
+            let Some(Endpoint::Location(target)) = self.node(nodes, &leg.target) else {
                 self.leg_refused(
                     leg.target.span,
                     "a leg of a branch point must end in a location",
@@ -451,28 +451,28 @@ impl Checker<'_> {
     }
 }
 
-fn nodes(template: &ast::Template) -> FxHashMap<&str, Node> {
+fn nodes(template: &ast::Template) -> FxHashMap<&str, Endpoint> {
     let mut nodes = FxHashMap::default();
     for (i, location) in template.locations.iter().enumerate() {
         nodes
             .entry(location.id.as_str())
-            .or_insert(Node::Location(i as u32));
+            .or_insert(Endpoint::Location(i as u32));
     }
     for (i, branchpoint) in template.branchpoints.iter().enumerate() {
         nodes
             .entry(branchpoint.id.as_str())
-            .or_insert(Node::Branchpoint(i));
+            .or_insert(Endpoint::Branchpoint(i));
     }
     nodes
 }
 
 fn node_name<'t>(
     template: &'t ast::Template,
-    nodes: &FxHashMap<&str, Node>,
+    nodes: &FxHashMap<&str, Endpoint>,
     id: &'t str,
 ) -> &'t str {
     let name = match nodes.get(id) {
-        Some(&Node::Location(i)) => template.locations[i as usize].name.as_ref(),
+        Some(&Endpoint::Location(i)) => template.locations[i as usize].name.as_ref(),
         _ => None,
     };
     name.map_or(id, |name| name.text.as_str())

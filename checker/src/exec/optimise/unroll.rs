@@ -98,7 +98,7 @@ fn blocks_of_loop(head: usize, latch: usize, predecessors: &[Vec<usize>]) -> Vec
 type Integers = FxHashMap<Register, i32>;
 
 /// How a loop ends.
-struct End {
+struct LoopEnd {
     /// How often control comes to the head.
     rounds: usize,
     /// The block that leaves the loop in the last round.
@@ -108,7 +108,7 @@ struct End {
 }
 
 /// How the loop ends at the latest, if that is known and not after too many rounds.
-fn find_end(function: &Function, found: &Loop, dominators: &[usize]) -> Option<End> {
+fn find_end(function: &Function, found: &Loop, dominators: &[usize]) -> Option<LoopEnd> {
     let always: Vec<usize> = found
         .blocks
         .iter()
@@ -137,7 +137,7 @@ fn find_end(function: &Function, found: &Loop, dominators: &[usize]) -> Option<E
             {
                 let next = if condition != 0 { then } else { otherwise };
                 if found.blocks.binary_search(&(next.0 as usize)).is_err() {
-                    return Some(End {
+                    return Some(LoopEnd {
                         rounds,
                         block,
                         next,
@@ -191,7 +191,7 @@ fn evaluate(instruction: &Instruction, integers: &mut Integers) {
 
 /// Appends a copy of the loop for every round after the first; in the last round, the block that
 /// leaves the loop only does so.
-fn write_out(function: &mut Function, found: &Loop, end: &End) {
+fn write_out(function: &mut Function, found: &Loop, end: &LoopEnd) {
     let count = found.blocks.len();
     let first_copy = function.blocks.len();
     let copy_of = |round: usize, block: usize| -> Option<usize> {

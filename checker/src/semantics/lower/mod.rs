@@ -12,9 +12,12 @@
 //!   the first clock. A returned array or struct is written to an address that comes as last
 //!   parameter.
 
+mod assignments;
+mod calls;
 pub(super) mod clocks;
 mod expressions;
 mod places;
+mod quantifiers;
 mod statements;
 
 use std::collections::HashMap;
@@ -159,7 +162,7 @@ impl<'n> Builder<'n> {
                 words: ty.size().words,
             });
         } else {
-            self.store(places::Target::Memory(target), register, &ty);
+            self.store(places::Destination::Memory(target), register, &ty);
         }
         self.homes[local.0 as usize] = Some(Home::Frame(offset));
     }
@@ -200,7 +203,7 @@ impl<'n> Builder<'n> {
             });
         } else {
             let value = self.value(expr);
-            self.store(places::Target::Memory(target), value, &expr.ty);
+            self.store(places::Destination::Memory(target), value, &expr.ty);
         }
         self.terminate(Terminator::Return(None));
         self.finish(name, None).0
@@ -248,7 +251,7 @@ impl<'n> Builder<'n> {
     /// from the first.
     pub(super) fn offset(&mut self, expr: &Expr, memory: Memory) -> (u32, u32, Option<Register>) {
         let path = self.path(expr, memory);
-        debug_assert!(path.start == places::Start::Fixed, "it is no local");
+        debug_assert!(path.start == places::AddressStart::Fixed, "it is no local");
         (path.offset, path.reach + 1, path.index)
     }
 

@@ -9,7 +9,7 @@ use crate::ir::{
 
 /// Where a value can be stored.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Target {
+pub(super) enum Destination {
     /// In a register.
     Register(Register),
     /// In memory.
@@ -18,7 +18,7 @@ pub(super) enum Target {
 
 /// What a path of indices and fields starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Start {
+pub(super) enum AddressStart {
     /// The memory that is meant, counted from its beginning.
     Fixed,
     /// The constants.
@@ -34,7 +34,7 @@ pub(super) enum Start {
 /// A place in one memory.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Path {
-    pub(super) start: Start,
+    pub(super) start: AddressStart,
     /// The known part of the offset.
     pub(super) offset: u32,
     /// The computed part.
@@ -77,12 +77,12 @@ impl Builder<'_> {
                 if memory == Memory::Words {
                     self.effects.reads_state = true;
                 }
-                Start::Fixed
+                AddressStart::Fixed
             }
-            Root::Constants => Start::Constants,
+            Root::Constants => AddressStart::Constants,
             Root::Local(local) => match self.homes[local.0 as usize] {
-                Some(Home::Register(register)) => Start::Home(register),
-                Some(Home::Frame(frame)) => return fixed_path(Start::Frame, offset + frame),
+                Some(Home::Register(register)) => AddressStart::Home(register),
+                Some(Home::Frame(frame)) => return fixed_path(AddressStart::Frame, offset + frame),
                 Some(Home::Reference { address, clock }) => {
                     let register = if memory == Memory::Clocks {
                         clock
@@ -90,7 +90,7 @@ impl Builder<'_> {
                         address
                     };
                     let register = register.expect("a reference holds what its type promises");
-                    Start::Register(register, Some(local))
+                    AddressStart::Register(register, Some(local))
                 }
                 None => unreachable!("locals are declared before they are used"),
             },
@@ -146,11 +146,11 @@ impl Builder<'_> {
     /// The address of a place in the words that is not a register.
     pub(super) fn path_address(path: Path) -> Address {
         let base = match path.start {
-            Start::Fixed => Base::State,
-            Start::Constants => Base::Constants,
-            Start::Frame => Base::Frame,
-            Start::Register(register, _) => Base::Register(register),
-            Start::Home(_) => unreachable!("only whole scalars live in registers"),
+            AddressStart::Fixed => Base::State,
+            AddressStart::Constants => Base::Constants,
+            AddressStart::Frame => Base::Frame,
+            AddressStart::Register(register, _) => Base::Register(register),
+            AddressStart::Home(_) => unreachable!("only whole scalars live in registers"),
         };
         Address {
             base,
@@ -160,7 +160,7 @@ impl Builder<'_> {
     }
 
     /// Where an assignment to a place stores; `written` records the words as changed.
-    pub(super) fn target(&mut self, expr: &Expr, written: bool) -> Target {
+    pub(super) fn target(&mut self, expr: &Expr, written: bool) -> Destination {
         match &expr.kind {
             Kind::Variable(_) | Kind::Index { .. } | Kind::Field { .. } => {
                 let path = self.path(expr, Memory::Words);
@@ -168,19 +168,19 @@ impl Builder<'_> {
                     self.record_write(path, expr.ty.size().words);
                 }
                 match path.start {
-                    Start::Home(register) => Target::Register(register),
-                    _ => Target::Memory(Self::path_address(path)),
+                    AddressStart::Home(register) => Destination::Register(register),
+                    _ => Destination::Memory(Self::path_address(path)),
                 }
             }
             Kind::Ternary(condition, then, otherwise) => {
-                Target::Memory(self.choose_address(condition, then, otherwise, written))
+                Destination::Memory(self.choose_address(condition, then, otherwise, written))
             }
             Kind::Assign(target, value) => self.assign(target, value),
             Kind::Compound(operator, target, value) => {
                 self.compound(*operator, target, value, expr.span).0
             }
             Kind::Step { target, delta, .. } => self.step(target, *delta, expr.span).0,
-            _ => Target::Memory(self.address(expr)),
+            _ => Destination::Memory(self.address(expr)),
         }
     }
 
@@ -197,8 +197,10 @@ impl Builder<'_> {
         for (block, side) in [(yes, then), (no, otherwise)] {
             self.switch(block);
             let address = match self.target(side, written) {
-                Target::Memory(address) => address,
-                Target::Register(_) => unreachable!("places that are chosen from lie in memory"),
+                Destination::Memory(address) => address,
+                Destination::Register(_) => {
+                    unreachable!("places that are chosen from lie in memory")
+                }
             };
             self.emit(Instruction::AddressOf {
                 target: chosen,
@@ -212,7 +214,7 @@ impl Builder<'_> {
 
     /// Records that words may be changed, if they are words of the state.
     pub(super) fn record_write(&mut self, path: Path, words: u32) {
-        if path.start == Start::Fixed {
+        if path.start == AddressStart::Fixed {
             self.effects.writes.push((path.offset, path.reach + words));
         }
     }
@@ -229,8 +231,8 @@ impl Builder<'_> {
                 self.choose_value_address(condition, then, otherwise)
             }
             _ if expr.is_place() => match self.target(expr, false) {
-                Target::Memory(address) => address,
-                Target::Register(register) => self.spill(register, &expr.ty),
+                Destination::Memory(address) => address,
+                Destination::Register(register) => self.spill(register, &expr.ty),
             },
             _ => {
                 let value = self.value(expr);
@@ -259,15 +261,15 @@ impl Builder<'_> {
     /// Puts a value into memory of its own.
     fn spill(&mut self, register: Register, ty: &Type) -> Address {
         let address = self.frame(ty.size().words.max(1));
-        self.store(Target::Memory(address), register, ty);
+        self.store(Destination::Memory(address), register, ty);
         address
     }
 
     /// Stores a scalar.
-    pub(super) fn store(&mut self, target: Target, source: Register, ty: &Type) {
+    pub(super) fn store(&mut self, target: Destination, source: Register, ty: &Type) {
         match target {
-            Target::Register(register) => self.copy(register, source),
-            Target::Memory(address) => self.emit(if *ty == Type::Double {
+            Destination::Register(register) => self.copy(register, source),
+            Destination::Memory(address) => self.emit(if *ty == Type::Double {
                 Instruction::StoreDouble { address, source }
             } else {
                 Instruction::StoreInteger { address, source }
@@ -276,10 +278,10 @@ impl Builder<'_> {
     }
 
     /// Loads a scalar.
-    pub(super) fn load(&mut self, target: Target, ty: &Type) -> Register {
+    pub(super) fn load(&mut self, target: Destination, ty: &Type) -> Register {
         match target {
-            Target::Register(register) => register,
-            Target::Memory(address) => {
+            Destination::Register(register) => register,
+            Destination::Memory(address) => {
                 let target = self.register(register_type(ty));
                 self.emit(if *ty == Type::Double {
                     Instruction::LoadDouble { target, address }
@@ -307,7 +309,7 @@ impl Builder<'_> {
         }
         let path = self.path(expr, Memory::Clocks);
         let first = ClockId(path.offset);
-        let Start::Register(register, parameter) = path.start else {
+        let AddressStart::Register(register, parameter) = path.start else {
             let operand = ClockOperand {
                 first,
                 index: path.index,
@@ -371,10 +373,10 @@ impl Builder<'_> {
 
 fn address_path(address: Address) -> Path {
     let start = match address.base {
-        Base::State => Start::Fixed,
-        Base::Constants => Start::Constants,
-        Base::Frame => Start::Frame,
-        Base::Register(register) => Start::Register(register, None),
+        Base::State => AddressStart::Fixed,
+        Base::Constants => AddressStart::Constants,
+        Base::Frame => AddressStart::Frame,
+        Base::Register(register) => AddressStart::Register(register, None),
     };
     Path {
         start,
@@ -384,7 +386,7 @@ fn address_path(address: Address) -> Path {
     }
 }
 
-fn fixed_path(start: Start, offset: u32) -> Path {
+fn fixed_path(start: AddressStart, offset: u32) -> Path {
     Path {
         start,
         offset,

@@ -51,7 +51,7 @@ pub(super) fn number_values(function: &mut Function, constants: &[i32]) -> bool 
         literals: FxHashMap::default(),
         addresses: FxHashMap::default(),
         sums: FxHashMap::default(),
-        known: Known::default(),
+        known: KnownFacts::default(),
         output: Vec::new(),
         has_decided: false,
     };
@@ -73,7 +73,7 @@ fn count_writes(function: &Function) -> Vec<u32> {
 
 /// What is known at a place of the function.
 #[derive(Clone, Debug, Default)]
-struct Known {
+struct KnownFacts {
     /// The value that a register which is written several times holds, and whether that is not yet
     /// in the register itself.
     current: FxHashMap<Register, (Register, bool)>,
@@ -84,9 +84,9 @@ struct Known {
     memory: FxHashMap<Address, Register>,
 }
 
-impl Known {
+impl KnownFacts {
     /// What remains behind a join of several ways.
-    fn behind_join(mut self) -> Known {
+    fn behind_join(mut self) -> KnownFacts {
         self.current.clear();
         self.memory
             .retain(|address, _| address.base == Base::Constants);
@@ -115,7 +115,7 @@ struct Numbering<'a> {
     addresses: FxHashMap<Register, Address>,
     /// The values that are an index and a constant.
     sums: FxHashMap<Register, (Register, i32)>,
-    known: Known,
+    known: KnownFacts,
     /// The block under construction.
     output: Vec<Instruction>,
     /// Whether a branch was found to go only one way.
@@ -133,11 +133,11 @@ impl Numbering<'_> {
         for block in 1..count {
             heirs[dominators[block]] += usize::from(hands_on || !is_join[block]);
         }
-        let mut ends: Vec<Option<Known>> = vec![None; count];
+        let mut ends: Vec<Option<KnownFacts>> = vec![None; count];
         let mut reached = vec![false; count];
         reached[0] = true;
         for block in 0..count {
-            let mut known = Known::default();
+            let mut known = KnownFacts::default();
             if block > 0 && (hands_on || !is_join[block]) {
                 let from = dominators[block];
                 heirs[from] -= 1;

@@ -1,0 +1,184 @@
+//! Calls and their arguments.
+
+use super::super::typed::{ClockEffect, ClockSet, Expr, Kind, LocalId, Parameter, Root, Signature};
+use super::super::types::Type;
+use super::{Builder, register_type};
+use crate::ir::{Address, ClockAtom, FunctionId, Instruction, Register, RegisterType};
+
+impl Builder<'_> {
+    /// Calls a function. An array or struct that it returns goes to `result`.
+    pub(super) fn call(&mut self, expr: &Expr, result: Option<Address>) -> Option<Register> {
+        let Kind::Call {
+            function,
+            signature,
+            arguments,
+        } = &expr.kind
+        else {
+            unreachable!("called for calls only");
+        };
+        let mut registers = Vec::new();
+        let mut clock_sets = Vec::new();
+        for (i, argument) in arguments.iter().enumerate() {
+            let changes = arguments[i + 1..].iter().any(Expr::has_effect);
+            let set = self.argument(argument, &signature.parameters[i], changes, &mut registers);
+            clock_sets.push(set);
+        }
+        if let Some(address) = result {
+            let target = self.register(RegisterType::Address);
+            self.emit(Instruction::AddressOf { target, address });
+            registers.push(target);
+        }
+        self.record_effects(signature, &clock_sets);
+        self.emit_call(*function, registers, &expr.ty)
+    }
+
+    fn emit_call(
+        &mut self,
+        function: FunctionId,
+        arguments: Vec<Register>,
+        ty: &Type,
+    ) -> Option<Register> {
+        let target = ty.is_register().then(|| self.register(register_type(ty)));
+        self.emit(Instruction::Call {
+            target,
+            function,
+            arguments,
+        });
+        target
+    }
+
+    /// Adds the registers of one argument; returns the clocks that it refers to.
+    fn argument(
+        &mut self,
+        argument: &Expr,
+        parameter: &Parameter,
+        changes_follow: bool,
+        registers: &mut Vec<Register>,
+    ) -> Option<ClockSet> {
+        if parameter.reference {
+            return self.reference(argument, parameter, registers);
+        }
+        if parameter.ty.is_aggregate() {
+            let source = self.checked_address(argument, &parameter.ty);
+            let address = if changes_follow {
+                let words = parameter.ty.size().words;
+                let target = self.frame(words);
+                self.emit(Instruction::CopyWords {
+                    target,
+                    source,
+                    words,
+                });
+                target
+            } else {
+                source
+            };
+            let target = self.register(RegisterType::Address);
+            self.emit(Instruction::AddressOf { target, address });
+            registers.push(target);
+            return None;
+        }
+        let value = self.stable_value(argument, changes_follow);
+        self.check_range(value, argument.interval, &parameter.ty, argument.span);
+        registers.push(value);
+        None
+    }
+
+    fn reference(
+        &mut self,
+        argument: &Expr,
+        parameter: &Parameter,
+        registers: &mut Vec<Register>,
+    ) -> Option<ClockSet> {
+        let size = parameter.ty.size();
+        if parameter.ty.has_words() {
+            let address = if parameter.constant {
+                self.checked_address(argument, &parameter.ty)
+            } else {
+                self.address(argument)
+            };
+            if !parameter.constant
+                && argument
+                    .variable()
+                    .is_some_and(|place| place.root == Root::State)
+            {
+                let extent = extent(argument);
+                self.effects.writes.push(extent);
+            }
+            let target = self.register(RegisterType::Address);
+            self.emit(Instruction::AddressOf { target, address });
+            registers.push(target);
+        }
+        (size.clocks > 0).then(|| {
+            let (operand, set) = self.clock(argument);
+            let number = self.clock_number(operand);
+            registers.push(number);
+            match set {
+                ClockSet::Range(mut range) => {
+                    range.count += size.clocks - 1;
+                    ClockSet::Range(range)
+                }
+                parameter @ ClockSet::Parameter(_) => parameter,
+            }
+        })
+    }
+
+    fn record_effects(&mut self, signature: &Signature, arguments: &[Option<ClockSet>]) {
+        let effects = &signature.effects;
+        self.effects.writes.extend_from_slice(&effects.writes);
+        self.effects.reads_state |= effects.reads_state;
+        self.effects.mentions_clocks |= effects.mentions_clocks;
+        let atoms: &[ClockAtom] = &effects.atoms;
+        self.effects.atoms.extend_from_slice(atoms);
+        let substitute = |set: ClockSet| match set {
+            ClockSet::Parameter(LocalId(i)) => {
+                arguments[i as usize].expect("the parameter refers to clocks")
+            }
+            range @ ClockSet::Range(_) => range,
+        };
+        for effect in &effects.assignments {
+            self.emits = true;
+            self.effects.assignments.push(ClockEffect {
+                target: substitute(effect.target),
+                source: effect.source.map(substitute),
+                range: effect.range,
+            });
+        }
+    }
+}
+
+/// The words of the state that a place may be, without emitting code.
+fn extent(expr: &Expr) -> (u32, u32) {
+    let (mut offset, mut reach) = (0, 0);
+    let mut place = expr;
+    loop {
+        match &place.kind {
+            Kind::Index {
+                array,
+                index,
+                first,
+                length,
+                stride,
+            } => {
+                if *length == 0 {
+                    // The index is an error, and nothing is touched.
+                    return (0, 0);
+                }
+                match index.constant() {
+                    Some(i) if i >= *first && i.abs_diff(*first) < *length => {
+                        offset += i.abs_diff(*first) * stride.words;
+                    }
+                    _ => reach += (length - 1) * stride.words,
+                }
+                place = array;
+            }
+            Kind::Field { record, offset: by } => {
+                offset += by.words;
+                place = record;
+            }
+            Kind::Variable(root) => {
+                return (root.base.words + offset, reach + expr.ty.size().words);
+            }
+            _ => unreachable!("called for parts of variables only"),
+        }
+    }
+}
