@@ -4,7 +4,7 @@ use crate::builtins::Number;
 use crate::cancellation;
 use crate::exec::arithmetic::Wrapping;
 use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
-use crate::exec::{EmittedAssignment, EmittedConstraint, Executor, RunTimeError, arithmetic};
+use crate::exec::{EmittedAssignment, EmittedConstraint, RunTimeError, arithmetic};
 use crate::ir::{
     ClockId, ClockOperand, Instruction, MathFunction, Overflow, Register, RegisterType,
     RunTimeErrorKind, SiteId,
