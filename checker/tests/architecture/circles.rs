@@ -23,8 +23,6 @@ const CIRCLES: [&str; 4] = [
      game/partial_observation/solver",
     "network/discrete/broadcast network/discrete/broadcast_receivers \
      network/discrete/enabled_edges network/discrete/pairing network/discrete/stepper",
-    "network/symbolic/constant_effect network/symbolic/deadlock network/symbolic/predicate \
-     network/symbolic/successor_cache network/symbolic/zone_graph",
 ];
 
 /// Files that pass on the same name, at most.

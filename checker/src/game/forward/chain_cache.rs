@@ -226,7 +226,7 @@ impl Graph<'_, '_> {
         if !self.symbolic.is_enabled(one, zone)? {
             return Ok(Onward::Ends);
         }
-        let Some(last) = self.symbolic.fix(one, words) else {
+        let Some(last) = self.symbolic.stepper.fix(one, words) else {
             return Ok(Onward::Varies);
         };
         let mut zone = Zone::from_bounds(self.dimension(), zone);
@@ -290,7 +290,7 @@ impl Graph<'_, '_> {
         if trails.bytes > MOST_BYTES {
             return Ok(Onward::Unknown);
         }
-        let Some(last) = self.symbolic.fix(one, words) else {
+        let Some(last) = self.symbolic.stepper.fix(one, words) else {
             return Ok(Onward::Varies);
         };
         let mut zone = trail.zone.clone();

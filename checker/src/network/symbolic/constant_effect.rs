@@ -9,7 +9,7 @@ use crate::ir::{FunctionId, Update};
 
 use super::clock_effect::to_constraints;
 use crate::network::discrete::selects::select_values;
-use crate::network::{ClockEffect, MoveRef, Stepper, Symbolic};
+use crate::network::{ClockEffect, MoveRef, Stepper};
 use crate::zones::clocks::Assignment;
 use crate::zones::dbm::Constraint;
 use crate::zones::federation::block_bytes;
@@ -68,13 +68,11 @@ impl Stepper<'_> {
         one.enter_locations(words);
         Ok(())
     }
-}
 
-impl Symbolic<'_> {
     /// Works out a move of a state with these words; `None` if its effect on clocks, or whether it
     /// is possible, may depend on variables.
     pub fn fix(&self, one: MoveRef<'_>, words: &[i32]) -> Option<FixedMove> {
-        let network = self.stepper.network();
+        let network = self.network();
         let mut fixed = FixedMove {
             calls: Vec::new(),
             targets: Vec::new(),
@@ -89,7 +87,7 @@ impl Symbolic<'_> {
         }
         let mut arguments = Vec::new();
         for &part in one.parts {
-            let edge = self.stepper.edge(part);
+            let edge = self.edge(part);
             let branch = &edge.branches[part.branch as usize];
             select_values(edge, part.select, &mut arguments);
             fixed.add(&edge.update, &arguments)?;
@@ -108,7 +106,7 @@ impl Symbolic<'_> {
     /// The invariants of a location vector; `None` if they depend on variables or never hold.
     fn fixed_invariant(&self, locations: &[i32]) -> Option<Vec<Constraint>> {
         let mut emitted = Vec::new();
-        for (process, &location) in self.stepper.network().processes.iter().zip(locations) {
+        for (process, &location) in self.network().processes.iter().zip(locations) {
             let invariant = &process.locations[location as usize].invariant;
             if invariant.function.is_some() {
                 return None;
@@ -117,24 +115,5 @@ impl Symbolic<'_> {
             emitted.extend(fixed.map(EmittedConstraint::from));
         }
         to_constraints(&emitted).ok()?
-    }
-
-    /// Whether locations and the answers of guards decide which moves there are, and locations
-    /// alone how time passes.
-    pub fn is_fixed(&self) -> bool {
-        if self.has_priorities || self.restriction.is_some() {
-            return false;
-        }
-        let network = self.stepper.network();
-        let is_urgent = network.channels.iter().any(|channel| channel.urgent);
-        let locations = network
-            .processes
-            .iter()
-            .flat_map(|process| &process.locations);
-        !is_urgent
-            && locations
-                .map(|location| location.rates.len())
-                .sum::<usize>()
-                == 0
     }
 }

@@ -18,17 +18,8 @@ use crate::zones::{Bound, Federation, Zone};
 
 use super::clock_effect::add_constraints;
 use super::predicate::Extent;
-use crate::network::{ClockEffect, Failure, Moves, Symbolic};
-
-/// Buffers for looks at deadlocks, which are used again.
-#[derive(Debug, Default)]
-pub(super) struct Lookout {
-    moves: Moves,
-    target: Vec<i32>,
-    effect: ClockEffect,
-    needs: Vec<Constraint>,
-    invariant: Vec<Constraint>,
-}
+use super::zone_graph::DeadlockBuffers;
+use crate::network::{ClockEffect, Failure, Symbolic};
 
 /// The valuations of a zone from which a move is possible.
 enum Alive {
@@ -69,9 +60,9 @@ impl Symbolic<'_> {
     }
 
     fn alive(&mut self, words: &mut [i32], zone: &[Bound]) -> Result<Alive, Failure> {
-        let mut lookout = std::mem::take(&mut self.lookout);
-        let alive = self.alive_by(words, zone, &mut lookout);
-        self.lookout = lookout;
+        let mut buffers = std::mem::take(&mut self.deadlock_buffers);
+        let alive = self.alive_by(words, zone, &mut buffers);
+        self.deadlock_buffers = buffers;
         alive
     }
 
@@ -79,7 +70,7 @@ impl Symbolic<'_> {
         &mut self,
         words: &mut [i32],
         own: &[Bound],
-        lookout: &mut Lookout,
+        buffers: &mut DeadlockBuffers,
     ) -> Result<Alive, Failure> {
         let may_delay = self.may_delay(words)?;
         let stopped = self.stopped(words)?;
@@ -91,23 +82,23 @@ impl Symbolic<'_> {
         } else {
             Barriers::none(self.dimension())
         };
-        self.moves_within(words, zone, &mut lookout.moves)?;
+        self.moves_within(words, zone, &mut buffers.moves)?;
         let is_witness_of_use = self.tuning().deadlock_witness;
         if is_witness_of_use && barriers.is_empty() && stopped.is_empty() {
             // Moves without guards are the likeliest to be within reach.
             for is_first in [true, false] {
-                if self.is_one_within_reach(words, zone, may_delay, is_first, lookout)? {
+                if self.is_one_within_reach(words, zone, may_delay, is_first, buffers)? {
                     return Ok(Alive::Everywhere);
                 }
             }
         }
-        let Lookout {
+        let DeadlockBuffers {
             moves,
             target,
             effect,
             needs,
             ..
-        } = lookout;
+        } = buffers;
         let mut alive = Federation::empty(self.dimension());
         for one in moves.iter() {
             if !self.is_enabled(one, zone)? {
@@ -142,15 +133,15 @@ impl Symbolic<'_> {
         zone: &[Bound],
         may_delay: bool,
         is_unconditional: bool,
-        lookout: &mut Lookout,
+        buffers: &mut DeadlockBuffers,
     ) -> Result<bool, Failure> {
-        let Lookout {
+        let DeadlockBuffers {
             moves,
             target,
             effect,
             needs,
             invariant,
-        } = lookout;
+        } = buffers;
         let mut has_invariant = false;
         for one in moves.iter() {
             if one.is_unconditional() != is_unconditional || !self.is_enabled(one, zone)? {

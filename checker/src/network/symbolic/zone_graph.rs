@@ -21,7 +21,6 @@ use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
 use super::clock_effect::{
     ClockEffect, add_constraints, check_limit, to_assignment, to_constraint, to_constraints,
 };
-use super::deadlock::Lookout;
 use super::successor_cache::ZoneMemo;
 use crate::analysis::LiveVariables;
 use crate::analysis::clock_bounds::ClockBounds;
@@ -55,8 +54,18 @@ pub struct Symbolic<'a> {
     pub(super) ceilings: Ceilings,
     pub(super) memo: ZoneMemo,
     pub(super) inner_moves: Moves,
-    pub(super) lookout: Lookout,
+    pub(super) deadlock_buffers: DeadlockBuffers,
     /// The invariants of the state that [`Symbolic::take`] entered last.
+    pub(super) invariant: Vec<Constraint>,
+}
+
+/// Buffers for looks at deadlocks, which are used again.
+#[derive(Debug, Default)]
+pub(super) struct DeadlockBuffers {
+    pub(super) moves: Moves,
+    pub(super) target: Vec<i32>,
+    pub(super) effect: ClockEffect,
+    pub(super) needs: Vec<Constraint>,
     pub(super) invariant: Vec<Constraint>,
 }
 
@@ -92,7 +101,7 @@ impl<'a> Symbolic<'a> {
             memo: ZoneMemo::new(network),
             bounds,
             inner_moves: Moves::default(),
-            lookout: Lookout::default(),
+            deadlock_buffers: DeadlockBuffers::default(),
             invariant: Vec::new(),
             stepper,
         }

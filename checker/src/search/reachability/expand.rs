@@ -298,8 +298,8 @@ impl Explorer {
             words.copy_from_slice(&source.words);
             let zone = zone.bounds_mut();
             let kept = if let Some(known) = source.known.filter(|&one| symbolic.is_known(one)) {
-                let from = (known, source.zone.bounds());
-                let Some(kept) = symbolic.enter_known(one, words, from, zone)? else {
+                let from = source.zone.bounds();
+                let Some(kept) = symbolic.enter_known(one, words, known, from, zone)? else {
                     return Ok(Taken::Nothing);
                 };
                 Some(kept)

@@ -1,0 +1,242 @@
+//! Successors by what is remembered of zones: see [`super::successor_cache`].
+
+use crate::cancellation;
+use crate::network::{Failure, MoveRef, Symbolic};
+use crate::zones::clocks;
+use crate::zones::zone_table::ZoneId;
+use crate::zones::{Bound, dbm, simulation};
+
+use super::clock_effect::{add_constraints, check_limit, to_assignment};
+use super::packed_effects::{ASSIGNMENTS, GUARD, INVARIANT};
+use super::successor_cache::{FixedEffect, KeptZone, KnownZone, MemoLimits, NOTHING, ZoneOutcome};
+
+impl<'a> Symbolic<'a> {
+    /// The same, with other limits to what is remembered of zones.
+    #[must_use]
+    pub fn remembering(mut self, limits: MemoLimits) -> Symbolic<'a> {
+        self.memo.limits = limits;
+        self
+    }
+
+    /// Says whether zones are needed as they are entered, before extrapolation. They are unless
+    /// this was said.
+    pub fn need_entered(&mut self, needs: bool) {
+        if self.memo.needs_entered != needs {
+            self.memo.forget();
+            self.memo.needs_entered = needs;
+        }
+    }
+
+    /// The number of the zone of a state that is explored; `None` where looking up moves by it is
+    /// impossible or does not pay.
+    pub fn know(&mut self, zone: &[Bound]) -> Option<KnownZone> {
+        let is_used = self.tuning().successor_cache && self.memo.is_possible;
+        if !is_used || self.has_barriers() || self.splits() {
+            return None;
+        }
+        self.memo.know(zone)
+    }
+
+    /// Whether moves from the zone can still be looked up.
+    pub fn is_known(&self, known: KnownZone) -> bool {
+        known.age == self.memo.age
+    }
+
+    /// As [`Symbolic::take`], [`Symbolic::forget`] and [`Symbolic::pass_time`], for a move from a
+    /// zone that is known and that each of its guards leaves something of; `zone`, of the same
+    /// dimension, is overwritten. `None` if the move is not possible.
+    pub fn enter_known(
+        &mut self,
+        one: MoveRef<'_>,
+        words: &mut [i32],
+        known: KnownZone,
+        source: &[Bound],
+        zone: &mut [Bound],
+    ) -> Result<Option<KeptZone>, Failure> {
+        cancellation::work(words.len() + zone.len());
+        if let Some(offered) = one.offered
+            && let Some(Some(fixed)) = self.memo.fixed.get(&offered)
+            && let Some(outcome) = self.memo.find(known.zone, fixed.effect)
+        {
+            self.stepper.take(&fixed.one, words)?;
+            self.forget(words);
+            self.memo.balance.note(true);
+            return Ok(self.memo.result(outcome, zone));
+        }
+        let dimension = self.dimension;
+        if one.constraints.len() > 1 {
+            zone.copy_from_slice(source);
+            if !add_constraints(one.constraints, &mut self.invariant)?
+                || !dbm::constrain_all(zone, dimension, &self.invariant)
+            {
+                return Ok(None);
+            }
+        }
+        let effects = &mut self.memo.effects;
+        effects.begin();
+        effects.add_constraints(one.constraints);
+        effects.end(GUARD);
+        for assignment in self.stepper.fire(one.parts, words)? {
+            check_limit(assignment.value)?;
+            effects.add_assignment(*assignment);
+        }
+        effects.end(ASSIGNMENTS);
+        match self.stepper.invariants(words)? {
+            Some(emitted) => effects.add_constraints(emitted),
+            None => return Ok(None),
+        }
+        effects.end(INVARIANT);
+        self.forget(words);
+        let may_delay = match self.may_delay(words) {
+            Ok(may_delay) => may_delay,
+            // Where nothing of the zone is left nobody asks whether time may pass.
+            Err(failure) => {
+                let is_left = self.apply_effect(source, zone)?;
+                return if is_left { Err(failure) } else { Ok(None) };
+            }
+        };
+        self.memo.effects.key.push(may_delay.into());
+        self.bounds.classes_into(words, &mut self.memo.effects.key);
+        let effect = self.memo.effects.intern();
+        self.fix_effect(one, words, effect);
+        let found = self.memo.find(known.zone, effect);
+        self.memo.balance.note(found.is_some());
+        if let Some(outcome) = found {
+            return Ok(self.memo.result(outcome, zone));
+        }
+        let (entered, kept) = if self.compute(words, source, may_delay, zone)? {
+            // A single state may have successors without end.
+            if self.memo.used_bytes() > self.memo.limits.bytes {
+                self.memo.forget();
+            }
+            self.intern(words, zone)
+        } else {
+            (NOTHING, NOTHING)
+        };
+        let outcome = ZoneOutcome {
+            zone: known.zone,
+            effect,
+            entered,
+            kept,
+        };
+        if self.is_known(known) {
+            self.memo.insert(outcome);
+        }
+        Ok(self.memo.result(outcome, zone))
+    }
+
+    /// Remembers the effect of a move of an offer, which led to these words, unless it may depend
+    /// on variables.
+    fn fix_effect(&mut self, one: MoveRef<'_>, words: &[i32], effect: u32) {
+        let Some(offered) = one.offered else { return };
+        if self.memo.fixed.contains_key(&offered) {
+            return;
+        }
+        let is_fixed =
+            self.tuning().constant_effect && self.is_fixed() && self.bounds.follow_locations();
+        let fixed = self.stepper.fix(one, words).filter(|_| is_fixed);
+        let fixed = fixed.map(|one| FixedEffect { one, effect });
+        self.memo.fixed.insert(offered, fixed);
+    }
+
+    /// Applies the effect at hand to a zone.
+    fn apply_effect(&mut self, source: &[Bound], zone: &mut [Bound]) -> Result<bool, Failure> {
+        let dimension = self.dimension;
+        let effects = &self.memo.effects;
+        zone.copy_from_slice(source);
+        if !add_constraints(&effects.guard(), &mut self.invariant)?
+            || !dbm::constrain_all(zone, dimension, &self.invariant)
+        {
+            return Ok(false);
+        }
+        for assignment in effects.assignments() {
+            if !clocks::assign(zone, dimension, &[to_assignment(&assignment)?]) {
+                return Ok(false);
+            }
+        }
+        Ok(add_constraints(&effects.invariant(), &mut self.invariant)?
+            && dbm::constrain_all(zone, dimension, &self.invariant))
+    }
+
+    /// Applies the effect at hand to a zone and lets time pass if it may.
+    fn compute(
+        &mut self,
+        words: &[i32],
+        source: &[Bound],
+        may_delay: bool,
+        zone: &mut [Bound],
+    ) -> Result<bool, Failure> {
+        if !self.apply_effect(source, zone)? {
+            return Ok(false);
+        }
+        let invariant = std::mem::take(&mut self.invariant);
+        let result = self.delay(words, may_delay, &invariant, zone);
+        self.invariant = invariant;
+        result.map(|()| true)
+    }
+
+    /// The numbers of a zone that was entered and of what is kept of it.
+    fn intern(&mut self, words: &[i32], zone: &[Bound]) -> (ZoneId, ZoneId) {
+        let mut kept = std::mem::take(&mut self.memo.scratch);
+        kept.clear();
+        kept.extend_from_slice(zone);
+        let kept_zone = if self.keeps_reduced() {
+            self.bounds.ceilings_into(words, &mut self.ceilings);
+            simulation::reduce(&mut kept, self.dimension, &self.ceilings);
+            kept.extend_from_slice(self.ceilings.limits());
+            self.memo.reduced.intern(&kept)
+        } else {
+            self.extrapolate(words, &mut kept);
+            self.memo.zones.intern(&kept)
+        };
+        self.memo.scratch = kept;
+        if self.memo.needs_entered || self.keeps_reduced() {
+            (self.memo.zones.intern(zone), kept_zone)
+        } else {
+            (kept_zone, kept_zone)
+        }
+    }
+
+    /// Whether the reduced forms of zones are kept (see [`Symbolic::to_stored`]): not where states
+    /// are exchanged before.
+    pub fn keeps_reduced(&self) -> bool {
+        self.stores_reduced() && self.symmetry().is_none()
+    }
+
+    /// What is kept of a zone that the last move entered: the reduced form and the limits of its
+    /// ceilings, or the extrapolated zone and no limits.
+    pub fn kept(&self, kept: KeptZone) -> (&[Bound], &[Bound]) {
+        if self.keeps_reduced() {
+            self.memo
+                .reduced
+                .get(kept.zone)
+                .split_at(self.dimension * self.dimension)
+        } else {
+            (self.memo.zones.get(kept.zone), &[])
+        }
+    }
+
+    /// The number of the extrapolated zone that is kept; `None` if it is a reduced form.
+    pub fn known_kept(&self, KeptZone { zone, age }: KeptZone) -> Option<KnownZone> {
+        (!self.keeps_reduced()).then_some(KnownZone { zone, age })
+    }
+
+    /// Whether locations and the answers of guards decide which moves there are, and locations
+    /// alone how time passes.
+    pub fn is_fixed(&self) -> bool {
+        if self.has_priorities || self.restriction.is_some() {
+            return false;
+        }
+        let network = self.stepper.network();
+        let is_urgent = network.channels.iter().any(|channel| channel.urgent);
+        let locations = network
+            .processes
+            .iter()
+            .flat_map(|process| &process.locations);
+        !is_urgent
+            && locations
+                .map(|location| location.rates.len())
+                .sum::<usize>()
+                == 0
+    }
+}
