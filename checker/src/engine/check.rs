@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::answer::{Answer, Verdict};
-use super::evidence::named_strategies;
+use super::evidence::named_strategies::{self, StrategyFile};
 use super::loaded_model::{Due, LoadedModel, NamedStrategy};
 use super::options::Options;
 use super::rejection::Rejection;
@@ -40,11 +40,12 @@ impl LoadedModel {
         let mut answer = match (&query.kind, self.constant_failure()) {
             (_, Some(failure)) => Answer::failed(failure),
             (QueryKind::SaveStrategy { file, strategy }, None) => {
-                self.save_strategy((file, strategy), query.span, options)?
+                let (name, span) = (strategy, query.span);
+                self.save_strategy(StrategyFile { file, name, span }, options)?
             }
             (QueryKind::LoadStrategy { file }, None) => {
-                let name = query.strategy.as_deref().unwrap_or_default();
-                self.load_strategy((file, name), query.span, options)?
+                let (name, span) = (query.strategy.as_deref().unwrap_or_default(), query.span);
+                self.load_strategy(StrategyFile { file, name, span }, options)?
             }
             _ => self.answer(&query, options)?,
         };

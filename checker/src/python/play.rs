@@ -15,7 +15,7 @@ use crate::engine::evidence::strategy_check;
 use crate::engine::format::{strategy_json, text};
 use crate::engine::query::time_clock;
 use crate::engine::session::play::{
-    self as engine, Done, Follower, Refused, Unadvised, player_name,
+    self as engine, Done, Follower, Refused, Unadvised, Wait, player_name,
 };
 use crate::engine::{LoadedModel, NamedStrategy};
 use crate::game::strategy::attractor::Selection;
@@ -290,7 +290,10 @@ impl Play {
             (None, None) => Done::Nothing,
         };
         self.model.get().with(|model| {
-            let wait = (numerator, denominator);
+            let wait = Wait {
+                numerator,
+                denominator,
+            };
             let made = self.inner.pass(model.network(), wait, done);
             made.map_err(|why| refused(model, why))
         })

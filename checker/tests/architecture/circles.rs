@@ -11,7 +11,7 @@ use crate::Source;
 
 /// The circles that are still there, each with its files in order. This list may only become
 /// shorter.
-const CIRCLES: [&str; 4] = [
+const CIRCLES: [&str; 3] = [
     "game/backward/budget game/backward/losing_timed game/backward/memory \
      game/backward/parallel game/backward/predecessors game/backward/result_cache \
      game/backward/solver game/backward/winning_sets game/exploration/lazy_safety \

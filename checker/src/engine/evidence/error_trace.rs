@@ -15,7 +15,7 @@ use crate::search::reachability::report::Order;
 use crate::search::reachability::search;
 use crate::zones::Zone;
 
-use super::timed_run::{self, Shows};
+use super::timed_run::{self, Shows, ToProve};
 use super::witness::{Witness, WitnessKind};
 use crate::engine::answer::{Answer, Verdict};
 use crate::engine::limits::{LimitWatch, Limits};
@@ -64,9 +64,14 @@ impl LoadedModel {
         if has_run && !is_timed && !witness.trace.states.is_empty() {
             let mut symbolic = self.symbolic();
             let network = self.network();
-            let (trace, subject) = (&witness.trace, (None, Shows::Possible));
             let is_doubtful = network.features.stopwatches;
-            let run = timed_run::prove(&mut symbolic, network, trace, subject, is_doubtful);
+            let what = ToProve {
+                trace: &witness.trace,
+                ending: None,
+                shows: Shows::Possible,
+                is_doubtful,
+            };
+            let run = timed_run::prove(&mut symbolic, what);
             witness.run = Some(run);
         }
         if witness.trace.states.is_empty() {
@@ -143,9 +148,7 @@ impl LoadedModel {
             network: self.network(),
             executor: self.executor(),
             under: None,
-            within: None,
-            priorities: options.priorities,
-            tuning: options.tuning,
+            options,
         };
         let wanted = Abstraction::LowerUpper;
         let mut symbolic = subject::symbolic(subject, predicates, &[], wanted);

@@ -33,6 +33,17 @@ pub fn unnamed(query: &str) -> &str {
     parts.map_or(query, |parts| parts.1.trim())
 }
 
+/// What a query asks to save or load.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StrategyFile<'q> {
+    /// The file, as the query names it.
+    pub(crate) file: &'q str,
+    /// The name of the strategy.
+    pub(crate) name: &'q str,
+    /// The query.
+    pub(crate) span: Span,
+}
+
 impl LoadedModel {
     /// The strategy that a query is asked under, or that is to be saved; it is made within these
     /// limits if that is due.
@@ -92,10 +103,10 @@ impl LoadedModel {
     /// Answers `saveStrategy`.
     pub(crate) fn save_strategy(
         &mut self,
-        (file, name): (&str, &str),
-        span: Span,
+        asked: StrategyFile<'_>,
         options: &Options,
     ) -> Result<Answer, Rejection> {
+        let StrategyFile { file, name, span } = asked;
         let strategy = self.existing_strategy(name, span, options)?;
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let text = strategy_json::text(self.network(), &strategy, query);
@@ -112,10 +123,10 @@ impl LoadedModel {
     /// Answers `strategy S = loadStrategy("file")`.
     pub(crate) fn load_strategy(
         &mut self,
-        (file, name): (&str, &str),
-        span: Span,
+        asked: StrategyFile<'_>,
         options: &Options,
     ) -> Result<Answer, Rejection> {
+        let StrategyFile { file, name, span } = asked;
         let path = self.strategy_path(file, options);
         let bytes = strategy_place::load(&path).map_err(|refusal| {
             let Refusal { message, help } = refusal;

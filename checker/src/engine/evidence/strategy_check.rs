@@ -116,11 +116,7 @@ pub fn verify(
         let outcome = strategy::Outcome::Violated(Box::new(violation), Coverage::default());
         Ok(outcome)
     };
-    if !is_for(
-        network,
-        asked,
-        (played.owner, played.start, played.time_limit),
-    )? {
+    if !is_for(network, asked, &played)? {
         return violated_at_once(Defect::OtherGame);
     }
     let start = match played.start {
@@ -216,8 +212,14 @@ fn without_priorities(network: &Network) -> Network {
 pub(crate) fn is_for(
     network: &Network,
     asked: Asked<'_>,
-    (owner, start, time_limit): (Player, &Start, Option<i32>),
+    played: &Played<'_>,
 ) -> Result<bool, verify::Error> {
+    let Played {
+        owner,
+        start,
+        time_limit,
+        ..
+    } = *played;
     let has_start = match (asked.is_cooperative, owner) {
         (false, _) => *start == Start::Initial,
         (true, Player::Controller) => *start != Start::Anywhere,

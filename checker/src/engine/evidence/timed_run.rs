@@ -8,7 +8,7 @@
 //! earliest times settle into a pattern, and then two states on entry of the loop lie in the same
 //! region.
 
-use crate::ir::{Measure, Network, Predicate};
+use crate::ir::{Measure, Predicate};
 use crate::network::{Failure, Part, Symbolic};
 use crate::search::Trace;
 use crate::search::liveness::ending::RunEnding;
@@ -57,20 +57,36 @@ pub struct Takes<'q> {
     pub deadline: Option<(i32, u32)>,
 }
 
-/// Finds times for a trace and replays it. If `is_doubtful`, there may be none.
-pub fn prove(
-    symbolic: &mut Symbolic<'_>,
-    network: &Network,
-    trace: &Trace,
-    (ending, shows): (Option<RunEnding>, Shows<'_>),
-    is_doubtful: bool,
-) -> Proof {
+/// A trace of which it is to be proved that it shows something.
+#[derive(Clone, Copy, Debug)]
+pub struct ToProve<'t> {
+    /// The symbolic run.
+    pub trace: &'t Trace,
+    /// Why it never ends, if it does not.
+    pub ending: Option<RunEnding>,
+    /// What it shows.
+    pub shows: Shows<'t>,
+    /// Whether there may be no run.
+    pub is_doubtful: bool,
+}
+
+/// Finds times for a trace and replays it.
+pub fn prove(symbolic: &mut Symbolic<'_>, what: ToProve<'_>) -> Proof {
+    let ToProve {
+        trace,
+        ending,
+        shows,
+        is_doubtful,
+    } = what;
+    let network = symbolic.stepper.network();
     let result = match (shows, ending) {
-        (Shows::Stays(stays), Some(RunEnding::Loop(start))) if network.features.stopwatches => {
-            closed(symbolic, network, trace, start, stays)
-        }
         (Shows::Stays(stays), Some(RunEnding::Loop(start))) => {
-            looped(symbolic, network, trace, start, stays)
+            let lasso = Lasso::new(trace, start, stays);
+            if network.features.stopwatches {
+                lasso.closed(symbolic)
+            } else {
+                lasso.looped(symbolic)
+            }
         }
         (Shows::Stays(stays), ending) => {
             let finish = if ending == Some(RunEnding::Waits) {
@@ -194,89 +210,106 @@ pub(crate) fn timed(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<
 /// Rounds of a loop, at most, before the one in which a run with stopwatches closes it.
 const MOST_EARLIER_ROUNDS: usize = 3;
 
-/// A run that ends in a loop of a network with stopwatches: after some rounds of the loop of the
-/// trace, one more comes back to the same values.
-fn closed(
-    symbolic: &mut Symbolic<'_>,
-    network: &Network,
-    trace: &Trace,
-    start: usize,
-    stays: Stays<'_>,
-) -> Result<Run, Missing> {
-    let (stem, cycle) = trace.moves.split_at(start);
-    let open = stays.from.map(|(_, open)| open);
-    let predicates: Vec<&Predicate> = open.into_iter().chain([stays.keep]).collect();
-    let above = replay::indifferent_above(network, &predicates);
-    let mut moves = [stem, cycle].concat();
-    for round in 0..=MOST_EARLIER_ROUNDS {
-        let head = start + round * cycle.len();
-        let closing = Some(Closing { head, above });
-        let run = timed(
-            symbolic,
-            &Wanted {
-                stays: Some(stays),
-                closing,
-                ..wanted(&moves, Finish::Entry)
-            },
-        );
-        match run {
-            Ok(mut run)
-                if run.from
-                    <= (Moment {
-                        state: head,
-                        wait: 0,
-                    }) =>
-            {
-                run.end = End::Loop(head);
-                return Ok(run);
-            }
-            Ok(_) | Err(Missing::Approximate) => moves.extend_from_slice(cycle),
-            Err(missing) => return Err(missing),
-        }
-    }
-    Err(Missing::OpenLoop)
+/// A trace that ends in a loop.
+struct Lasso<'t> {
+    /// The moves before the loop.
+    stem: &'t [Vec<Part>],
+    /// The moves of the loop.
+    cycle: &'t [Vec<Part>],
+    /// What stays during the run.
+    stays: Stays<'t>,
+    /// What is asked of its states.
+    predicates: Vec<&'t Predicate>,
 }
 
-/// A run that ends in a loop: the loop of the trace, taken as often as it needs to close.
-fn looped(
-    symbolic: &mut Symbolic<'_>,
-    network: &Network,
-    trace: &Trace,
-    start: usize,
-    stays: Stays<'_>,
-) -> Result<Run, Missing> {
-    let (stem, cycle) = trace.moves.split_at(start);
-    let open = stays.from.map(|(_, open)| open);
-    let predicates: Vec<&Predicate> = open.into_iter().chain([stays.keep]).collect();
-    let mut rounds = 1;
-    while rounds <= MOST_ROUNDS && stem.len() + rounds * cycle.len() <= MOST_MOVES {
-        let mut moves = stem.to_vec();
-        for _ in 0..rounds {
-            moves.extend_from_slice(cycle);
+impl<'t> Lasso<'t> {
+    fn new(trace: &'t Trace, start: usize, stays: Stays<'t>) -> Lasso<'t> {
+        let (stem, cycle) = trace.moves.split_at(start);
+        let open = stays.from.map(|(_, open)| open);
+        Lasso {
+            stem,
+            cycle,
+            stays,
+            predicates: open.into_iter().chain([stays.keep]).collect(),
         }
-        let mut run = timed(
-            symbolic,
-            &Wanted {
-                stays: Some(stays),
-                ..wanted(&moves, Finish::Entry)
-            },
-        )?;
-        let replayed = replay::replay(network, &run, &Claim::Possible);
-        let states = match replayed.map_err(Missing::NotCovered)? {
-            Outcome::Replayed(states, _) => states,
-            // The replay of the whole run says what is wrong.
-            Outcome::Violated(_) => return Ok(run),
-        };
-        let mut heads: Vec<usize> = (0..=rounds).map(|k| start + k * cycle.len()).collect();
-        heads.retain(|&state| run.from <= Moment { state, wait: 0 });
-        let at_heads: Vec<&State> = heads.iter().map(|&head| &states[head]).collect();
-        let found = replay::repeated(network, &at_heads, run.ticks_per_unit, &predicates);
-        if let Some((first, last)) = found.map_err(Missing::NotCovered)? {
-            run.steps.truncate(heads[last]);
-            run.end = End::Loop(heads[first]);
-            return Ok(run);
-        }
-        rounds *= 2;
     }
-    Err(Missing::OpenLoop)
+
+    /// The moves, with the loop taken so often.
+    fn moves(&self, rounds: usize) -> Vec<Vec<Part>> {
+        let mut moves = self.stem.to_vec();
+        for _ in 0..rounds {
+            moves.extend_from_slice(self.cycle);
+        }
+        moves
+    }
+
+    /// The state on entry of the loop after so many rounds.
+    fn head(&self, rounds: usize) -> usize {
+        self.stem.len() + rounds * self.cycle.len()
+    }
+
+    /// The run in a network with stopwatches: after some rounds of the loop, one more comes back to
+    /// the same values.
+    fn closed(&self, symbolic: &mut Symbolic<'_>) -> Result<Run, Missing> {
+        let above = replay::indifferent_above(symbolic.stepper.network(), &self.predicates);
+        for earlier in 0..=MOST_EARLIER_ROUNDS {
+            let head = self.head(earlier);
+            let moves = self.moves(earlier + 1);
+            let run = timed(
+                symbolic,
+                &Wanted {
+                    stays: Some(self.stays),
+                    closing: Some(Closing { head, above }),
+                    ..wanted(&moves, Finish::Entry)
+                },
+            );
+            let entry = Moment {
+                state: head,
+                wait: 0,
+            };
+            match run {
+                Ok(mut run) if run.from <= entry => {
+                    run.end = End::Loop(head);
+                    return Ok(run);
+                }
+                Ok(_) | Err(Missing::Approximate) => {}
+                Err(missing) => return Err(missing),
+            }
+        }
+        Err(Missing::OpenLoop)
+    }
+
+    /// The run with the loop taken as often as it needs to close.
+    fn looped(&self, symbolic: &mut Symbolic<'_>) -> Result<Run, Missing> {
+        let network = symbolic.stepper.network();
+        let mut rounds = 1;
+        while rounds <= MOST_ROUNDS && self.head(rounds) <= MOST_MOVES {
+            let moves = self.moves(rounds);
+            let mut run = timed(
+                symbolic,
+                &Wanted {
+                    stays: Some(self.stays),
+                    ..wanted(&moves, Finish::Entry)
+                },
+            )?;
+            let replayed = replay::replay(network, &run, &Claim::Possible);
+            let states = match replayed.map_err(Missing::NotCovered)? {
+                Outcome::Replayed(states, _) => states,
+                // The replay of the whole run says what is wrong.
+                Outcome::Violated(_) => return Ok(run),
+            };
+            let mut heads: Vec<usize> = (0..=rounds).map(|round| self.head(round)).collect();
+            heads.retain(|&state| run.from <= Moment { state, wait: 0 });
+            let at_heads: Vec<&State> = heads.iter().map(|&head| &states[head]).collect();
+            let unit = run.ticks_per_unit;
+            let found = replay::repeated(network, &at_heads, unit, &self.predicates);
+            if let Some((first, last)) = found.map_err(Missing::NotCovered)? {
+                run.steps.truncate(heads[last]);
+                run.end = End::Loop(heads[first]);
+                return Ok(run);
+            }
+            rounds *= 2;
+        }
+        Err(Missing::OpenLoop)
+    }
 }

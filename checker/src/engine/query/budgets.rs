@@ -13,6 +13,9 @@ pub(super) const STATES_BEFORE_CROWD: u64 = 2048;
 /// So many zones for each discrete state are many.
 pub(super) const CROWD: usize = 4;
 
+/// The same in time-optimal games: with more of them, there will be more still.
+pub(super) const CROWD_IN_RACES: usize = 2;
+
 /// Discrete states that are explored instead, at most. More of them are rather such that no run
 /// reaches.
 const MOST_DISCRETE_STATES: u64 = 64 * STATES_BEFORE_CROWD;
@@ -44,6 +47,13 @@ pub(super) const IN_DISCRETE_STATES: Allowance = Allowance {
     bytes_each: MOST_BYTES_OF_DISCRETE_STATE,
     operations_each: MOST_OPERATIONS_ON_DISCRETE_STATE,
     states_of_grace: STATES_OF_GRACE,
+};
+
+/// To play a time-optimal game in discrete states. Beside the clock, zones that are reached are
+/// rarely few enough to be worth more.
+pub(super) const RACE_IN_DISCRETE_STATES: Allowance = Allowance {
+    explored: 1 << 20,
+    ..IN_DISCRETE_STATES
 };
 
 /// To play a game with a goal that is to recur in discrete states. All nodes are computed in each

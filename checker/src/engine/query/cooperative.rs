@@ -21,16 +21,30 @@ use crate::engine::evidence::{strategy_check, timed_run};
 use crate::engine::format::text;
 use crate::engine::limits::stop_text;
 
-/// The strategy of the winner of a game that was solved with both players working together.
-/// `rounds` are those of a goal that is to recur, and `zones` fresh ones of the game. An error of
-/// the inner result says why there is none.
+/// What is known of a solved game beside its graph.
+pub(super) struct Solved<'s, 'n> {
+    /// Who wins.
+    pub(super) winner: Player,
+    /// The rounds of a goal that is to recur.
+    pub(super) rounds: Option<&'s [Vec<Win>]>,
+    /// Fresh zones of the game, to look for runs in.
+    pub(super) zones: &'s mut Symbolic<'n>,
+    pub(super) options: &'s Options,
+}
+
+/// The strategy of the winner of a game that was solved with both players working together. An
+/// error of the inner result says why there is none.
 pub(super) fn strategy(
     solver: &mut Solver<'_, '_, '_>,
-    (winner, rounds): (Player, Option<&[Vec<Win>]>),
-    zones: &mut Symbolic<'_>,
-    options: &Options,
+    solved: Solved<'_, '_>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, String>, Failure> {
+    let Solved {
+        winner,
+        rounds,
+        zones,
+        options,
+    } = solved;
     if winner == Player::Environment {
         let nodes = (0..solver.graph.nodes.len() as u32).rev().collect();
         let strategy = match rounds {

@@ -17,10 +17,11 @@ use super::extremum::extremum;
 use super::liveness::{always, leads_to};
 use super::partial_observation::ObservedGame;
 use super::reachable::reachable;
-use super::subject::Subject;
+use super::subject::{Followed, Subject};
 use super::time_optimal::{Race, fastest};
 use super::{game, partial_observation, time_clock};
 use crate::engine::answer::{Answer, Verdict};
+use crate::engine::evidence::strategy_check::Asked;
 use crate::engine::limits::{CLOCKS_GREW, LimitWatch};
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
@@ -39,12 +40,13 @@ impl LoadedModel {
         let subject = Subject {
             network: &network,
             executor: self.executor(),
-            under: under.as_ref(),
-            within,
-            priorities: options.priorities,
-            tuning: options.tuning,
+            under: under
+                .as_ref()
+                .zip(within)
+                .map(|(moves, strategy)| Followed { moves, strategy }),
+            options,
         };
-        let mut answer = answer(subject, query, options);
+        let mut answer = answer(subject, query);
         if time_limit.is_some() && query.strategy.is_none() {
             answer.evidence.forget_last_clock();
         }
@@ -53,7 +55,8 @@ impl LoadedModel {
 }
 
 /// Answers a query that [`crate::engine::LoadedModel`] has accepted.
-fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> Answer {
+fn answer(subject: Subject<'_>, query: &Query) -> Answer {
+    let options = subject.options;
     let start = Instant::now();
     let zone_bytes = subject.network.clocks.len().pow(2) * size_of::<Bound>();
     let at_hand_bytes = (zones_at_hand(&query.kind) * zone_bytes) as u64;
@@ -61,7 +64,7 @@ fn answer(subject: Subject<'_>, query: &Query, options: &Options) -> Answer {
     let result = watch.bound(|watch| {
         // Where there are thousands of clocks this alone may be too much.
         cancellation::ask_for(zone_bytes);
-        answer_within(subject, query, options, watch)
+        answer_within(subject, query, watch)
     });
     let mut answer =
         result.unwrap_or_else(|(reason, counters)| Answer::new(Verdict::Unknown(reason), counters));
@@ -100,35 +103,27 @@ fn zones_at_hand(kind: &QueryKind) -> usize {
 }
 
 /// The same, within the limits.
-fn answer_within(
-    subject: Subject<'_>,
-    query: &Query,
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Answer {
-    let Subject {
-        network, executor, ..
-    } = subject;
+fn answer_within(subject: Subject<'_>, query: &Query, watch: &mut LimitWatch) -> Answer {
     match &query.kind {
-        QueryKind::Reachable(goal) => reduced(subject, options, |symmetry| {
-            reachable(subject, goal, options, symmetry, watch)
+        QueryKind::Reachable(goal) => reduced(subject, |symmetry| {
+            reachable(subject, goal, symmetry, watch)
         }),
         QueryKind::Invariantly(invariant) => {
             let broken = invariant.negated();
-            let answer = reduced(subject, options, |symmetry| {
-                reachable(subject, &broken, options, symmetry, watch)
+            let answer = reduced(subject, |symmetry| {
+                reachable(subject, &broken, symmetry, watch)
             });
             answer.negated()
         }
-        QueryKind::PotentiallyAlways(keep) => always(subject, keep, options, watch),
+        QueryKind::PotentiallyAlways(keep) => always(subject, keep, watch),
         QueryKind::Eventually(goal) => {
             let keep = goal.negated();
-            always(subject, &keep, options, watch).negated()
+            always(subject, &keep, watch).negated()
         }
         QueryKind::LeadsTo(cause, effect) => {
             let open = Predicate::And(vec![cause.clone(), effect.negated()]);
             let keep = effect.negated();
-            leads_to(subject, (&open, &keep), options, watch)
+            leads_to(subject, &open, &keep, watch)
         }
         QueryKind::Extremum {
             least,
@@ -143,8 +138,8 @@ fn answer_within(
                 greatest: *greatest,
                 further: subject.atoms(),
             };
-            reduced(subject, options, |symmetry| {
-                extremum(subject, question, options, symmetry, watch)
+            reduced(subject, |symmetry| {
+                extremum(subject, question, symmetry, watch)
             })
         }
         QueryKind::Control {
@@ -158,7 +153,7 @@ fn answer_within(
                 limit,
                 rest,
             };
-            fastest(network, executor, &race, options, watch)
+            fastest(subject, &race, watch)
         }
         QueryKind::Control {
             objective,
@@ -169,16 +164,19 @@ fn answer_within(
                 objective,
                 observations: &observations[..],
             };
-            partial_observation::game(network, executor, asked, options, watch)
+            partial_observation::game(subject, asked, watch)
         }
         QueryKind::Control {
             objective,
             cooperative,
             ..
         } => {
-            let asked = (objective, *cooperative);
-            let under = subject.under.zip(subject.within);
-            game::game((network, under), executor, asked, options, watch)
+            let asked = Asked {
+                objective,
+                is_cooperative: *cooperative,
+                time_optimal: None,
+            };
+            game::game(subject, asked, watch)
         }
         QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
             unreachable!("strategies are saved and loaded elsewhere")
@@ -187,15 +185,14 @@ fn answer_within(
 }
 
 /// Answers with a search that takes states that differ only by exchanged members of scalar sets for
-/// the same, if that is wanted and sound. Whether a failure is met can hang on the order in which a
-/// quantifier runs through members, so that one that is found so is looked for again among all
+/// the same, if that is wanted and sound. Whether a failure is met can depend on the order in which
+/// a quantifier runs through members, so that one that is found so is looked for again among all
 /// states.
 fn reduced(
     subject: Subject<'_>,
-    options: &Options,
     mut answer: impl FnMut(Option<&Arc<Symmetry>>) -> Answer,
 ) -> Answer {
-    let is_allowed = options.reductions.symmetry && subject.under.is_none();
+    let is_allowed = subject.options.reductions.symmetry && subject.under.is_none();
     let symmetry = is_allowed
         .then(|| Symmetry::of_network(subject.network))
         .flatten();

@@ -16,7 +16,6 @@ use crate::verify::replay::Shown;
 use super::optimal_trace::{Sought, best, not_the_best};
 use super::subject::{Subject, live_variables, symbolic};
 use super::witnesses::{Witnesses, found};
-use crate::engine::Options;
 use crate::engine::answer::{Answer, Evidence, Values, Verdict};
 use crate::engine::evidence::timed_run::{Shows, Takes};
 use crate::engine::evidence::witness::{Witness, WitnessKind};
@@ -26,16 +25,16 @@ use crate::engine::limits::LimitWatch;
 pub(super) fn extremum(
     subject: Subject<'_>,
     question: Question<'_>,
-    options: &Options,
     symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Answer {
+    let options = subject.options;
     let read = predicate::functions(question.predicate).into_iter();
     let read = read.chain(question.items.iter().filter_map(|(item, _)| match *item {
         Measure::Integer(function) => Some(function),
         Measure::Clock(clock) => predicate::chooser(clock),
     }));
-    let live = live_variables(subject, read, options, symmetry);
+    let live = live_variables(subject, read, symmetry);
     let mut zones = |further: &[ClockAtom]| {
         let predicates = [question.predicate];
         symbolic(subject, &predicates, further, Abstraction::LowerUpper)
@@ -79,7 +78,6 @@ pub(super) fn extremum(
         let mut runs = Runs {
             subject,
             question,
-            options,
             witnesses: Vec::new(),
             why_not_best: None,
             are_sure: true,
@@ -104,7 +102,6 @@ pub(super) fn extremum(
 struct Runs<'q> {
     subject: Subject<'q>,
     question: Question<'q>,
-    options: &'q Options,
     witnesses: Vec<Witness>,
     /// Why some are any ones where the best were wanted.
     why_not_best: Option<String>,
@@ -153,7 +150,7 @@ impl Runs<'_> {
         mut symbolic: Symbolic<'_>,
         watch: &mut LimitWatch,
     ) -> Option<Verdict> {
-        let options = self.options;
+        let options = self.subject.options;
         let search = || search::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
         let report = cancellation::unless_cut(search).ok()?;
         let Ok(Outcome::Found(trace)) = report.outcome else {
@@ -165,7 +162,7 @@ impl Runs<'_> {
             predicate: self.question.predicate,
             atoms,
         };
-        let (trace, deadline) = match best(self.subject, &mut symbolic, sought, options, watch) {
+        let (trace, deadline) = match best(self.subject, &mut symbolic, sought, watch) {
             Ok(None) => (trace, None),
             Ok(Some((best, deadline))) => (best, deadline),
             Err(reason) => {

@@ -1,13 +1,16 @@
 //! One file for each kind of query.
 
+pub(super) mod attempts;
 pub(super) mod budgets;
 pub(super) mod cooperative;
 pub(super) mod dispatch;
 pub(super) mod extremum;
 pub(super) mod game;
+pub(super) mod game_zones;
 pub(super) mod liveness;
 pub(super) mod optimal_trace;
 pub mod partial_observation;
+pub(super) mod plans;
 pub(super) mod reachable;
 pub(crate) mod subject;
 pub mod time_clock;

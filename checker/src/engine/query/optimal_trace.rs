@@ -12,7 +12,7 @@ use crate::zones::Bound;
 use super::subject::{Subject, symbolic};
 use super::time_clock::with_time;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
-use crate::engine::{Options, TraceWanted};
+use crate::engine::options::TraceWanted;
 
 /// The states that a trace is to lead to.
 pub(super) struct Sought<'q> {
@@ -34,7 +34,6 @@ pub(super) fn best(
     subject: Subject<'_>,
     zones: &mut Symbolic<'_>,
     sought: Sought<'_>,
-    options: &Options,
     watch: &mut LimitWatch,
 ) -> Result<Option<(Trace, Option<best_first::Cost>)>, String> {
     let Sought {
@@ -43,7 +42,7 @@ pub(super) fn best(
         mut atoms,
     } = sought;
     let none = Counters::default();
-    let way = match options.trace {
+    let way = match subject.options.trace {
         TraceWanted::Any => return Ok(None),
         TraceWanted::Shortest => {
             let mut search =
@@ -68,7 +67,7 @@ pub(super) fn best(
     };
     match way {
         Ok(Outcome::Found(way)) => {
-            let deadline = (options.trace == TraceWanted::Fastest).then_some(way.cost);
+            let deadline = (subject.options.trace == TraceWanted::Fastest).then_some(way.cost);
             Ok(Some((way.trace(zones, target), deadline)))
         }
         Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),

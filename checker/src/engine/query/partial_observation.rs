@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::analysis::{Abstraction, ClockBounds};
-use crate::exec::Executor;
+use crate::analysis::Abstraction;
 use crate::game::partial_observation::{Answer as GameAnswer, Question, Solver};
 use crate::game::strategy::attractor::Selection;
 use crate::game::{Player, Priorities};
@@ -13,13 +12,13 @@ use crate::search::limits::{Counters, Watch};
 use crate::verify::Effort;
 use crate::verify::observed::{self, MachineState};
 
-use super::game::{self, objective_atoms, zones_of};
-use super::subject::has_differences;
+use super::game_zones::{IGNORED_PRIORITIES, effort_of, objective_atoms, zones_of};
+use super::subject::{Subject, has_differences};
 use crate::engine::answer::{Answer, Verdict, Verification};
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::machine_json;
 use crate::engine::limits::LimitWatch;
-use crate::engine::options::{Options, Rules};
+use crate::engine::options::Rules;
 
 /// What a game query with observations asks for.
 #[derive(Clone, Copy, Debug)]
@@ -32,12 +31,13 @@ pub struct ObservedGame<'q> {
 
 /// Answers a game query with observations.
 pub(super) fn game(
-    network: &Network,
-    executor: &dyn Executor,
+    subject: Subject<'_>,
     asked: ObservedGame<'_>,
-    options: &Options,
     watch: &mut LimitWatch,
 ) -> Answer {
+    let Subject {
+        network, options, ..
+    } = subject;
     let ObservedGame {
         objective,
         observations,
@@ -52,8 +52,7 @@ pub(super) fn game(
     } else {
         Abstraction::Maximum
     };
-    let bounds = ClockBounds::new(network, &atoms, abstraction, options.tuning);
-    let mut symbolic = zones_of(network, executor, bounds, options);
+    let mut symbolic = zones_of(subject, &atoms, abstraction);
     let (goal, keep, must_reach) = match objective {
         Objective::Reach(goal) => (Some(goal), None, true),
         Objective::Until(keep, goal) => (Some(goal), Some(keep), true),
@@ -81,7 +80,7 @@ pub(super) fn game(
     };
     let mut answer = Answer::new(verdict, counters);
     if ignores_priorities {
-        answer.message = Some(game::IGNORED_PRIORITIES.to_owned());
+        answer.message = Some(IGNORED_PRIORITIES.to_owned());
     }
     if options.plans.is_some() {
         let message = "a game with observations gives no plans: its strategy is a machine that goes by what it sees";
@@ -97,7 +96,7 @@ pub(super) fn game(
                 let machine = machine_json::to_check(&machine);
                 let rules = options.rules();
                 let mut ends = || watch.look(&Counters::default()).is_some();
-                let effort = &mut game::effort_of(options).unless(&mut ends);
+                let effort = &mut effort_of(options).unless(&mut ends);
                 let result = verify(network, asked, &machine, rules, effort);
                 answer.evidence.verification = Some(result);
             }

@@ -11,65 +11,66 @@ use crate::search::reachability::report::Report;
 use crate::search::reachability::search;
 use crate::search::{Outcome, Trace};
 
+use super::attempts::{Accuracy, first_of_use};
 use super::optimal_trace::{Sought, best, not_the_best};
-use super::subject::{Subject, coarser, live_variables, symbolic};
+use super::subject::{Subject, can_be_coarse, coarse, live_variables, symbolic};
 use super::witnesses::Witnesses;
 use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::evidence::certificate;
 use crate::engine::evidence::timed_run::Shows;
 use crate::engine::limits::LimitWatch;
-use crate::engine::{Options, TraceWanted};
+use crate::engine::options::TraceWanted;
+
+/// A search for the goal that has ended, with its zones.
+struct Searched<'a> {
+    symbolic: Symbolic<'a>,
+    report: Report,
+}
 
 /// Is there a state in which the goal holds?
 pub(super) fn reachable<'a>(
     subject: Subject<'a>,
     goal: &Predicate,
-    options: &Options,
     symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Answer {
+    let options = subject.options;
     // A strategy may forbid moves in one order and allow them in another.
     let is_ordered = options.reductions.partial_order && subject.under.is_none();
     let order = is_ordered
         .then(|| PartialOrder::new(subject.network, goal, options.tuning))
         .flatten();
-    let live = live_variables(subject, predicate::functions(goal), options, symmetry);
-    let reduced = |symbolic: Symbolic<'a>| {
+    let live = live_variables(subject, predicate::functions(goal), symmetry);
+    let search = |accuracy| {
+        let symbolic = match accuracy {
+            Accuracy::Coarse => coarse(subject, &[goal]),
+            Accuracy::Exact => symbolic(subject, &[goal], &[], Abstraction::LowerUpper),
+        };
         let symbolic = symbolic.reduced_by(symmetry.cloned());
-        symbolic.ordered_by(order.clone()).forgetting(live.clone())
+        let mut symbolic = symbolic.ordered_by(order.clone()).forgetting(live.clone());
+        let mut look = goal;
+        let report = search::search_shared(&mut symbolic, &mut look, options.manner(), watch);
+        Searched { symbolic, report }
     };
-    if let Some((mut symbolic, report)) = reach_coarsely(subject, goal, options, reduced, watch) {
-        return conclude(subject, &mut symbolic, goal, report, options, watch);
-    }
-    let mut symbolic = reduced(symbolic(subject, &[goal], &[], Abstraction::LowerUpper));
-    let mut look = goal;
-    let report = search::search_shared(&mut symbolic, &mut look, options.manner(), watch);
-    conclude(subject, &mut symbolic, goal, report, options, watch)
-}
-
-/// Looks for a deadlock in zones that are too large for it. One that is found counts if it remains
-/// in the exact zones of its trace. `None` if this settles nothing, or does not apply.
-fn reach_coarsely<'a>(
-    subject: Subject<'a>,
-    goal: &Predicate,
-    options: &Options,
-    reduced: impl FnOnce(Symbolic<'a>) -> Symbolic<'a>,
-    watch: &mut LimitWatch,
-) -> Option<(Symbolic<'a>, Report)> {
-    // The zones of a certificate must be free of deadlocks themselves, and the best trace is found
-    // in them.
-    let is_exact = options.certificate || options.trace != TraceWanted::Any;
-    if is_exact || !predicate::has_deadlock(goal) {
-        return None;
-    }
-    let mut coarse = reduced(coarser(subject, &[goal])?);
-    let mut look = goal;
-    let report = search::search_shared(&mut coarse, &mut look, options.manner(), watch);
-    let is_settled = match &report.outcome {
-        Ok(Outcome::Found(trace)) => ends_in(&mut coarse, goal, trace),
+    let is_settled = |searched: &mut Searched<'a>| match &searched.report.outcome {
+        Ok(Outcome::Found(trace)) => ends_in(&mut searched.symbolic, goal, trace),
         _ => true,
     };
-    is_settled.then_some((coarse, report))
+    let attempts = attempts(subject, goal);
+    let searched = first_of_use(attempts, search, |_, searched| is_settled(searched));
+    conclude(subject, goal, searched, watch)
+}
+
+/// A deadlock is first looked for in zones that are too large for it: one that is found counts if
+/// it remains in the exact zones of its trace.
+fn attempts(subject: Subject<'_>, goal: &Predicate) -> &'static [Accuracy] {
+    // The zones of a certificate must be free of deadlocks themselves, and the best trace is found
+    // in them.
+    let is_exact = subject.options.certificate || subject.options.trace != TraceWanted::Any;
+    if is_exact || !predicate::has_deadlock(goal) || !can_be_coarse(subject, &[goal]) {
+        return &[Accuracy::Exact];
+    }
+    &[Accuracy::Coarse, Accuracy::Exact]
 }
 
 /// Whether the last state of a trace, whose zones are exact, satisfies the predicate somewhere.
@@ -87,14 +88,17 @@ fn ends_in(symbolic: &mut Symbolic<'_>, goal: &Predicate, trace: &Trace) -> bool
 /// The answer that the report of a search for the goal amounts to.
 fn conclude(
     subject: Subject<'_>,
-    symbolic: &mut Symbolic<'_>,
     goal: &Predicate,
-    report: Report,
-    options: &Options,
+    searched: Searched<'_>,
     watch: &mut LimitWatch,
 ) -> Answer {
+    let options = subject.options;
+    let Searched {
+        mut symbolic,
+        report,
+    } = searched;
     let counters = report.counters;
-    let mut witnesses = Witnesses::new(symbolic, options);
+    let mut witnesses = Witnesses::new(&mut symbolic, options);
     let mut certificate = None;
     let mut message = None;
     let verdict = match report.outcome {
@@ -105,7 +109,7 @@ fn conclude(
                 predicate: goal,
                 atoms: Vec::new(),
             };
-            let (trace, deadline) = match best(subject, symbolic, sought, options, watch) {
+            let (trace, deadline) = match best(subject, symbolic, sought, watch) {
                 Ok(None) => (trace, None),
                 Ok(Some((best, deadline))) => (best, deadline),
                 Err(reason) => {

@@ -12,7 +12,6 @@ use crate::network::symbolic::predicate;
 use crate::network::{Restriction, Stepper, Symbolic, Symmetry};
 
 use crate::engine::options::Options;
-use crate::tuning::Tuning;
 
 /// What a query is about.
 #[derive(Clone, Copy)]
@@ -20,31 +19,35 @@ pub(crate) struct Subject<'a> {
     pub(crate) network: &'a Network,
     pub(crate) executor: &'a dyn Executor,
     /// The strategy that the controller follows.
-    pub(crate) under: Option<&'a ClosedLoop>,
-    /// The same for games, whose strategies are within it.
-    pub(crate) within: Option<&'a Arc<Under>>,
-    /// Whether priorities count under the strategy.
-    pub(crate) priorities: Priorities,
-    /// Which heuristics are used.
-    pub(crate) tuning: Tuning,
+    pub(crate) under: Option<Followed<'a>>,
+    /// How the query is to be answered.
+    pub(crate) options: &'a Options,
+}
+
+/// A strategy that the controller follows.
+#[derive(Clone, Copy)]
+pub(crate) struct Followed<'a> {
+    /// The moves that it allows.
+    pub(crate) moves: &'a ClosedLoop,
+    /// The strategy itself, with its query.
+    pub(crate) strategy: &'a Arc<Under>,
 }
 
 impl<'a> Subject<'a> {
     /// The comparisons of the strategy.
     pub(super) fn atoms(&self) -> &'a [ClockAtom] {
-        self.under.map_or(&[], Restriction::atoms)
+        self.under.map_or(&[], |under| under.moves.atoms())
     }
 }
 
 /// The variables that a search whose question reads words by `functions` may forget where they are
-/// not live. What a strategy allows hangs on all of them.
+/// not live. What a strategy allows depends on all of them.
 pub(super) fn live_variables(
     subject: Subject<'_>,
     functions: impl IntoIterator<Item = FunctionId>,
-    options: &Options,
     symmetry: Option<&Arc<Symmetry>>,
 ) -> Option<Arc<LiveVariables>> {
-    if !options.reductions.live_variables || subject.under.is_some() {
+    if !subject.options.reductions.live_variables || subject.under.is_some() {
         return None;
     }
     // An initial value is the same member for all, so that states would no longer be each other's
@@ -70,16 +73,10 @@ pub(crate) fn symbolic<'a>(
         network,
         executor,
         under,
-        priorities,
-        tuning,
-        ..
+        options,
     } = subject;
-    let mut atoms: Vec<ClockAtom> = predicates
-        .iter()
-        .flat_map(|one| predicate::atoms(one))
-        .chain(further.iter().cloned())
-        .chain(subject.atoms().iter().cloned())
-        .collect();
+    let mut atoms = atoms_of(predicates);
+    atoms.extend(further.iter().chain(subject.atoms()).cloned());
     let mut needs_maximum = predicates.iter().any(|one| predicate::has_deadlock(one));
     if predicate::depends_on_negations(network) {
         if further.is_empty() {
@@ -96,36 +93,38 @@ pub(crate) fn symbolic<'a>(
     } else {
         wanted
     };
-    let bounds = ClockBounds::new(network, &atoms, abstraction, tuning);
-    let symbolic = Symbolic::new(Stepper::tuned(network, executor, tuning), bounds)
-        .restricted(under.map(|one| one as &dyn Restriction));
-    if under.is_some() && priorities == Priorities::Ignored {
+    let bounds = ClockBounds::new(network, &atoms, abstraction, options.tuning);
+    let symbolic = Symbolic::new(Stepper::tuned(network, executor, options.tuning), bounds)
+        .restricted(under.map(|under| under.moves as &dyn Restriction));
+    if under.is_some() && options.priorities == Priorities::Ignored {
         symbolic.without_priorities()
     } else {
         symbolic
     }
 }
 
+/// Whether there are zones coarser than those of [`symbolic`] that show that there is nothing.
+pub(super) fn can_be_coarse(subject: Subject<'_>, predicates: &[&Predicate]) -> bool {
+    if !subject.options.tuning.coarser_first || predicate::depends_on_negations(subject.network) {
+        return false;
+    }
+    let mut atoms = atoms_of(predicates);
+    atoms.extend(subject.atoms().iter().cloned());
+    !has_differences(subject.network, &atoms)
+}
+
 /// Zones that may be too large for what is asked, where those of [`symbolic`] would be many more:
-/// nothing that these zones do not have is there, but what they have may not be. `None` if there
-/// are none but those of [`symbolic`].
-pub(super) fn coarser<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Option<Symbolic<'a>> {
-    if !subject.tuning.coarser_first || predicate::depends_on_negations(subject.network) {
-        return None;
-    }
-    let atoms: Vec<ClockAtom> = predicates
-        .iter()
-        .flat_map(|one| predicate::atoms(one))
-        .collect();
-    let all: Vec<ClockAtom> = [&atoms, subject.atoms()]
-        .into_iter()
-        .flatten()
-        .cloned()
-        .collect();
-    if has_differences(subject.network, &all) {
-        return None;
-    }
+/// nothing that these zones do not have is there, but what they have may not be. They are sound
+/// where [`can_be_coarse`] says so.
+pub(super) fn coarse<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Symbolic<'a> {
+    let atoms = atoms_of(predicates);
     // What simulates a valuation may have more moves: a deadlock could be left out for a state that
     // has none.
-    Some(symbolic(subject, &[], &atoms, Abstraction::LowerUpper).comparing_as_sets())
+    symbolic(subject, &[], &atoms, Abstraction::LowerUpper).comparing_as_sets()
+}
+
+/// The comparisons of clocks in these predicates.
+fn atoms_of(predicates: &[&Predicate]) -> Vec<ClockAtom> {
+    let atoms = predicates.iter().flat_map(|one| predicate::atoms(one));
+    atoms.collect()
 }

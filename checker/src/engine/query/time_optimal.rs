@@ -10,7 +10,7 @@
 //!
 //! The clock tells apart when a state is reached, so that there are soon many zones for each
 //! discrete state. Then there is one node for each, if that is possible: how much time is needed
-//! does not hang on how much has passed. The limit has no part in how many these are, so that a
+//! does not depend on how much has passed. The limit has no part in how many these are, so that a
 //! generous one is tried first.
 //!
 //! For a strategy the game is solved again, with the time that was found as the limit and a clock
@@ -18,22 +18,22 @@
 
 use std::sync::Arc;
 
-use crate::analysis::{Abstraction, ClockBounds};
-use crate::exec::Executor;
-use crate::game::backward::budget::Allowance;
+use crate::analysis::Abstraction;
 use crate::game::backward::solver::{Answer as GameAnswer, Extent, Solver, Win};
 use crate::game::forward::graph::{Deadline, Graph, Objective as GameObjective};
 use crate::game::strategy::attractor::{self, Strategy};
 use crate::game::{Nodes, Player};
-use crate::ir::{ClockAtom, ClockId, ClockRange, FunctionId, Network, Objective, Predicate};
+use crate::ir::{ClockAtom, ClockId, ClockRange, FunctionId, Objective, Predicate};
 use crate::network::{Failure, Stepper};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::optimum::extremum::{Extreme, Extremes};
 use crate::zones::{Bound, Zone};
 
-use super::budgets::{IN_DISCRETE_STATES, STATES_BEFORE_CROWD};
-use super::game::{self, objective_atoms};
-use super::subject::has_differences;
+use super::attempts::first_of_use;
+use super::budgets::{CROWD_IN_RACES, RACE_IN_DISCRETE_STATES, STATES_BEFORE_CROWD};
+use super::game;
+use super::game_zones::{self, objective_atoms, verified, zones_of};
+use super::subject::{Subject, has_differences};
 use super::time_clock::{TIME, with_time};
 use crate::engine::answer::{Answer, Values, Verdict};
 use crate::engine::evidence::strategy_check::Asked;
@@ -46,13 +46,6 @@ const FIRST_LIMIT: i32 = 16;
 /// The limit to start from in discrete states.
 const FIRST_LIMIT_IN_DISCRETE_STATES: i32 = 1 << 12;
 
-/// So many zones for each discrete state are many: with more of them, there will be more still.
-const CROWD: usize = 2;
-
-/// Discrete states that are explored, at most. Beside the clock, zones that are reached are rarely
-/// few enough to be worth more.
-const MOST_DISCRETE_STATES: u64 = 1 << 20;
-
 /// What is asked: the goal, what is kept, and the bounds u and g.
 pub(super) struct Race<'q> {
     pub(super) objective: &'q Objective,
@@ -63,7 +56,9 @@ pub(super) struct Race<'q> {
 /// The least time, and whether it is reached or only approached.
 type Time = (i32, bool);
 
-enum Run {
+/// How an attempt to find the time ended.
+enum RaceEnd {
+    /// The least time, if it is within the limit.
     Time(Option<Time>),
     Stopped(StopReason),
     Approximate,
@@ -72,188 +67,249 @@ enum Run {
 }
 
 /// Answers a time-optimal query.
-pub(super) fn fastest(
-    network: &Network,
-    executor: &dyn Executor,
-    race: &Race<'_>,
-    options: &Options,
-    watch: &mut LimitWatch,
-) -> Answer {
-    let mut counters = Counters::default();
-    let is_strategy_wanted = options.strategy || options.verify;
-    let mut limit = if let Some(limit) = race.limit {
-        let mut words = network.initial.clone();
-        match Stepper::tuned(network, executor, options.tuning).evaluate(limit, &mut words) {
-            // Time is never negative.
-            Ok(limit) => limit.max(-1),
-            Err(error) => {
-                let failure = Verdict::Error(error.into());
-                return Answer::new(failure, counters);
-            }
+pub(super) fn fastest(subject: Subject<'_>, race: &Race<'_>, watch: &mut LimitWatch) -> Answer {
+    let (first_limit, counters) = match first_limit(subject, race, watch) {
+        Ok(found) => found,
+        Err(answer) => return *answer,
+    };
+    let (timed, clock) = with_time(subject.network);
+    let game = Timed {
+        subject: Subject {
+            network: &timed,
+            ..subject
+        },
+        clock,
+        race,
+    };
+    let mut tried = Tried {
+        limit: first_limit,
+        counters,
+    };
+    let play = |nodes| game.least_time(nodes, &mut tried, watch);
+    let end = first_of_use(game.attempts(), play, |nodes, end| match end {
+        Ok(RaceEnd::GivenUp) => false,
+        // A run-time error may lie in a state that no run reaches.
+        Err(_) => nodes != Nodes::Discrete,
+        Ok(_) => true,
+    });
+    let (verdict, time) = match end {
+        Ok(RaceEnd::GivenUp) => unreachable!("symbolic states are all there is"),
+        Ok(RaceEnd::Time(None)) => (Verdict::NotSatisfied, None),
+        Ok(RaceEnd::Time(time)) => (Verdict::Satisfied, time),
+        Ok(RaceEnd::Stopped(reason)) => (Verdict::Unknown(reason), None),
+        Ok(RaceEnd::Approximate) => (Verdict::Maybe, None),
+        Err(failure) => (Verdict::Error(failure), None),
+    };
+    let mut answer = Answer::new(verdict, tried.counters);
+    if let Some((value, is_reached)) = time {
+        answer.value = Some(least_value(value, is_reached));
+        if !is_reached {
+            answer.remark(format!("time > {value}: the value itself is not reached"));
         }
-    } else {
-        let asked = (race.objective, false);
-        let plain = Options {
-            limits: options.limits.clone(),
-            forced: options.forced,
-            priorities: options.priorities,
-            tuning: options.tuning,
-            ..Options::default()
+    }
+    // Where the time is only approached, the strategy needs less than a unit more.
+    let limit = match (verdict, time) {
+        (Verdict::Satisfied, Some((value, is_reached))) => Some(value + i32::from(!is_reached)),
+        (Verdict::NotSatisfied, _) if race.limit.is_some() => Some(tried.limit),
+        _ => None,
+    };
+    let is_strategy_wanted = subject.options.strategy || subject.options.verify;
+    if let Some(limit) = limit.filter(|_| is_strategy_wanted) {
+        game.add_strategy(subject, limit, &mut answer, watch);
+    }
+    answer
+}
+
+/// The limit to begin with, and what was done to find it: that of the query, or a small one if the
+/// goal can be forced at all. An error is the answer to the query.
+fn first_limit(
+    subject: Subject<'_>,
+    race: &Race<'_>,
+    watch: &mut LimitWatch,
+) -> Result<(i32, Counters), Box<Answer>> {
+    let Subject {
+        network,
+        executor,
+        options,
+        ..
+    } = subject;
+    if let Some(limit) = race.limit {
+        let mut words = network.initial.clone();
+        let limit = Stepper::tuned(network, executor, options.tuning).evaluate(limit, &mut words);
+        return match limit {
+            // Time is never negative.
+            Ok(limit) => Ok((limit.max(-1), Counters::default())),
+            Err(error) => Err(Box::new(Answer::failed(error.into()))),
         };
-        let answer = game::game((network, None), executor, asked, &plain, watch);
-        if answer.verdict == Verdict::NotSatisfied && is_strategy_wanted {
+    }
+    let asked = Asked {
+        objective: race.objective,
+        is_cooperative: false,
+        time_optimal: None,
+    };
+    let plain = Options {
+        limits: options.limits.clone(),
+        forced: options.forced,
+        priorities: options.priorities,
+        tuning: options.tuning,
+        ..Options::default()
+    };
+    let plain_game = Subject {
+        options: &plain,
+        ..subject
+    };
+    let answer = game::game(plain_game, asked, watch);
+    match answer.verdict {
+        Verdict::Satisfied => Ok((FIRST_LIMIT, answer.counters)),
+        Verdict::NotSatisfied if options.strategy || options.verify => {
             let with_strategy = Options {
                 strategy: options.strategy,
                 verify: options.verify,
                 ..plain
             };
-            return game::game((network, None), executor, asked, &with_strategy, watch);
+            let game_with_strategy = Subject {
+                options: &with_strategy,
+                ..subject
+            };
+            Err(Box::new(game::game(game_with_strategy, asked, watch)))
         }
-        if answer.verdict != Verdict::Satisfied {
-            return answer;
-        }
-        counters = answer.counters;
-        FIRST_LIMIT
-    };
-    let (timed, clock) = with_time(network);
-    let game = Timed {
-        network: &timed,
-        clock,
-        executor,
-        race,
-        options,
-    };
-    let mut nodes = game.first_nodes();
-    loop {
-        if race.limit.is_none() && nodes == Nodes::Discrete {
-            limit = limit.max(FIRST_LIMIT_IN_DISCRETE_STATES);
-        }
-        let run = game.time_needed(limit, nodes, &mut counters, watch);
-        let (verdict, time) = match run {
-            Ok(Run::Time(None)) if race.limit.is_none() && limit <= Bound::MAX_VALUE / 2 => {
-                limit *= 2;
-                continue;
-            }
-            Ok(Run::GivenUp) if nodes == Nodes::Automatic => {
-                nodes = Nodes::Discrete;
-                continue;
-            }
-            // A run-time error may lie in a state that no run reaches.
-            Ok(Run::GivenUp) | Err(_) if nodes == Nodes::Discrete => {
-                nodes = Nodes::Symbolic;
-                if race.limit.is_none() {
-                    limit = FIRST_LIMIT;
-                }
-                continue;
-            }
-            Ok(Run::GivenUp) => unreachable!("symbolic states are all there is"),
-            Ok(Run::Time(None)) => (Verdict::NotSatisfied, None),
-            Ok(Run::Time(time)) => (Verdict::Satisfied, time),
-            Ok(Run::Stopped(reason)) => (Verdict::Unknown(reason), None),
-            Ok(Run::Approximate) => (Verdict::Maybe, None),
-            Err(failure) => (Verdict::Error(failure), None),
-        };
-        let mut answer = Answer::new(verdict, counters);
-        let mut remarks = Vec::new();
-        if let Some((value, is_reached)) = time {
-            let least = Some(Extreme::Value { value, is_reached });
-            answer.value = Some(Values {
-                least: true,
-                greatest: false,
-                items: vec![Extremes {
-                    least,
-                    greatest: None,
-                }],
-            });
-            if !is_reached {
-                remarks.push(format!("time > {value}: the value itself is not reached"));
-            }
-        }
-        // Where the time is only approached, the strategy needs less than a unit more.
-        let limit = match (verdict, time) {
-            (Verdict::Satisfied, Some((value, is_reached))) => Some(value + i32::from(!is_reached)),
-            (Verdict::NotSatisfied, _) if race.limit.is_some() => Some(limit),
-            _ => None,
-        };
-        if let Some(limit) = limit.filter(|_| is_strategy_wanted) {
-            match cut_as_interrupted(|| game.strategy(limit, watch)) {
-                Ok(Ok(strategy)) => {
-                    if options.verify {
-                        let asked = Asked {
-                            objective: race.objective,
-                            is_cooperative: false,
-                            time_optimal: Some((race.limit, race.rest)),
-                        };
-                        let verification =
-                            game::verified(network, asked, &strategy, options, watch);
-                        answer.evidence.verification = Some(verification);
-                    }
-                    remarks.push(match strategy.owner {
-                        Player::Controller => {
-                            format!("the strategy gets there within {TIME} <= {limit}")
-                        }
-                        Player::Environment => {
-                            format!("the environment holds out as long as {TIME} <= {limit}")
-                        }
-                    });
-                    answer.evidence.strategy = Some(Arc::new(strategy));
-                }
-                Ok(Err(reason)) => remarks.push(format!("no strategy: {}", stop_text(reason))),
-                Err(Failure::Interrupted) => {
-                    remarks.push(format!("no strategy: {}", stop_text(watch.stop())));
-                }
-                Err(failure) => answer.verdict = Verdict::Error(failure),
-            }
-        }
-        answer.message = (!remarks.is_empty()).then(|| remarks.join("; "));
-        return answer;
+        _ => Err(Box::new(answer)),
     }
+}
+
+/// A least time as the value of a query.
+fn least_value(value: i32, is_reached: bool) -> Values {
+    let least = Some(Extreme::Value { value, is_reached });
+    Values {
+        least: true,
+        greatest: false,
+        items: vec![Extremes {
+            least,
+            greatest: None,
+        }],
+    }
+}
+
+/// What all attempts share.
+struct Tried {
+    /// The limit that was tried last.
+    limit: i32,
+    /// What was done.
+    counters: Counters,
 }
 
 /// The game on the network with the clock.
 struct Timed<'a, 'q> {
-    network: &'a Network,
+    /// About the network with the clock.
+    subject: Subject<'a>,
     clock: usize,
-    executor: &'a dyn Executor,
     race: &'a Race<'q>,
-    options: &'a Options,
 }
 
 impl Timed<'_, '_> {
-    /// What nodes are tried first.
-    fn first_nodes(&self) -> Nodes {
-        let can_be_discrete = self.options.tuning.discrete_nodes
-            && game::can_be_discrete(self.network, false, self.options)
-            && !has_differences(self.network, &objective_atoms(self.race.objective));
-        if can_be_discrete {
-            self.options.nodes
-        } else {
-            Nodes::Symbolic
+    /// What the nodes of graphs are in which the time is looked for, one after the other.
+    fn attempts(&self) -> &'static [Nodes] {
+        let Subject {
+            network, options, ..
+        } = self.subject;
+        let can_be_discrete = game_zones::can_be_discrete(network, false, options)
+            && !has_differences(network, &objective_atoms(self.race.objective));
+        match options.nodes {
+            Nodes::Automatic if can_be_discrete => {
+                &[Nodes::Automatic, Nodes::Discrete, Nodes::Symbolic]
+            }
+            Nodes::Discrete if can_be_discrete => &[Nodes::Discrete, Nodes::Symbolic],
+            _ => &[Nodes::Symbolic],
         }
     }
 
-    /// The time that is needed, if it is at most the limit.
+    /// The least time. If the query has no limit, limits are doubled until one is enough.
+    fn least_time(
+        &self,
+        nodes: Nodes,
+        tried: &mut Tried,
+        watch: &mut LimitWatch,
+    ) -> Result<RaceEnd, Failure> {
+        if self.race.limit.is_none() {
+            tried.limit = match nodes {
+                Nodes::Discrete => tried.limit.max(FIRST_LIMIT_IN_DISCRETE_STATES),
+                Nodes::Automatic | Nodes::Symbolic => FIRST_LIMIT,
+            };
+        }
+        loop {
+            let end = self.time_needed(nodes, tried, watch);
+            let is_enough = !matches!(end, Ok(RaceEnd::Time(None)));
+            let is_last = self.race.limit.is_some() || tried.limit > Bound::MAX_VALUE / 2;
+            if is_enough || is_last {
+                return end;
+            }
+            tried.limit *= 2;
+        }
+    }
+
+    /// The time that is needed, if it is at most the limit that is tried.
     fn time_needed(
         &self,
-        limit: i32,
         nodes: Nodes,
-        counters: &mut Counters,
+        tried: &mut Tried,
         watch: &mut LimitWatch,
-    ) -> Result<Run, Failure> {
+    ) -> Result<RaceEnd, Failure> {
+        let limit = tried.limit;
         if limit < 0 {
-            return Ok(Run::Time(None));
+            return Ok(RaceEnd::Time(None));
         }
         let conclude = |result, solver: &mut Solver<'_, '_, '_>, _: &mut dyn Watch| {
-            *counters = *counters + solver.counters();
+            tried.counters = tried.counters + solver.counters();
             Ok(match result {
-                GameAnswer::Stopped(_) if solver.has_given_up => Run::GivenUp,
-                GameAnswer::Stopped(reason) => Run::Stopped(reason),
-                GameAnswer::Won(_) if solver.graph.symbolic.is_approximate() => Run::Approximate,
-                GameAnswer::Won(_) => Run::Time(needed(solver, self.clock, limit)),
+                GameAnswer::Stopped(_) if solver.has_given_up => RaceEnd::GivenUp,
+                GameAnswer::Stopped(reason) => RaceEnd::Stopped(reason),
+                GameAnswer::Won(_) if solver.graph.symbolic.is_approximate() => {
+                    RaceEnd::Approximate
+                }
+                GameAnswer::Won(_) => RaceEnd::Time(needed(solver, self.clock, limit)),
             })
         };
-        let start = (limit, Some(nodes));
-        self.solve(start, watch, conclude)
+        self.solve(limit, Some(nodes), watch, conclude)
+    }
+
+    /// Adds the strategy of the player who wins with this limit, or why there is none. `subject` is
+    /// about the network without the clock.
+    fn add_strategy(
+        &self,
+        subject: Subject<'_>,
+        limit: i32,
+        answer: &mut Answer,
+        watch: &mut LimitWatch,
+    ) {
+        let strategy = match cut_as_interrupted(|| self.strategy(limit, watch)) {
+            Ok(Ok(strategy)) => strategy,
+            Ok(Err(reason)) => {
+                return answer.remark(format!("no strategy: {}", stop_text(reason)));
+            }
+            Err(Failure::Interrupted) => {
+                return answer.remark(format!("no strategy: {}", stop_text(watch.stop())));
+            }
+            Err(failure) => {
+                answer.verdict = Verdict::Error(failure);
+                return;
+            }
+        };
+        if subject.options.verify {
+            let asked = Asked {
+                objective: self.race.objective,
+                is_cooperative: false,
+                time_optimal: Some((self.race.limit, self.race.rest)),
+            };
+            let verification = verified(subject, asked, &strategy, watch);
+            answer.evidence.verification = Some(verification);
+        }
+        answer.remark(match strategy.owner {
+            Player::Controller => format!("the strategy gets there within {TIME} <= {limit}"),
+            Player::Environment => {
+                format!("the environment holds out as long as {TIME} <= {limit}")
+            }
+        });
+        answer.evidence.strategy = Some(Arc::new(strategy));
     }
 
     /// The strategy of the player who wins with this limit.
@@ -262,7 +318,7 @@ impl Timed<'_, '_> {
         limit: i32,
         watch: &mut dyn Watch,
     ) -> Result<Result<Strategy, StopReason>, Failure> {
-        self.solve((limit, None), watch, |result, solver, watch| {
+        self.solve(limit, None, watch, |result, solver, watch| {
             if let GameAnswer::Stopped(reason) = result {
                 return Ok(Err(reason));
             }
@@ -282,19 +338,22 @@ impl Timed<'_, '_> {
     /// or in these nodes wholly, with a clock that starts anywhere up to the limit.
     fn solve<R>(
         &self,
-        (limit, nodes): (i32, Option<Nodes>),
+        limit: i32,
+        nodes: Option<Nodes>,
         watch: &mut dyn Watch,
         conclude: impl FnOnce(GameAnswer, &mut Solver<'_, '_, '_>, &mut dyn Watch) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
+        let Subject {
+            network, options, ..
+        } = self.subject;
         let mut atoms = objective_atoms(self.race.objective);
         atoms.extend(limits_of(self.clock, limit.max(0)));
         let abstraction = match nodes {
-            _ if has_differences(self.network, &atoms) => Abstraction::Differences,
+            _ if has_differences(network, &atoms) => Abstraction::Differences,
             Some(Nodes::Discrete) => Abstraction::Exact,
             _ => Abstraction::Maximum,
         };
-        let bounds = ClockBounds::new(self.network, &atoms, abstraction, self.options.tuning);
-        let mut symbolic = game::zones_of(self.network, self.executor, bounds, self.options);
+        let mut symbolic = zones_of(self.subject, &atoms, abstraction);
         let (goal, keep): (&Predicate, _) = match self.race.objective {
             Objective::Until(keep, goal) => (goal, Some(keep)),
             Objective::Reach(goal) => (goal, None),
@@ -316,14 +375,13 @@ impl Timed<'_, '_> {
             Some(Nodes::Discrete) => Graph::of_discrete_states(&mut symbolic, wanted),
             _ => Graph::new(&mut symbolic, wanted),
         }?;
-        let mut solver = Solver::new(&mut graph, Player::Controller, self.options.forced);
-        solver.share_among(self.options.thread_count());
+        let mut solver = Solver::new(&mut graph, Player::Controller, options.forced);
+        solver.share_among(options.thread_count());
         match nodes {
-            Some(Nodes::Automatic) => solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD),
-            Some(Nodes::Discrete) => solver.give_up_beyond(Some(Allowance {
-                explored: MOST_DISCRETE_STATES,
-                ..IN_DISCRETE_STATES
-            })),
+            Some(Nodes::Automatic) => {
+                solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD_IN_RACES);
+            }
+            Some(Nodes::Discrete) => solver.give_up_beyond(Some(RACE_IN_DISCRETE_STATES)),
             Some(Nodes::Symbolic) | None => {}
         }
         let result = match nodes {

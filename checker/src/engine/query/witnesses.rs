@@ -7,7 +7,7 @@ use crate::search::Trace;
 use crate::search::liveness::ending::RunEnding;
 
 use crate::engine::answer::{Evidence, Verdict};
-use crate::engine::evidence::timed_run::{self, Shows, Takes};
+use crate::engine::evidence::timed_run::{self, Shows, Takes, ToProve};
 use crate::engine::evidence::witness::{Missing, Proof, Witness, WitnessKind};
 use crate::engine::options::Options;
 
@@ -83,12 +83,13 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         let mut is_replayed = false;
         let is_wanted = self.has_runs || self.is_doubtful;
         if is_wanted && is_comparable && !witness.trace.states.is_empty() {
-            let network = self.symbolic.stepper.network();
-            let is_doubtful = self.is_doubtful || self.symbolic.is_approximate();
-            let subject = (ending, shows);
-            let trace = &witness.trace;
-            let symbolic = &mut *self.symbolic;
-            let prove = || timed_run::prove(symbolic, network, trace, subject, is_doubtful);
+            let what = ToProve {
+                trace: &witness.trace,
+                ending,
+                shows,
+                is_doubtful: self.is_doubtful || self.symbolic.is_approximate(),
+            };
+            let prove = || timed_run::prove(self.symbolic, what);
             let proof = cancellation::unless_cut(prove);
             let proof = proof.unwrap_or(Proof::Missing(Missing::Stopped));
             is_replayed = matches!(proof, Proof::Replayed(..));

@@ -286,7 +286,13 @@ fn read_timed(network: &Network, state: &Json, words: Vec<i32>) -> Result<Timed,
 }
 
 /// A wait as a fraction of the unit of time: numerator and denominator.
-pub type Wait = (i64, i64);
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wait {
+    /// Not negative.
+    pub numerator: i64,
+    /// At least 1.
+    pub denominator: i64,
+}
 
 /// Why a step is not made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -355,8 +361,7 @@ impl LoadedModel {
             )));
         };
         let strategy = &follower.strategy;
-        let facts = (strategy.owner, &strategy.start, strategy.time_limit);
-        match strategy_check::is_for(self.network(), asked, facts) {
+        match strategy_check::is_for(self.network(), asked, &Played::new(strategy, &[])) {
             Ok(true) => {}
             Ok(false) => {
                 return Err(rejection(format!(
@@ -530,12 +535,11 @@ impl Play {
     }
 
     /// Lets so much time pass, and then something be done.
-    pub fn pass(
-        &mut self,
-        network: &Network,
-        (numerator, denominator): Wait,
-        done: Done,
-    ) -> Result<(), Refused> {
+    pub fn pass(&mut self, network: &Network, wait: Wait, done: Done) -> Result<(), Refused> {
+        let Wait {
+            numerator,
+            denominator,
+        } = wait;
         let now = self.now();
         let situation = self.look(network, now)?;
         let timing = match done {
