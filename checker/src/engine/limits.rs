@@ -48,13 +48,13 @@ const SHOW_EVERY: Duration = Duration::from_millis(50);
 #[derive(Debug)]
 pub(super) struct LimitWatch {
     limits: Limits,
-    patience: Arc<Patience>,
+    shared: Arc<SharedLimits>,
     /// The greatest number of bytes seen.
     pub(super) peak_bytes: u64,
 }
 
 /// What is looked at between states, and also in the middle of a call that runs long.
-struct Patience {
+struct SharedLimits {
     start: Instant,
     timeout: Option<Duration>,
     memory_bytes: Option<u64>,
@@ -76,7 +76,7 @@ struct Seen {
     stop: Option<StopReason>,
 }
 
-impl Patience {
+impl SharedLimits {
     fn look(&self, counters: &Counters) -> Option<StopReason> {
         self.seen().counters = *counters;
         self.look_beside(0)
@@ -111,9 +111,9 @@ impl Patience {
     }
 }
 
-impl std::fmt::Debug for Patience {
+impl std::fmt::Debug for SharedLimits {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Patience")
+        f.debug_struct("SharedLimits")
             .field("start", &self.start)
             .field("timeout", &self.timeout)
             .field("seen", &self.seen)
@@ -135,7 +135,7 @@ impl LimitWatch {
             stop: None,
         };
         LimitWatch {
-            patience: Arc::new(Patience {
+            shared: Arc::new(SharedLimits {
                 start: now,
                 timeout: limits.timeout,
                 memory_bytes: limits.memory_bytes,
@@ -157,10 +157,10 @@ impl LimitWatch {
         &mut self,
         run: impl FnOnce(&mut LimitWatch) -> R,
     ) -> Result<R, (StopReason, Counters)> {
-        let patience = Arc::clone(&self.patience);
-        let look: Look = Arc::new(move |bytes| patience.look_beside(bytes).is_some());
+        let shared = Arc::clone(&self.shared);
+        let look: Look = Arc::new(move |bytes| shared.look_beside(bytes).is_some());
         let result = cancellation::within(look, || run(self));
-        result.map_err(|Cut| (self.stop(), self.patience.seen().counters))
+        result.map_err(|Cut| (self.stop(), self.shared.seen().counters))
     }
 
     /// Why an end was called for, by the limit of time or by the user.
@@ -174,7 +174,7 @@ impl LimitWatch {
     }
 
     fn last_stop(&self) -> Option<StopReason> {
-        self.patience.seen().stop
+        self.shared.seen().stop
     }
 }
 
@@ -214,11 +214,13 @@ impl Watch for LimitWatch {
         {
             return Some(StopReason::States);
         }
-        if self.limits.memory_bytes.is_some_and(|limit| {
-            counters.bytes.saturating_add(self.patience.at_hand_bytes) >= limit
-        }) {
+        if self
+            .limits
+            .memory_bytes
+            .is_some_and(|limit| counters.bytes.saturating_add(self.shared.at_hand_bytes) >= limit)
+        {
             return Some(StopReason::Memory);
         }
-        self.patience.look(counters)
+        self.shared.look(counters)
     }
 }

@@ -12,7 +12,7 @@ use crate::zones::dbm::Constraint;
 
 use crate::engine::format::json;
 use crate::engine::format::json_reader::{At, Difference, compare, only};
-use crate::engine::format::strategy_json::Reader;
+use crate::engine::format::strategy_json::NetworkReader;
 
 /// Compares all that a trace shows with the run in it, which was replayed; what of it is not
 /// checked, by name.
@@ -33,7 +33,7 @@ pub(super) fn compare_trace(
     }
     if trace.get("failing").is_some() {
         for edge in whole.list("failing")? {
-            Reader::new(network).part(&edge)?;
+            NetworkReader::new(network).part(&edge)?;
         }
     }
     if trace.get("transitions").is_none() && trace.get("states").is_none() {
@@ -124,7 +124,7 @@ fn contains(
     if shown.0.get("zone").is_none() {
         return Ok(Ok(()));
     }
-    let reader = Reader::new(network);
+    let reader = NetworkReader::new(network);
     let mut violated = None;
     for one in shown.list("zone")? {
         let mut constraints = Vec::new();

@@ -57,7 +57,11 @@ impl<'q> Asked<'q> {
     }
 
     /// The game that is played within a limit of time, if there is one.
-    pub(crate) fn game<'n>(&self, network: &'n Network, limit: Option<i32>) -> time_clock::Game<'n>
+    pub(crate) fn game<'n>(
+        &self,
+        network: &'n Network,
+        limit: Option<i32>,
+    ) -> time_clock::LimitedGame<'n>
     where
         'q: 'n,
     {

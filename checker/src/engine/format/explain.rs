@@ -1,5 +1,5 @@
-//! The pages of the diagnostics: what a code means, an example of the mistake, how to mend it, the
-//! example mended.
+//! The pages of the diagnostics: what a code means, an example of the mistake, how to fix it, the
+//! example fixed.
 //!
 //! A page is Markdown. Its examples are fenced, and the word behind the opening fence says what
 //! they are: a language (`xta`, `xml`; `query` for one query, `q` for a file of queries) and then
@@ -30,7 +30,7 @@ pub enum Role {
     Model,
     /// It has the mistake.
     Wrong,
-    /// It is mended.
+    /// It is fixed.
     Right,
 }
 

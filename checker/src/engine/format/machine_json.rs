@@ -18,7 +18,7 @@ use crate::verify::observed as check;
 use crate::zones::{Federation, Zone};
 
 use super::json_reader::{At, Difference, MACHINE_FORMAT, Mismatch, compare};
-use super::strategy_json::{self, Reader};
+use super::strategy_json::{self, NetworkReader};
 use super::{json, text};
 
 /// The version of the format that is written, and the only one that is read.
@@ -176,7 +176,7 @@ fn read_action(network: &Network, at: &At<'_>) -> Result<check::Action, Mismatch
         };
         return Ok(check::Action::Channel(channel as u32));
     }
-    let part = Reader::new(network).part(&at.field("edge")?)?;
+    let part = NetworkReader::new(network).part(&at.field("edge")?)?;
     Ok(check::Action::Edge {
         process: part.process,
         edge: part.edge,

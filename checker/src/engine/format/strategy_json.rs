@@ -25,7 +25,7 @@ use crate::zones::{Bound, Federation, Zone};
 
 use super::json;
 use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT};
-use super::text::{self, Place};
+use super::text::{self, ValuePlace};
 use crate::engine::query::time_clock;
 
 /// The name of the format.
@@ -240,7 +240,7 @@ fn read_whole(network: &Network, whole: &At<'_>) -> Result<(String, Strategy), M
         Some(limit) => Some(time_limit(&At(limit, "time_limit".to_owned()))?),
     };
     let network = &*time_clock::with_limit(network, time_limit);
-    let reader = Reader { network, owner };
+    let reader = NetworkReader { network, owner };
     let mut strategy = Strategy {
         owner,
         selection,
@@ -299,7 +299,9 @@ fn start(network: &Network, file: &Json) -> Result<Start, Mismatch> {
     for step in at.list("steps")? {
         step.only(&["wait", "edges"])?;
         let edges = step.list("edges")?;
-        let parts = edges.iter().map(|edge| Reader::new(network).part(edge));
+        let parts = edges
+            .iter()
+            .map(|edge| NetworkReader::new(network).part(edge));
         moves.push((
             ticks(&step, "wait")?,
             parts.collect::<Result<Vec<Part>, _>>()?,
@@ -330,7 +332,7 @@ fn time_limit(at: &At<'_>) -> Result<i32, Mismatch> {
 /// # Errors
 /// It is none of the network.
 pub(crate) fn read_words(network: &Network, state: &Json) -> Result<Vec<i32>, Mismatch> {
-    let reader = Reader::new(network);
+    let reader = NetworkReader::new(network);
     let mut words = network.initial.clone();
     let state = At::whole(state);
     reader.locations(&state, &mut words)?;
@@ -339,22 +341,22 @@ pub(crate) fn read_words(network: &Network, state: &Json) -> Result<Vec<i32>, Mi
 }
 
 /// Reads parts of a file for a network.
-pub(crate) struct Reader<'n> {
+pub(crate) struct NetworkReader<'n> {
     network: &'n Network,
     owner: Player,
 }
 
-impl<'n> Reader<'n> {
+impl<'n> NetworkReader<'n> {
     /// A reader of what the controller does.
-    pub(crate) fn new(network: &'n Network) -> Reader<'n> {
-        Reader {
+    pub(crate) fn new(network: &'n Network) -> NetworkReader<'n> {
+        NetworkReader {
             network,
             owner: Player::Controller,
         }
     }
 }
 
-impl Reader<'_> {
+impl NetworkReader<'_> {
     fn state(&self, state: &At<'_>) -> Result<StrategyState, Mismatch> {
         state.only(&["locations", "variables", "goal", "decisions", "legs"])?;
         let mut words = self.network.initial.clone();
@@ -642,7 +644,7 @@ impl Reader<'_> {
 }
 
 /// Sets the words of a scalar part of a variable; returns false if it cannot have the value.
-fn set_value(place: Place<'_>, value: &Json, words: &mut [i32]) -> bool {
+fn set_value(place: ValuePlace<'_>, value: &Json, words: &mut [i32]) -> bool {
     let offset = place.offset;
     if let Shape::Double = place.shape {
         let Some(value) = value.as_f64() else {

@@ -18,7 +18,7 @@ use crate::zones::{Bound, Zone, minimal};
 
 /// Calls `visit` with the name and the value of every scalar part of every variable.
 pub fn for_each_value(network: &Network, words: &[i32], mut visit: impl FnMut(&str, Value)) {
-    for_each_place(network, |name, Place { shape, offset }| {
+    for_each_place(network, |name, ValuePlace { shape, offset }| {
         visit(
             name,
             match shape {
@@ -34,7 +34,7 @@ pub fn for_each_value(network: &Network, words: &[i32], mut visit: impl FnMut(&s
 
 /// Where a scalar part of a variable lies among the words.
 #[derive(Clone, Copy, Debug)]
-pub struct Place<'n> {
+pub struct ValuePlace<'n> {
     /// Its shape: neither an array nor a struct.
     pub shape: &'n Shape,
     /// Its first word.
@@ -42,7 +42,7 @@ pub struct Place<'n> {
 }
 
 /// Calls `visit` with the name and the place of every scalar part of every variable.
-pub fn for_each_place<'n>(network: &'n Network, mut visit: impl FnMut(&str, Place<'n>)) {
+pub fn for_each_place<'n>(network: &'n Network, mut visit: impl FnMut(&str, ValuePlace<'n>)) {
     for variable in &network.layout.variables {
         let offset = variable.offset as usize;
         visit_shape(&variable.shape, &variable.name, offset, &mut visit);
@@ -62,11 +62,11 @@ fn visit_shape<'n>(
     shape: &'n Shape,
     name: &str,
     offset: usize,
-    visit: &mut impl FnMut(&str, Place<'n>),
+    visit: &mut impl FnMut(&str, ValuePlace<'n>),
 ) {
     match shape {
         Shape::Integer { .. } | Shape::Bool | Shape::Scalar { .. } | Shape::Double => {
-            visit(name, Place { shape, offset });
+            visit(name, ValuePlace { shape, offset });
         }
         Shape::Array {
             part,

@@ -45,7 +45,7 @@ pub(crate) fn with_limit(network: &Network, limit: Option<i32>) -> Cow<'_, Netwo
 }
 
 /// A game with its network.
-pub(crate) struct Game<'n> {
+pub(crate) struct LimitedGame<'n> {
     pub(crate) network: Cow<'n, Network>,
     pub(crate) objective: Cow<'n, Objective>,
 }
@@ -57,9 +57,9 @@ pub(crate) fn game<'n>(
     objective: &'n Objective,
     limit: Option<i32>,
     rest: Option<FunctionId>,
-) -> Game<'n> {
+) -> LimitedGame<'n> {
     let Some(limit) = limit else {
-        return Game {
+        return LimitedGame {
             network: Cow::Borrowed(network),
             objective: Cow::Borrowed(objective),
         };
@@ -84,7 +84,7 @@ pub(crate) fn game<'n>(
     let goal = Predicate::And(vec![goal.clone(), until(None)]);
     let kept = keep.into_iter().cloned().chain([until(rest)]);
     let objective = Objective::Until(Predicate::And(kept.collect()), goal);
-    Game {
+    LimitedGame {
         network: Cow::Owned(network),
         objective: Cow::Owned(objective),
     }

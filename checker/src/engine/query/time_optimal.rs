@@ -73,7 +73,7 @@ pub(super) fn fastest(subject: Subject<'_>, race: &Race<'_>, watch: &mut LimitWa
         Err(answer) => return *answer,
     };
     let (timed, clock) = with_time(subject.network);
-    let game = Timed {
+    let game = ClockedGame {
         subject: Subject {
             network: &timed,
             ..subject
@@ -199,14 +199,14 @@ struct Tried {
 }
 
 /// The game on the network with the clock.
-struct Timed<'a, 'q> {
+struct ClockedGame<'a, 'q> {
     /// About the network with the clock.
     subject: Subject<'a>,
     clock: usize,
     race: &'a Race<'q>,
 }
 
-impl Timed<'_, '_> {
+impl ClockedGame<'_, '_> {
     /// What the nodes of graphs are in which the time is looked for, one after the other.
     fn attempts(&self) -> &'static [Nodes] {
         let Subject {

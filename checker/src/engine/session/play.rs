@@ -429,7 +429,7 @@ fn beginning(
 }
 
 impl Play {
-    fn game<'n>(&'n self, network: &'n Network) -> time_clock::Game<'n> {
+    fn game<'n>(&'n self, network: &'n Network) -> time_clock::LimitedGame<'n> {
         let asked = Asked::of(&self.query.kind).expect("only games are played");
         asked.game(network, self.follower.strategy.time_limit)
     }
