@@ -1,11 +1,11 @@
 //! How work that takes too long, or too much memory, is ended from inside the operation at hand.
 //!
-//! Whoever starts work says what to look at ([`within`]): a clock, an account of memory, a user who
-//! interrupts. Operations that can take long say what they have done ([`work`]) and what they are
-//! about to allocate ([`ask_for`]), and now and then that is looked at. When it is time to end, the
-//! thread unwinds to whoever started the work, which gets [`Cut`]: nothing that is half done is
-//! ever seen, and what it took is given back on the way. Where code that cannot unwind runs, it
-//! asks ([`is_due`]) and ends by an error of its own.
+//! The caller that starts work says what to look at ([`within`]): a clock, an account of memory, a
+//! user who interrupts. Operations that can take long say what they have done ([`work`]) and what
+//! they are about to allocate ([`ask_for`]), and now and then that is looked at. When it is time to
+//! end, the thread unwinds to the caller that started the work, which gets [`Cut`]: nothing that is
+//! half done is ever seen, and what it took is given back on the way. Where code that cannot unwind
+//! runs, it asks ([`is_due`]) and ends by an error of its own.
 //!
 //! What is looked at belongs to a thread; who starts another one hands it on ([`current`],
 //! [`looking_at`]). Where nothing is to be looked at, work runs to its end.
@@ -51,7 +51,7 @@ pub fn work(units: usize) {
     });
 }
 
-/// Looks before so many bytes are allocated beside what the account says.
+/// Looks before this number of bytes is allocated beside what the account says.
 #[cold]
 pub fn ask_for(bytes: usize) {
     look_and_unwind(bytes as u64);

@@ -46,7 +46,7 @@ impl Span {
     }
 }
 
-/// One parsed piece of text and the way back to the file it came from.
+/// One parsed piece of text, and the file that it came from.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     /// The file as the user named it; empty for text given directly (a query on the command line).

@@ -84,7 +84,7 @@ class Clock:
     Attributes:
         name: For example ``x`` or ``Train(1).x``.
         process: The process it is local to; ``None`` if it is global.
-        hybrid: Whether it is abstracted away in symbolic and game queries.
+        hybrid: Whether it is ignored in symbolic and game queries.
     """
 
     name: str

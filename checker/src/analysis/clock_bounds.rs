@@ -26,7 +26,7 @@ use rustc_hash::FxHashMap;
 
 use super::clock_differences::Differences;
 use super::joint_resets::{self, Partners};
-use super::location_splitting::{Analysis, Step, Tracked, Valuations};
+use super::location_splitting::{SplitStep, Splitting, Tracked, Valuations};
 
 /// No comparison: the clock is inactive in this direction.
 const NONE: i32 = i32::MIN;
@@ -153,7 +153,7 @@ impl ClockBounds {
         };
         let reset = differences.greatest_reset;
         let partners = Partners::new(network).filter(|_| tuning.joint_resets);
-        let mut analysis = Analysis::new(network, tuning);
+        let mut analysis = Splitting::new(network, tuning);
         let (mut tables, mut tracked) = (Vec::new(), Vec::new());
         let mut summary = Summary::default();
         let is_maximum = abstraction == Abstraction::Maximum;
@@ -166,7 +166,7 @@ impl ClockBounds {
             if network.features.clock_copies {
                 tables.push(table);
             } else {
-                // One process at a time: tables have a place for every clock, and processes bounds
+                // One process at a time: tables have a place forevery clock, and processes bounds
                 // on few.
                 ceilings.push(summary.of(table, is_maximum));
             }
@@ -211,7 +211,7 @@ impl ClockBounds {
         self.greatest
     }
 
-    /// Whether zones are to be cut by [`ClockBounds::split`].
+    /// Whether zones must be cut by [`ClockBounds::split`].
     pub fn splits(&self) -> bool {
         self.abstraction == Abstraction::Differences
     }
@@ -253,7 +253,7 @@ impl ClockBounds {
         }
     }
 
-    /// Whether these numbers hang on locations alone.
+    /// Whether these numbers depend on locations alone.
     pub(crate) fn follow_locations(&self) -> bool {
         self.classes.iter().all(|one| one.tracked.is_empty())
     }
@@ -348,7 +348,7 @@ fn fixpoint(
 }
 
 /// Carries the bounds of a step's target to its source; returns whether they grew.
-fn propagate(edge: &Edge, step: Step, partners: Option<&Partners>, table: &mut Table) -> bool {
+fn propagate(edge: &Edge, step: SplitStep, partners: Option<&Partners>, table: &mut Table) -> bool {
     let branch = &edge.branches[step.branch];
     let is_reset = |clock: usize| {
         joint_resets::resets(edge, branch, clock)
@@ -415,7 +415,7 @@ fn spread_over_copies(network: &Network, tables: &mut [Table], everywhere: &mut 
     });
     let copies: Vec<_> = updates.flat_map(|update| &update.assignments).collect();
     // As many rounds as there are clocks reach the end of every chain of copies. Bounds that still
-    // grow then do so for ever (a cycle of copies that adds a negative number): they become the
+    // grow then do so forever (a cycle of copies that adds a negative number): they become the
     // greatest bound that zones can hold.
     let mut step: fn(&mut [(i32, i32)], &ClockAssignment) -> bool = spread;
     let mut round = 0;

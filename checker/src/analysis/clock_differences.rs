@@ -7,7 +7,7 @@
 //! matters everywhere. With assignments from clock to clock a comparison of the target is one of
 //! the source, and all matter everywhere.
 //!
-//! A bound that the words decide stands for every value that it may take. Where that makes more
+//! A bound that the words decide stands forevery value that it may take. Where that makes more
 //! comparisons than `MOST_DIFFERENCES`, there is no such abstraction, and exploring may not end.
 //!
 //! Source: J. Bengtsson, W. Yi, "On Clock Difference Constraints and Termination in Reachability

@@ -1,4 +1,4 @@
-//! Which words of a state a function may read, as far as its code shows it without being run.
+//! Which words of a state a function may read, if its code shows it without being run.
 
 use std::ops::Range;
 
@@ -49,7 +49,7 @@ pub(crate) fn read_words(
     (words.len() <= most).then_some(words)
 }
 
-/// The words of the state that an access to so many words may touch; `None` if that is not known,
+/// The words of the state that an access to `count` words may touch; `None` if that is not known,
 /// or its place is one of more than `most`.
 pub(super) fn state_words(
     code: &Function,

@@ -15,9 +15,9 @@ const MOST_ENTRIES: usize = 1 << 20;
 #[derive(Debug)]
 pub(super) struct Partners {
     clocks: usize,
-    /// Of all senders; without any sender, all clocks.
+    /// What all senders reset; without any sender, all clocks.
     senders: Vec<bool>,
-    /// Of all receivers.
+    /// What all receivers reset.
     receivers: Vec<bool>,
     is_broadcast: Vec<bool>,
 }

@@ -18,7 +18,7 @@ use super::read_before_write::{Exposure, Exposures, WordSet};
 
 /// Larger variables are not looked at, for they are hardly ever written as a whole.
 const MOST_WORDS_OF_VARIABLE: u32 = 64;
-/// At most so many words are looked at.
+/// The most words that are looked at.
 const MOST_WORDS: usize = 4096;
 /// Nothing is found out where it takes more bits than this: one for each word and function or
 /// location.
@@ -30,12 +30,12 @@ pub struct LiveVariables {
     /// The words that are dead somewhere, ascending, each with what it is set to there.
     words: Vec<(u32, i32)>,
     /// The processes that may read one of them.
-    readers: Vec<Reader>,
+    readers: Vec<WordReader>,
 }
 
 /// A process that reads some of the words.
 #[derive(Clone, Debug)]
-struct Reader {
+struct WordReader {
     process: u32,
     /// By location: the words that are live there, as bits of as many integers as all of them need.
     live: Vec<u64>,
@@ -54,7 +54,7 @@ impl LiveVariables {
         for (number, &word) in looked_at.iter().enumerate() {
             numbers[word as usize] = Some(number as u32);
         }
-        let mut analysis = Analysis {
+        let mut analysis = LiveSearch {
             exposures: Exposures::new(network, &numbers, looked_at.len()),
             count: looked_at.len(),
             senders: vec![WordSet::full(looked_at.len()); network.channels.len()],
@@ -82,7 +82,7 @@ impl LiveVariables {
                 .flat_map(|live| bits_of(live, &kept))
                 .collect();
             let reads_any = bits.iter().any(|&bits| bits != 0);
-            reads_any.then_some(Reader {
+            reads_any.then_some(WordReader {
                 process: process as u32,
                 live: bits,
             })
@@ -166,7 +166,7 @@ fn has_scalars(shape: &Shape) -> bool {
     }
 }
 
-struct Analysis<'n> {
+struct LiveSearch<'n> {
     network: &'n Network,
     exposures: Exposures<'n>,
     count: usize,
@@ -176,7 +176,7 @@ struct Analysis<'n> {
     receivers: Vec<WordSet>,
 }
 
-impl Analysis<'_> {
+impl LiveSearch<'_> {
     /// Finds what those surely write that synchronise on a channel.
     fn ask_partners(&mut self) {
         let network = self.network;

@@ -1,18 +1,18 @@
 //! What a process can do in a location, told apart by the values of a few variables that only it
 //! writes.
 //!
-//! A comparison of clocks often hangs on a flag that a process keeps: `running && x <= 5`. While
+//! A comparison of clocks often depends on a flag that a process keeps: `running && x <= 5`. While
 //! the flag is not set the comparison does not matter, and it is set where the clock is. So
 //! locations are taken apart by the values of such variables: a *node* is a location with values of
 //! the tracked variables. Guards and updates are run by the interpreter for all values of what they
 //! read, as long as these are few; where they are not, everything counts as possible.
 //!
 //! Invariants
-//! * Only words that nobody else writes and that are no `meta` are tracked: who takes no part in a
+//! * Only words that nobody else writes and that are not `meta` are tracked: who takes no part in a
 //!   transition stays in its node, and states with different nodes are different.
 //! * Every transition of the network in which the process takes an edge leads from a node to
-//!   another one along a [`Step`], and the comparisons in the guards that it evaluates are among
-//!   the [`Node::atoms`].
+//!   another one along a [`SplitStep`], and the comparisons in the guards that it evaluates are
+//!   among the [`Node::atoms`].
 
 use rustc_hash::FxHashMap;
 
@@ -24,9 +24,9 @@ use crate::tuning::Tuning;
 
 /// A variable with more values is not tracked.
 const MOST_VALUES: i64 = 8;
-/// A process has at most so many nodes.
+/// The most nodes of a process.
 const MOST_NODES: usize = 512;
-/// A function is run for at most so many combinations of values.
+/// A function is run for at most this number of combinations of values.
 const MOST_COMBINATIONS: i64 = 256;
 /// So many runs are made for all of a network.
 const MOST_RUNS: usize = 50_000;
@@ -59,9 +59,9 @@ impl Writer {
 /// The writers of all words.
 #[derive(Debug, Default)]
 struct Writers {
-    /// Of words in short ranges.
+    /// Values of words in short ranges.
     of_words: FxHashMap<u32, Writer>,
-    /// Of variables of which long ranges are written, by their first words.
+    /// Values of variables that are written as long ranges, by their first words.
     of_variables: FxHashMap<u32, Writer>,
 }
 
@@ -143,14 +143,14 @@ pub(super) struct Tracked {
 
 /// An edge with a branch that leads from node to node.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Step {
+pub(super) struct SplitStep {
     pub(super) source: usize,
     pub(super) target: usize,
     pub(super) edge: usize,
     pub(super) branch: usize,
 }
 
-/// The nodes of a process. The number of a node is that of its location plus, for every tracked
+/// The nodes of a process. The number of a node is that of its location plus, forevery tracked
 /// word, its value above the least one times the stride.
 #[derive(Debug, Default)]
 pub(super) struct Valuations {
@@ -158,11 +158,11 @@ pub(super) struct Valuations {
     pub(super) nodes: usize,
     /// Node, and a comparison in a guard that can be evaluated there.
     pub(super) atoms: Vec<(usize, ClockAtom)>,
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<SplitStep>,
 }
 
 /// Takes the processes of a network apart.
-pub(super) struct Analysis<'a> {
+pub(super) struct Splitting<'a> {
     network: &'a Network,
     /// Made with the first function that is run.
     interpreter: Option<Interpreter>,
@@ -175,14 +175,14 @@ pub(super) struct Analysis<'a> {
 
 /// What can happen with a guard in a valuation.
 #[derive(Clone)]
-struct Answer {
+struct GuardAnswer {
     can_hold: bool,
     atoms: Vec<ClockAtom>,
 }
 
-impl<'a> Analysis<'a> {
-    pub(super) fn new(network: &'a Network, tuning: Tuning) -> Analysis<'a> {
-        Analysis {
+impl<'a> Splitting<'a> {
+    pub(super) fn new(network: &'a Network, tuning: Tuning) -> Splitting<'a> {
+        Splitting {
             network,
             interpreter: None,
             runs: 0,
@@ -211,13 +211,14 @@ impl<'a> Analysis<'a> {
         let combinations = combinations(&tracked);
         for (index, edge) in process.edges.iter().enumerate() {
             for values in &combinations {
-                self.add((index, edge), (&tracked, values), &mut valuations);
+                let tracked = &tracked;
+                self.add(index, edge, Valuation { tracked, values }, &mut valuations);
             }
         }
         valuations
     }
 
-    /// The words of a process on which guards with comparisons of clocks hang.
+    /// The words of a process that guards with comparisons of clocks depend on.
     fn tracked(&mut self, process: usize) -> Vec<Ranged> {
         let network = self.network;
         let edges = &network.processes[process].edges;
@@ -248,7 +249,7 @@ impl<'a> Analysis<'a> {
         tracked
     }
 
-    /// The values of a word of a variable that is no `meta`, if they are integers, and who writes
+    /// The values of a word of a variable that is not `meta`, if they are integers, and who writes
     /// it.
     fn range_of(&mut self, word: u32) -> Option<(Ranged, Writer)> {
         let network = self.network;
@@ -271,19 +272,14 @@ impl<'a> Analysis<'a> {
     }
 
     /// Adds what an edge can do where the tracked words have these values.
-    fn add(
-        &mut self,
-        (index, edge): (usize, &Edge),
-        (tracked, values): (&[Ranged], &[i32]),
-        valuations: &mut Valuations,
-    ) {
+    fn add(&mut self, index: usize, edge: &Edge, here: Valuation<'_>, valuations: &mut Valuations) {
         let node = |location: u32, values: &[i32]| {
             let offsets = valuations.tracked.iter().zip(values);
             let offsets = offsets.map(|(one, &value)| (value - one.low) as usize * one.stride);
             location as usize + offsets.sum::<usize>()
         };
-        let source = node(edge.source.0, values);
-        let answer = self.guard(edge, tracked, values);
+        let source = node(edge.source.0, here.values);
+        let answer = self.guard(edge, here);
         let mut steps = Vec::new();
         if answer.can_hold {
             for (branch, end) in edge.branches.iter().enumerate() {
@@ -291,13 +287,13 @@ impl<'a> Analysis<'a> {
                 let writes = edge.update.writes.iter().chain(&end.update.writes);
                 let is_written = writes
                     .flat_map(|&(first, count)| first..first + count)
-                    .any(|word| tracked.iter().any(|one| one.word == word));
+                    .any(|word| here.tracked.iter().any(|one| one.word == word));
                 let targets = if is_written {
-                    self.update(edge, functions, tracked, values)
+                    self.update(edge, functions, here)
                 } else {
-                    vec![values.to_vec()]
+                    vec![here.values.to_vec()]
                 };
-                steps.extend(targets.iter().map(|values| Step {
+                steps.extend(targets.iter().map(|values| SplitStep {
                     source,
                     target: node(end.target.0, values),
                     edge: index,
@@ -312,26 +308,26 @@ impl<'a> Analysis<'a> {
 
     /// Whether the guard of an edge can hold where the tracked words have these values, and what it
     /// compares.
-    fn guard(&mut self, edge: &Edge, tracked: &[Ranged], values: &[i32]) -> Answer {
+    fn guard(&mut self, edge: &Edge, here: Valuation<'_>) -> GuardAnswer {
         let guard = &edge.guard;
-        let everything = Answer {
+        let everything = GuardAnswer {
             can_hold: !guard.never_holds,
             atoms: guard.atoms.clone(),
         };
-        let Some(function) = guard.function.filter(|_| !tracked.is_empty()) else {
+        let Some(function) = guard.function.filter(|_| !here.tracked.is_empty()) else {
             return everything;
         };
-        let Some((free, of_tracked)) = self.free_words(&[function], tracked) else {
+        let Some((free, of_tracked)) = self.free_words(&[function], here.tracked) else {
             return everything;
         };
         if !of_tracked {
             return everything;
         }
-        let mut answer = Answer {
+        let mut answer = GuardAnswer {
             can_hold: false,
             atoms: Vec::new(),
         };
-        let finished = self.run_all(edge, &[function], &free, (tracked, values), |run| {
+        let finished = self.run_all(edge, &[function], &free, here, |run| {
             // Who evaluates a guard that fails with an error goes no further, but first looks at
             // what it compared.
             if run.result != Ok(0) {
@@ -347,18 +343,17 @@ impl<'a> Analysis<'a> {
         &mut self,
         edge: &Edge,
         functions: [Option<FunctionId>; 2],
-        tracked: &[Ranged],
-        values: &[i32],
+        here: Valuation<'_>,
     ) -> Vec<Vec<i32>> {
         let functions: Vec<FunctionId> = functions.into_iter().flatten().collect();
         let mut targets: Vec<Vec<i32>> = Vec::new();
-        let finished = match self.free_words(&functions, tracked) {
+        let finished = match self.free_words(&functions, here.tracked) {
             None => false,
-            Some((free, _)) => self.run_all(edge, &functions, &free, (tracked, values), |run| {
+            Some((free, _)) => self.run_all(edge, &functions, &free, here, |run| {
                 if run.result.is_err() {
                     return;
                 }
-                let values = tracked.iter().map(|one| run.state[one.word as usize]);
+                let values = here.tracked.iter().map(|one| run.state[one.word as usize]);
                 let values: Vec<i32> = values.collect();
                 if !targets.contains(&values) {
                     targets.push(values);
@@ -368,7 +363,7 @@ impl<'a> Analysis<'a> {
         if finished {
             targets
         } else {
-            combinations(tracked)
+            combinations(here.tracked)
         }
     }
 
@@ -394,8 +389,8 @@ impl<'a> Analysis<'a> {
         edge: &Edge,
         functions: &[FunctionId],
         free: &[Ranged],
-        (tracked, values): (&[Ranged], &[i32]),
-        mut look: impl FnMut(Run<'_>),
+        here: Valuation<'_>,
+        mut look: impl FnMut(FunctionRun<'_>),
     ) -> bool {
         let selects = edge.select.iter().map(|select| Ranged {
             word: 0,
@@ -417,7 +412,10 @@ impl<'a> Analysis<'a> {
             let (arguments, words) = combination.split_at(edge.select.len());
             self.runs += 1;
             self.state.clone_from(&network.initial);
-            let set = free.iter().zip(words).chain(tracked.iter().zip(values));
+            let set = free
+                .iter()
+                .zip(words)
+                .chain(here.tracked.iter().zip(here.values));
             for (one, &value) in set {
                 self.state[one.word as usize] = value;
             }
@@ -441,7 +439,7 @@ impl<'a> Analysis<'a> {
                 }
             }
             assignments.clear();
-            look(Run {
+            look(FunctionRun {
                 result,
                 state: &self.state,
                 constraints: &constraints,
@@ -451,8 +449,15 @@ impl<'a> Analysis<'a> {
     }
 }
 
+/// The values of the tracked words.
+#[derive(Clone, Copy)]
+struct Valuation<'a> {
+    tracked: &'a [Ranged],
+    values: &'a [i32],
+}
+
 /// What a run left behind.
-struct Run<'a> {
+struct FunctionRun<'a> {
     result: Result<i32, ()>,
     state: &'a [i32],
     constraints: &'a [EmittedConstraint],

@@ -26,7 +26,7 @@ pub struct Possibility<'a> {
 
 /// One way through a function.
 #[derive(Clone)]
-struct Way {
+struct Path {
     /// The running function and its callers, outermost first.
     calls: Vec<Call>,
 }
@@ -41,7 +41,7 @@ struct Call {
 }
 
 /// How a way goes on.
-enum Onward {
+enum NextStep {
     /// Here.
     Here,
     /// In two blocks, since the value that decides is not known.
@@ -99,7 +99,7 @@ impl<'a> Possibility<'a> {
     /// Whether a function without parameters can return a truth value.
     fn can_return(&mut self, function: FunctionId, truth: bool) -> bool {
         let most = MOST_STEPS.min(self.steps + MOST_STEPS_OF_A_QUESTION);
-        let mut ways = vec![Way {
+        let mut ways = vec![Path {
             calls: vec![self.call(function, &[])],
         }];
         while let Some(mut way) = ways.pop() {
@@ -109,15 +109,15 @@ impl<'a> Possibility<'a> {
                     return true;
                 }
                 match self.step(&mut way) {
-                    Onward::Here => {}
-                    Onward::Fork(one, other) => {
+                    NextStep::Here => {}
+                    NextStep::Fork(one, other) => {
                         let mut second = way.clone();
                         second.enter(other);
                         ways.push(second);
                         way.enter(one);
                     }
-                    Onward::Failed => return true,
-                    Onward::Returned(value) => {
+                    NextStep::Failed => return true,
+                    NextStep::Returned(value) => {
                         if value.is_none_or(|value| (value != 0) == truth) {
                             return true;
                         }
@@ -141,9 +141,9 @@ impl<'a> Possibility<'a> {
     }
 
     /// Does the next instruction of a way, or goes to the next block.
-    fn step(&self, way: &mut Way) -> Onward {
+    fn step(&self, way: &mut Path) -> NextStep {
         let Some(active) = way.calls.last_mut() else {
-            return Onward::Failed;
+            return NextStep::Failed;
         };
         let code = &self.network.functions[active.function.0 as usize].blocks[active.block];
         let Some(instruction) = code.instructions.get(active.next) else {
@@ -159,33 +159,33 @@ impl<'a> Possibility<'a> {
             let arguments: Vec<_> = arguments.iter().map(|&one| active.value(one)).collect();
             let callee = self.call(*function, &arguments);
             way.calls.push(callee);
-            return Onward::Here;
+            return NextStep::Here;
         }
         let value = self.value_of(active, instruction);
         if let Some(target) = instruction.target() {
             active.registers[target.0 as usize] = value;
         }
-        Onward::Here
+        NextStep::Here
     }
 
     /// Takes the end of a block.
-    fn leave(&self, way: &mut Way, terminator: Terminator) -> Onward {
+    fn leave(&self, way: &mut Path, terminator: Terminator) -> NextStep {
         let Some(active) = way.calls.last_mut() else {
-            return Onward::Failed;
+            return NextStep::Failed;
         };
         match terminator {
             Terminator::Jump(block) => way.enter(block.0 as usize),
             Terminator::Branch(condition, yes, no) => match active.value(condition) {
-                None => return Onward::Fork(yes.0 as usize, no.0 as usize),
+                None => return NextStep::Fork(yes.0 as usize, no.0 as usize),
                 Some(0) => way.enter(no.0 as usize),
                 Some(_) => way.enter(yes.0 as usize),
             },
-            Terminator::Fail(..) => return Onward::Failed,
+            Terminator::Fail(..) => return NextStep::Failed,
             Terminator::Return(register) => {
                 let value = register.and_then(|register| active.value(register));
                 way.calls.pop();
                 let Some(caller) = way.calls.last_mut() else {
-                    return Onward::Returned(value);
+                    return NextStep::Returned(value);
                 };
                 let code = &self.network.functions[caller.function.0 as usize].blocks[caller.block];
                 if let Some(target) = code.instructions[caller.next - 1].target() {
@@ -193,10 +193,10 @@ impl<'a> Possibility<'a> {
                 }
             }
         }
-        Onward::Here
+        NextStep::Here
     }
 
-    /// What an instruction computes, as far as it is known.
+    /// What an instruction computes, if that is known.
     fn value_of(&self, active: &Call, instruction: &Instruction) -> Option<i32> {
         let value = |register| active.value(register);
         match *instruction {
@@ -219,7 +219,7 @@ impl<'a> Possibility<'a> {
     }
 }
 
-impl Way {
+impl Path {
     fn enter(&mut self, block: usize) {
         if let Some(active) = self.calls.last_mut() {
             active.block = block;

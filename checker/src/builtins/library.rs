@@ -1,9 +1,9 @@
 //! What the built-in functions compute.
 //!
-//! Interpretation, constant folding and compiled code call the very same machine code: mostly the
+//! Interpretation, constant folding and compiled code call the same machine code: mostly the
 //! platform's C library itself, whose results may differ in the last bit from those of other
 //! libraries, so that no two engines may use different ones. Rust's standard library has no `erf`,
-//! `logb` or `ldexp`, and its `asinh` is its own; hence the declarations at the end.
+//! `logb` or `ldexp`, and its `asinh` is its own; so they are declared at the end.
 //!
 //! Two functions see the sign of a NaN, which IEEE arithmetic leaves open: `signbit` and the second
 //! argument of `copysign`. Here every NaN counts as positive there.

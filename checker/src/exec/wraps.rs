@@ -1,6 +1,6 @@
 //! Where the result of integer arithmetic did not fit into 32 bits, and wrapped round.
 //!
-//! Of all such places the first one in the order of sites is kept, which depends neither on the
+//! Only the first such place in the order of sites is kept, which depends neither on the
 //! engine nor on the order in which several threads run.
 
 use std::sync::atomic::{AtomicU32, Ordering};

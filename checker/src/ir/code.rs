@@ -167,7 +167,7 @@ pub enum Instruction {
     },
     /// An integer as a double.
     IntegerToDouble { target: Register, source: Register },
-    /// A double truncated towards zero; an error if it is no number or does not fit.
+    /// A double truncated towards zero; an error if it is not a number or does not fit.
     DoubleToInteger {
         target: Register,
         source: Register,
@@ -366,7 +366,7 @@ pub enum RunTimeErrorKind {
     OutOfRange,
     /// An array index outside the array.
     IndexOutOfBounds,
-    /// A double that is no number or does not fit into an integer.
+    /// A double that is not a number or does not fit into an integer.
     NotAnInteger,
     /// A clock set to a negative value, or a clock bound beyond the limits of the engine.
     ClockValue,
@@ -374,6 +374,6 @@ pub enum RunTimeErrorKind {
     AssertionFailed,
     /// A loop that ran longer than the limit of one call allows.
     StepLimit,
-    /// None of the model: whoever ran it ended the call.
+    /// Not an error of the model: the caller ended the call.
     Interrupted,
 }

@@ -1,4 +1,4 @@
-//! What guards ask and updates do, as far as it is known without running code.
+//! What guards ask and updates do, where this is known without running code.
 
 use super::ids::{ClockId, FunctionId};
 

@@ -14,7 +14,7 @@
 //!   scalar constants are folded into the code. Local arrays and structs of functions lie in a
 //!   frame of [`Function::frame_words`] words, zeroed on entry.
 //!
-//! Clocks are no part of the words. Clock 0 is the reference clock (always 0); the model's clocks
+//! Clocks are not part of the words. Clock 0 is the reference clock (always 0); the model's clocks
 //! count from 1, arrays of clocks flattened. Channels are flattened likewise and count from 0.
 
 mod ids;

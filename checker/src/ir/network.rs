@@ -253,7 +253,7 @@ pub struct Variable {
     pub meta: bool,
 }
 
-/// A type, as far as printing and packing of values need it.
+/// What printing and packing of values need to know about a type.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// An integer in a range.

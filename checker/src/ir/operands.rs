@@ -251,7 +251,7 @@ impl Function {
         self.blocks.iter().flat_map(|block| &block.instructions)
     }
 
-    /// The functions that it calls, once for every call.
+    /// The functions that it calls, once forevery call.
     pub(crate) fn callees(&self) -> impl Iterator<Item = FunctionId> {
         self.instructions()
             .filter_map(|instruction| match instruction {

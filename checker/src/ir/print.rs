@@ -217,34 +217,11 @@ impl Display for Instruction {
                 let name = format!("{function:?}").to_lowercase();
                 write!(f, "{target} = {name}({})  {site}", RegisterList(arguments))
             }
-            Instruction::AddIndices {
-                target,
-                left,
-                right,
-            } => write!(f, "{target} = {left} + {right}  (index)"),
-            Instruction::ScaleIndex {
-                target,
-                index,
-                first,
-                length,
-                stride,
-                site,
-            } => write!(
-                f,
-                "{target} = ({index} - {first}) below {length} * {stride}  {site}"
-            ),
-            Instruction::CheckRange {
-                value,
-                low,
-                high,
-                site,
-            } => write!(f, "check {low} <= {value} <= {high}  {site}"),
-            Instruction::Require {
-                condition,
-                kind,
-                site,
-            } => write!(f, "require {condition}, else {kind:?}  {site}"),
-            Instruction::CountRound { site } => write!(f, "count round  {site}"),
+            Instruction::AddIndices { .. }
+            | Instruction::ScaleIndex { .. }
+            | Instruction::CheckRange { .. }
+            | Instruction::Require { .. }
+            | Instruction::CountRound { .. } => write_check(self, f),
             Instruction::Call {
                 target,
                 function,
@@ -266,6 +243,41 @@ impl Display for Instruction {
             | Instruction::SetClock { .. }
             | Instruction::CopyClock { .. } => write_clock(self, f),
         }
+    }
+}
+
+/// The instructions on indices, and those that may only fail.
+fn write_check(instruction: &Instruction, f: &mut Formatter<'_>) -> Result {
+    match instruction {
+        Instruction::AddIndices {
+            target,
+            left,
+            right,
+        } => write!(f, "{target} = {left} + {right}  (index)"),
+        Instruction::ScaleIndex {
+            target,
+            index,
+            first,
+            length,
+            stride,
+            site,
+        } => write!(
+            f,
+            "{target} = ({index} - {first}) below {length} * {stride}  {site}"
+        ),
+        Instruction::CheckRange {
+            value,
+            low,
+            high,
+            site,
+        } => write!(f, "check {low} <= {value} <= {high}  {site}"),
+        Instruction::Require {
+            condition,
+            kind,
+            site,
+        } => write!(f, "require {condition}, else {kind:?}  {site}"),
+        Instruction::CountRound { site } => write!(f, "count round  {site}"),
+        _ => Ok(()),
     }
 }
 

@@ -35,7 +35,7 @@ impl Checker<'_> {
     }
 
     /// `target = value`; `of_target` is where among the unknown values those stand that the target
-    /// hangs on.
+    /// depends on.
     pub(super) fn assignment(
         &mut self,
         target: Expr,

@@ -197,7 +197,7 @@ impl Checker<'_> {
                         argument.ty.described()
                     ),
                 )
-                .help("a reference needs a variable of the very same type, range included, and a channel that is as free as the parameter"),
+                .help("a reference needs a variable of the same type, range included, and a channel with the same prefixes as the parameter"),
             );
             return None;
         }

@@ -42,7 +42,7 @@ pub(super) struct Checker<'a> {
     /// The locals of the function, guard or update that is being checked.
     pub(super) locals: Vec<Local>,
     /// The values that only statistical queries know, as long as it is open whether anything
-    /// depends on them: what is to be said if so.
+    /// depends on them: what is reported if something does.
     pub(super) unknowns: Vec<Diagnostic>,
     /// The variables that are left out because only statistical queries know their values.
     pub(super) left_out: LeftOut,
@@ -86,6 +86,12 @@ pub(super) struct World {
     pub(super) processes: super::processes::Processes,
 }
 
+/// What was reported at a time.
+pub(super) struct Reports {
+    diagnostics: Vec<Diagnostic>,
+    has_errors: bool,
+}
+
 impl<'a> Checker<'a> {
     pub(super) fn new(sources: &'a SourceMap, world: World) -> Checker<'a> {
         Checker {
@@ -121,16 +127,19 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Begins to hold back what is reported. What the reporting has to go back to is returned.
-    pub(super) fn hold_reports(&mut self) -> (Vec<Diagnostic>, bool) {
-        let diagnostics = std::mem::take(&mut self.diagnostics);
-        (diagnostics, std::mem::take(&mut self.has_errors))
+    /// Begins to hold back what is reported; returns what was reported before.
+    pub(super) fn hold_reports(&mut self) -> Reports {
+        Reports {
+            diagnostics: std::mem::take(&mut self.diagnostics),
+            has_errors: std::mem::take(&mut self.has_errors),
+        }
     }
 
-    /// Ends holding back; what was is returned, and can be reported again.
-    pub(super) fn release_reports(&mut self, held: (Vec<Diagnostic>, bool)) -> Vec<Diagnostic> {
-        let found = std::mem::replace(&mut self.diagnostics, held.0);
-        self.has_errors = held.1;
+    /// Goes back to what was reported before; returns what was held back, which can be reported
+    /// again.
+    pub(super) fn release_reports(&mut self, before: Reports) -> Vec<Diagnostic> {
+        let found = std::mem::replace(&mut self.diagnostics, before.diagnostics);
+        self.has_errors = before.has_errors;
         for diagnostic in &found {
             self.reported
                 .remove(&(diagnostic.code.code, diagnostic.span));
@@ -138,7 +147,7 @@ impl<'a> Checker<'a> {
         found
     }
 
-    /// Reports a mistake with a way out.
+    /// Reports a mistake and how to fix it.
     pub(super) fn error(&mut self, code: Code, span: Span, message: impl Into<String>, help: &str) {
         self.report(Diagnostic::new(code, span, message).help(help));
     }
@@ -381,7 +390,7 @@ impl<'a> Checker<'a> {
                 span,
                 "this does not fit into 32 bits, and wraps round",
             )
-            .help("use smaller numbers; --overflow error lets no query go on from here"),
+            .help("use smaller numbers; with --overflow error every query ends in an error here"),
         );
     }
 

@@ -61,7 +61,7 @@ impl Checker<'_> {
         let diagnostic = Diagnostic::new(
             codes::CLOCK_AS_NUMBER,
             expr.span,
-            "the value of a clock is no number here: it is known only symbolically",
+            "the value of a clock is not a number here: it is known only symbolically",
         );
         let diagnostic = diagnostic.help("compare the clock in a guard instead");
         self.unknown(diagnostic, expr, Type::Double)
@@ -287,7 +287,7 @@ impl Checker<'_> {
         Expr::new(kind, ty, span)
     }
 
-    /// What is to be said of a comparison that hangs on hybrid clocks, which are abstracted away.
+    /// The report about a comparison that depends on hybrid clocks, which are ignored.
     fn hybrid_comparison(&self, compared: &Expr) -> Option<Diagnostic> {
         let Kind::ClockCompare { left, right, .. } = &compared.kind else {
             return None;
@@ -299,7 +299,8 @@ impl Checker<'_> {
             .variable()
             .and_then(|place| self.cause_of(place.declared));
         let Some(cause) = cause else {
-            let message = "hybrid clocks are abstracted away in symbolic and game queries and cannot be compared";
+            let message =
+                "symbolic and game queries ignore hybrid clocks, so they cannot be compared";
             return Some(
                 Diagnostic::new(codes::HYBRID_CLOCK_COMPARED, compared.span, message)
                     .help("use an ordinary clock, or keep the hybrid one out of conditions"),
@@ -310,10 +311,10 @@ impl Checker<'_> {
             Diagnostic::new(
                 codes::HYBRID_CLOCK_COMPARED,
                 compared.span,
-                "this clock is abstracted away in symbolic and game queries and cannot be compared",
+                "symbolic and game queries ignore this clock, so it cannot be compared",
             )
             .note(format!("line {line}: {}", cause.message))
-            .help("mend that, or keep the clock out of conditions"),
+            .help("fix that, or keep the clock out of conditions"),
         )
     }
 
@@ -329,7 +330,7 @@ fn clock_with_double(span: Span) -> Diagnostic {
     Diagnostic::new(
         codes::CLOCK_WITH_DOUBLE,
         span,
-        "a clock meets a double here: clocks have exact, symbolic values",
+        "a clock and a double cannot be combined: clocks have exact, symbolic values",
     )
     .help("use integers for clocks; fint(…) truncates a double")
 }

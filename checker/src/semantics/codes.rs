@@ -9,7 +9,7 @@ codes! {
     NAME_DECLARED_TWICE = "E0202" "name-declared-twice";
     /// A type, function, template or location where a value is needed.
     NAME_WITHOUT_VALUE = "E0203" "name-without-value";
-    /// A name that is no type where a type is needed.
+    /// A name that is not a type where a type is needed.
     TYPE_EXPECTED = "E0204" "type-expected";
     /// A type that cannot stand where it stands.
     TYPE_MISPLACED = "E0205" "type-misplaced";
@@ -17,7 +17,7 @@ codes! {
     PREFIX_MISPLACED = "E0206" "prefix-misplaced";
     /// A range whose lower bound is greater than its upper bound.
     RANGE_EMPTY = "E0207" "range-empty";
-    /// A type without bounds where values are to be run through.
+    /// A type without bounds where something runs over its values.
     RANGE_EXPECTED = "E0208" "range-expected";
     /// More values than can be run through.
     RANGE_TOO_LARGE = "E0209" "range-too-large";
@@ -57,13 +57,13 @@ codes! {
     TARGET_NOT_ASSIGNABLE = "E0227" "target-not-assignable";
     /// A change where nothing may change.
     SIDE_EFFECT = "E0228" "side-effect";
-    /// A field of something that is no struct.
+    /// A field of something that is not a struct.
     FIELD_OF_NO_STRUCT = "E0229" "field-of-no-struct";
     /// A field that the struct does not have.
     FIELD_UNKNOWN = "E0230" "field-unknown";
-    /// An index into something that is no array.
+    /// An index into something that is not an array.
     INDEX_OF_NO_ARRAY = "E0231" "index-of-no-array";
-    /// A call of something that is no function.
+    /// A call of something that is not a function.
     CALL_OF_NO_FUNCTION = "E0232" "call-of-no-function";
     /// Too few or too many arguments.
     ARGUMENT_COUNT = "E0233" "argument-count";
@@ -81,7 +81,7 @@ codes! {
     RETURN_MISSING = "E0239" "return-missing";
     /// `return` with a value where none belongs, or without where one does.
     RETURN_MISMATCHED = "E0240" "return-mismatched";
-    /// A sum of clocks that is no difference of two.
+    /// A sum of clocks that is not a difference of two.
     CLOCKS_BEYOND_DIFFERENCE = "E0242" "clocks-beyond-difference";
     /// A clock compared with, or set to, a double.
     CLOCK_WITH_DOUBLE = "E0243" "clock-with-double";
@@ -97,7 +97,7 @@ codes! {
     HYBRID_CLOCK_COMPARED = "E0248" "hybrid-clock-compared";
     /// A rate outside an invariant.
     RATE_MISPLACED = "E0249" "rate-misplaced";
-    /// The rate of something that is no known clock.
+    /// The rate of something that is not a known clock.
     RATE_OF_NO_CLOCK = "E0250" "rate-of-no-clock";
     /// A rate other than 0 and 1 on an ordinary clock.
     RATE_NOT_ZERO_OR_ONE = "E0251" "rate-not-zero-or-one";
@@ -107,11 +107,11 @@ codes! {
     CONDITION_NOT_AN_INVARIANT = "E0253" "condition-not-an-invariant";
     /// An edge or `init` that names no location.
     LOCATION_UNKNOWN = "E0254" "location-unknown";
-    /// An initial location that is none.
+    /// An initial location that does not exist.
     INITIAL_LOCATION = "E0256" "initial-location";
     /// A branch point or a leg of one that breaks the rules.
     BRANCH_REFUSED = "E0257" "branch-refused";
-    /// A name that is no template where one is needed.
+    /// A name that is not a template where one is needed.
     TEMPLATE_EXPECTED = "E0258" "template-expected";
     /// A process in the system line with a parameter that has no value and no bounds.
     FREE_PARAMETER_UNBOUNDED = "E0259" "free-parameter-unbounded";
@@ -153,7 +153,7 @@ codes! {
     HOOK_SIGNATURE = "E0281" "hook-signature";
     /// A function that makes the initial state and ends in an error.
     HOOK_FAILS = "E0282" "hook-fails";
-    /// A channel, or a condition on clocks, where something is to be done.
+    /// A channel, or a condition on clocks, where a statement is needed.
     NOT_A_STATEMENT = "E0291" "not-a-statement";
     /// A channel that is chosen by `?:`.
     CHANNEL_CHOSEN = "E0292" "channel-chosen";

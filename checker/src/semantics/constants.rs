@@ -43,7 +43,7 @@ impl Checker<'_> {
     }
 
     /// The words of an expression that must be known now, converted to `ty`; `None` if that was
-    /// reported, or if it hangs on a value that no instance gives.
+    /// reported, or if it depends on a value that no instance gives.
     pub(super) fn known_words(&mut self, expr: &Expr, ty: &Type, what: &str) -> Option<Vec<i32>> {
         if expr.is_error() || ty.is_error() {
             return None;
@@ -53,7 +53,7 @@ impl Checker<'_> {
                 codes::VALUE_NOT_CONSTANT,
                 expr.span,
                 format!("{what} must be known when the model is loaded"),
-                "use constants, and functions that read nothing but constants",
+                "use constants, and functions that read only constants",
             );
             return None;
         }

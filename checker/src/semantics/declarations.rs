@@ -209,7 +209,7 @@ impl Checker<'_> {
                 codes::ARRAY_TOO_LARGE,
                 span,
                 format!("the model has more {what} than the engine takes"),
-                &format!("the limit is {limit} of them, parts of arrays and structs included"),
+                &format!("the limit is {limit}, parts of arrays and structs included"),
             );
         }
         fits

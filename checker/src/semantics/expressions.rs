@@ -157,7 +157,7 @@ impl Checker<'_> {
                 codes::FIELD_OF_NO_STRUCT,
                 name.span,
                 format!("{} has no field '{}'", record.ty.described(), name.text),
-                "only structs, and processes in queries, have parts with names",
+                "only structs have fields, and only processes in queries have members",
             );
             return Expr::error(span);
         };
@@ -197,7 +197,7 @@ impl Checker<'_> {
                 codes::INDEX_OF_NO_ARRAY,
                 array.span,
                 format!("{} cannot be indexed", array.ty.described()),
-                "only arrays have parts with numbers",
+                "only arrays have an index",
             );
             return Expr::error(span);
         };

@@ -395,7 +395,7 @@ impl Checker<'_> {
             self.error(
                 codes::NOT_A_STATEMENT,
                 checked.span,
-                format!("{} is no statement", checked.ty.described()),
+                format!("{} is not a statement", checked.ty.described()),
                 "write an assignment or a call; channels stand in synchronisations, conditions in guards",
             );
             return Expr::error(checked.span);
@@ -437,7 +437,7 @@ impl Checker<'_> {
             let diagnostic = Diagnostic::new(
                 codes::CONDITION_EXPECTED,
                 checked.span,
-                "functions cannot look at clocks: their values are known only symbolically",
+                "functions cannot read clocks: their values are known only symbolically",
             );
             let diagnostic = diagnostic.help("test the clock in the guard of an edge");
             return self.unknown(diagnostic, checked, Type::Bool);

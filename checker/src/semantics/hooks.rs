@@ -32,9 +32,11 @@ impl Checker<'_> {
                     Diagnostic::new(
                         codes::HOOK_WITHOUT_EFFECT,
                         span,
-                        format!("'{name}' is not run: it comes after all that a query sees"),
+                        format!(
+                            "'{name}' is not run: it comes after everything that a query reads"
+                        ),
                     )
-                    .help("leave it if UPPAAL needs it; no answer depends on it"),
+                    .help("keep it if UPPAAL needs it; no answer depends on it"),
                 );
             }
         }
@@ -72,7 +74,7 @@ impl Checker<'_> {
             self.error(
                 codes::HOOK_SIGNATURE,
                 span,
-                format!("'{name}' is called by the checker, which has no arguments for it and needs no result"),
+                format!("UPPAAL calls '{name}' without arguments and uses no result"),
                 &format!("declare it as void {name}(), or give it another name"),
             );
         }
@@ -111,7 +113,7 @@ impl Checker<'_> {
         let diagnostic = Diagnostic::new(
             codes::HOOK_FAILS,
             span,
-            format!("there is no initial state, for the hook that makes it ends in {reason}"),
+            format!("there is no initial state, because the hook that makes it ends in {reason}"),
         );
         self.report(
             diagnostic

@@ -7,7 +7,7 @@ use super::typed::Expr;
 use super::types::{Size, StructType, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::CLOCK_LIMIT;
-use crate::syntax::ast::{Initialiser, Name};
+use crate::syntax::ast::{self, Initialiser, Name};
 
 /// The value that one part of a variable starts with.
 pub(super) struct InitialPart {
@@ -53,20 +53,7 @@ impl Checker<'_> {
     ) {
         match (initialiser, ty) {
             (Initialiser::Expr(expr), _) => {
-                let value = self.expression(expr);
-                self.expect_pure(&value, "an initial value");
-                let value = if ty.is_clock() {
-                    self.initial_clock(value, ty)
-                } else if ty.size().channels > 0 || *ty == Type::Void {
-                    self.misplaced_initialiser(expr.span, ty);
-                    None
-                } else if *ty == Type::String {
-                    None
-                } else {
-                    self.converted(value, ty)
-                };
-                // A mistake leaves an error, so that the variable is known to have no value.
-                let value = value.unwrap_or_else(|| Expr::error(expr.span));
+                let value = self.initial_value(expr, ty);
                 parts.push(InitialPart {
                     offset,
                     ty: ty.clone(),
@@ -74,35 +61,7 @@ impl Checker<'_> {
                 });
             }
             (Initialiser::List(items, span), Type::Array(array)) => {
-                if items.len() < array.index.length as usize {
-                    self.report(
-                        Diagnostic::new(
-                            codes::INITIALISER_INCOMPLETE,
-                            *span,
-                            format!(
-                                "the array has {} parts, but only {} values are given",
-                                array.index.length,
-                                items.len()
-                            ),
-                        )
-                        .note(
-                            "the other parts start with the value of an array without initialiser",
-                        )
-                        .help("give one value for each part"),
-                    );
-                }
-                if items.len() > array.index.length as usize {
-                    let message = format!(
-                        "the array has {} parts, but {} values are given",
-                        array.index.length,
-                        items.len()
-                    );
-                    self.error(
-                        codes::INITIALISER_COUNT,
-                        *span,
-                        message,
-                        "give one value for each part",
-                    );
+                if !self.has_fitting_length(items.len(), array.index.length as usize, *span) {
                     parts.push(broken_part(offset, ty, *span));
                     return;
                 }
@@ -124,6 +83,47 @@ impl Checker<'_> {
                 parts.push(broken_part(offset, ty, *span));
             }
         }
+    }
+
+    /// The value of one part. A mistake leaves an error, so that the variable is known to have no
+    /// value.
+    fn initial_value(&mut self, expr: &ast::Expr, ty: &Type) -> Expr {
+        let value = self.expression(expr);
+        self.expect_pure(&value, "an initial value");
+        let value = if ty.is_clock() {
+            self.initial_clock(value, ty)
+        } else if ty.size().channels > 0 || *ty == Type::Void {
+            self.misplaced_initialiser(expr.span, ty);
+            None
+        } else if *ty == Type::String {
+            None
+        } else {
+            self.converted(value, ty)
+        };
+        value.unwrap_or_else(|| Expr::error(expr.span))
+    }
+
+    /// Whether an array of this length can take this number of values; too few are a warning.
+    fn has_fitting_length(&mut self, given: usize, length: usize, span: Span) -> bool {
+        if given < length {
+            let message =
+                format!("the array has {length} parts, but only {given} values are given");
+            self.report(
+                Diagnostic::new(codes::INITIALISER_INCOMPLETE, span, message)
+                    .note("the other parts start with the value of an array without initialiser")
+                    .help("give one value for each part"),
+            );
+        }
+        if given > length {
+            let message = format!("the array has {length} parts, but {given} values are given");
+            self.error(
+                codes::INITIALISER_COUNT,
+                span,
+                message,
+                "give one value for each part",
+            );
+        }
+        given <= length
     }
 
     /// The value that a clock starts with; that of a hybrid clock does not matter.

@@ -2,7 +2,7 @@
 //!
 //! A name in the system line that has parameters left stands for a set of processes, one for each
 //! combination of their values, the first parameter changing slowest. Arguments by value are
-//! constants; arguments by reference stand for the very variable, clock or channel.
+//! constants; arguments by reference stand for the variable, clock or channel itself.
 
 use crate::cancellation;
 
@@ -83,7 +83,7 @@ impl Checker<'_> {
             )
         } else if has_chart {
             (
-                "the system has no process: live sequence charts are none",
+                "the system has no process: live sequence charts are not processes",
                 "name the processes that the charts observe",
             )
         } else {
@@ -187,8 +187,8 @@ impl Checker<'_> {
             self.error(
                 codes::PROCESS_TWICE,
                 name.span,
-                format!("'{}' stands twice in the system line", name.text),
-                "give the second process a name of its own by an instantiation",
+                format!("the system line names '{}' twice", name.text),
+                "give the second process its own name, with an instantiation",
             );
             return;
         }
@@ -219,7 +219,12 @@ impl Checker<'_> {
         }
         let first = self.world.network.processes.len() as u32;
         for values in combinations(&types) {
-            self.make_process(document, (name, target, formals), (&types, &values), level);
+            cancellation::work(UNITS_FOR_PROCESS);
+            let scope = free_values(formals, &types, &values);
+            if let Some((template, scope)) = self.bind(document, target, scope) {
+                let template = &document.templates[template];
+                self.make_process(template, scope, process_name(name, &values), level);
+            }
         }
         self.place_in_group(first, &types);
     }
@@ -268,7 +273,7 @@ impl Checker<'_> {
                     codes::FREE_PARAMETER_UNBOUNDED,
                     name.span,
                     format!(
-                        "'{}' cannot stand in the system line: its parameter '{}' has no value and is no bounded integer or scalar",
+                        "'{}' cannot stand in the system line: its parameter '{}' has no value and is not a bounded integer or scalar",
                         name.text, formal.name.text
                     ),
                     "instantiate it with arguments, or give the parameter a range",
@@ -302,33 +307,17 @@ impl Checker<'_> {
 
     fn make_process(
         &mut self,
-        document: &Document,
-        (name, target, formals): (&Name, Instantiated, &[Parameter]),
-        (types, values): (&[Type], &[i32]),
+        template: &ast::Template,
+        scope: Scope,
+        full_name: String,
         level: u32,
     ) {
-        cancellation::work(UNITS_FOR_PROCESS);
-        let mut scope = Scope::default();
-        for (formal, (ty, &value)) in formals.iter().zip(types.iter().zip(values)) {
-            let value = Expr::int(value, ty.clone(), formal.name.span);
-            let entity = Entity::Constant { value, free: true };
-            scope.set(&formal.name.text, entity, formal.name.span);
-        }
-        let Some((template, scope)) = self.bind(document, target, scope) else {
-            return;
-        };
-        let full_name = if values.is_empty() {
-            name.text.clone()
-        } else {
-            let values: Vec<String> = values.iter().map(i32::to_string).collect();
-            format!("{}({})", name.text, values.join(","))
-        };
         let id = ProcessId(self.world.network.processes.len() as u32);
         let outer = self.process.replace((id, full_name));
         self.hides_system = true;
-        let scope = self.own_parameters(&document.templates[template], scope);
+        let scope = self.own_parameters(template, scope);
         self.scopes.push(scope);
-        let process = self.template(&document.templates[template], level);
+        let process = self.template(template, level);
         let scope = self.scopes.pop().expect("the scope was just opened");
         self.hides_system = false;
         self.process = outer;
@@ -448,7 +437,7 @@ impl Checker<'_> {
                     ty.described(),
                     argument.ty.described()
                 ),
-                "a reference needs a variable of the very same type, range included",
+                "a reference needs a variable of the same type, range included",
             );
             return None;
         }
@@ -507,7 +496,7 @@ impl Checker<'_> {
                 format!("{what} has parts that are not supported; no process of the system is made of it"),
             )
             .note(note)
-            .help("nothing is to be done, unless it is to be used"),
+            .help("do nothing, unless you want to use it"),
         );
     }
 
@@ -661,4 +650,24 @@ pub(super) fn combinations(types: &[Type]) -> Vec<Vec<i32>> {
             .collect();
     }
     all
+}
+
+/// A scope with the values of the free parameters of a process.
+fn free_values(formals: &[Parameter], types: &[Type], values: &[i32]) -> Scope {
+    let mut scope = Scope::default();
+    for (formal, (ty, &value)) in formals.iter().zip(types.iter().zip(values)) {
+        let value = Expr::int(value, ty.clone(), formal.name.span);
+        let entity = Entity::Constant { value, free: true };
+        scope.set(&formal.name.text, entity, formal.name.span);
+    }
+    scope
+}
+
+/// `P`, or `P(0,1)` for a process of a set.
+fn process_name(name: &Name, values: &[i32]) -> String {
+    if values.is_empty() {
+        return name.text.clone();
+    }
+    let values: Vec<String> = values.iter().map(i32::to_string).collect();
+    format!("{}({})", name.text, values.join(","))
 }

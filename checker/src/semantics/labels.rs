@@ -35,7 +35,7 @@ impl Checker<'_> {
             self.error(
                 codes::CONDITION_NOT_A_GUARD,
                 guard.span,
-                "this cannot be a guard: inequalities, negations and disjunctions of clock conditions, and rates, are no guards",
+                "this cannot be a guard: inequalities, negations and disjunctions of clock conditions, and rates, are not guards",
                 "split the edge into one for each case",
             );
             return Guard::default();
@@ -204,7 +204,7 @@ impl Checker<'_> {
         update.assignments = update
             .fixed
             .iter()
-            .map(|&reset| fixed_assignment(reset))
+            .map(|&(clock, value)| fixed_assignment(clock, value))
             .collect();
         if rest.is_empty() {
             return update;
@@ -333,7 +333,7 @@ fn sets_clocks(expr: &Expr) -> bool {
     })
 }
 
-fn fixed_assignment((clock, value): (ClockId, i32)) -> ClockAssignment {
+fn fixed_assignment(clock: ClockId, value: i32) -> ClockAssignment {
     ClockAssignment {
         target: single(clock),
         value: AssignedValue::Integer(value, value),

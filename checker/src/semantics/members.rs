@@ -1,7 +1,7 @@
 //! Processes in queries: `P.location`, `P.l`, `P.x`, `P(1).x`, `P(i).l`.
 //!
 //! The members of a process set come from one template and lie one behind the other, so `P(i).x`
-//! with a computed `i` is an index into them. Where members differ (a constant that hangs on the
+//! with a computed `i` is an index into them. Where members differ (a constant that depends on the
 //! parameter), and for clocks, the quantifier that binds `i` is unrolled.
 
 use super::checker::Checker;
@@ -23,7 +23,7 @@ struct Member {
 }
 
 impl Checker<'_> {
-    /// `record.name` where `record` is a process; `None` if it is none.
+    /// `record.name` where `record` is a process; `None` if it is not.
     pub(super) fn process_member(
         &mut self,
         record: &ast::Expr,
@@ -91,7 +91,7 @@ impl Checker<'_> {
                 self.error(
                     codes::PROCESS_NOT_IN_SYSTEM,
                     record.span,
-                    format!("'{callee}' does not stand in the system line"),
+                    format!("'{callee}' is not in the system line"),
                     "only processes of the system have a state",
                 );
                 return Some(Err(()));

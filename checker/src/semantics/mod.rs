@@ -7,7 +7,7 @@
 //! Templates that no process uses are checked with unknown parameters.
 //!
 //! Invariants:
-//! * All mistakes are reported in one run; what hangs on a mistake is silent.
+//! * All mistakes are reported in one run; what follows from a mistake is not reported.
 //! * Nothing is lowered after a mistake, so lowering never fails.
 //! * The scopes of a model outlive its check: queries are compiled against them, and only append to
 //!   the network.

@@ -4,7 +4,7 @@
 use super::checker::Checker;
 use super::codes;
 use super::typed::{Expr, Kind};
-use super::types::{Class, Type};
+use super::types::{Class, Interval, Type};
 use crate::builtins::{Code, Number};
 use crate::diagnostics::Span;
 use crate::exec::arithmetic;
@@ -12,7 +12,7 @@ use crate::ir::{DoubleOperator, IntegerOperator, MathFunction, Relation};
 use crate::syntax::ast::BinaryOp;
 
 impl Checker<'_> {
-    /// `left operator right`, for every binary operator.
+    /// `left operator right`, forevery binary operator.
     pub(super) fn binary(
         &mut self,
         operator: BinaryOp,
@@ -65,7 +65,7 @@ impl Checker<'_> {
     /// Reports that an operator does not apply to its operands.
     pub(super) fn operands_refused(&mut self, left: &Expr, right: &Expr, span: Span) -> Expr {
         let help = if left.ty.is_clock() || right.ty.is_clock() {
-            "clocks can be compared, subtracted from each other, and set; they have no value to compute with"
+            "clocks can only be compared, subtracted from each other, and set"
         } else {
             "convert with fint(…), or use other operands"
         };
@@ -288,7 +288,8 @@ pub(super) fn compare_integers(relation: Relation, left: Expr, right: Expr, span
 }
 
 /// The truth values of a comparison of values in these intervals.
-fn comparison_interval(relation: Relation, (a, b): (i32, i32), (c, d): (i32, i32)) -> (i32, i32) {
+fn comparison_interval(relation: Relation, left: Interval, right: Interval) -> Interval {
+    let ((a, b), (c, d)) = (left, right);
     let (always, never) = match relation {
         Relation::Less => (b < c, a >= d),
         Relation::LessEqual => (b <= c, a > d),
@@ -321,9 +322,10 @@ fn compare_doubles(relation: Relation, left: Expr, right: Expr, span: Span) -> E
 /// Results that may not fit into 32 bits may wrap round to any value.
 pub(super) fn integer_interval(
     operator: IntegerOperator,
-    (a, b): (i32, i32),
-    (c, d): (i32, i32),
-) -> (i32, i32) {
+    left: Interval,
+    right: Interval,
+) -> Interval {
+    let ((a, b), (c, d)) = (left, right);
     let (wide_a, wide_b) = (i64::from(a), i64::from(b));
     let (wide_c, wide_d) = (i64::from(c), i64::from(d));
     let clamp = |value: i64| value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
@@ -369,7 +371,8 @@ pub(super) fn integer_interval(
 
 /// The values of a quotient: a positive constant divisor keeps the order, any other can only change
 /// the sign.
-fn divided((a, b): (i32, i32), (c, d): (i32, i32), magnitude: i32) -> (i32, i32) {
+fn divided(dividend: Interval, divisor: Interval, magnitude: i32) -> Interval {
+    let ((a, b), (c, d)) = (dividend, divisor);
     if c > 0 && c == d {
         return (a / c, b / c);
     }

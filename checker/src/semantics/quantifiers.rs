@@ -26,13 +26,7 @@ impl Checker<'_> {
             return Expr::error(span);
         };
         if range.0 > range.1 {
-            // The body may speak of the members of a set of processes that has none.
-            let value = i32::from(quantifier == Quantifier::ForAll);
-            let ty = match quantifier {
-                Quantifier::Sum => Type::ANY_INT,
-                Quantifier::ForAll | Quantifier::Exists => Type::Bool,
-            };
-            return Expr::int(value, ty, span);
+            return over_nothing(quantifier, span);
         }
         let local = self.new_local(range_type.clone());
         let place = Place {
@@ -152,4 +146,15 @@ impl Checker<'_> {
         }
         parts.pop().unwrap_or_else(|| Expr::error(span))
     }
+}
+
+/// The value of a quantifier over an empty range. Its body is not looked at, since it may speak of
+/// the members of a set of processes that has none.
+fn over_nothing(quantifier: Quantifier, span: Span) -> Expr {
+    let value = i32::from(quantifier == Quantifier::ForAll);
+    let ty = match quantifier {
+        Quantifier::Sum => Type::ANY_INT,
+        Quantifier::ForAll | Quantifier::Exists => Type::Bool,
+    };
+    Expr::int(value, ty, span)
 }

@@ -66,7 +66,7 @@ impl Checker<'_> {
                     codes::STRATEGY_TWICE,
                     strategy.span,
                     format!(
-                        "there is a strategy '{}' already; this one takes its place",
+                        "there is already a strategy '{}'; this one replaces it",
                         strategy.text
                     ),
                 )
@@ -335,8 +335,8 @@ impl Checker<'_> {
             self.error(
                 codes::DOUBLE_IN_QUERY,
                 expr.span,
-                "doubles and hybrid clocks cannot stand in symbolic and game queries",
-                "let the model put what matters into an integer",
+                "symbolic and game queries cannot use doubles and hybrid clocks",
+                "use an integer in the model instead",
             );
         }
         is_refused
@@ -348,7 +348,7 @@ impl Checker<'_> {
             self.error(
                 codes::DEADLOCK_MISPLACED,
                 expr.span,
-                "deadlock can stand in E<> and A[] queries only",
+                "deadlock is only allowed in E<> and A[] queries",
                 "ask E<> deadlock or A[] not deadlock",
             );
         } else if features.priorities || features.guarded_receivers {
@@ -399,7 +399,7 @@ impl Checker<'_> {
                 self.error(
                     codes::CONDITION_EXPECTED,
                     expr.span,
-                    "clock conditions cannot stand inside this expression",
+                    "clock conditions are not allowed inside this expression",
                     "join them with &&, || and not",
                 );
                 None

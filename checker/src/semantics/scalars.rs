@@ -145,8 +145,8 @@ struct Body {
 }
 
 /// Whether running through the values of `local` in another order does the same: each round touches
-/// only its own parts of what is written, or gathers into variables in a way that does not hang on
-/// the order, or only looks for a reason to return.
+/// only its own parts of what is written, or gathers into variables in a way that does not depend
+/// on the order, or only looks for a reason to return.
 pub(super) fn is_order_irrelevant(body: &Statement, local: LocalId, locals: &[Local]) -> bool {
     let mut parts = Body {
         local,

@@ -17,7 +17,7 @@ use crate::ir::FunctionId;
 /// What a name stands for.
 #[derive(Clone, Debug)]
 pub(super) enum Entity {
-    /// A scalar whose value is known; `free` if it hangs on a free parameter of a process set.
+    /// A scalar whose value is known; `free` if it depends on a free parameter of a process set.
     Constant { value: Expr, free: bool },
     /// A variable, clock or channel, or an array or struct of any.
     Variable { place: Place, ty: Type },

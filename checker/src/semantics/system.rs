@@ -13,7 +13,7 @@ use crate::ir::{AssignedValue, Clock, ClockAtom, Features, Location, Network};
 use crate::syntax::ast::{Declaration, Document, SystemItem, UnsupportedPart};
 
 impl Checker<'_> {
-    /// Checks and lowers a model. Returns how its provisional offsets of words are to be read.
+    /// Checks and lowers a model. Returns what its provisional offsets of words stand for.
     pub(super) fn document(&mut self, document: &Document, prelude: &[Declaration]) -> Relocation {
         self.world.network.clocks.push(Clock {
             name: String::from("0"),
@@ -55,7 +55,7 @@ impl Checker<'_> {
                     format!("the {} is left out", construct.text),
                 )
                 .note("charts observe a system and do not change it; `sat:` queries are not supported")
-                .help("nothing is to be done for other queries"),
+                .help("do nothing for other queries"),
             );
         }
     }
@@ -184,7 +184,7 @@ impl Checker<'_> {
                 Diagnostic::new(
                     codes::HYBRID_CLOCK_IGNORED,
                     span,
-                    format!("the hybrid clock '{name}' is abstracted away in symbolic and game queries"),
+                    format!("the hybrid clock '{name}' is ignored in symbolic and game queries"),
                 )
                 .note("its rates and assignments have no effect there; nothing that a query sees depends on it")
                 .help("use an ordinary clock if it matters"),

@@ -72,7 +72,7 @@ impl Checker<'_> {
         result
     }
 
-    /// Says that an array has no parts, which generated models have for what there is none of.
+    /// Warns of an array without parts, which generated models have for things that do not occur.
     fn note_emptiness(&mut self, part: &Type, span: Span) {
         if part.size().clocks + part.size().channels > 0 {
             self.error(
@@ -371,7 +371,7 @@ impl Checker<'_> {
                     codes::RANGE_EXPECTED,
                     ty.span,
                     format!(
-                        "only bounded integers and scalars can be run through, not {}",
+                        "loops and quantifiers run over bounded integers and scalars only, not over {}",
                         other.described()
                     ),
                     "write int[a,b]",

@@ -8,7 +8,7 @@
 //! * A place (something that may be assigned, referred to or indexed) is a [`Kind::Variable`] under
 //!   [`Kind::Index`] and [`Kind::Field`]; which memory it means follows from the type at its top.
 
-use super::types::{Size, Type};
+use super::types::{Interval, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{
     ClockAtom, ClockRange, DoubleOperator, FunctionId, IntegerOperator, MathFunction, Relation,
@@ -83,7 +83,7 @@ pub(super) enum Kind {
         length: u32,
         stride: Size,
     },
-    /// A field of a struct, so many words, clocks and channels behind its start.
+    /// A field of a struct, by its offset from the start in words, clocks and channels.
     Field { record: Box<Expr>, offset: Size },
     /// An integer as a double.
     ToDouble(Box<Expr>),
@@ -188,15 +188,15 @@ pub(super) struct Signature {
     pub(super) result: Type,
     /// What it does to the state.
     pub(super) effects: Effects,
-    /// Set if its result hangs on values that only statistical queries know. Then it is not
+    /// Set if its result depends on values that only statistical queries know. Then it is not
     /// lowered.
     pub(super) unknown: Option<Unknown>,
 }
 
-/// That a function hangs on values which only statistical queries know.
+/// Why the result of a function depends on values that only statistical queries know.
 #[derive(Clone, Debug)]
 pub(super) struct Unknown {
-    /// What is to be said where anything depends on the function.
+    /// The report if anything depends on the function.
     pub(super) diagnostic: Diagnostic,
     /// Whether it may change something outside itself.
     may_write: bool,
@@ -336,7 +336,7 @@ impl Expr {
     }
 
     /// The same with a narrower interval.
-    pub(super) fn within(mut self, interval: (i32, i32)) -> Expr {
+    pub(super) fn within(mut self, interval: Interval) -> Expr {
         self.interval = interval;
         self
     }
@@ -483,7 +483,7 @@ impl Expr {
         })
     }
 
-    /// Whether it hangs on values that only statistical queries know.
+    /// Whether it depends on values that only statistical queries know.
     pub(super) fn is_unknown(&self) -> bool {
         self.any(&|e| match &e.kind {
             Kind::Unknown(_) => true,

@@ -14,6 +14,9 @@
 use std::fmt;
 use std::sync::Arc;
 
+/// The least and the greatest of some integers; empty if the first is the greater one.
+pub(super) type Interval = (i32, i32);
+
 /// The bounds of `int` without a range.
 pub(super) const DEFAULT_INT: (i32, i32) = (-32768, 32767);
 
@@ -24,7 +27,7 @@ pub(super) const SIZE_LIMIT: u64 = 1 << 24;
 /// The most channels of a model: each has a name of its own.
 pub(super) const CHANNEL_LIMIT: u64 = 1 << 20;
 
-/// The most clocks of a model: one zone of so many takes 64 MiB.
+/// The most clocks of a model: one zone of them takes 64 MiB.
 pub(super) const CLOCK_LIMIT: u64 = 4095;
 
 /// A type.

@@ -45,13 +45,13 @@ codes! {
     MISSING_SYSTEM = "E0128" "missing-system";
     /// More bytes than positions can count.
     FILE_TOO_LARGE = "E0129" "file-too-large";
-    /// `commit` or `urgent` with a name that is no location.
+    /// `commit` or `urgent` with a name that is not a location.
     UNKNOWN_LOCATION = "E0130" "unknown-location";
     /// A query that is an expression only.
     MISSING_PATH_QUANTIFIER = "E0140" "missing-path-quantifier";
     /// A path quantifier inside another one.
     NESTED_PATH_QUANTIFIERS = "E0141" "nested-path-quantifiers";
-    /// `control:` with a path formula that is no objective.
+    /// `control:` with a path formula that is not an objective.
     INVALID_OBJECTIVE = "E0142" "invalid-objective";
     /// `strategy S =` followed by a query that yields no strategy.
     NOT_A_STRATEGY = "E0143" "not-a-strategy";

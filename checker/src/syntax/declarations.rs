@@ -87,7 +87,7 @@ impl Parser<'_> {
         let message = "a `;` that ends nothing";
         self.report(
             Diagnostic::new(codes::UNEXPECTED_TOKEN, self.here(), message)
-                .help("remove it; the `}` of a function or process needs none"),
+                .help("remove it; no `;` is needed after the `}` of a function or process"),
         );
         self.bump();
     }

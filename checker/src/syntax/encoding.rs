@@ -1,4 +1,5 @@
-//! From bytes to text: byte order marks, declared encodings, and the refusal of what is no text.
+//! From bytes to text: byte order marks, declared encodings, and the refusal of bytes that are not
+//! text.
 //!
 //! Known are UTF-8, UTF-16 in both byte orders, US-ASCII and Latin-1; a byte order mark wins over
 //! what the XML declaration says. Positions count characters, so they are right in every encoding.
@@ -71,8 +72,9 @@ fn about_file(path: &str, code: Code, message: &str, sources: &mut SourceMap) ->
     let span: Span = super::add_file(path, String::new(), sources);
     let diagnostic = Diagnostic::new(code, span, message);
     match code {
-        codes::EMPTY_FILE | codes::NOT_A_MODEL => diagnostic
-            .help("a model is an XML file as UPPAAL writes it, or a text in the XTA format"),
+        codes::EMPTY_FILE | codes::NOT_A_MODEL => {
+            diagnostic.help("a model is an XML file that UPPAAL wrote, or a text in the XTA format")
+        }
         codes::WRONG_ENCODING | codes::NOT_UTF8 => diagnostic.help("save the file as UTF-8"),
         _ => diagnostic,
     }
@@ -104,7 +106,7 @@ fn utf16(
         .collect();
     let text = String::from_utf16(&units);
     if text.is_err() || bytes.len() % 2 == 1 {
-        let message = "the file begins like UTF-16 and is none";
+        let message = "the file begins like UTF-16, but is not UTF-16";
         report(codes::WRONG_ENCODING, message);
         return None;
     }

@@ -112,7 +112,7 @@ fn limit(diagnostics: &mut Vec<Diagnostic>) {
             diagnostics.push(Diagnostic::new(
                 codes::TOO_MANY_MISTAKES,
                 span,
-                format!("more than {MOST_MISTAKES} mistakes; the rest is left out"),
+                format!("more than {MOST_MISTAKES} mistakes; the others are not reported"),
             ));
         }
     }

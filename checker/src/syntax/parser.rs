@@ -228,7 +228,7 @@ impl<'a> Parser<'a> {
         self.report(Diagnostic::new(code, span, message));
     }
 
-    /// Leaves the rest of the text unread: nobody reads that many mistakes.
+    /// Leaves the rest of the text unread.
     fn give_up(&mut self) {
         self.position = self.tokens.len() - 1;
         self.blamed = Some(self.position);
@@ -305,7 +305,7 @@ impl<'a> Parser<'a> {
         } else {
             ("=>", ">=")
         };
-        let message = format!("`{old}` is no operator");
+        let message = format!("`{old}` is not an operator");
         Diagnostic::new(codes::OLD_COMPARISON, self.here(), message)
             .help(format!("write `{new}`; only the old syntax knows `{old}`"))
     }

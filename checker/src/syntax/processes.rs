@@ -181,7 +181,9 @@ impl Parser<'_> {
                 self.since(start),
                 "the interface of a process (`IO`) is read and has no effect",
             )
-            .note("only queries of Ecdar, such as `refinement:`, look at it, and they are not supported"),
+            .note(
+                "only queries of Ecdar, such as `refinement:`, use it, and they are not supported",
+            ),
         );
         self.expect(TokenKind::LeftBrace, "after `IO` and the process");
         while !self.at_end() && !self.at(TokenKind::RightBrace) {
@@ -424,7 +426,7 @@ impl Parser<'_> {
                 continue;
             }
             let Some(&index) = index.get(&name.text) else {
-                let message = format!("`{}` is no location of this process", name.text);
+                let message = format!("`{}` is not a location of this process", name.text);
                 self.report_behind(Diagnostic::new(codes::UNKNOWN_LOCATION, name.span, message));
                 continue;
             };
@@ -552,7 +554,7 @@ impl Parser<'_> {
                 "this synchronisation has no direction (CSP synchronisation is not supported)";
             self.report(
                 Diagnostic::new(codes::MISSING_DIRECTION, channel.span, message)
-                    .help("write `!` behind the channel to send, `?` to receive"),
+                    .help("write `!` after the channel to send, `?` to receive"),
             );
         } else {
             self.expected("`!` or `?` after the channel");

@@ -103,7 +103,7 @@ impl<'a> Splitter<'a> {
                     end: start + 2,
                     ..self.file
                 };
-                let message = format!("`{token}` is no expectation");
+                let message = format!("`{token}` is not an expectation");
                 self.diagnostics.push(
                     Diagnostic::new(codes::UNKNOWN_EXPECTATION, span, message)
                         .help("known are T, F, MT, MF, E, numbers, and numbers with a unit"),

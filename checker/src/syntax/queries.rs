@@ -55,8 +55,8 @@ impl Parser<'_> {
         if strategy.is_some() && !yields_strategy(&kind) {
             let formula = self.since(formula);
             self.report(
-                Diagnostic::new(codes::NOT_A_STRATEGY, formula, "this query yields no strategy").help(
-                    "`strategy S =` wants `control: …`, `loadStrategy(…)`, `minE`, `maxE`, `minPr` or `maxPr`",
+                Diagnostic::new(codes::NOT_A_STRATEGY, formula, "this query gives no strategy").help(
+                    "`strategy S =` needs `control: …`, `loadStrategy(…)`, `minE`, `maxE`, `minPr` or `maxPr`",
                 ),
             );
         }
@@ -333,7 +333,7 @@ impl Parser<'_> {
     fn invalid_objective(&mut self) -> Objective {
         let span = self.here();
         self.report(
-            Diagnostic::new(codes::INVALID_OBJECTIVE, span, "this is no objective of a game").help(
+            Diagnostic::new(codes::INVALID_OBJECTIVE, span, "this is not an objective of a game").help(
                 "write `A<> p`, `A[] p`, `A[ p U q ]`, `A[ p W q ]` or `A[] (p && A<> q)` after `control:`",
             ),
         );

@@ -7,7 +7,7 @@ use super::parser::Parser;
 use crate::diagnostics::Span;
 
 impl Parser<'_> {
-    /// Whether the current word begins a type that is no mere name.
+    /// Whether the current word begins a type that is more than a name.
     pub(super) fn at_type_word(&self) -> bool {
         let word = self.word();
         matches!(

@@ -160,7 +160,7 @@ impl Reader<'_, '_> {
         let name = root.tag_name().name();
         if !matches!(name, "nta" | "project") {
             let span = self.tag(root, "");
-            let message = format!("this XML file is no UPPAAL model: its root is `<{name}>`");
+            let message = format!("this XML file is not a UPPAAL model: its root is `<{name}>`");
             self.diagnostics.push(
                 Diagnostic::new(codes::NOT_A_MODEL, span, message)
                     .help("a model has the root element `<nta>`"),
@@ -275,10 +275,10 @@ impl Reader<'_, '_> {
         let bytes = word.as_bytes();
         if !begins(bytes[0]) || end_of_word(bytes, 0) != bytes.len() {
             let shown: String = word.chars().take(40).collect();
-            let message = format!("`{}` is no identifier", shown.escape_debug());
+            let message = format!("`{}` is not an identifier", shown.escape_debug());
             self.diagnostics.push(
                 Diagnostic::new(codes::INVALID_NAME, span, message)
-                    .help("a name has letters, digits and `_`, and begins with no digit"),
+                    .help("a name has letters, digits and `_`, and does not begin with a digit"),
             );
         } else if is_reserved(&word, Dialect::Old) {
             let message = format!("the reserved word `{word}` cannot be a name");

@@ -1,5 +1,5 @@
-//! The text of XML elements with the way back to the file: entities, character references, CDATA
-//! and line ends make the text that is parsed differ from the bytes of the file.
+//! The text of XML elements with the places in the file that it comes from: entities, character
+//! references, CDATA and line ends make the text that is parsed differ from the bytes of the file.
 
 use super::lexer::to_u32;
 use crate::diagnostics::{Source, SourceId, SourceMap, Span};

@@ -35,8 +35,8 @@ pub(super) fn read(
         diagnostics.truncate(reported);
         let start = Span { end: 0, ..span };
         diagnostics.push(
-            Diagnostic::new(codes::NOT_A_MODEL, start, "this text is no UPPAAL model")
-                .help("a model is an XML file as UPPAAL writes it, or a text in the XTA format"),
+            Diagnostic::new(codes::NOT_A_MODEL, start, "this text is not a UPPAAL model")
+                .help("a model is an XML file that UPPAAL wrote, or a text in the XTA format"),
         );
     }
     document.queries = query_texts(&queries, sources);

@@ -87,7 +87,7 @@ pub fn verify(network: &Network, states: &[States], avoided: &Predicate) -> Resu
         return Err(Error::Unsupported(what));
     }
     let clocks = network.clocks.len().max(1);
-    let mut check = Check {
+    let mut check = ClosureCheck {
         code: Code::new(network),
         clocks,
         zones: HashMap::new(),
@@ -141,7 +141,7 @@ fn zones(network: &Network, entry: &States, clocks: usize) -> Option<Vec<Zone>> 
     })
 }
 
-/// A move from some words, as far as they decide.
+/// A move from some words, where only they decide.
 struct Possible {
     parts: Vec<Part>,
     level: (u32, u32),
@@ -152,14 +152,14 @@ struct Possible {
     enabled: Vec<Zone>,
 }
 
-struct Check<'a> {
+struct ClosureCheck<'a> {
     code: Code<'a>,
     clocks: usize,
     zones: HashMap<&'a [i32], Vec<Zone>>,
     coverage: Coverage,
 }
 
-impl Check<'_> {
+impl ClosureCheck<'_> {
     fn of(&self, words: &[i32]) -> &[Zone] {
         self.zones.get(words).map_or(&[], Vec::as_slice)
     }

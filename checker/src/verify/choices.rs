@@ -15,13 +15,13 @@ pub struct Choice {
     /// Its participants, the sender first.
     pub parts: Vec<Part>,
     /// The waits after which it is possible, as ascending windows of ticks from first to last;
-    /// without a last one for ever.
+    /// without a last one forever.
     pub windows: Vec<(i64, Option<i64>)>,
 }
 
 /// The moves of states.
 pub struct Choices<'a> {
-    /// Of twice as many ticks: there is one between each two moments.
+    /// With twice as many ticks, so that there is one between each two moments.
     semantics: Semantics<'a>,
     moments: Moments,
 }
@@ -41,7 +41,7 @@ impl<'a> Choices<'a> {
     }
 
     /// What can happen in a state, in the order of the first moments; and how long time can pass,
-    /// `None` for ever.
+    /// `None` forever.
     pub fn of(&self, state: &State) -> Result<(Vec<Choice>, Option<i64>), Error> {
         let state = doubled(state);
         let is_stopped = self.semantics.stopped(&state)?;

@@ -43,6 +43,13 @@ pub(super) struct Candidate {
     pub(super) guard: Vec<FixedConstraint>,
 }
 
+/// An edge that sends.
+struct Sender<'c> {
+    process: usize,
+    candidate: &'c Candidate,
+    channel: u32,
+}
+
 /// A combination of edges that are taken together.
 #[derive(Clone, Debug)]
 pub(super) struct Combination {
@@ -216,8 +223,12 @@ impl<'a> Code<'a> {
                 match one.sync {
                     None => self.push(&[one], &[], &mut found)?,
                     Some((channel, true)) => {
-                        let sender = (process, one, channel);
-                        self.synchronise(sender, candidates, is_possible, &mut found)?;
+                        let sender = Sender {
+                            process,
+                            candidate: one,
+                            channel,
+                        };
+                        self.synchronise(&sender, candidates, is_possible, &mut found)?;
                     }
                     Some((_, false)) => {}
                 }
@@ -235,7 +246,7 @@ impl<'a> Code<'a> {
 
     fn synchronise(
         &self,
-        (sender, send, channel): (usize, &Candidate, u32),
+        sender: &Sender<'_>,
         candidates: &[Vec<Candidate>],
         is_possible: &IsPossible<'_>,
         found: &mut Vec<Combination>,
@@ -243,17 +254,17 @@ impl<'a> Code<'a> {
         let receiving = |process: usize| -> Vec<&Candidate> {
             let edges = candidates[process].iter();
             edges
-                .filter(|one| one.sync == Some((channel, false)))
+                .filter(|one| one.sync == Some((sender.channel, false)))
                 .collect()
         };
-        let others = (0..candidates.len()).filter(|&process| process != sender);
-        if !self.network.channels[channel as usize].broadcast {
+        let others = (0..candidates.len()).filter(|&process| process != sender.process);
+        if !self.network.channels[sender.channel as usize].broadcast {
             for receive in others.flat_map(receiving) {
-                self.push(&[send, receive], &[], found)?;
+                self.push(&[sender.candidate, receive], &[], found)?;
             }
             return Ok(());
         }
-        let mut open = vec![(vec![send], Vec::new())];
+        let mut open = vec![(vec![sender.candidate], Vec::new())];
         for choices in others.map(receiving).filter(|choices| !choices.is_empty()) {
             let may_abstain = choices.iter().all(|choice| !choice.guard.is_empty());
             let mut next = Vec::new();

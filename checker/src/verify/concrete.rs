@@ -100,7 +100,7 @@ impl<'a> Semantics<'a> {
         self.code.stopped(&state.words)
     }
 
-    /// The state after so many ticks, whether or not so much time can pass.
+    /// The state after this number of ticks, whether or not this time can pass.
     pub fn after(&self, state: &State, wait: i64) -> Result<State, Error> {
         let is_stopped = self.stopped(state)?;
         let mut later = state.clone();

@@ -43,7 +43,7 @@ impl<'a> Effort<'a> {
         self.next_question = 0;
     }
 
-    /// Whether one more region would be too much, after so many.
+    /// Whether one more region would be too much, after this number of them.
     pub(super) fn is_over(&mut self, regions: u64) -> Option<GivenUp> {
         if regions >= self.most {
             return Some(GivenUp::TooLarge);

@@ -34,7 +34,7 @@ pub(super) struct Moments {
 pub(super) struct Stretch {
     /// The moment, or the one before, in ticks.
     pub(super) first: i64,
-    /// The moment, or the one after; `None` for ever.
+    /// The moment, or the one after; `None` forever.
     pub(super) last: Option<i64>,
     /// A moment of it.
     pub(super) moment: i64,
@@ -84,7 +84,7 @@ impl Moments {
         for atom in atoms {
             let (low, high) = (i64::from(atom.low), i64::from(atom.high));
             if high - low > MOST_VALUES {
-                return Err(Error::Unsupported("clock bounds of so many values"));
+                return Err(Error::Unsupported("clock bounds with too many values"));
             }
             constants.extend((low..=high).flat_map(|value| [value, -value]));
         }
@@ -96,7 +96,7 @@ impl Moments {
                 AssignedValue::Integer(..) => continue,
             };
             if i64::from(high) - i64::from(low) > MOST_VALUES {
-                return Err(Error::Unsupported("clock assignments of so many values"));
+                return Err(Error::Unsupported("clock assignments with too many values"));
             }
             shifts.extend((low..=high).map(|shift| sign * i64::from(shift)));
         }
@@ -105,7 +105,7 @@ impl Moments {
             constants.extend(plain.iter().map(|constant| constant + shift));
         }
         if constants.len() > MOST_MOMENTS {
-            return Err(Error::Unsupported("clock comparisons of so many values"));
+            return Err(Error::Unsupported("clock comparisons with too many values"));
         }
         Ok(Moments {
             constants,
@@ -169,7 +169,7 @@ impl Moments {
                 }
             }
             if changes.len() > MOST_MOMENTS {
-                return Err(Error::Unsupported("waits with so many moments"));
+                return Err(Error::Unsupported("waits with too many moments"));
             }
         }
         let last = changes.last().copied().unwrap_or(0);

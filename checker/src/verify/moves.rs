@@ -9,7 +9,7 @@ pub enum Error {
     RunTime(RunTimeError),
     /// The initial state breaks an invariant.
     InitialInvariant,
-    /// What is to be checked needs something that is not checked here; the text names it.
+    /// The check needs something that is not supported here; the text names it.
     Unsupported(&'static str),
 }
 

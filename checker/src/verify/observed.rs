@@ -6,7 +6,7 @@
 //! the state of the machine, and its action is proposed: where it is possible, it is taken or the
 //! environment moves; elsewhere the environment moves, or time passes to the next region. When the
 //! observation changes, the machine goes to the state that it has for the new one. It is right if
-//! * it has a state for every observation that is met before the goal, and what must be kept holds
+//! * it has a state forevery observation that is met before the goal, and what must be kept holds
 //!   until then;
 //! * where time cannot pass and its action is not possible, the environment has to move, or, if the
 //!   controller has only to keep something, may stop: as for a strategy that waits there

@@ -29,7 +29,7 @@ pub struct Advice {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Waiting {
     /// The half ticks after which it no longer waits, or the first moment that was chosen for it;
-    /// `None` if it waits for ever.
+    /// `None` if it waits forever.
     pub half_ticks: Option<i64>,
     /// The decisions that apply then, by index.
     pub then: Vec<usize>,
@@ -169,7 +169,7 @@ pub enum Ending {
     Broken,
     /// Time cannot pass, and nobody has to move.
     Stopped,
-    /// Time passes for ever.
+    /// Time passes forever.
     Endless,
 }
 
@@ -214,7 +214,7 @@ pub struct Situation {
     pub waits: Window,
     /// What happens after [`Situation::half_ticks`] if the opponent does not move.
     pub next: Next,
-    /// When, in half ticks; `None` if time passes for ever.
+    /// When, in half ticks; `None` if time passes forever.
     pub half_ticks: Option<i64>,
     /// Whether the goal holds now.
     pub is_goal: bool,

@@ -7,7 +7,7 @@
 //! smallest of the different fractional parts other than 0 becomes `2 k` ticks, and the odd ticks
 //! are where they go while those clocks that were integers are on their way. A plain grid without
 //! this renaming would be wrong for strict constraints, however fine: a run may need fractional
-//! parts that grow for ever below another one.
+//! parts that grow forever below another one.
 //!
 //! Two things make the set finite:
 //! * [`Bounding::Values`], without comparisons of clock differences: a clock above the greatest

@@ -7,7 +7,7 @@
 //! * every move is one of the possible moves of the state, of the highest priority;
 //! * it ends as it says: in a loop, if the last state and the one that it leads back to lie in the
 //!   same region ([`super::regions`]; with stopwatches if they have the same values as far as they
-//!   matter), so that the same moves are possible again and again; waiting for ever; or without any
+//!   matter), so that the same moves are possible again and again; waiting forever; or without any
 //!   move, now or after any wait.
 //!
 //! What must hold during a wait is looked at at all moments at which something may change
@@ -36,14 +36,14 @@ pub struct Step {
 /// How a run ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// In its last state, after waiting so many ticks.
+    /// In its last state, after waiting this number of ticks.
     After(i64),
     /// Its last state is one of the same region as the state with this index (the first is 0), on
     /// entry of both.
     Loop(usize),
-    /// After so many ticks in its last state time goes on for ever.
+    /// After this number of ticks in its last state, time goes on forever.
     Waits(i64),
-    /// After so many ticks in its last state nothing is possible any more.
+    /// After this number of ticks in its last state, nothing is possible any more.
     Stuck(i64),
 }
 
@@ -87,7 +87,7 @@ pub enum Claim<'a> {
     Possible,
     /// At its end the predicate holds.
     Reaches(&'a Predicate),
-    /// The first predicate holds at [`Run::from`], and the second from there on for ever.
+    /// The first predicate holds at [`Run::from`], and the second from there on forever.
     Stays(&'a Predicate, &'a Predicate),
     /// At its end the predicate holds, and the measure has the value.
     Takes(&'a Predicate, &'a Measure, Shown),
@@ -114,7 +114,7 @@ pub enum Defect {
     NoTime,
     /// The move is not possible here.
     NoMove,
-    /// What is to be reached does not hold at the end.
+    /// The goal does not hold at the end.
     NotReached,
     /// What is to hold at the moment from which something stays does not.
     NotOpen,
@@ -122,7 +122,7 @@ pub enum Defect {
     NotKept,
     /// The last state is not like the one that it is said to lead back to.
     NoLoop,
-    /// Time does not go on for ever here.
+    /// Time does not go on forever here.
     NotEndless,
     /// Something is possible here.
     NotStuck,
@@ -270,7 +270,7 @@ impl Replay<'_> {
         self.semantics.after(state, 2 * wait)
     }
 
-    /// Whether time may pass in the state with this index so long, or for ever, and what must hold
+    /// Whether time may pass in the state with this index so long, or forever, and what must hold
     /// does meanwhile.
     fn wait(&mut self, index: usize, wait: Option<i64>, claim: &Claim<'_>) -> Checked {
         if wait.is_some_and(|wait| wait < 0) {
@@ -406,7 +406,7 @@ impl Replay<'_> {
         let is_shown = match *claim {
             Claim::Possible => true,
             Claim::Reaches(goal) => self.holds(goal, end)?,
-            // A run that ends does not stay for ever.
+            // A run that ends does not stay forever.
             Claim::Stays(..) => return Ok(Err(Defect::NotEndless)),
             Claim::Takes(predicate, measure, shown) => {
                 if self.holds(predicate, end)? && !self.shows(measure, shown, end)? {

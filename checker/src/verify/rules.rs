@@ -26,7 +26,7 @@ pub struct Constraint {
 pub struct Decision {
     /// Where it applies: in one of these conjunctions.
     pub zones: Vec<Vec<Constraint>>,
-    /// The move to take; `None` is to wait. Of one of the controller only the edges and their
+    /// The move to take; `None` is to wait. For a move of the controller only the edges and their
     /// `select` values count: the environment picks the branches.
     pub action: Option<Vec<Part>>,
 }
@@ -108,9 +108,9 @@ pub enum Owner {
 pub enum Aim {
     /// To reach the goal.
     Reach,
-    /// To keep what must be kept for ever, or until the goal.
+    /// To keep what must be kept forever, or until the goal.
     Keep,
-    /// To keep it for ever, and have the goal again and again.
+    /// To keep it forever, and have the goal again and again.
     Recur,
 }
 
@@ -143,7 +143,7 @@ pub struct Claim<'a> {
 }
 
 impl Claim<'_> {
-    /// Whether plays that go on for ever, without the goal if that is to recur, are lost for the
+    /// Whether plays that go on forever, without the goal if that is to recur, are lost for the
     /// owner.
     pub(super) fn must_end(&self) -> bool {
         (self.owner == Owner::Controller) == (self.aim != Aim::Keep)

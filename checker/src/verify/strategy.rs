@@ -11,7 +11,7 @@
 //! * where it waits and time cannot pass, the environment has a move and must take it (see
 //!   [`Forcing`]); if it has only to keep something, play may also stop there, if the controller
 //!   has no move;
-//! * if it has to reach the goal, no play goes on for ever without: the graph up to the goals has
+//! * if it has to reach the goal, no play goes on forever without: the graph up to the goals has
 //!   no cycle, not even a region without end; if the goal is to recur, the same from each goal on.
 //!
 //! One of the environment, which may say which branches of the controller's edges it picks, is
@@ -67,7 +67,7 @@ pub enum Defect {
     /// The strategy waits where time cannot pass, although play may stop there, lost, or it must
     /// move itself.
     Stuck,
-    /// The play goes on for ever without what the owner wants.
+    /// The play goes on forever without what the owner wants.
     Endless,
     /// The goal comes again and again, against the environment.
     Recurring,
@@ -251,7 +251,7 @@ impl Play<'_> {
                     }
                     continue;
                 }
-                // From each goal that is to recur, play is followed anew.
+                // From each goal that is to recur, play is followed again.
                 let Some((goal, successors)) = self.goals.pop() else {
                     return Ok(Outcome::Verified(self.coverage));
                 };

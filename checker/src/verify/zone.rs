@@ -11,27 +11,27 @@ use crate::ir::FixedConstraint;
 
 /// `difference < value`, or `<=` if weak; ordered from tight to loose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Limit {
+struct Bounded {
     value: i64,
     is_weak: bool,
 }
 
 /// No limit.
-const NONE: Limit = Limit {
+const NONE: Bounded = Bounded {
     value: i64::MAX,
     is_weak: true,
 };
 
-const ZERO: Limit = Limit {
+const ZERO: Bounded = Bounded {
     value: 0,
     is_weak: true,
 };
 
-fn sum(one: Limit, other: Limit) -> Limit {
+fn sum(one: Bounded, other: Bounded) -> Bounded {
     if one == NONE || other == NONE {
         return NONE;
     }
-    Limit {
+    Bounded {
         value: one.value + other.value,
         is_weak: one.is_weak && other.is_weak,
     }
@@ -47,8 +47,8 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    fn limit(self) -> Limit {
-        Limit {
+    fn limit(self) -> Bounded {
+        Bounded {
             value: self.bound,
             is_weak: !self.is_strict,
         }
@@ -103,7 +103,7 @@ pub(super) fn is_exact(stopped: &[bool]) -> bool {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Zone {
     clocks: usize,
-    limits: Vec<Limit>,
+    limits: Vec<Bounded>,
     is_empty: bool,
 }
 
@@ -122,11 +122,11 @@ impl Zone {
         zone
     }
 
-    fn at(&mut self, left: usize, right: usize) -> &mut Limit {
+    fn at(&mut self, left: usize, right: usize) -> &mut Bounded {
         &mut self.limits[left * self.clocks + right]
     }
 
-    fn get(&self, left: usize, right: usize) -> Limit {
+    fn get(&self, left: usize, right: usize) -> Bounded {
         self.limits[left * self.clocks + right]
     }
 
@@ -285,9 +285,9 @@ impl Zone {
                 bound: value,
                 is_strict: false,
             }]);
-            let shifted = |limit: Limit, by: i64| match limit {
+            let shifted = |limit: Bounded, by: i64| match limit {
                 NONE => NONE,
-                _ => Limit {
+                _ => Bounded {
                     value: limit.value + by,
                     ..limit
                 },

@@ -167,16 +167,7 @@ impl Execution<'_, '_> {
                 let value = arithmetic::scale_index(index, first, length, stride)?;
                 self.set_integer(active, target, value);
             }
-            Instruction::CountRound { .. } => {
-                self.effort.rounds += 1;
-                if self.effort.rounds > self.round_limit {
-                    return Err(RunTimeErrorKind::StepLimit);
-                }
-                if self.effort.rounds.is_multiple_of(ROUNDS_BETWEEN_LOOKS) && cancellation::is_due()
-                {
-                    return Err(RunTimeErrorKind::Interrupted);
-                }
-            }
+            Instruction::CountRound { .. } => self.count_round()?,
             Instruction::Require {
                 condition, kind, ..
             } => {
@@ -185,6 +176,17 @@ impl Execution<'_, '_> {
                 }
             }
             _ => unreachable!("sorted out by execute"),
+        }
+        Ok(())
+    }
+
+    fn count_round(&mut self) -> Result<(), RunTimeErrorKind> {
+        self.effort.rounds += 1;
+        if self.effort.rounds > self.round_limit {
+            return Err(RunTimeErrorKind::StepLimit);
+        }
+        if self.effort.rounds.is_multiple_of(ROUNDS_BETWEEN_LOOKS) && cancellation::is_due() {
+            return Err(RunTimeErrorKind::Interrupted);
         }
         Ok(())
     }

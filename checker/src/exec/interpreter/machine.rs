@@ -19,7 +19,7 @@ impl Stacks {
     }
 }
 
-/// A function on its way.
+/// A function that is running.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Activation {
     pub(super) function: usize,

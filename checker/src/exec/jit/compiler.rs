@@ -82,7 +82,8 @@ impl Compiler {
             "false"
         };
         for (name, value) in [
-            // Code comes optimised; to do it again takes as long as all the rest and gains nothing.
+            // The code is optimised already: doing it again takes as long as all the rest and gains
+            // nothing.
             ("opt_level", "none"),
             ("enable_verifier", verify),
             ("is_pic", "false"),
@@ -161,7 +162,7 @@ impl Compiler {
         }))
     }
 
-    /// The function and all that it calls, as far as they are not compiled.
+    /// The function and all that it calls, without those that are compiled.
     fn uncompiled_below(&self, root: usize) -> Vec<usize> {
         let functions = self.optimiser.made();
         let mut found = vec![false; functions.len()];

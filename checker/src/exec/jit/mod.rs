@@ -1,10 +1,10 @@
 //! Native code by Cranelift: the fast engine.
 //!
-//! Functions that loop much are compiled beforehand ([`Jit::prepare`]). Any other function is
-//! interpreted until it has run for a while, and then optimised and compiled with all that it
-//! calls. A model with thousands of small guards pays for the few that matter, and a model that is
-//! solved at once for none. As interpreted and compiled code agree in everything, it makes no
-//! difference to results when this happens.
+//! Functions that loop much are compiled before their first call ([`Jit::prepare`]). Any other
+//! function is interpreted until it has run for a while, and then optimised and compiled with all
+//! that it calls. A model with thousands of small guards pays for the few that matter, and a model
+//! that is solved at once for none. As interpreted and compiled code agree in everything, it makes
+//! no difference to results when this happens.
 //!
 //! Invariants
 //! * Compiled code is never moved or freed before the engine is dropped; queries that come later
@@ -38,10 +38,10 @@ pub use compiler::JitError;
 use compiler::Compiler;
 use runtime::{NativeContext, result_of_status};
 
-/// After so many interpreted instructions a function is compiled. They take about as long as
+/// A function is compiled after this number of interpreted instructions. They take about as long as
 /// compiling a small one.
 const HOT_INSTRUCTIONS: u64 = 20_000;
-/// Preparing stops after so many instructions, which take some milliseconds to compile.
+/// Preparing stops after this number of instructions, which take some milliseconds to compile.
 const MOST_PREPARED: usize = 6_000;
 /// The heat of a function that is not to be compiled.
 const NEVER: u64 = u64::MAX;
@@ -120,7 +120,7 @@ impl Jit {
     }
 
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what
-    /// was given before. What is compiled stays so. An error for code that is no valid program
+    /// was given before. What is compiled stays so. An error for code that is not a valid program
     /// ([`validate`]), and then nothing is taken over.
     pub fn extend(&mut self, functions: &[Function], constants: &[i32]) -> Result<(), JitError> {
         let words =

@@ -8,7 +8,7 @@ const MAX_INSTRUCTIONS: usize = 20_000;
 const MAX_STACK_BYTES: usize = 1 << 20;
 /// Functions that call each other deeper are interpreted, which needs no native stack.
 const MAX_DEPTH: usize = 100;
-/// A loop is taken to have so many rounds.
+/// The number of rounds that a loop is assumed to have.
 const ROUNDS: u64 = 4;
 /// A call that runs more instructions than this is worth compiling before the first one.
 const HEAVY_WORK: u64 = 1000;
@@ -36,7 +36,7 @@ impl Needs {
             && self.frame_words <= MAX_FRAME_WORDS
     }
 
-    /// Whether compiling the function beforehand is likely to pay.
+    /// Whether compiling the function before its first call is likely to pay.
     pub(super) fn are_heavy(self) -> bool {
         self.work > HEAVY_WORK
     }

@@ -135,15 +135,15 @@ pub(super) extern "C" fn emit_assignment(
 /// Sets words to 0.
 #[expect(unsafe_code, reason = "compiled code passes raw addresses")]
 pub(super) unsafe extern "C" fn zero_words(target: *mut i32, words: u64) {
-    // SAFETY: compiled code passes the frame of a function, which has so many words.
+    // SAFETY: compiled code passes the frame of a function, which has this number of words.
     unsafe { target.write_bytes(0, words as usize) }
 }
 
 /// Copies words between ranges that are the same or disjoint.
 #[expect(unsafe_code, reason = "compiled code passes raw addresses")]
 pub(super) unsafe extern "C" fn copy_words(target: *mut i32, source: *const i32, words: u64) {
-    // SAFETY: compiled code passes places of arrays or structs of so many words, whose indices were
-    // checked; `copy` allows the two to be the same.
+    // SAFETY: compiled code passes places of arrays or structs with this number of words, whose
+    // indices were checked; `copy` allows the two to be the same.
     unsafe { target.copy_from(source, words as usize) }
 }
 
@@ -154,8 +154,8 @@ pub(super) unsafe extern "C" fn equal_words(
     right: *const i32,
     words: u64,
 ) -> i32 {
-    // SAFETY: compiled code passes places of arrays or structs of so many words, whose indices were
-    // checked, and nothing writes during the comparison.
+    // SAFETY: compiled code passes places of arrays or structs with this number of words, whose
+    // indices were checked, and nothing writes during the comparison.
     let (left, right) = unsafe {
         (
             std::slice::from_raw_parts(left, words as usize),

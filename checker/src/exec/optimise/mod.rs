@@ -30,7 +30,7 @@ const MAX_SIZE_TO_INLINE: usize = 60;
 const MAX_SIZE: usize = 1500;
 /// Callees of at most this size are not made to measure, for they will be inlined.
 const MAX_SIZE_TO_LEAVE_GENERAL: usize = 12;
-/// A function is made to measure for at most so many different arguments.
+/// A function is specialised for at most this number of different arguments.
 const MAX_VARIANTS: usize = 16;
 /// Larger functions are left as they are.
 const MAX_SIZE_TO_OPTIMISE: usize = 20_000;
@@ -127,7 +127,7 @@ impl Optimiser {
         self.specialise(function, Vec::new())
     }
 
-    /// Whether a function is to be made to measure. Without a limit, functions that hand on their
+    /// Whether a function should be specialised. Without a limit, functions that hand on their
     /// arguments to each other in several ways would multiply.
     fn may_specialise(&self, function: FunctionId, arguments: &Constants) -> bool {
         let general = (function, Constants::new());

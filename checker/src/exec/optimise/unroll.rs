@@ -177,7 +177,7 @@ fn integers_at_entry(function: &Function, found: &Loop, dominators: &[usize]) ->
     integers
 }
 
-/// Does what an instruction does, as far as it is known.
+/// Does what an instruction does, if that is known.
 fn evaluate(instruction: &Instruction, integers: &mut Integers) {
     let Some(target) = instruction.target() else {
         return;
@@ -189,7 +189,7 @@ fn evaluate(instruction: &Instruction, integers: &mut Integers) {
     };
 }
 
-/// Appends a copy of the loop for every round after the first; in the last round, the block that
+/// Appends a copy of the loop forevery round after the first; in the last round, the block that
 /// leaves the loop only does so.
 fn write_out(function: &mut Function, found: &Loop, end: &LoopEnd) {
     let count = found.blocks.len();

@@ -42,7 +42,7 @@ impl LeftOut {
         self.fixed
     }
 
-    /// What is to be left out the next time; `None` if that is no more than this time.
+    /// What the next check leaves out; `None` if that is no more than this check.
     pub(in crate::semantics) fn next(&self) -> Option<Causes> {
         let mut next = self.fixed.clone();
         for (variable, cause) in &self.candidates {

@@ -140,13 +140,13 @@ impl Checker<'_> {
         let warning = Diagnostic::new(
             code,
             declared,
-            format!("the {what} '{name}' is abstracted away in symbolic and game queries"),
+            format!("the {what} '{name}' is ignored in symbolic and game queries"),
         )
         .note(format!("line {line}: {}", cause.message))
         .note(
-            "what is assigned to it is not computed there; nothing that a query sees depends on it",
+            "what is assigned to it is not computed, and nothing that a query reads depends on it",
         )
-        .help("nothing is to be done, unless it matters");
+        .help("do nothing, unless the value matters");
         self.left_out.warnings.push(warning);
     }
 

@@ -2,7 +2,7 @@
 
 use super::super::operators::integer_interval;
 use super::super::typed::{Expr, Kind};
-use super::super::types::{Index, Type};
+use super::super::types::{Index, Interval, Type};
 use super::places::Destination;
 use super::{Builder, at};
 use crate::diagnostics::Span;
@@ -140,7 +140,7 @@ impl Builder<'_> {
     pub(super) fn check_range(
         &mut self,
         value: Register,
-        interval: (i32, i32),
+        interval: Interval,
         ty: &Type,
         span: Span,
     ) {

@@ -1,6 +1,7 @@
 //! Clock constraints and clock assignments.
 
 use super::super::typed::{ClockEffect, ClockRelation, ClockSet, Expr, Kind};
+use super::super::types::Interval;
 use super::Builder;
 use crate::ir::{BlockId, ClockAtom, ClockId, ClockOperand, ClockRange, Instruction, Register};
 use crate::syntax::ast::Quantifier;
@@ -32,7 +33,8 @@ pub(in crate::semantics) fn comparisons(
 }
 
 /// The values of a bound, or of its negation.
-pub(in crate::semantics) fn bound_range((low, high): (i32, i32), negated: bool) -> (i32, i32) {
+pub(in crate::semantics) fn bound_range(bounds: Interval, negated: bool) -> Interval {
+    let (low, high) = bounds;
     if negated {
         (high.saturating_neg(), low.saturating_neg())
     } else {

@@ -383,7 +383,7 @@ fn open_block() -> Block {
     }
 }
 
-/// Leaves out the blocks that are never reached and numbers the others anew.
+/// Leaves out the blocks that are never reached and renumbers the others.
 fn reachable_blocks(blocks: Vec<Block>) -> Vec<Block> {
     let mut reached = vec![false; blocks.len()];
     let mut open = vec![0];

@@ -1,7 +1,7 @@
 //! Loops over the values of a type: quantifiers and sums.
 
 use super::super::typed::{Expr, Kind, LocalId};
-use super::super::types::Type;
+use super::super::types::{Interval, Type};
 use super::places::Destination;
 use super::{Builder, Home, register_type};
 use crate::diagnostics::Span;
@@ -73,23 +73,24 @@ impl Builder<'_> {
     pub(super) fn count(
         &mut self,
         local: LocalId,
-        (low, high): (i32, i32),
+        values: Interval,
         expr: &Expr,
         body: &mut dyn FnMut(&mut Self),
     ) {
-        self.counted((low, high), expr.span, &mut |builder, counter| {
+        self.counted(values, expr.span, &mut |builder, counter| {
             builder.bind_counter(local, counter);
             body(builder);
         });
     }
 
-    /// Runs `body` for each value of a counter from `low` to `high`.
+    /// Runs `body` for each value of a counter.
     pub(super) fn counted(
         &mut self,
-        (low, high): (i32, i32),
+        values: Interval,
         span: Span,
         body: &mut dyn FnMut(&mut Self, Register),
     ) {
+        let (low, high) = values;
         if low > high {
             return;
         }

@@ -16,18 +16,7 @@ impl Builder<'_> {
             }
             Statement::Expr(expr) => self.effect(expr),
             Statement::Declare(local, initialisers) => self.declare(*local, initialisers),
-            Statement::Loop {
-                condition,
-                step,
-                body,
-                tested_first,
-                span,
-            } => self.repeat(
-                condition.as_ref(),
-                step.as_ref(),
-                body,
-                (*tested_first, *span),
-            ),
+            Statement::Loop { .. } => self.repeat(statement),
             Statement::Iterate { local, range, body } => {
                 let place = Expr::bool(true, Span::default());
                 self.count(*local, *range, &place, &mut |builder| {
@@ -79,22 +68,26 @@ impl Builder<'_> {
         }
     }
 
-    fn repeat(
-        &mut self,
-        condition: Option<&Expr>,
-        step: Option<&Expr>,
-        body: &Statement,
-        (tested_first, span): (bool, Span),
-    ) {
+    fn repeat(&mut self, statement: &Statement) {
+        let Statement::Loop {
+            condition,
+            step,
+            body,
+            tested_first,
+            span,
+        } = statement
+        else {
+            unreachable!("called for loops only");
+        };
         let (test, start, end) = (self.new_block(), self.new_block(), self.new_block());
-        self.jump(if tested_first { test } else { start });
+        self.jump(if *tested_first { test } else { start });
         self.switch(test);
         match condition {
             Some(condition) => self.condition(condition, start, end),
             None => self.jump(start),
         }
         self.switch(start);
-        let site = self.site(span);
+        let site = self.site(*span);
         self.emit(Instruction::CountRound { site });
         self.loops += 1;
         self.statement(body);

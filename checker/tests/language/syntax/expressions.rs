@@ -149,8 +149,8 @@ fn words_of_the_query_language_are_names_in_models() {
 
 #[test]
 fn comparisons_of_the_old_syntax_are_named_in_the_new_one() {
-    check_mistake("x =< 3", "`=<` is no operator");
-    check_mistake("x => 3", "`=>` is no operator");
+    check_mistake("x =< 3", "`=<` is not an operator");
+    check_mistake("x => 3", "`=>` is not an operator");
 }
 
 #[test]

@@ -120,7 +120,7 @@ fn files_that_are_no_models_get_one_diagnostic() {
         ),
         (
             b"\xff\xfe\x00",
-            "E0123 at 1:1 \"the file begins like UTF-16 and is none\"",
+            "E0123 at 1:1 \"the file begins like UTF-16, but is not UTF-16\"",
         ),
         (
             b"<?xml version=\"1.0\" encoding=\"koi8-r\"?><nta>\xd0</nta>",
@@ -128,11 +128,11 @@ fn files_that_are_no_models_get_one_diagnostic() {
         ),
         (
             b"# Notes\n\nSee the other file; it is better.",
-            "E0121 at 1:1 \"this text is no UPPAAL model\"",
+            "E0121 at 1:1 \"this text is not a UPPAAL model\"",
         ),
         (
             b"<html><body/></html>",
-            "E0121 at 1:1 \"this XML file is no UPPAAL model: its root is `<html>`\"",
+            "E0121 at 1:1 \"this XML file is not a UPPAAL model: its root is `<html>`\"",
         ),
         (b"<nta>\n<template>\n</nta>", "E0120 at 3:1"),
         (b"<nta>&nbsp;</nta>", "E0120 at 1:6"),

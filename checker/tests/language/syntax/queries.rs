@@ -256,7 +256,7 @@ fn an_unknown_expectation_is_a_warning() {
     let (queries, diagnostics) = read_queries("q", b"E<> a /* EXPECT:maybe */", &mut sources);
     assert_eq!(queries.len(), 1);
     let shown: Vec<String> = diagnostics.iter().map(|d| shown(d, &sources)).collect();
-    assert_eq!(shown, ["W0105 at 1:7 \"`maybe` is no expectation\""]);
+    assert_eq!(shown, ["W0105 at 1:7 \"`maybe` is not an expectation\""]);
 }
 
 #[test]

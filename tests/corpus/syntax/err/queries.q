@@ -14,13 +14,13 @@ sup{p: x
 inf:
 E<> for all
 E<> P.a ?
-// expect: W0105 at 13:1 "`whatever` is no expectation"
+// expect: W0105 at 13:1 "`whatever` is not an expectation"
 // expect: E0140 at 1:1 "this query has no path quantifier"
 // expect: E0105 at 2:3 "a path quantifier is one word"
 // expect: E0141 at 3:5 "`A<>` inside another formula"
-// expect: E0142 at 4:10 "this is no objective of a game"
+// expect: E0142 at 4:10 "this is not an objective of a game"
 // expect: E0105 at 5:15 "expected `U` or `W` inside `A[ … ]`, found `q`"
-// expect: E0143 at 6:14 "this query yields no strategy"
+// expect: E0143 at 6:14 "this query gives no strategy"
 // expect: E0105 at 7:9 "expected an expression, found the end of the text"
 // expect: E0105 at 8:7 "expected `)` to close the parenthesis, found the end of the text"
 // expect: E0105 at 9:7 "expected the end of the query, found `)`"

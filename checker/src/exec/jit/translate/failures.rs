@@ -154,7 +154,7 @@ impl Translator<'_> {
         block
     }
 
-    /// Does what is to be done where a result of integer arithmetic does not fit: notes it and goes
+    /// Handles a result of integer arithmetic that does not fit: notes it and goes
     /// on, or fails.
     pub(super) fn overflow_if(&mut self, condition: Value, site: SiteId) {
         if self.overflow == Overflow::Error {

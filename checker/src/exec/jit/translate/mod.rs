@@ -31,7 +31,7 @@ use crate::ir::{
 
 use super::runtime;
 
-/// Up to so many words are copied, compared or zeroed in line.
+/// At most this number of words is copied, compared or zeroed in line.
 const INLINE_WORDS: u32 = 16;
 
 /// Memory of the model: always there, but a double may lie at an odd word.

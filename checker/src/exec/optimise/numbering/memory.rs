@@ -12,7 +12,7 @@ use super::{Numbering, Simplified};
 /// So many words of memory are remembered.
 const MAX_KNOWN_WORDS: usize = 1024;
 
-/// Copies of up to so many words become loads and stores, which can be followed.
+/// Copies of at most this number of words become loads and stores, which can be followed.
 pub(super) const MAX_WORDS_TO_EXPAND: u32 = 9;
 
 impl Numbering<'_> {
@@ -139,7 +139,7 @@ impl Numbering<'_> {
         }
     }
 
-    /// Forgets what a write of so many words may change.
+    /// Forgets what a write of this number of words may change.
     fn forget(&mut self, written: Address, words: u32) {
         let mut memory = std::mem::take(&mut self.known.memory);
         memory.retain(|&address, &mut value| {
