@@ -35,6 +35,8 @@ thread_local! {
     /// Units of work that are left until the next look.
     static LEFT: Cell<i64> = const { Cell::new(i64::MAX) };
     static LOOK: RefCell<Option<Look>> = const { RefCell::new(None) };
+    /// Units of work that were done.
+    static DONE: Cell<u64> = const { Cell::new(0) };
 }
 
 /// Counts units of work, and looks when they have become many.
@@ -42,6 +44,7 @@ thread_local! {
 /// A unit is about what it takes to read and compare one bound of a zone.
 #[inline]
 pub fn work(units: usize) {
+    DONE.with(|done| done.set(done.get().wrapping_add(units as u64)));
     LEFT.with(|left| {
         let rest = left.get().saturating_sub_unsigned(units as u64);
         left.set(rest);
@@ -49,6 +52,11 @@ pub fn work(units: usize) {
             look_and_unwind(0);
         }
     });
+}
+
+/// How many units of work this thread has done; two such numbers show what was done in between.
+pub fn done() -> u64 {
+    DONE.with(Cell::get)
 }
 
 /// Looks before this number of bytes is allocated beside what the account says.
@@ -81,6 +89,11 @@ pub fn unless_cut<R>(run: impl FnOnce() -> R) -> Result<R, Cut> {
         Err(cause) if cause.is::<Cut>() => Err(Cut),
         Err(panic) => panic::resume_unwind(panic),
     }
+}
+
+/// Unwinds to whoever started the work: for who has caught [`Cut`] and does not end there.
+pub fn cut() -> ! {
+    panic::resume_unwind(Box::new(Cut))
 }
 
 /// What this thread looks at, for another one that shares its work.
@@ -126,7 +139,7 @@ fn look(bytes: u64) -> bool {
 #[cold]
 fn look_and_unwind(bytes: u64) {
     if look(bytes) && !thread::panicking() {
-        panic::resume_unwind(Box::new(Cut));
+        cut();
     }
 }
 

@@ -49,11 +49,9 @@ const SHOW_EVERY: Duration = Duration::from_millis(50);
 pub(super) struct LimitWatch {
     limits: Limits,
     shared: Arc<SharedLimits>,
-    /// The greatest number of bytes seen.
-    pub(super) peak_bytes: u64,
 }
 
-/// What is looked at between states, and also in the middle of a call that runs long.
+/// What is looked at between states, and also in the middle of an operation that takes long.
 struct SharedLimits {
     start: Instant,
     timeout: Option<Duration>,
@@ -70,6 +68,8 @@ struct SharedLimits {
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     counters: Counters,
+    /// The greatest number of bytes.
+    peak_bytes: u64,
     /// When it was shown to the observer.
     shown: Instant,
     /// Why an end was called for.
@@ -86,6 +86,7 @@ impl SharedLimits {
     fn look_beside(&self, bytes: u64) -> Option<StopReason> {
         let mut seen = self.seen();
         let memory = seen.counters.bytes.saturating_add(bytes);
+        seen.peak_bytes = seen.peak_bytes.max(memory);
         let memory = memory.saturating_add(self.at_hand_bytes);
         let now = Instant::now();
         if self.timeout.is_some_and(|limit| now - self.start >= limit) {
@@ -131,6 +132,7 @@ impl LimitWatch {
         let now = Instant::now();
         let seen = Seen {
             counters: Counters::default(),
+            peak_bytes: 0,
             shown: now,
             stop: None,
         };
@@ -145,7 +147,6 @@ impl LimitWatch {
                 seen: Mutex::new(seen),
             }),
             limits,
-            peak_bytes: 0,
         }
     }
 
@@ -161,6 +162,11 @@ impl LimitWatch {
         let look: Look = Arc::new(move |bytes| shared.look_beside(bytes).is_some());
         let result = cancellation::within(look, || run(self));
         result.map_err(|Cut| (self.stop(), self.shared.seen().counters))
+    }
+
+    /// The greatest number of bytes seen.
+    pub(super) fn peak_bytes(&self) -> u64 {
+        self.shared.seen().peak_bytes
     }
 
     /// Why an end was called for, by the limit of time or by the user.
@@ -206,7 +212,9 @@ pub(super) fn cut_as_interrupted<R>(
 
 impl Watch for LimitWatch {
     fn look(&mut self, counters: &Counters) -> Option<StopReason> {
-        self.peak_bytes = self.peak_bytes.max(counters.bytes);
+        let mut seen = self.shared.seen();
+        seen.peak_bytes = seen.peak_bytes.max(counters.bytes);
+        drop(seen);
         if self
             .limits
             .states

@@ -21,7 +21,7 @@ use crate::cancellation;
 use super::clocks::{self, Assignment};
 use super::dbm::{self, Constraint, Relation};
 use super::rows::rows;
-use super::{Bound, ClockSet, Patience, Zone, minimal};
+use super::{Bound, ClockSet, Zone, minimal};
 
 /// What it takes to find out that a zone is not in another, as a rule: see [`cancellation::work`].
 const UNITS_FOR_COMPARISON: usize = 16;
@@ -124,16 +124,6 @@ impl Federation {
             .fold(false, |is_new, zone| self.add(zone) | is_new)
     }
 
-    /// As [`Federation::unite`], with limited patience.
-    pub fn unite_within(&mut self, other: &Federation, patience: &mut Patience<'_>) {
-        for zone in other.zones() {
-            if patience.ends_through(self.zone_count()) {
-                return;
-            }
-            self.add(zone);
-        }
-    }
-
     /// Whether the valuation is in the federation; see [`dbm::contains`].
     pub fn contains(&self, numerators: &[i64], denominator: i64) -> bool {
         self.zones()
@@ -154,24 +144,20 @@ impl Federation {
     /// The valuations in both.
     #[must_use]
     pub fn intersection(&self, other: &Federation) -> Federation {
-        self.intersection_within(other, &mut Patience::endless())
-    }
-
-    /// As [`Federation::intersection`], with limited patience.
-    #[must_use]
-    pub fn intersection_within(
-        &self,
-        other: &Federation,
-        patience: &mut Patience<'_>,
-    ) -> Federation {
         let mut result = Federation::empty(self.dimension);
+        let mut both = vec![Bound::LE_ZERO; self.size()];
         for zone in other.zones() {
-            if patience.ends_with(self.zone_count() + result.zone_count()) {
-                break;
+            cancellation::work(self.bounds.len());
+            let mut part = Federation::empty(self.dimension);
+            for own in self.zones() {
+                both.copy_from_slice(own);
+                if !dbm::are_apart(own, zone, self.dimension)
+                    && dbm::intersect(&mut both, zone, self.dimension)
+                {
+                    part.append(&both);
+                }
             }
-            let mut part = self.clone();
-            part.intersect_zone(zone);
-            result.unite_within(&part, patience);
+            result.unite(&part);
         }
         result
     }
@@ -272,40 +258,21 @@ impl Federation {
 
     /// Removes the valuations of another federation.
     pub fn subtract(&mut self, other: &Federation) {
-        self.subtract_within(other, &mut Patience::endless());
-    }
-
-    /// As [`Federation::subtract`], with limited patience.
-    pub fn subtract_within(&mut self, other: &Federation, patience: &mut Patience<'_>) {
         for zone in other.zones() {
-            if patience.ends_with(self.zone_count()) {
-                return;
-            }
             self.subtract_zone(zone);
         }
     }
 
     /// Whether every valuation of the zone is in the federation; exact.
     pub fn includes_zone(&self, zone: &[Bound]) -> bool {
-        self.includes_zone_within(zone, &mut Patience::endless())
-    }
-
-    /// As [`Federation::includes_zone`], with limited patience.
-    pub fn includes_zone_within(&self, zone: &[Bound], patience: &mut Patience<'_>) -> bool {
         dbm::is_empty(zone)
             || self.zones().any(|other| dbm::is_subset(zone, other))
-            || is_covered(zone, &self.bounds, self.dimension, patience)
+            || is_covered(zone, &self.bounds, self.dimension)
     }
 
     /// Whether every valuation of this federation is in the other; exact.
     pub fn is_subset(&self, other: &Federation) -> bool {
-        self.is_subset_within(other, &mut Patience::endless())
-    }
-
-    /// As [`Federation::is_subset`], with limited patience.
-    pub fn is_subset_within(&self, other: &Federation, patience: &mut Patience<'_>) -> bool {
-        let mut zones = self.zones();
-        zones.all(|zone| other.includes_zone_within(zone, patience))
+        self.zones().all(|zone| other.includes_zone(zone))
     }
 
     /// Whether the two are the same set; exact.
@@ -371,12 +338,9 @@ impl Federation {
     }
 
     /// Removes every zone that a single other one contains. Quadratic in the number of zones.
-    fn remove_included(&mut self, patience: &mut Patience<'_>) {
+    fn remove_included(&mut self) {
         let zones = std::mem::take(&mut self.bounds);
         for zone in zones.chunks_exact(self.size()) {
-            if patience.ends_through(self.zone_count()) {
-                return;
-            }
             self.add(zone);
         }
     }
@@ -384,35 +348,27 @@ impl Federation {
     /// Makes the description shorter: joins pairs of zones whose union is a zone, and removes zones
     /// that the rest covers. The set stays the same.
     pub fn reduce(&mut self) {
-        self.reduce_within(&mut Patience::endless());
-    }
-
-    /// As [`Federation::reduce`], with limited patience.
-    pub fn reduce_within(&mut self, patience: &mut Patience<'_>) {
-        self.merge_within(patience);
-        self.remove_covered(patience);
+        self.merge();
+        self.remove_covered();
     }
 
     /// Makes the description shorter as [`Federation::reduce`] does, but leaves zones that only
     /// several others cover. Cheaper.
-    pub fn merge_within(&mut self, patience: &mut Patience<'_>) {
-        self.remove_included(patience);
-        self.join_pairs(patience);
+    pub fn merge(&mut self) {
+        self.remove_included();
+        self.join_pairs();
     }
 
     /// Replaces pairs of zones by their hull where that adds no valuation, until there is no such
     /// pair.
     ///
     /// Zones enter one by one; one that joins with another enters again as their hull.
-    fn join_pairs(&mut self, patience: &mut Patience<'_>) {
+    fn join_pairs(&mut self) {
         let size = self.size();
         let zones = std::mem::take(&mut self.bounds);
         let mut entering = vec![Bound::LE_ZERO; size];
         let mut hull = entering.clone();
         for zone in zones.chunks_exact(size) {
-            if patience.ends_with(self.zone_count()) {
-                return;
-            }
             cancellation::work(self.zone_count() * self.dimension);
             entering.copy_from_slice(zone);
             while let Some(index) = self
@@ -427,18 +383,15 @@ impl Federation {
     }
 
     /// Removes the zones that all others together cover.
-    fn remove_covered(&mut self, patience: &mut Patience<'_>) {
+    fn remove_covered(&mut self) {
         let size = self.size();
         let mut index = 0;
         while index < self.zone_count() && self.zone_count() > 1 {
-            if patience.ends_with(self.zone_count()) {
-                return;
-            }
             let zone: Vec<Bound> = self
                 .bounds
                 .drain(index * size..(index + 1) * size)
                 .collect();
-            if !self.includes_zone_within(&zone, patience) {
+            if !self.includes_zone(&zone) {
                 self.bounds.splice(index * size..index * size, zone);
                 index += 1;
             }
@@ -544,6 +497,16 @@ pub fn block_bytes(bytes: usize) -> usize {
     (bytes + size_of::<usize>()).next_multiple_of(16).max(32)
 }
 
+/// The bytes of a hash table with room for so many entries: a power of two of places, of which an
+/// eighth stays free, and a byte for each.
+pub fn table_bytes<T>(capacity: usize) -> usize {
+    if capacity == 0 {
+        return 0;
+    }
+    let places = (capacity * 8).div_ceil(7).next_power_of_two();
+    places * (size_of::<T>() + 1)
+}
+
 /// A zone that is taken away from others: its minimal constraints are found once.
 struct Subtrahend<'a> {
     zone: &'a [Bound],
@@ -619,23 +582,15 @@ fn is_contradiction(constraints: &[Constraint]) -> bool {
 }
 
 /// Whether the zones, one after the other in `cover`, contain the whole zone.
-fn is_covered(
-    zone: &[Bound],
-    cover: &[Bound],
-    dimension: usize,
-    patience: &mut Patience<'_>,
-) -> bool {
-    if patience.ends_through(cover.len() / (dimension * dimension)) {
-        return false;
-    }
+fn is_covered(zone: &[Bound], cover: &[Bound], dimension: usize) -> bool {
+    cancellation::work(cover.len() / (dimension * dimension) * UNITS_FOR_COMPARISON);
     let mut cover = cover;
     while let Some((first, others)) = cover.split_at_checked(dimension * dimension) {
         if dbm::is_subset(zone, first) {
             return true;
         }
         if !dbm::are_apart(zone, first, dimension) {
-            let mut is_part_covered =
-                |part: &[Bound]| is_covered(part, others, dimension, patience);
+            let mut is_part_covered = |part: &[Bound]| is_covered(part, others, dimension);
             return Subtrahend::new(first, dimension).subtract_from(zone, &mut is_part_covered);
         }
         cover = others;

@@ -14,39 +14,19 @@
 use crate::cancellation;
 
 use super::federation::Federation;
-use super::{Bound, ClockSet, Patience, dbm};
+use super::{Bound, ClockSet, dbm};
 
 /// The valuations from which every small enough delay leads into the federation.
 #[must_use]
 pub fn before(federation: &Federation, stopped: &ClockSet) -> Federation {
-    before_within(federation, stopped, &mut Patience::endless())
-}
-
-/// As [`before`], with limited patience.
-#[must_use]
-pub fn before_within(
-    federation: &Federation,
-    stopped: &ClockSet,
-    patience: &mut Patience<'_>,
-) -> Federation {
-    moved(federation, stopped, (&weak, &strict), patience)
+    moved(federation, stopped, (&weak, &strict))
 }
 
 /// The valuations that every small enough delay has just led out of the federation, or on within
 /// it.
 #[must_use]
 pub fn after(federation: &Federation, stopped: &ClockSet) -> Federation {
-    after_within(federation, stopped, &mut Patience::endless())
-}
-
-/// As [`after`], with limited patience.
-#[must_use]
-pub fn after_within(
-    federation: &Federation,
-    stopped: &ClockSet,
-    patience: &mut Patience<'_>,
-) -> Federation {
-    moved(federation, stopped, (&strict, &weak), patience)
+    moved(federation, stopped, (&strict, &weak))
 }
 
 fn weak(bound: Bound) -> Bound {
@@ -70,15 +50,11 @@ fn moved(
     federation: &Federation,
     stopped: &ClockSet,
     (from_below, from_above): (&dyn Fn(Bound) -> Bound, &dyn Fn(Bound) -> Bound),
-    patience: &mut Patience<'_>,
 ) -> Federation {
     let dimension = federation.dimension();
     let mut result = Federation::empty(dimension);
     let mut moved = Vec::new();
     for zone in federation.zones() {
-        if patience.ends_through(result.zone_count() + 1) {
-            break;
-        }
         cancellation::work(dimension * dimension * dimension / 4);
         moved.clear();
         moved.extend_from_slice(zone);

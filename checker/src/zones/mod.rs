@@ -20,7 +20,6 @@
 //! * [`federation`]: finite unions of zones, with exact subtraction and inclusion;
 //! * [`past`]: the safe timed predecessors of timed games;
 //! * [`future`]: their mirror image, and delays that something stops;
-//! * [`patience`]: an end to operations that take too long;
 //! * [`instants`]: what lies just before and just after a set.
 //!
 //! Sources: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, for the
@@ -45,7 +44,6 @@ pub mod federation;
 pub mod future;
 pub mod instants;
 pub mod past;
-pub mod patience;
 
 #[cfg(test)]
 mod tests;
@@ -54,5 +52,4 @@ pub use bound::Bound;
 pub use clock_set::ClockSet;
 pub use dbm::Relation;
 pub use federation::Federation;
-pub use patience::Patience;
 pub use zone::Zone;

@@ -20,7 +20,7 @@
 //! for the Analysis of Timed Games", CONCUR 2005, section 4.
 
 use super::federation::Federation;
-use super::{Bound, ClockSet, Patience, clocks, dbm};
+use super::{Bound, ClockSet, clocks, dbm};
 
 /// Subtracting a zone can multiply the zones of the rest, reducing costs the square of their
 /// number: from about this many zones on, reducing first was faster on random federations.
@@ -30,17 +30,6 @@ const WORTH_REDUCING: usize = 16;
 /// rest.
 #[must_use]
 pub fn predecessors(good: &Federation, bad: &Federation, stopped: &ClockSet) -> Federation {
-    predecessors_within(good, bad, stopped, &mut Patience::endless())
-}
-
-/// As [`predecessors`], with limited patience.
-#[must_use]
-pub fn predecessors_within(
-    good: &Federation,
-    bad: &Federation,
-    stopped: &ClockSet,
-    patience: &mut Patience<'_>,
-) -> Federation {
     let dimension = good.dimension();
     let with_past = |zone| WithPast::new(zone, dimension, stopped);
     let bad: Vec<WithPast> = bad.zones().map(with_past).collect();
@@ -48,21 +37,18 @@ pub fn predecessors_within(
     for good in good.zones().map(with_past) {
         let mut lost = Federation::empty(dimension);
         for bad in &bad {
-            if patience.ends_with(result.zone_count() + lost.zone_count()) {
-                return result;
-            }
             // Where the pasts do not meet, this bad zone forbids nothing.
             if !dbm::are_apart(&good.past, &bad.past, dimension) {
                 let lost_to_it = lost_to(&good, bad, dimension, stopped);
-                lost.unite_within(&lost_to_it, patience);
+                lost.unite(&lost_to_it);
             }
         }
         if lost.zone_count() > WORTH_REDUCING {
-            lost.reduce_within(patience);
+            lost.reduce();
         }
         let mut safe = Federation::of_zone(dimension, &good.past);
-        safe.subtract_within(&lost, patience);
-        result.unite_within(&safe, patience);
+        safe.subtract(&lost);
+        result.unite(&safe);
     }
     result
 }

@@ -25,19 +25,20 @@ const MOST_DISCRETE_STATES: u64 = 64 * STATES_BEFORE_CROWD;
 /// what is reached.
 const MOST_BYTES_OF_DISCRETE_STATE: u64 = 64 << 10;
 
-/// Operations on many zones that a discrete state may take, on average, for the same reason. Where
-/// the pieces stay few there are some dozens, and where they do not, thousands soon.
-const MOST_OPERATIONS_ON_DISCRETE_STATE: u64 = 256;
+/// Units of work ([`crate::cancellation::work`]) that computing what a discrete state wins may take,
+/// on average, for the same reason. Where the pieces stay few it takes far fewer, and where they do
+/// not, many more soon.
+const MOST_WORK_ON_DISCRETE_STATE: u64 = 1 << 20;
 
-/// States that are counted beside those that are stored, for the bytes and the operations that an
-/// average one may take.
+/// States that are counted beside those that are stored, for the bytes and the work that an average
+/// one may take.
 const STATES_OF_GRACE: u64 = 256;
 
 /// To play a game without abstraction.
 pub(super) const WITHOUT_ABSTRACTION: Allowance = Allowance {
     explored: MOST_EXACT_STATES,
     bytes_each: u64::MAX,
-    operations_each: u64::MAX,
+    work_each: u64::MAX,
     states_of_grace: STATES_OF_GRACE,
 };
 
@@ -45,7 +46,7 @@ pub(super) const WITHOUT_ABSTRACTION: Allowance = Allowance {
 pub(super) const IN_DISCRETE_STATES: Allowance = Allowance {
     explored: MOST_DISCRETE_STATES,
     bytes_each: MOST_BYTES_OF_DISCRETE_STATE,
-    operations_each: MOST_OPERATIONS_ON_DISCRETE_STATE,
+    work_each: MOST_WORK_ON_DISCRETE_STATE,
     states_of_grace: STATES_OF_GRACE,
 };
 
@@ -59,6 +60,6 @@ pub(super) const RACE_IN_DISCRETE_STATES: Allowance = Allowance {
 /// To play a game with a goal that is to recur in discrete states. All nodes are computed in each
 /// round, in symbolic states too.
 pub(super) const IN_DISCRETE_STATES_BY_ROUNDS: Allowance = Allowance {
-    operations_each: 16 * MOST_OPERATIONS_ON_DISCRETE_STATE,
+    work_each: 16 * MOST_WORK_ON_DISCRETE_STATE,
     ..IN_DISCRETE_STATES
 };

@@ -83,7 +83,7 @@ fn answer(subject: Subject<'_>, query: &Query) -> Answer {
         game::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());
     }
     answer.seconds = start.elapsed().as_secs_f64();
-    answer.peak_bytes = watch.peak_bytes.max(answer.counters.bytes);
+    answer.peak_bytes = watch.peak_bytes().max(answer.counters.bytes);
     answer
 }
 

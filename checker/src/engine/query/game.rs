@@ -9,7 +9,8 @@ use std::sync::Arc;
 
 use crate::analysis::{Abstraction, LiveVariables};
 use crate::game::backward::solver::{Answer as GameAnswer, Extent, Solver, Win};
-use crate::game::forward::graph::{Graph, Objective as GameObjective};
+use crate::game::forward::graph::Graph;
+use crate::game::forward::objective::Objective as GameObjective;
 use crate::game::objectives::buchi;
 use crate::game::strategy::attractor::{self, Strategy};
 use crate::game::strategy::co_buchi;

@@ -1,7 +1,7 @@
 //! Where time stops, and who must move there.
 
 use crate::network::{Failure, Symbolic};
-use crate::zones::{Bound, Federation, Patience};
+use crate::zones::{Bound, Federation};
 
 use super::predecessors::Situation;
 use super::solver::Solver;
@@ -15,7 +15,6 @@ impl Solver<'_, '_, '_> {
         node: u32,
         bad: &Federation,
         situation: &Situation,
-        patience: &mut Patience<'_>,
     ) -> Federation {
         let opponent = self.enabled_moves(node, Player::Environment);
         if opponent.is_empty() {
@@ -24,7 +23,7 @@ impl Solver<'_, '_, '_> {
         let mut all = Federation::empty(self.graph.dimension());
         for (component, stop) in &situation.stops {
             let mut stop = stop.intersection(&opponent);
-            stop.subtract_within(bad, patience);
+            stop.subtract(bad);
             for (mover, edge) in &situation.movers {
                 let blocks = match (self.forced, *component) {
                     (Forced::Neutral, _) => false,
@@ -49,16 +48,15 @@ impl Solver<'_, '_, '_> {
         &self,
         node: u32,
         situation: &Situation,
-        patience: &mut Patience<'_>,
     ) -> Federation {
         let mut forced = self.enabled_moves(node, Player::Controller);
         if !forced.is_empty() {
-            forced = forced.intersection_within(&self.standstill(situation), patience);
+            forced = forced.intersection(&self.standstill(situation));
         }
         if !forced.is_empty() {
             let nothing = Federation::empty(self.graph.dimension());
-            let others = self.forced_environment(node, &nothing, situation, patience);
-            forced.subtract_within(&others, patience);
+            let others = self.forced_environment(node, &nothing, situation);
+            forced.subtract(&others);
         }
         if let Some(urgent) = self.graph.urgent(node) {
             forced.unite(&urgent.obliged.intersection(&urgent.reached));

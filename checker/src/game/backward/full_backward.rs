@@ -16,7 +16,8 @@ use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch, states_between_looks};
 
 use super::solver::{Answer, Extent, LOOK_EVERY, MOST_TASKS, Solver, Win};
-use crate::game::forward::graph::{Graph, NONE};
+use crate::game::forward::graph::Graph;
+use crate::game::forward::node::NONE;
 
 /// Batches of nodes between two looks at the limits.
 const BATCHES_BETWEEN_LOOKS: u32 = 16;

@@ -18,11 +18,12 @@
 
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
-use crate::zones::{Federation, Patience};
+use crate::zones::Federation;
 
-use super::memory::{table_bytes, wins_bytes};
+use super::memory::wins_bytes;
 use super::solver::{Solver, Win};
 use crate::game::Player;
+use crate::zones::federation::table_bytes;
 
 /// Prospects are computed again when there are so many times as many explored states as the first
 /// time,
@@ -165,17 +166,12 @@ impl Solver<'_, '_, '_> {
         is_in_play: &[bool],
         watch: &mut dyn Watch,
     ) -> Outlook {
-        let nodes = (0..is_in_play.len() as u32).filter(|&node| is_in_play[node as usize]);
-        let (best, reason) = self.patiently(watch, |solver, patience| {
-            let best = nodes.map_while(|node| {
-                let best = solver.best_defence(node, prospects, patience);
-                (!patience.ends()).then_some(best)
-            });
-            best.flatten().collect::<Vec<_>>()
-        });
-        if let Some(reason) = reason {
+        if let Some(reason) = self.tell(watch) {
             return Outlook::Stopped(reason);
         }
+        let nodes = (0..is_in_play.len() as u32).filter(|&node| is_in_play[node as usize]);
+        let best = nodes.filter_map(|node| self.best_defence(node, prospects));
+        let best: Vec<(usize, u32)> = best.collect();
         let is_any_strong = best.iter().any(|(_, strength)| *strength > 0);
         for (edge, strength) in &best {
             if *strength > 0 || !is_any_strong {
@@ -190,12 +186,7 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The strongest of the held moves from a node that help against what the seeker may win.
-    fn best_defence(
-        &self,
-        node: u32,
-        prospects: &Prospects,
-        patience: &mut Patience<'_>,
-    ) -> Option<(usize, u32)> {
+    fn best_defence(&self, node: u32, prospects: &Prospects) -> Option<(usize, u32)> {
         let edges = self.graph.edges_of(node);
         let held: Vec<usize> = edges.filter(|&edge| self.defences.holds(edge)).collect();
         if held.is_empty() {
@@ -206,9 +197,9 @@ impl Solver<'_, '_, '_> {
             Win::Everything => self.whole(node),
             Win::Part(part) => part.clone(),
         };
-        let threatened = self.new_part(node, &hoped, patience)?;
+        let threatened = self.new_part(node, &hoped)?;
         let aims = self.aims(node, &prospects.win, &prospects.attackers);
-        let (index, strength) = self.strongest(&held, aims, &threatened, patience)?;
+        let (index, strength) = self.strongest(&held, aims, &threatened)?;
         Some((held[index], strength))
     }
 }

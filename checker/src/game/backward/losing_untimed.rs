@@ -17,7 +17,7 @@
 //! Nodes lose hope as the graph grows and never gain it again.
 
 use super::solver::{Solver, Win};
-use crate::game::forward::graph::{Edge, NONE};
+use crate::game::forward::node::{Edge, NONE};
 use crate::game::{Forced, Player};
 
 impl Solver<'_, '_, '_> {

@@ -2,7 +2,8 @@
 //!
 //! Everything that grows with the game counts: the graph, what nodes win with what is left of them
 //! and what was gained when, the lists of nodes, what was computed before, and what is set aside
-//! meanwhile. Zones at hand in an operation are told by its patience.
+//! meanwhile. Zones at hand in an operation are asked for where they are many
+//! ([`crate::cancellation::ask_for`]).
 //!
 //! Invariants:
 //! * Vectors that only grow count by what is in them: room at their end takes no memory before it
@@ -10,7 +11,7 @@
 //! * The valuations that are kept have no room to spare.
 
 use crate::search::limits::Counters;
-use crate::zones::federation::block_bytes;
+use crate::zones::federation::{block_bytes, table_bytes};
 use crate::zones::{Bound, Federation};
 
 use super::solver::{Gain, Pending, Solver, Win};
@@ -63,16 +64,6 @@ pub(super) fn gains_bytes(gains: &Vec<Gain>) -> u64 {
 /// The bytes that winning valuations by node take.
 pub(in crate::game) fn wins_bytes(wins: &[Win]) -> u64 {
     size_of_val(wins) as u64 + wins.iter().map(Win::heap_bytes).sum::<u64>()
-}
-
-/// The bytes of a hash table with room for so many entries: a power of two of places, of which an
-/// eighth stays free, and a byte for each.
-pub(in crate::game) fn table_bytes<T>(capacity: usize) -> usize {
-    if capacity == 0 {
-        return 0;
-    }
-    let places = (capacity * 8).div_ceil(7).next_power_of_two();
-    places * (size_of::<T>() + 1)
 }
 
 impl Solver<'_, '_, '_> {

@@ -1,18 +1,18 @@
 //! Computing what several nodes win, by several threads.
 //!
 //! All tasks start from the same winning valuations, and what comes out is recorded in the order of
-//! the tasks when all are done. So the result does not hang on how many threads there are, nor on
+//! the tasks when all are done. So the result does not depend on how many threads there are, nor on
 //! how fast they are.
 
 use std::panic;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::Duration;
 
-use crate::cancellation;
-use crate::search::limits::{Counters, StopReason, Watch};
-use crate::zones::Patience;
+use crate::cancellation::{self, Cut, Look};
+use crate::search::limits::{StopReason, Watch};
 use crate::zones::federation::block_bytes;
 
 use super::predecessors::Situation;
@@ -62,15 +62,75 @@ struct Done {
 struct Progress {
     /// The next task that nobody has begun.
     next: AtomicUsize,
-    is_cut: AtomicBool,
-    /// By thread: the zones at hand.
-    zones: Vec<AtomicUsize>,
+    threads: Vec<ThreadProgress>,
     /// The bytes of the tasks, and of what is computed and not recorded yet.
     done_bytes: AtomicU64,
-    /// How many operations on many zones were done.
-    operations: AtomicU64,
-    /// After so many operations the game is given up: see [`super::budget`].
-    most_operations: u64,
+    /// The units of work that were done: see [`cancellation::work`].
+    work: AtomicU64,
+    /// After so many units the game is given up: see [`super::budget`].
+    most_work: u64,
+    /// What is looked at beside.
+    beside: Option<Look>,
+}
+
+/// What one thread tells the others.
+#[derive(Default)]
+struct ThreadProgress {
+    /// The bytes that it asked for last in its task.
+    asked_bytes: AtomicU64,
+    /// How much work it had done when it told of it last.
+    work_told: AtomicU64,
+}
+
+impl Progress {
+    /// What a thread looks at during its tasks.
+    fn look_of(self: &Arc<Self>, thread: usize) -> Look {
+        let progress = Arc::clone(self);
+        Arc::new(move |bytes| {
+            progress.tell_work(thread);
+            let all = if bytes > 0 {
+                let asked = &progress.threads[thread].asked_bytes;
+                asked.store(bytes, Ordering::Relaxed);
+                progress.bytes()
+            } else {
+                0
+            };
+            let is_due = |look: &Look| look(all);
+            progress.is_beyond() || progress.beside.as_ref().is_some_and(is_due)
+        })
+    }
+
+    /// Whether more work was done than the budget allows.
+    fn is_beyond(&self) -> bool {
+        self.work.load(Ordering::Relaxed) > self.most_work
+    }
+
+    /// The bytes that no account knows yet.
+    fn bytes(&self) -> u64 {
+        let asked = self.threads.iter().map(|one| &one.asked_bytes);
+        let asked = asked
+            .map(|bytes| bytes.load(Ordering::Relaxed))
+            .sum::<u64>();
+        self.done_bytes.load(Ordering::Relaxed) + asked
+    }
+
+    /// Begins a task: what was done and asked for before is none of it.
+    fn begin(&self, thread: usize) {
+        let ThreadProgress {
+            asked_bytes,
+            work_told,
+        } = &self.threads[thread];
+        asked_bytes.store(0, Ordering::Relaxed);
+        work_told.store(cancellation::done(), Ordering::Relaxed);
+    }
+
+    /// Adds what a thread has done since it told last.
+    fn tell_work(&self, thread: usize) {
+        let done = cancellation::done();
+        let told = self.threads[thread].work_told.swap(done, Ordering::Relaxed);
+        self.work
+            .fetch_add(done.wrapping_sub(told), Ordering::Relaxed);
+    }
 }
 
 impl Solver<'_, '_, '_> {
@@ -92,27 +152,21 @@ impl Solver<'_, '_, '_> {
         } else {
             1
         };
-        let progress = Progress {
+        let progress = Arc::new(Progress {
             next: AtomicUsize::new(0),
-            is_cut: AtomicBool::new(false),
-            zones: (0..threads).map(|_| AtomicUsize::new(0)).collect(),
+            threads: (0..threads).map(|_| ThreadProgress::default()).collect(),
             done_bytes: AtomicU64::new(tasks.iter().map(Task::heap_bytes).sum()),
-            operations: AtomicU64::new(self.operations),
-            most_operations: self.most_operations(),
-        };
-        let (mut done, reason) = if threads == 1 {
-            self.work_and_look(&tasks, &progress, watch)
-        } else {
-            self.share(&tasks, &progress, watch)
-        };
-        if reason.is_some() {
-            return reason;
-        }
-        self.operations = progress.operations.load(Ordering::Relaxed);
-        if self.operations > progress.most_operations {
+            work: AtomicU64::new(self.work),
+            most_work: self.most_work(),
+            beside: cancellation::current(),
+        });
+        let done = cancellation::unless_cut(|| self.share(&tasks, &progress));
+        self.work = progress.work.load(Ordering::Relaxed);
+        if progress.is_beyond() {
             self.has_given_up = true;
             return Some(StopReason::States);
         }
+        let mut done = done.unwrap_or_else(|Cut| cancellation::cut());
         done.sort_unstable_by_key(|one| one.index);
         for (task, one) in tasks.into_iter().zip(done) {
             if let Some(key) = task.key {
@@ -140,49 +194,28 @@ impl Solver<'_, '_, '_> {
         zones.sum::<usize>() * self.graph.dimension().pow(2) >= WORTH_STARTING
     }
 
-    /// Does the tasks with several threads, of which the caller's is one.
-    fn share(
-        &self,
-        tasks: &[Task],
-        progress: &Progress,
-        watch: &mut dyn Watch,
-    ) -> (Vec<Done>, Option<StopReason>) {
+    /// Does the tasks with as many threads as tell of their progress; the caller's is the first.
+    fn share(&self, tasks: &[Task], progress: &Arc<Progress>) -> Vec<Done> {
         thread::scope(|scope| {
-            let (over, is_over) = mpsc::channel();
-            let helpers: Vec<_> = (1..progress.zones.len())
+            let (over, is_over) = mpsc::channel::<()>();
+            let helpers: Vec<_> = (1..progress.threads.len())
                 .filter_map(|index| {
                     let over = over.clone();
-                    let look = cancellation::current();
                     let work = move || {
-                        let zones = &progress.zones[index];
-                        let mut goes_on = |count: usize| {
-                            zones.store(count, Ordering::Relaxed);
-                            !progress.is_cut.load(Ordering::Relaxed)
-                        };
-                        let done = self.work(tasks, progress, &mut goes_on);
-                        // Nobody listens any more once there is a reason to stop.
-                        let _ = over.send(());
-                        done
+                        // It is told also when the work is cut off.
+                        let _over = over;
+                        self.work(tasks, progress, index)
                     };
                     // Who cannot be started is not missed: the others do its tasks.
                     let thread = thread::Builder::new().stack_size(STACK_BYTES);
-                    let run = move || cancellation::looking_at(look, work);
-                    thread.spawn_scoped(scope, run).ok()
+                    thread.spawn_scoped(scope, work).ok()
                 })
                 .collect();
             drop(over);
-            let (mut done, mut reason) = self.work_and_look(tasks, progress, watch);
-            let mut working = helpers.len();
-            while working > 0 {
-                match is_over.recv_timeout(PULSE) {
-                    Ok(()) => working -= 1,
-                    Err(RecvTimeoutError::Disconnected) => break,
-                    Err(RecvTimeoutError::Timeout) if reason.is_none() => {
-                        reason = watch.look(&self.counters_with(progress, 0));
-                        progress.is_cut.store(reason.is_some(), Ordering::Relaxed);
-                    }
-                    Err(RecvTimeoutError::Timeout) => {}
-                }
+            let mut done = self.work(tasks, progress, 0);
+            // The user is asked by this thread only, so that it looks while it waits.
+            while is_over.recv_timeout(PULSE) == Err(RecvTimeoutError::Timeout) {
+                cancellation::is_due();
             }
             for helper in helpers {
                 match helper.join() {
@@ -190,75 +223,34 @@ impl Solver<'_, '_, '_> {
                     Err(panic) => panic::resume_unwind(panic),
                 }
             }
-            (done, reason)
+            done
         })
     }
 
-    /// Does tasks that nobody has begun, as long as the watch gives no reason to stop.
-    fn work_and_look(
-        &self,
-        tasks: &[Task],
-        progress: &Progress,
-        watch: &mut dyn Watch,
-    ) -> (Vec<Done>, Option<StopReason>) {
-        let mut reason = None;
-        let mut goes_on = |zones: usize| {
-            reason = watch.look(&self.counters_with(progress, zones));
-            reason.is_none()
-        };
-        let done = self.work(tasks, progress, &mut goes_on);
-        if reason.is_some() {
-            progress.is_cut.store(true, Ordering::Relaxed);
-        }
-        (done, reason)
-    }
-
-    /// Does tasks that nobody has begun, as long as it may go on.
-    fn work(
-        &self,
-        tasks: &[Task],
-        progress: &Progress,
-        goes_on: &mut dyn FnMut(usize) -> bool,
-    ) -> Vec<Done> {
-        let mut ask = |zones: usize| {
-            let operations = progress.operations.fetch_add(1, Ordering::Relaxed);
-            operations < progress.most_operations && goes_on(zones)
-        };
+    /// Does tasks that nobody has begun, as one of the threads.
+    fn work(&self, tasks: &[Task], progress: &Arc<Progress>, thread: usize) -> Vec<Done> {
         let mut done = Vec::new();
-        loop {
-            let index = progress.next.fetch_add(1, Ordering::Relaxed);
-            let Some(Task {
-                node, situation, ..
-            }) = tasks.get(index)
-            else {
-                return done;
-            };
-            // Each task has a patience of its own, so that what it asks does not hang on who does
-            // it.
-            let mut patience = Patience::as_long_as(&mut ask);
-            let (won, defence) = self.winnable_against_defence(*node, situation, &mut patience);
-            let gained = self.gained(*node, won, &mut patience);
-            if patience.is_over() || progress.is_cut.load(Ordering::Relaxed) {
-                return done;
+        let look = progress.look_of(thread);
+        cancellation::looking_at(Some(look), || {
+            loop {
+                let index = progress.next.fetch_add(1, Ordering::Relaxed);
+                let Some(task) = tasks.get(index) else {
+                    break;
+                };
+                progress.begin(thread);
+                let (won, defence) = self.winnable_against_defence(task.node, &task.situation);
+                let gained = self.gained(task.node, won);
+                progress.tell_work(thread);
+                let bytes = gained.heap_bytes();
+                cancellation::ask_for(bytes as usize);
+                progress.done_bytes.fetch_add(bytes, Ordering::Relaxed);
+                done.push(Done {
+                    index,
+                    gained,
+                    defence,
+                });
             }
-            let bytes = gained.heap_bytes();
-            progress.done_bytes.fetch_add(bytes, Ordering::Relaxed);
-            done.push(Done {
-                index,
-                gained,
-                defence,
-            });
-        }
-    }
-
-    /// The counters, with the zones that threads have at hand beside what is stored.
-    fn counters_with(&self, progress: &Progress, own_zones: usize) -> Counters {
-        let counters = self.counters();
-        let others = progress.zones.iter();
-        let zones: usize = others.map(|zones| zones.load(Ordering::Relaxed)).sum();
-        let bytes = counters.bytes
-            + progress.done_bytes.load(Ordering::Relaxed)
-            + (own_zones + zones) as u64 * self.zone_bytes();
-        Counters { bytes, ..counters }
+        });
+        done
     }
 }

@@ -2,7 +2,7 @@
 //! [`super::solver`].
 
 use crate::network::Failure;
-use crate::zones::{ClockSet, Federation, Patience, past};
+use crate::zones::{ClockSet, Federation, past};
 
 use super::solver::{Solver, Win};
 use crate::game::Player;
@@ -51,13 +51,8 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The valuations of a node in this situation that are won by what is known of its successors.
-    pub(in crate::game) fn winnable(
-        &self,
-        node: u32,
-        situation: &Situation,
-        patience: &mut Patience<'_>,
-    ) -> Federation {
-        self.winnable_without(node, situation, &[], patience).0
+    pub(in crate::game) fn winnable(&self, node: u32, situation: &Situation) -> Federation {
+        self.winnable_without(node, situation, &[]).0
     }
 
     /// The valuations of a node that are won if the evader does not use the edges that are held
@@ -67,14 +62,13 @@ impl Solver<'_, '_, '_> {
         node: u32,
         situation: &Situation,
         held: &[usize],
-        patience: &mut Patience<'_>,
     ) -> (Federation, Federation) {
         let (mut won, decided) = match self.seeker {
             Player::Controller => {
                 let nothing = Federation::empty(self.graph.dimension());
-                (self.controllers_gain(node, situation, patience), nothing)
+                (self.controllers_gain(node, situation), nothing)
             }
-            Player::Environment => self.environments_gain(node, situation, held, patience),
+            Player::Environment => self.environments_gain(node, situation, held),
         };
         match self.graph.urgent(node) {
             None => won.intersect_zone(self.graph.zone(node)),
@@ -84,12 +78,7 @@ impl Solver<'_, '_, '_> {
     }
 
     /// What the controller wins as the seeker, as far as known.
-    fn controllers_gain(
-        &self,
-        node: u32,
-        situation: &Situation,
-        patience: &mut Patience<'_>,
-    ) -> Federation {
+    fn controllers_gain(&self, node: u32, situation: &Situation) -> Federation {
         let mut good = self.known(node);
         let goal = self.goal(node);
         let mut bad = self.broken(node);
@@ -100,21 +89,21 @@ impl Solver<'_, '_, '_> {
             }
             if edge.controllable {
                 let before = self.before(&edge, &self.win[edge.target as usize]);
-                good.unite_within(&before, patience);
+                good.unite(&before);
             } else {
-                let spoiling = self.spoiling(&edge, patience);
-                bad.unite_within(&spoiling, patience);
+                let spoiling = self.spoiling(&edge);
+                bad.unite(&spoiling);
             }
         }
         for legs in self.graph.chances.of(node) {
             let legs = self.targets_of(legs, &self.win);
-            good.unite_within(&self.before_all(legs, patience), patience);
+            good.unite(&self.before_all(legs));
         }
-        bad.subtract_within(&goal, patience);
-        let forced = self.forced_environment(node, &bad, situation, patience);
-        good.unite_within(&forced, patience);
-        let mut won = self.safe_past(node, good, &bad, situation, patience);
-        won.unite_within(&goal, patience);
+        bad.subtract(&goal);
+        let forced = self.forced_environment(node, &bad, situation);
+        good.unite(&forced);
+        let mut won = self.safe_past(node, good, &bad, situation);
+        won.unite(&goal);
         won
     }
 
@@ -124,7 +113,6 @@ impl Solver<'_, '_, '_> {
         node: u32,
         situation: &Situation,
         held: &[usize],
-        patience: &mut Patience<'_>,
     ) -> (Federation, Federation) {
         let goal = self.goal(node);
         let mut now = self.broken(node);
@@ -135,24 +123,24 @@ impl Solver<'_, '_, '_> {
                 continue;
             }
             if edge.controllable {
-                let spoiling = self.spoiling(&edge, patience);
-                escape.unite_within(&spoiling, patience);
+                let spoiling = self.spoiling(&edge);
+                escape.unite(&spoiling);
             } else {
                 let before = self.before(&edge, &self.win[edge.target as usize]);
-                now.unite_within(&before, patience);
+                now.unite(&before);
             }
         }
         for legs in self.graph.chances.of(node) {
-            escape.unite_within(&self.spoiling_all(legs, patience), patience);
+            escape.unite(&self.spoiling_all(legs));
         }
-        now.subtract_within(&goal, patience);
-        let mut good = self.forced_controller(node, situation, patience);
-        good.subtract_within(&escape, patience);
-        good.unite_within(&now, patience);
-        good.unite_within(&self.known(node), patience);
-        escape.subtract_within(&now, patience);
-        escape.unite_within(&goal, patience);
-        let won = self.safe_past(node, good, &escape, situation, patience);
+        now.subtract(&goal);
+        let mut good = self.forced_controller(node, situation);
+        good.subtract(&escape);
+        good.unite(&now);
+        good.unite(&self.known(node));
+        escape.subtract(&now);
+        escape.unite(&goal);
+        let won = self.safe_past(node, good, &escape, situation);
         (won, now)
     }
 
@@ -172,15 +160,14 @@ impl Solver<'_, '_, '_> {
         mut good: Federation,
         bad: &Federation,
         situation: &Situation,
-        patience: &mut Patience<'_>,
     ) -> Federation {
         if self.graph.nodes[node as usize].delays {
             if let Some(urgent) = self.graph.urgent(node) {
-                return urgent.predecessors(&good, bad, patience);
+                return urgent.predecessors(&good, bad);
             }
-            return past::predecessors_within(&good, bad, &situation.stopped, patience);
+            return past::predecessors(&good, bad, &situation.stopped);
         }
-        good.subtract_within(bad, patience);
+        good.subtract(bad);
         good
     }
 }

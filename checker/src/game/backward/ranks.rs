@@ -8,12 +8,13 @@
 //!
 //! Cost: as much as computing what the explored nodes win.
 
+use crate::cancellation::{self, Cut};
 use crate::network::Failure;
 use crate::search::limits::Watch;
 use crate::zones::Federation;
 
-use super::memory::table_bytes;
 use super::solver::{Gain, Solver, Win};
+use crate::zones::federation::table_bytes;
 
 /// Computations between two looks at the limits.
 const BETWEEN_LOOKS: u32 = 64;
@@ -37,9 +38,9 @@ impl Solver<'_, '_, '_> {
         let tables = win.len() * by_node + table_bytes::<(u32, Federation)>(rest.capacity());
         self.aside_bytes += gained_bytes + tables as u64;
         self.begin_anew();
-        let is_layered = match self.gain_in_layers(watch) {
-            Err(Failure::Interrupted) => false,
-            result => result?,
+        let is_layered = match cancellation::unless_cut(|| self.gain_in_layers(watch)) {
+            Ok(Err(Failure::Interrupted)) | Err(Cut) => false,
+            Ok(result) => result?,
         };
         self.aside_bytes -= gained_bytes + tables as u64;
         if !is_layered {
@@ -75,21 +76,14 @@ impl Solver<'_, '_, '_> {
                     Some(false) => {}
                     None => {
                         let situation = self.situation_for_win(node)?;
-                        let (one, reason) = self.patiently(watch, |solver, patience| {
-                            let won = solver.winnable(node, &situation, patience);
-                            solver.gained(node, won, patience)
-                        });
-                        if reason.is_some() {
-                            return Ok(false);
-                        }
-                        gained.push((node, Some(one)));
+                        let won = self.winnable(node, &situation);
+                        gained.push((node, Some(self.gained(node, won))));
                     }
                 }
                 until_look -= 1;
                 if until_look == 0 {
                     until_look = BETWEEN_LOOKS;
-                    self.graph.counted_zones = self.graph.zones.len();
-                    if watch.look(&self.counters()).is_some() {
+                    if self.tell(watch).is_some() {
                         return Ok(false);
                     }
                 }

@@ -22,12 +22,12 @@ use crate::ir::Urgency;
 use crate::network::Failure;
 use crate::zones::federation::block_bytes;
 
-use super::memory::table_bytes;
 use super::solver::{Solver, Win};
 use super::winning_sets::Gained;
 use crate::game::Forced;
 use crate::game::exploration::lazy_safety::Defence;
-use crate::game::forward::graph::Standing;
+use crate::game::forward::node::Standing;
+use crate::zones::federation::table_bytes;
 
 /// Cases that are remembered, at most.
 const MOST_CASES: usize = 1 << 14;

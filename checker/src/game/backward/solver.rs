@@ -52,8 +52,8 @@ use std::collections::VecDeque;
 use rustc_hash::FxHashMap;
 
 use crate::network::Failure;
-use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
-use crate::zones::{Federation, Patience};
+use crate::search::limits::{StopReason, Watch, states_between_looks};
+use crate::zones::Federation;
 
 use super::budget::Allowance;
 use super::losing_timed::{Outlook, Schedule};
@@ -62,7 +62,8 @@ use super::result_cache::{Case, Repeats};
 use super::winning_sets::Gained;
 use crate::game::exploration::lazy_safety::Defences;
 use crate::game::exploration::waiting::Frontier;
-use crate::game::forward::graph::{Graph, Standing};
+use crate::game::forward::graph::Graph;
+use crate::game::forward::node::Standing;
 use crate::game::{Forced, Player};
 
 /// Expanded nodes between two looks at the limits.
@@ -174,8 +175,8 @@ pub struct Solver<'g, 's, 'a> {
     /// it has taken.
     pub has_given_up: bool,
     pub(super) allowance: Option<Allowance>,
-    /// How many operations on many zones were done in computing what nodes win.
-    pub(super) operations: u64,
+    /// The units of work that computing what nodes win has taken.
+    pub(super) work: u64,
     /// The nodes to be expanded.
     pub(in crate::game) frontier: Frontier,
     /// By node, as far as it was looked at: whether the seeker may still win; see
@@ -234,7 +235,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             crowd: usize::MAX,
             has_given_up: false,
             allowance: None,
-            operations: 0,
+            work: 0,
             frontier: Frontier::default(),
             has_hope: Vec::new(),
             updates: VecDeque::new(),
@@ -539,9 +540,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
         let mut edges = self.graph.edges.iter();
         self.win.iter().any(|win| !matches!(win, Win::Everything))
-            || edges.any(|edge| {
-                edge.length > 1 && !self.spoiling(edge, &mut Patience::endless()).is_empty()
-            })
+            || edges.any(|edge| edge.length > 1 && !self.spoiling(edge).is_empty())
     }
 
     /// Whether the seeker wins from the initial valuation.
@@ -627,42 +626,5 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             return Some(false);
         }
         None
-    }
-
-    /// Does something with zones unless, or until, the watch gives a reason to stop; then the
-    /// result is of no use.
-    pub(in crate::game) fn patiently<R>(
-        &mut self,
-        watch: &mut dyn Watch,
-        work: impl FnOnce(&mut Self, &mut Patience<'_>) -> R,
-    ) -> (R, Option<StopReason>) {
-        let counters = self.counters();
-        self.graph.counted_zones = self.graph.zones.len();
-        let zone_bytes = self.zone_bytes();
-        let mut reason = None;
-        let mut goes_on = |zones: usize| {
-            let bytes = counters.bytes + zones as u64 * zone_bytes;
-            reason = watch.look(&Counters { bytes, ..counters });
-            reason.is_none()
-        };
-        let mut patience = Patience::as_long_as(&mut goes_on);
-        let result = work(self, &mut patience);
-        (result, reason)
-    }
-
-    /// As [`Solver::patiently`]; the inner error is why the result is of no use.
-    ///
-    /// # Errors
-    /// The work fails.
-    pub(in crate::game) fn unless_stopped<R>(
-        &mut self,
-        watch: &mut dyn Watch,
-        work: impl FnOnce(&mut Self, &mut Patience<'_>) -> Result<R, Failure>,
-    ) -> Result<Result<R, StopReason>, Failure> {
-        let (result, reason) = self.patiently(watch, work);
-        match reason {
-            Some(reason) => Ok(Err(reason)),
-            None => result.map(Ok),
-        }
     }
 }

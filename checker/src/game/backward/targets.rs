@@ -5,7 +5,7 @@ use crate::zones::Federation;
 use super::memory::gains_bytes;
 use super::solver::{AfterGoal, Gain, Pending, Solver, Win};
 use crate::game::Player;
-use crate::game::forward::graph::Standing;
+use crate::game::forward::node::Standing;
 
 impl Solver<'_, '_, '_> {
     /// Gives nodes that were just made their place: what is sought is won from the start.

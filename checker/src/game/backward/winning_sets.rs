@@ -1,11 +1,11 @@
 //! The valuations that nodes win, the rest of them, and where edges lead into either.
 
+use crate::zones::Federation;
 use crate::zones::federation::block_bytes;
-use crate::zones::{Federation, Patience};
 
 use super::solver::{Gain, Solver, Win};
 use crate::game::Player;
-use crate::game::forward::graph::{Edge, NONE};
+use crate::game::forward::node::{Edge, NONE};
 
 /// What a node gains.
 #[derive(Clone, Debug)]
@@ -26,13 +26,8 @@ pub(super) enum Gained {
 }
 
 impl Solver<'_, '_, '_> {
-    /// What a node gains if these valuations are won, which is of use unless the patience is over.
-    pub(super) fn gained(
-        &self,
-        node: u32,
-        mut won: Federation,
-        patience: &mut Patience<'_>,
-    ) -> Gained {
+    /// What a node gains if these valuations are won.
+    pub(super) fn gained(&self, node: u32, mut won: Federation) -> Gained {
         let (mut rest, is_first) = match &self.win[node as usize] {
             Win::Everything => return Gained::Nothing,
             Win::Part(_) => (self.rest[&node].clone(), false),
@@ -41,17 +36,17 @@ impl Solver<'_, '_, '_> {
         if !rest.intersects(&won) {
             return Gained::Nothing;
         }
-        won.reduce_within(patience);
+        won.reduce();
         let part = if is_first {
             won.clone()
         } else {
-            rest.intersection_within(&won, patience)
+            rest.intersection(&won)
         };
-        rest.subtract_within(&won, patience);
+        rest.subtract(&won);
         let mut gained = if rest.is_empty() {
             Gained::Everything((!is_first).then_some(part))
         } else {
-            rest.merge_within(patience);
+            rest.merge();
             Gained::Part { won, part, rest }
         };
         gained.shrink();
@@ -174,12 +169,12 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The valuations from which a move of the evader is not known to lead into won ones.
-    pub(in crate::game) fn spoiling(&self, edge: &Edge, patience: &mut Patience<'_>) -> Federation {
+    pub(in crate::game) fn spoiling(&self, edge: &Edge) -> Federation {
         if self.seeker == Player::Environment && self.graph.programs.waits(edge.program) {
             return self.enabled(edge);
         }
         let is_missed = (edge.length == 1).then(|| self.lost(edge.target));
-        self.missing(edge, (&self.win[edge.target as usize], is_missed), patience)
+        self.missing(edge, (&self.win[edge.target as usize], is_missed))
     }
 
     /// The valuations from which an edge is possible and does not lead into the given valuations of
@@ -190,14 +185,13 @@ impl Solver<'_, '_, '_> {
         &self,
         edge: &Edge,
         (hit, missed): (&Win, Option<Win>),
-        patience: &mut Patience<'_>,
     ) -> Federation {
         if edge.length == 1 {
-            let missed = missed.unwrap_or_else(|| self.complement(edge.target, hit, patience));
+            let missed = missed.unwrap_or_else(|| self.complement(edge.target, hit));
             return self.before(edge, &missed);
         }
         let mut missing = self.enabled(edge);
-        missing.subtract_within(&self.before(edge, hit), patience);
+        missing.subtract(&self.before(edge, hit));
         missing
     }
 
@@ -211,13 +205,13 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The other valuations of a node.
-    fn complement(&self, node: u32, part: &Win, patience: &mut Patience<'_>) -> Win {
+    fn complement(&self, node: u32, part: &Win) -> Win {
         match part {
             Win::Nothing => Win::Everything,
             Win::Everything => Win::Nothing,
             Win::Part(part) => {
                 let mut rest = self.whole(node);
-                rest.subtract_within(part, patience);
+                rest.subtract(part);
                 Win::Part(rest)
             }
         }

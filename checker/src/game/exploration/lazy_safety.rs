@@ -21,13 +21,13 @@
 //! rather the way to it, and whether dives that leave them out find it sooner is a matter of luck.
 
 use crate::network::Failure;
+use crate::zones::Federation;
 use crate::zones::federation::block_bytes;
-use crate::zones::{Federation, Patience};
 
 use crate::game::Player;
 use crate::game::backward::predecessors::Situation;
 use crate::game::backward::solver::{Solver, Win};
-use crate::game::forward::graph::Edge;
+use crate::game::forward::node::Edge;
 
 /// Hubs are counted anew when the edges have grown by this part of them.
 const BETWEEN_COUNTS: usize = 4;
@@ -143,7 +143,7 @@ impl Solver<'_, '_, '_> {
         let mut forced = Federation::empty(self.graph.dimension());
         if self.may_stop(node) {
             let situation = self.situation(node)?;
-            forced = self.forced_controller(node, &situation, &mut Patience::endless());
+            forced = self.forced_controller(node, &situation);
         }
         self.frontier.reserve.is_used = true;
         let holds = &mut self.defences.holds;
@@ -263,32 +263,28 @@ impl Solver<'_, '_, '_> {
         &self,
         node: u32,
         situation: &Situation,
-        patience: &mut Patience<'_>,
     ) -> (Federation, Defence) {
         let edges = self.graph.edges_of(node);
         let first = edges.start;
         let mut held: Vec<usize> = edges.filter(|&edge| self.defences.holds(edge)).collect();
         if held.is_empty() {
-            let won = self.winnable(node, situation, patience);
+            let won = self.winnable(node, situation);
             return (won, Defence::default());
         }
         let aims = self.aims(node, &self.win, &self.defences.attackers);
         let mut moves = Vec::new();
         let mut is_pressed = false;
         let won = loop {
-            let (won, decided) = self.winnable_without(node, situation, &held, patience);
-            if patience.is_over() {
-                break won;
-            }
-            let Some(mut threatened) = self.new_part(node, &won, patience) else {
+            let (won, decided) = self.winnable_without(node, situation, &held);
+            let Some(mut threatened) = self.new_part(node, &won) else {
                 break won;
             };
-            threatened.subtract_within(&decided, patience);
-            match self.strongest(&held, aims, &threatened, patience) {
+            threatened.subtract(&decided);
+            match self.strongest(&held, aims, &threatened) {
                 None => break won,
                 Some((_, 0)) if !self.defences.uses_weak => {
                     is_pressed = true;
-                    break self.winnable(node, situation, patience);
+                    break self.winnable(node, situation);
                 }
                 Some((index, _)) => moves.push((held.remove(index) - first) as u32),
             }
@@ -301,15 +297,10 @@ impl Solver<'_, '_, '_> {
     }
 
     /// What of these valuations a node has not won; `None` if there are none.
-    pub(in crate::game) fn new_part(
-        &self,
-        node: u32,
-        won: &Federation,
-        patience: &mut Patience<'_>,
-    ) -> Option<Federation> {
+    pub(in crate::game) fn new_part(&self, node: u32, won: &Federation) -> Option<Federation> {
         let part = match &self.win[node as usize] {
             Win::Everything => return None,
-            Win::Part(_) => self.rest[&node].intersection_within(won, patience),
+            Win::Part(_) => self.rest[&node].intersection(won),
             Win::Nothing => won.clone(),
         };
         (!part.is_empty()).then_some(part)
@@ -322,7 +313,6 @@ impl Solver<'_, '_, '_> {
         held: &[usize],
         aims: u32,
         threatened: &Federation,
-        patience: &mut Patience<'_>,
     ) -> Option<(usize, u32)> {
         let mut best: Option<(usize, u32)> = None;
         for (index, &edge) in held.iter().enumerate() {
@@ -330,7 +320,7 @@ impl Solver<'_, '_, '_> {
             let strength = (edge.movers & aims).count_ones();
             if best.is_none_or(|(_, most)| strength > most)
                 && !matches!(self.win[edge.target as usize], Win::Everything)
-                && self.spoiling(edge, patience).intersects(threatened)
+                && self.spoiling(edge).intersects(threatened)
             {
                 best = Some((index, strength));
             }

@@ -14,7 +14,7 @@
 //! nothing that is not known; and more moves do the evader no harm.
 
 use crate::game::backward::solver::{Solver, Win};
-use crate::game::forward::graph::Edge;
+use crate::game::forward::node::Edge;
 
 /// So many nodes may be looked at for each explored state to find those in play; if that is not
 /// enough, reserves do not pay.

@@ -15,7 +15,7 @@ use crate::network::Failure;
 
 use super::lazy_zero_time::Reserve;
 use crate::game::backward::solver::{AfterGoal, Solver, Win};
-use crate::game::forward::graph::{Edge, NONE, Standing};
+use crate::game::forward::node::{Edge, NONE, Standing};
 
 /// One in so many starts is from the oldest node.
 const STARTS_FROM_OLDEST: u32 = 16;

@@ -12,14 +12,14 @@ use rustc_hash::FxHashMap;
 
 use crate::ir::Network;
 use crate::network::{Moves, Part, is_same_entry};
+use crate::zones::Federation;
 use crate::zones::federation::block_bytes;
-use crate::zones::{Federation, Patience};
 
-use super::graph::Edge;
+use super::node::Edge;
 use crate::game::Player;
-use crate::game::backward::memory::table_bytes;
 use crate::game::backward::solver::{Solver, Win};
 use crate::game::strategy::attractor::Decision;
+use crate::zones::federation::table_bytes;
 
 /// The entries with several legs that the controller owns.
 #[derive(Debug, Default)]
@@ -101,37 +101,29 @@ impl Solver<'_, '_, '_> {
     pub(in crate::game) fn before_all<'w>(
         &self,
         legs: impl IntoIterator<Item = (u32, &'w Win)>,
-        patience: &mut Patience<'_>,
     ) -> Federation {
         let mut into = Federation::empty(self.graph.dimension());
         let mut past = Federation::empty(self.graph.dimension());
         for (leg, hit) in legs {
             let edge = &self.graph.edges[leg as usize];
-            into.unite_within(&self.before(edge, hit), patience);
-            past.unite_within(&self.missing(edge, (hit, None), patience), patience);
+            into.unite(&self.before(edge, hit));
+            past.unite(&self.missing(edge, (hit, None)));
         }
-        into.subtract_within(&past, patience);
+        into.subtract(&past);
         into
     }
 
     /// The valuations from which all legs of an entry that are possible lead into valuations that
     /// the seeker is not known to win, and some leg is possible. The controller is the evader.
-    pub(in crate::game) fn spoiling_all(
-        &self,
-        legs: &[u32],
-        patience: &mut Patience<'_>,
-    ) -> Federation {
+    pub(in crate::game) fn spoiling_all(&self, legs: &[u32]) -> Federation {
         let mut away = Federation::empty(self.graph.dimension());
         let mut back = Federation::empty(self.graph.dimension());
         for &leg in legs {
             let edge = &self.graph.edges[leg as usize];
-            away.unite_within(&self.spoiling(edge, patience), patience);
-            back.unite_within(
-                &self.won_by_leg(leg, &self.win[edge.target as usize]),
-                patience,
-            );
+            away.unite(&self.spoiling(edge));
+            back.unite(&self.won_by_leg(leg, &self.win[edge.target as usize]));
         }
-        away.subtract_within(&back, patience);
+        away.subtract(&back);
         away
     }
 
@@ -178,9 +170,8 @@ impl Solver<'_, '_, '_> {
         &mut self,
         node: u32,
         (part, rank): (&Federation, u32),
-        picked: &mut dyn FnMut(&Self, u32, &mut Patience<'_>) -> Federation,
+        picked: &mut dyn FnMut(&Self, u32) -> Federation,
         (legs, taken): (&mut Vec<Decision>, &mut Vec<u32>),
-        patience: &mut Patience<'_>,
     ) -> Result<(), crate::network::Failure> {
         if self.graph.chances.of(node).is_empty() {
             return Ok(());
@@ -189,11 +180,11 @@ impl Solver<'_, '_, '_> {
         for entry in self.graph.chances.of(node).to_vec() {
             let mut left = part.clone();
             for leg in entry {
-                let zones = picked(self, leg, patience).intersection_within(&left, patience);
+                let zones = picked(self, leg).intersection(&left);
                 if zones.is_empty() {
                     continue;
                 }
-                left.subtract_within(&zones, patience);
+                left.subtract(&zones);
                 let ordinal = self.graph.edges[leg as usize].ordinal;
                 let action = moves.get(ordinal as usize).parts.to_vec();
                 legs.push(Decision {

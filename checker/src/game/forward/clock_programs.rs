@@ -11,7 +11,7 @@ use crate::zones::federation::block_bytes;
 use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, ClockSet, Federation, Zone};
 
-use crate::game::backward::memory::table_bytes;
+use crate::zones::federation::table_bytes;
 
 /// The index of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -25,12 +25,12 @@
 
 use crate::network::Failure;
 use crate::search::limits::Watch;
-use crate::zones::{Federation, Patience};
+use crate::zones::Federation;
 
 use crate::game::Player;
 use crate::game::backward::memory::wins_bytes;
 use crate::game::backward::solver::{Answer, Solver, Win};
-use crate::game::forward::graph::Standing;
+use crate::game::forward::node::Standing;
 
 /// Nodes between two looks at the limits.
 const NODES_BETWEEN_LOOKS: u32 = 64;
@@ -77,13 +77,7 @@ fn shrink(
     loop {
         let mut targets = Vec::with_capacity(kept.len());
         for node in 0..kept.len() as u32 {
-            let (target, reason) = solver.patiently(watch, |solver, patience| {
-                target(solver, node, &kept, patience)
-            });
-            if let Some(reason) = reason {
-                return Ok(Answer::Stopped(reason));
-            }
-            targets.push(target?);
+            targets.push(target(solver, node, &kept)?);
             if node.is_multiple_of(NODES_BETWEEN_LOOKS)
                 && let Some(reason) = solver.look(watch)
             {
@@ -110,13 +104,7 @@ fn shrink(
         for (node, old) in kept.iter_mut().enumerate() {
             if !has_shrunk {
                 let node = node as u32;
-                let (is_same, reason) = solver.patiently(watch, |solver, patience| {
-                    is_within(solver, node, (old, &solver.win[node as usize]), patience)
-                });
-                if let Some(reason) = reason {
-                    return Ok(Answer::Stopped(reason));
-                }
-                has_shrunk = !is_same;
+                has_shrunk = !is_within(solver, node, (old, &solver.win[node as usize]));
             }
             old.clone_from(&solver.win[node]);
         }
@@ -171,30 +159,20 @@ pub(in crate::game) fn to_federation(
     }
 }
 
-fn is_within(
-    solver: &Solver<'_, '_, '_>,
-    node: u32,
-    (one, other): (&Win, &Win),
-    patience: &mut Patience<'_>,
-) -> bool {
+fn is_within(solver: &Solver<'_, '_, '_>, node: u32, (one, other): (&Win, &Win)) -> bool {
     match (one, other) {
         (Win::Nothing, _) | (_, Win::Everything) => true,
         (_, Win::Nothing) => false,
         _ => {
             let other = to_federation(solver, node, other);
-            to_federation(solver, node, one).is_subset_within(&other, patience)
+            to_federation(solver, node, one).is_subset(&other)
         }
     }
 }
 
 /// The part of a node in which the goal holds, and from which the controller can go on without
 /// leaving what is kept.
-fn target(
-    solver: &mut Solver<'_, '_, '_>,
-    node: u32,
-    kept: &[Win],
-    patience: &mut Patience<'_>,
-) -> Result<Win, Failure> {
+fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Win, Failure> {
     let mut goal = match solver.graph.nodes[node as usize].standing {
         Standing::Open | Standing::Broken | Standing::Dead => return Ok(Win::Nothing),
         Standing::Goal => solver.whole(node),
@@ -206,8 +184,8 @@ fn target(
             )
         }
     };
-    goal.subtract_within(&leave(solver, node, kept, patience)?, patience);
-    if goal.includes_zone_within(solver.graph.zone(node), patience) {
+    goal.subtract(&leave(solver, node, kept)?);
+    if goal.includes_zone(solver.graph.zone(node)) {
         return Ok(Win::Everything);
     }
     Ok(as_win(goal))
@@ -218,10 +196,9 @@ pub(in crate::game) fn leave(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
     kept: &[Win],
-    patience: &mut Patience<'_>,
 ) -> Result<Federation, Failure> {
     let mut out = solver.whole(node);
-    out.subtract_within(&to_federation(solver, node, &kept[node as usize]), patience);
+    out.subtract(&to_federation(solver, node, &kept[node as usize]));
     let mut back = Federation::empty(solver.graph.dimension());
     for index in solver.graph.edges_of(node) {
         let edge = solver.graph.edges[index];
@@ -230,20 +207,20 @@ pub(in crate::game) fn leave(
             continue;
         }
         if edge.controllable {
-            back.unite_within(&solver.before(&edge, kept), patience);
+            back.unite(&solver.before(&edge, kept));
         } else {
-            let missing = solver.missing(&edge, (kept, None), patience);
-            out.unite_within(&missing, patience);
+            let missing = solver.missing(&edge, (kept, None));
+            out.unite(&missing);
         }
     }
     for legs in solver.graph.chances.of(node) {
         let legs = solver.targets_of(legs, kept);
-        back.unite_within(&solver.before_all(legs, patience), patience);
+        back.unite(&solver.before_all(legs));
     }
-    back.subtract_within(&out, patience);
+    back.subtract(&out);
     let situation = solver.situation(node)?;
-    let mut held = solver.forced_controller(node, &situation, patience);
-    held.subtract_within(&back, patience);
-    out.unite_within(&held, patience);
-    Ok(solver.safe_past(node, out, &back, &situation, patience))
+    let mut held = solver.forced_controller(node, &situation);
+    held.subtract(&back);
+    out.unite(&held);
+    Ok(solver.safe_past(node, out, &back, &situation))
 }

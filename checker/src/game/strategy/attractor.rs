@@ -27,17 +27,18 @@
 
 use std::sync::Arc;
 
+use crate::cancellation;
 use crate::network::{ClockEffect, Failure, Moves, Part};
 use crate::search::limits::{StopReason, Watch};
 use crate::zones::dbm::Constraint;
 use crate::zones::federation::block_bytes;
-use crate::zones::{ClockSet, Federation, Patience};
+use crate::zones::{ClockSet, Federation};
 
 use super::safety;
 use crate::game::Player;
 use crate::game::backward::solver::{Gain, Solver, Win};
 use crate::game::forward::chance::entry_of;
-use crate::game::forward::graph::{Edge, Standing};
+use crate::game::forward::node::{Edge, Standing};
 
 /// What to do in some part of a state.
 #[derive(Clone, Debug)]
@@ -68,7 +69,7 @@ pub struct StrategyState {
 
 impl StrategyState {
     /// The bytes that it takes.
-    fn bytes(&self) -> u64 {
+    fn bytes(&self) -> usize {
         let decisions = self.decisions.iter().chain(&self.legs).map(|decision| {
             let action = decision.action.as_ref();
             let parts = action.map_or(0, |parts| block_bytes(size_of_val(&**parts)));
@@ -78,7 +79,7 @@ impl StrategyState {
             + block_bytes(size_of_val(&*self.words))
             + block_bytes(self.decisions.capacity() * size_of::<Decision>())
             + block_bytes(self.legs.capacity() * size_of::<Decision>());
-        (own + decisions.sum::<usize>()) as u64
+        own + decisions.sum::<usize>()
     }
 }
 
@@ -167,21 +168,12 @@ pub fn extract(
 pub fn extract_from(
     solver: &mut Solver<'_, '_, '_>,
     owner: Player,
-    waiting: Vec<u32>,
+    mut waiting: Vec<u32>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
-    solver.unless_stopped(watch, |solver, patience| {
-        extract_within(solver, owner, waiting, patience)
-    })
-}
-
-/// As [`extract_from`], which is of use unless the patience is over.
-fn extract_within(
-    solver: &mut Solver<'_, '_, '_>,
-    owner: Player,
-    mut waiting: Vec<u32>,
-    patience: &mut Patience<'_>,
-) -> Result<Strategy, Failure> {
+    if let Some(reason) = solver.tell(watch) {
+        return Ok(Err(reason));
+    }
     let is_seeking = owner == solver.seeker;
     let mut strategy = Strategy {
         owner,
@@ -194,15 +186,13 @@ fn extract_within(
         start: Start::default(),
         states: Vec::new(),
     };
+    let mut bytes = 0;
     let mut steps_to_end = Vec::new();
     let mut seen = vec![false; solver.graph.nodes.len()];
     for &node in &waiting {
         seen[node as usize] = true;
     }
     while let Some(node) = waiting.pop() {
-        if patience.ends() {
-            break;
-        }
         let known = strategy.states.len();
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);
@@ -211,9 +201,9 @@ fn extract_within(
             legs,
             taken,
         } = if is_seeking {
-            choices(solver, node, patience)?
+            choices(solver, node)?
         } else {
-            safety::choices(solver, node, patience)?
+            safety::choices(solver, node)?
         };
         let standing = solver.graph.nodes[node as usize].standing;
         let source = words.clone();
@@ -228,33 +218,29 @@ fn extract_within(
         steps_to_end.resize(strategy.states.len(), 0);
         for edge in taken {
             if is_seeking {
-                inner_states(solver, edge, &source, &mut strategy, patience)?;
+                inner_states(solver, edge, &source, &mut strategy)?;
                 let inner = strategy.states.len() - steps_to_end.len();
                 steps_to_end.extend((1..=inner as u32).rev());
             } else {
-                safety::inner_states(solver, edge, &source, &mut strategy, patience)?;
+                safety::inner_states(solver, edge, &source, &mut strategy)?;
             }
             let target = solver.graph.edges[edge as usize].target;
             if !std::mem::replace(&mut seen[target as usize], true) {
                 waiting.push(target);
             }
         }
-        keep(solver, &strategy.states[known..], patience);
+        keep(&strategy.states[known..], &mut bytes);
     }
     if is_seeking {
         rank_chains(&mut strategy, &steps_to_end);
     }
-    Ok(strategy)
+    Ok(Ok(strategy))
 }
 
-/// Counts what new states take.
-pub(super) fn keep(
-    solver: &Solver<'_, '_, '_>,
-    states: &[StrategyState],
-    patience: &mut Patience<'_>,
-) {
-    let bytes: u64 = states.iter().map(StrategyState::bytes).sum();
-    patience.keep(bytes.div_ceil(solver.zone_bytes()) as usize);
+/// Adds what new states take to the bytes of a strategy, and asks whether it may take so many.
+pub(super) fn keep(states: &[StrategyState], bytes: &mut usize) {
+    *bytes += states.iter().map(StrategyState::bytes).sum::<usize>();
+    cancellation::ask_for(*bytes);
 }
 
 /// Ranks states inside chains above the end of their chain, by their steps to it. Their words may
@@ -303,11 +289,7 @@ pub(super) struct Choices {
 }
 
 /// What the seeker chooses in a node.
-fn choices(
-    solver: &mut Solver<'_, '_, '_>,
-    node: u32,
-    patience: &mut Patience<'_>,
-) -> Result<Choices, Failure> {
+fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
     let mut chosen = Choices::default();
     let is_over = solver.graph.nodes[node as usize].standing == won_standing(solver.seeker);
     let is_ever_over = solver.targets.is_none() && !hangs_on_time(solver, solver.seeker);
@@ -325,10 +307,10 @@ fn choices(
         // Where what is sought is to come again and again, play goes on from there into anything
         // that is won.
         let goes_on = solver.targets.is_some();
-        let earlier = |solver: &Solver<'_, '_, '_>, edge: u32, patience: &mut Patience<'_>| {
+        let earlier = |solver: &Solver<'_, '_, '_>, edge: u32| {
             let target = solver.graph.edges[edge as usize].target;
             if gain.stamp > 0 {
-                won_before(solver, target, gain.stamp, patience)
+                won_before(solver, target, gain.stamp)
             } else {
                 solver.win[target as usize].clone()
             }
@@ -336,15 +318,15 @@ fn choices(
         if gain.stamp > 0 || goes_on {
             for edges in own_choices(solver, node) {
                 let first = solver.graph.edges[edges[0] as usize];
-                let wins = edges.iter().map(|&edge| earlier(solver, edge, patience));
+                let wins = edges.iter().map(|&edge| earlier(solver, edge));
                 let wins: Vec<Win> = wins.collect();
                 let zones = match &wins[..] {
                     [win] => solver.before(&first, win),
-                    wins => solver.before_all(edges.iter().copied().zip(wins), patience),
+                    wins => solver.before_all(edges.iter().copied().zip(wins)),
                 };
-                let zones = zones.intersection_within(&rest, patience);
+                let zones = zones.intersection(&rest);
                 if !zones.is_empty() {
-                    rest.subtract_within(&zones, patience);
+                    rest.subtract(&zones);
                     decisions.push(Decision {
                         zones,
                         action: Some(named(solver, &moves, &first)),
@@ -355,12 +337,11 @@ fn choices(
             }
             if solver.seeker == Player::Environment {
                 let whole = whole_or_part(solver, node, gain.part.as_ref());
-                let mut picked =
-                    |solver: &Solver<'_, '_, '_>, leg: u32, patience: &mut Patience<'_>| {
-                        solver.won_by_leg(leg, &earlier(solver, leg, patience))
-                    };
+                let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
+                    solver.won_by_leg(leg, &earlier(solver, leg))
+                };
                 let chosen = (&mut *legs, &mut *taken);
-                solver.pick_legs(node, (&whole, gain.stamp), &mut picked, chosen, patience)?;
+                solver.pick_legs(node, (&whole, gain.stamp), &mut picked, chosen)?;
             }
         }
         if !rest.is_empty() {
@@ -430,12 +411,7 @@ pub(super) fn whole_or_part(
 }
 
 /// The valuations of a node that were won before a stamp.
-fn won_before(
-    solver: &Solver<'_, '_, '_>,
-    node: u32,
-    stamp: u32,
-    patience: &mut Patience<'_>,
-) -> Win {
+fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
     let mut won: Option<Federation> = None;
     for Gain { stamp: _, part } in solver.gains[node as usize]
         .iter()
@@ -447,7 +423,7 @@ fn won_before(
         match &mut won {
             None => won = Some(part.clone()),
             Some(won) => {
-                won.unite_within(part, patience);
+                won.unite(part);
             }
         }
     }
@@ -474,16 +450,12 @@ fn inner_states(
     edge: u32,
     source: &[i32],
     strategy: &mut Strategy,
-    patience: &mut Patience<'_>,
 ) -> Result<(), Failure> {
     let edge = solver.graph.edges[edge as usize];
     let inside = walk(solver, &edge, source)?;
     let is_own = |inner: &Inner| solver.seeker.owns(inner.controllable);
     let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
     for gain in &solver.gains[edge.target as usize] {
-        if patience.ends() {
-            return Ok(());
-        }
         let mut won = whole_or_part(solver, edge.target, gain.part.as_ref());
         for (inner, decisions) in inside.iter().zip(&mut decisions).rev() {
             inner.effect.preimage(&mut won);

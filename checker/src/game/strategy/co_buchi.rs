@@ -17,7 +17,7 @@
 
 use crate::network::{Failure, Part};
 use crate::search::limits::{StopReason, Watch};
-use crate::zones::{ClockSet, Federation, Patience};
+use crate::zones::{ClockSet, Federation};
 
 use super::attractor::{
     Choices, Decision, Selection, Start, Strategy, StrategyState, keep, moves_of, walk,
@@ -26,7 +26,7 @@ use super::attractor::{
 use super::safety::{new_decision, spoiling, within_invariant};
 use crate::game::Player;
 use crate::game::backward::solver::{Solver, Win};
-use crate::game::forward::graph::{Edge, Standing};
+use crate::game::forward::node::{Edge, Standing};
 use crate::game::objectives::buchi::{leave, to_federation};
 
 /// Reads the strategy of the environment, which wins from these nodes, from the rounds of the
@@ -37,21 +37,13 @@ use crate::game::objectives::buchi::{leave, to_federation};
 pub fn extract(
     solver: &mut Solver<'_, '_, '_>,
     rounds: &[Vec<Win>],
-    waiting: Vec<u32>,
+    mut waiting: Vec<u32>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
-    solver.unless_stopped(watch, |solver, patience| {
-        extract_within(solver, rounds, waiting, patience)
-    })
-}
-
-/// As [`extract`], which is of use unless the patience is over.
-fn extract_within(
-    solver: &mut Solver<'_, '_, '_>,
-    rounds: &[Vec<Win>],
-    mut waiting: Vec<u32>,
-    patience: &mut Patience<'_>,
-) -> Result<Strategy, Failure> {
+    if let Some(reason) = solver.tell(watch) {
+        return Ok(Err(reason));
+    }
+    let mut bytes = 0;
     let mut strategy = Strategy {
         owner: Player::Environment,
         selection: Selection::First,
@@ -65,9 +57,6 @@ fn extract_within(
         seen[node as usize] = true;
     }
     while let Some(node) = waiting.pop() {
-        if patience.ends() {
-            break;
-        }
         let known = strategy.states.len();
         let mut words = solver.graph.symbolic.stepper.network().initial.clone();
         solver.graph.load(node, &mut words);
@@ -75,7 +64,7 @@ fn extract_within(
             decisions,
             legs,
             taken,
-        } = choices(solver, node, rounds, patience)?;
+        } = choices(solver, node, rounds)?;
         strategy.states.push(StrategyState {
             words: words.clone(),
             decisions,
@@ -84,15 +73,15 @@ fn extract_within(
         });
         for edge in taken {
             let edge = solver.graph.edges[edge as usize];
-            let inner = inner_states(solver, &edge, &words, rounds, patience)?;
+            let inner = inner_states(solver, &edge, &words, rounds)?;
             strategy.states.extend(inner);
             if !std::mem::replace(&mut seen[edge.target as usize], true) {
                 waiting.push(edge.target);
             }
         }
-        keep(solver, &strategy.states[known..], patience);
+        keep(&strategy.states[known..], &mut bytes);
     }
-    Ok(strategy)
+    Ok(Ok(strategy))
 }
 
 /// What the environment chooses in a node.
@@ -100,7 +89,6 @@ fn choices(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
     rounds: &[Vec<Win>],
-    patience: &mut Patience<'_>,
 ) -> Result<Choices, Failure> {
     let mut chosen = Choices::default();
     let Choices {
@@ -112,14 +100,14 @@ fn choices(
     for (after, before) in (1..rounds.len()).zip(rounds) {
         let mut lost = to_federation(solver, node, &before[node as usize]);
         let left = to_federation(solver, node, &rounds[after][node as usize]);
-        lost.subtract_within(&left, patience);
+        lost.subtract(&left);
         if lost.is_empty() {
             continue;
         }
-        let leaving = leave(solver, node, before, patience)?;
-        let leaving = leaving.intersection_within(&lost, patience);
+        let leaving = leave(solver, node, before)?;
+        let leaving = leaving.intersection(&lost);
         let mut evading = lost.clone();
-        evading.subtract_within(&leaving, patience);
+        evading.subtract(&leaving);
         for (part, kept) in [(leaving, before), (evading, &rounds[after])] {
             let mut waiting = part.clone();
             for index in solver.graph.edges_of(node) {
@@ -128,22 +116,22 @@ fn choices(
                     continue;
                 }
                 let kept = &kept[edge.target as usize];
-                let acting = solver.missing(&edge, (kept, None), patience);
-                let acting = acting.intersection_within(&part, patience);
+                let acting = solver.missing(&edge, (kept, None));
+                let acting = acting.intersection(&part);
                 if !acting.is_empty() {
-                    waiting.subtract_within(&acting, patience);
+                    waiting.subtract(&acting);
                     let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
-                    push(decisions, (acting, action, after), patience);
+                    push(decisions, (acting, action, after));
                     taken.push(index as u32);
                 }
             }
-            push(decisions, (waiting, None, after), patience);
-            let mut picked = |solver: &Solver<'_, '_, '_>, leg, patience: &mut Patience<'_>| {
+            push(decisions, (waiting, None, after));
+            let mut picked = |solver: &Solver<'_, '_, '_>, leg| {
                 let edge = &solver.graph.edges[leg as usize];
-                solver.missing(edge, (&kept[edge.target as usize], None), patience)
+                solver.missing(edge, (&kept[edge.target as usize], None))
             };
             let chosen = (&mut *legs, &mut *taken);
-            solver.pick_legs(node, (&part, after as u32), &mut picked, chosen, patience)?;
+            solver.pick_legs(node, (&part, after as u32), &mut picked, chosen)?;
         }
         for index in solver.graph.edges_of(node) {
             let edge = solver.graph.edges[index];
@@ -160,10 +148,9 @@ fn choices(
 fn push(
     decisions: &mut Vec<Decision>,
     (mut zones, action, rank): (Federation, Option<Vec<Part>>, usize),
-    patience: &mut Patience<'_>,
 ) {
     if !zones.is_empty() {
-        zones.reduce_within(patience);
+        zones.reduce();
         decisions.push(Decision {
             rank: rank as u32,
             ..new_decision(zones, action)
@@ -178,7 +165,6 @@ fn inner_states(
     edge: &Edge,
     source: &[i32],
     rounds: &[Vec<Win>],
-    patience: &mut Patience<'_>,
 ) -> Result<Vec<StrategyState>, Failure> {
     let inside = walk(solver, edge, source)?;
     let dimension = solver.graph.dimension();
@@ -197,21 +183,21 @@ fn inner_states(
             let acting = if inner.controllable {
                 Federation::empty(dimension)
             } else {
-                spoiling(inner, &kept, patience)
+                spoiling(inner, &kept)
             };
             if inner.delays {
                 kept.down(&ClockSet::EMPTY);
                 kept.constrain_all(&inner.invariant);
             }
             let mut lost = within_invariant(inner, dimension);
-            lost.subtract_within(&kept, patience);
-            lost.subtract_within(&taken[index], patience);
-            taken[index].unite_within(&lost, patience);
-            let acting = acting.intersection_within(&lost, patience);
-            lost.subtract_within(&acting, patience);
+            lost.subtract(&kept);
+            lost.subtract(&taken[index]);
+            taken[index].unite(&lost);
+            let acting = acting.intersection(&lost);
+            lost.subtract(&acting);
             let action = Some(inner.parts.clone());
-            push(&mut decisions[index], (acting, action, rank), patience);
-            push(&mut decisions[index], (lost, None, rank), patience);
+            push(&mut decisions[index], (acting, action, rank));
+            push(&mut decisions[index], (lost, None, rank));
         }
     }
     let states = inside.into_iter().zip(decisions);

@@ -14,7 +14,7 @@ use crate::zones::Zone;
 use crate::zones::federation::block_bytes;
 
 use crate::game::backward::solver::{Solver, Win};
-use crate::game::forward::graph::Standing;
+use crate::game::forward::node::Standing;
 
 /// One transition of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,21 +5,17 @@
 //! controller allows everything that stays outside.
 
 use crate::network::{Failure, Part};
-use crate::zones::{ClockSet, Federation, Patience, Zone, instants, past};
+use crate::zones::{ClockSet, Federation, Zone, instants, past};
 
 use super::attractor::{
     Choices, Decision, Inner, Strategy, StrategyState, moves_of, named, walk, whole_or_part,
 };
 use crate::game::Player;
 use crate::game::backward::solver::{Solver, Win};
-use crate::game::forward::graph::Standing;
+use crate::game::forward::node::Standing;
 
 /// What the evader chooses in a node.
-pub(super) fn choices(
-    solver: &mut Solver<'_, '_, '_>,
-    node: u32,
-    patience: &mut Patience<'_>,
-) -> Result<Choices, Failure> {
+pub(super) fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
     let mut chosen = Choices::default();
     let Choices {
         decisions,
@@ -27,7 +23,7 @@ pub(super) fn choices(
         taken,
     } = &mut chosen;
     let mut free = rest_of(solver, node);
-    free.subtract_within(&ended(solver, node), patience);
+    free.subtract(&ended(solver, node));
     if free.is_empty() {
         return Ok(chosen);
     }
@@ -44,10 +40,10 @@ pub(super) fn choices(
             }
             continue;
         }
-        let spoiling = solver.spoiling(&edge, patience);
-        let zones = spoiling.intersection_within(&free, patience);
+        let spoiling = solver.spoiling(&edge);
+        let zones = spoiling.intersection(&free);
         if !zones.is_empty() {
-            acting.unite_within(&zones, patience);
+            acting.unite(&zones);
             let action = Some(named(solver, &moves, &edge));
             decisions.push(new_decision(zones, action));
             taken.push(index as u32);
@@ -55,30 +51,30 @@ pub(super) fn choices(
     }
     if solver.seeker == Player::Environment {
         for entry in solver.graph.chances.of(node) {
-            let spoiling = solver.spoiling_all(entry, patience);
-            let zones = spoiling.intersection_within(&free, patience);
+            let spoiling = solver.spoiling_all(entry);
+            let zones = spoiling.intersection(&free);
             if !zones.is_empty() {
-                acting.unite_within(&zones, patience);
+                acting.unite(&zones);
                 let first = &solver.graph.edges[entry[0] as usize];
                 decisions.push(new_decision(zones, Some(named(solver, &moves, first))));
                 taken.extend(entry);
             }
         }
     } else {
-        let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32, patience: &mut Patience<'_>| {
-            solver.spoiling(&solver.graph.edges[leg as usize], patience)
+        let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
+            solver.spoiling(&solver.graph.edges[leg as usize])
         };
-        solver.pick_legs(node, (&free, 0), &mut picked, (legs, taken), patience)?;
+        solver.pick_legs(node, (&free, 0), &mut picked, (legs, taken))?;
     }
     let mut waiting = match solver.seeker {
         Player::Controller => {
-            free.subtract_within(&acting, patience);
+            free.subtract(&acting);
             free
         }
-        Player::Environment => allowed_waiting(solver, node, (&free, &acting), patience)?,
+        Player::Environment => allowed_waiting(solver, node, (&free, &acting))?,
     };
     if !waiting.is_empty() {
-        waiting.reduce_within(patience);
+        waiting.reduce();
         decisions.push(new_decision(waiting, None));
     }
     Ok(chosen)
@@ -119,50 +115,49 @@ fn allowed_waiting(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
     (free, acting): (&Federation, &Federation),
-    patience: &mut Patience<'_>,
 ) -> Result<Federation, Failure> {
     let situation = solver.situation(node)?;
     let standstill = solver.standstill(&situation);
-    let mut at_rest = standstill.intersection_within(free, patience);
-    let forced = solver.forced_controller(node, &situation, patience);
-    at_rest.subtract_within(&forced, patience);
+    let mut at_rest = standstill.intersection(free);
+    let forced = solver.forced_controller(node, &situation);
+    at_rest.subtract(&forced);
     if !solver.graph.nodes[node as usize].delays {
         return Ok(at_rest);
     }
     let safe = rest_of(solver, node);
     let stopped = situation.stopped;
-    let before = instants::before_within(&safe, &stopped, patience);
-    let mut waiting = before.intersection_within(free, patience);
+    let before = instants::before(&safe, &stopped);
+    let mut waiting = before.intersection(free);
     // Where time can pass at all, and what it does not pass.
     let mut passing = safe.clone();
     let mut impassable = Federation::empty(safe.dimension());
     if let Some(urgent) = solver.graph.urgent(node) {
         let mut standstill = urgent.standstill();
         standstill.unite(&urgent.obliged);
-        waiting.subtract_within(&standstill, patience);
-        passing.subtract_within(&standstill, patience);
+        waiting.subtract(&standstill);
+        passing.subtract(&standstill);
         impassable.unite(&urgent.stops());
     }
     // What is safe may end in a limit that is not itself safe. Before such an end, the last
     // valuations with a move must use it.
     let mut unsafe_ones = whole_or_part(solver, node, None);
-    unsafe_ones.subtract_within(&safe, patience);
-    let after = instants::after_within(&passing, &stopped, patience);
-    let ends = unsafe_ones.intersection_within(&after, patience);
+    unsafe_ones.subtract(&safe);
+    let after = instants::after(&passing, &stopped);
+    let ends = unsafe_ones.intersection(&after);
     if !ends.is_empty() {
         let mut others = unsafe_ones.clone();
-        others.unite_within(&impassable, patience);
-        others.subtract_within(&ends, patience);
-        let before = past::predecessors_within(&ends, &others, &stopped, patience);
-        let ending = before.intersection_within(&safe, patience);
-        let mut last = ending.intersection_within(acting, patience);
+        others.unite(&impassable);
+        others.subtract(&ends);
+        let before = past::predecessors(&ends, &others, &stopped);
+        let ending = before.intersection(&safe);
+        let mut last = ending.intersection(acting);
         let mut later = ending;
-        later.subtract_within(acting, patience);
-        let earlier = past::predecessors_within(&later, &unsafe_ones, &stopped, patience);
-        last.subtract_within(&earlier, patience);
-        waiting.subtract_within(&last, patience);
+        later.subtract(acting);
+        let earlier = past::predecessors(&later, &unsafe_ones, &stopped);
+        last.subtract(&earlier);
+        waiting.subtract(&last);
     }
-    waiting.unite_within(&at_rest, patience);
+    waiting.unite(&at_rest);
     Ok(waiting)
 }
 
@@ -172,7 +167,6 @@ pub(super) fn inner_states(
     edge: u32,
     source: &[i32],
     strategy: &mut Strategy,
-    patience: &mut Patience<'_>,
 ) -> Result<(), Failure> {
     let edge = solver.graph.edges[edge as usize];
     let inside = walk(solver, &edge, source)?;
@@ -188,7 +182,7 @@ pub(super) fn inner_states(
         let is_own = !solver.seeker.owns(inner.controllable);
         let mut decisions = Vec::new();
         let acting = if is_own {
-            spoiling(&inner, &won, patience)
+            spoiling(&inner, &won)
         } else {
             Federation::empty(won.dimension())
         };
@@ -197,8 +191,8 @@ pub(super) fn inner_states(
             won.constrain_all(&inner.invariant);
         }
         let mut waiting = within_invariant(&inner, won.dimension());
-        waiting.subtract_within(&won, patience);
-        waiting.subtract_within(&acting, patience);
+        waiting.subtract(&won);
+        waiting.subtract(&acting);
         if !acting.is_empty() {
             decisions.push(new_decision(acting, Some(inner.parts)));
         }
@@ -218,10 +212,10 @@ pub(super) fn inner_states(
 
 /// Where the move of a state inside a chain is possible, and leads to none of the valuations that
 /// are won.
-pub(super) fn spoiling(inner: &Inner, won: &Federation, patience: &mut Patience<'_>) -> Federation {
+pub(super) fn spoiling(inner: &Inner, won: &Federation) -> Federation {
     let zone = Zone::of_constraints(won.dimension(), &inner.invariant);
     let mut acting = inner.effect.enabled_part(zone.bounds(), won.dimension());
-    acting.subtract_within(won, patience);
+    acting.subtract(won);
     acting
 }
 

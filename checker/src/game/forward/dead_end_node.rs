@@ -1,0 +1,52 @@
+//! The one node that all dead ends are: its edges, and how it is taken back.
+
+use crate::network::Failure;
+use crate::zones::Zone;
+
+use super::clock_programs::ProgramId;
+use super::dead_ends::DeadEnds;
+use super::graph::Graph;
+use super::node::{Edge, NONE, Origin, Standing};
+
+impl Graph<'_, '_> {
+    /// Adds an edge of `length` moves to the node of all dead ends.
+    pub(super) fn end_dead(
+        &mut self,
+        words: &[i32],
+        program: ProgramId,
+        origin: Origin,
+        length: u32,
+    ) {
+        let node = self.dead_ends.node.unwrap_or_else(|| {
+            let zone = Zone::universe(self.dimension());
+            let id = self.zones.intern(zone.bounds());
+            let discrete = self.discrete_of(words);
+            self.push_node(discrete, id, Standing::Dead)
+        });
+        self.dead_ends.node = Some(node);
+        self.link(origin, node, program, (length, false));
+    }
+
+    /// Takes back that dead ends are left out: expands the nodes anew that lead to one.
+    pub(in crate::game) fn go_on_in_dead_ends(&mut self) -> Result<(), Failure> {
+        let DeadEnds { node, .. } = std::mem::take(&mut self.dead_ends);
+        let mut edge = node.map_or(NONE, |node| self.nodes[node as usize].first_in);
+        let mut last = NONE;
+        while edge != NONE {
+            let Edge {
+                source, next_in, ..
+            } = self.edges[edge as usize];
+            // The edges of a node into the same target stand together.
+            if source != last {
+                self.expand(source)?;
+            }
+            last = source;
+            edge = next_in;
+        }
+        if self.nodes[0].standing == Standing::Dead {
+            self.judge_anew(0)?;
+            self.expand(0)?;
+        }
+        Ok(())
+    }
+}

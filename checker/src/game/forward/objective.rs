@@ -1,0 +1,50 @@
+//! What is to be reached and kept, and by when.
+//!
+//! Where the goal is to be reached in time, a clock that nothing sets measures the time. What is
+//! later than the deadline is lost for good, so zones end there: no state past it is ever made.
+
+use crate::ir::{FunctionId, Predicate};
+use crate::network::Failure;
+use crate::zones::Bound;
+use crate::zones::dbm::Constraint;
+
+/// What is to be reached and kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Objective<'q> {
+    /// The goal; play ends where it holds. `None`: there is none (safety).
+    pub goal: Option<&'q Predicate>,
+    /// What must hold until then; `None`: nothing.
+    pub keep: Option<&'q Predicate>,
+    /// Whether waiting for ever never helps the controller.
+    pub must_progress: bool,
+    /// By when the goal must be reached.
+    pub deadline: Option<Deadline>,
+    /// Whether what follows after dead ends is left out.
+    pub leaves_dead_ends: bool,
+}
+
+/// A limit on the time that play takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Deadline {
+    /// The clock that measures the time; nothing sets it.
+    pub clock: usize,
+    /// The limit.
+    pub limit: i32,
+    /// Whether the clock may start at any value up to the limit, so that the valuations of the
+    /// initial node show how much time is needed; else it starts at 0.
+    pub starts_anywhere: bool,
+    /// How much time, at least, is still to be left in a state before the goal; a negative value
+    /// counts as 0.
+    pub rest: Option<FunctionId>,
+}
+
+impl Deadline {
+    /// That the clock shows at most this.
+    pub(super) fn until(&self, limit: i32) -> Result<Constraint, Failure> {
+        Ok(Constraint {
+            left: self.clock,
+            right: 0,
+            bound: Bound::weak(limit).ok_or(Failure::ClockLimit(limit))?,
+        })
+    }
+}
