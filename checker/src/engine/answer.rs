@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::evidence::witness::{Proof, Witness};
 use crate::game::partial_observation::Machine;
-use crate::game::strategy::attractor::Strategy;
+use crate::game::strategy::Strategy;
 use crate::game::strategy::plans::Plan;
 use crate::ir::SiteId;
 use crate::network::Failure;

@@ -10,7 +10,7 @@ use super::loaded_model::{Due, LoadedModel, NamedStrategy};
 use super::options::Options;
 use super::rejection::Rejection;
 use crate::exec::RunTimeError;
-use crate::game::strategy::attractor::Under;
+use crate::game::strategy::Under;
 use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
 use crate::network::Failure;
 use crate::syntax::ast::QueryText;

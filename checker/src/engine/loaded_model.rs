@@ -11,7 +11,7 @@ use super::options::{CodeEngine, Options};
 use super::rejection::Rejection;
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
 use crate::exec::Executor;
-use crate::game::strategy::attractor::{Strategy, Under};
+use crate::game::strategy::{Strategy, Under};
 use crate::ir::{Network, Overflow, Query};
 use crate::semantics::{self, Model};
 use crate::syntax::{

@@ -18,7 +18,7 @@ use crate::engine::session::play::{
     self as engine, Done, Follower, Refused, Unadvised, Wait, player_name,
 };
 use crate::engine::{LoadedModel, NamedStrategy};
-use crate::game::strategy::attractor::Selection;
+use crate::game::strategy::Selection;
 use crate::verify::{self, Effort};
 
 /// A strategy of one of the players.

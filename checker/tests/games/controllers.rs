@@ -13,7 +13,7 @@ use std::process::{Command, Stdio};
 use checker::engine::format::{strategy_c, text};
 use checker::engine::query::time_clock;
 use checker::game::Player;
-use checker::game::strategy::attractor::{Decision, Selection, Strategy};
+use checker::game::strategy::{Decision, Selection, Strategy};
 use checker::game::strategy::closed_loop;
 use checker::network::{Part, is_same_entry};
 

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use checker::engine::format::strategy_json;
 use checker::engine::{NamedStrategy, Verdict};
 use checker::game::Player;
-use checker::game::strategy::attractor::{Decision, Selection, Start, Strategy, StrategyState};
+use checker::game::strategy::{Decision, Selection, Start, Strategy, StrategyState};
 use checker::network::Part;
 use checker::verify::regions::Bounding;
 use checker::verify::{Regions, Semantics, State};

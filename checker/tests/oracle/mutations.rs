@@ -9,7 +9,7 @@ use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
 use checker::engine::{LoadedModel, Options, Rules};
 use checker::game::Player;
-use checker::game::strategy::attractor::{Selection, Start, Strategy};
+use checker::game::strategy::{Selection, Start, Strategy};
 use checker::syntax::ast::QueryText;
 use checker::verify::strategy::{Decision, Decisions, Defect, Outcome};
 use checker::verify::{Effort, Part};

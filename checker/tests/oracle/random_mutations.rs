@@ -6,7 +6,7 @@
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::strategy_check::Played;
 use checker::engine::{LoadedModel, Options, Rules};
-use checker::game::strategy::attractor::{Selection, Start, Way};
+use checker::game::strategy::{Selection, Start, Way};
 use checker::game::{Forced, Player, Priorities};
 use checker::ir;
 use checker::syntax::ast::QueryText;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use checker::engine::format::strategy_json;
 use checker::engine::{NamedStrategy, Options};
-use checker::game::strategy::attractor::Strategy;
+use checker::game::strategy::Strategy;
 use checker::game::{Player, Priorities};
 use checker::network::Part;
 use checker::verify::{Regions, Semantics};

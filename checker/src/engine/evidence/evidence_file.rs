@@ -3,7 +3,7 @@
 
 use serde_json::Value as Json;
 
-use crate::game::strategy::attractor::Strategy;
+use crate::game::strategy::Strategy;
 use crate::ir::{Network, QueryKind};
 use crate::verify::Effort;
 

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::diagnostics::{Diagnostic, Span};
-use crate::game::strategy::attractor::Strategy;
+use crate::game::strategy::Strategy;
 
 use super::strategy_place::{self, Refusal};
 use crate::engine::answer::{Answer, Evidence, Verdict};

@@ -4,7 +4,7 @@
 //! order says nothing: each rule has the clock values for which it counts, in as few and as large
 //! zones as are found. So it is shorter than the strategy, and reads line by line.
 
-use crate::game::strategy::attractor::Strategy;
+use crate::game::strategy::Strategy;
 use crate::game::strategy::closed_loop;
 use crate::ir::Network;
 use crate::network::Part;

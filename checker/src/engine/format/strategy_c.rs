@@ -15,7 +15,7 @@ use std::fmt::{Display, Write as _};
 use std::hash::Hash;
 
 use crate::game::Player;
-use crate::game::strategy::attractor::{Selection, Start, Strategy};
+use crate::game::strategy::{Selection, Start, Strategy};
 use crate::ir::Network;
 use crate::network::Part;
 use crate::zones::dbm::Constraint;

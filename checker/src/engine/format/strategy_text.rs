@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use crate::game::Player;
-use crate::game::strategy::attractor::{Selection, Start, Strategy, Way};
+use crate::game::strategy::{Selection, Start, Strategy, Way};
 use crate::ir::Network;
 use crate::zones::{Federation, Zone};
 

@@ -4,7 +4,7 @@
 use crate::game::Player;
 use crate::game::backward::solver::{Solver, Win};
 use crate::game::objectives::cooperative::Winning;
-use crate::game::strategy::attractor::{self, Start, Strategy, Way};
+use crate::game::strategy::{Start, Strategy, Way, attractor};
 use crate::game::strategy::co_buchi;
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};

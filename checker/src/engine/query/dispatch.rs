@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::cancellation;
-use crate::game::strategy::attractor::Under;
+use crate::game::strategy::Under;
 use crate::game::strategy::closed_loop::ClosedLoop;
 use crate::ir::{Predicate, Query, QueryKind};
 use crate::network::symbolic::predicate;

@@ -12,7 +12,7 @@ use crate::game::backward::solver::{Answer as GameAnswer, Extent, Solver, Win};
 use crate::game::forward::graph::Graph;
 use crate::game::forward::objective::Objective as GameObjective;
 use crate::game::objectives::buchi;
-use crate::game::strategy::attractor::{self, Strategy};
+use crate::game::strategy::{Strategy, attractor};
 use crate::game::strategy::co_buchi;
 use crate::game::{Nodes, Player};
 use crate::ir::{ClockAtom, Objective, Predicate, QueryKind};

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::analysis::Abstraction;
-use crate::game::partial_observation::{Answer as GameAnswer, Question, Solver};
-use crate::game::strategy::attractor::Selection;
+use crate::game::partial_observation::{Outcome, Question, Solver};
+use crate::game::strategy::Selection;
 use crate::game::{Player, Priorities};
 use crate::ir::{ClockAtom, Network, Objective, Predicate};
 use crate::network::symbolic::predicate;
@@ -73,9 +73,9 @@ pub(super) fn game(
     let result = solver.solve(watch);
     let counters = solver.counters();
     let verdict = match result {
-        Ok(GameAnswer::Won) => Verdict::Satisfied,
-        Ok(GameAnswer::Lost) => Verdict::NotSatisfied,
-        Ok(GameAnswer::Stopped(reason)) => Verdict::Unknown(reason),
+        Ok(Outcome::Won) => Verdict::Satisfied,
+        Ok(Outcome::Lost) => Verdict::NotSatisfied,
+        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
         Err(failure) => Verdict::Error(failure),
     };
     let mut answer = Answer::new(verdict, counters);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::analysis::{Abstraction, ClockBounds, LiveVariables};
 use crate::exec::Executor;
 use crate::game::Priorities;
-use crate::game::strategy::attractor::Under;
+use crate::game::strategy::Under;
 use crate::game::strategy::closed_loop::ClosedLoop;
 use crate::ir::{ClockAtom, FunctionId, Network, Predicate};
 use crate::network::symbolic::predicate;

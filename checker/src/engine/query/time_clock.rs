@@ -6,7 +6,7 @@
 
 use std::borrow::Cow;
 
-use crate::game::strategy::attractor::Strategy;
+use crate::game::strategy::Strategy;
 use crate::ir::{
     Block, Clock, ClockChoice, ClockId, ClockPredicate, Function, FunctionId, Instruction,
     IntegerOperator, Network, Objective, Predicate, Register, RegisterType, SiteId, Terminator,

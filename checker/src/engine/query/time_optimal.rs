@@ -22,7 +22,7 @@ use crate::analysis::Abstraction;
 use crate::game::backward::solver::{Answer as GameAnswer, Extent, Solver, Win};
 use crate::game::forward::graph::Graph;
 use crate::game::forward::objective::{Deadline, Objective as GameObjective};
-use crate::game::strategy::attractor::{self, Strategy};
+use crate::game::strategy::{Strategy, attractor};
 use crate::game::{Nodes, Player};
 use crate::ir::{ClockAtom, ClockId, ClockRange, FunctionId, Objective, Predicate};
 use crate::network::{Failure, Stepper};

@@ -13,7 +13,7 @@ use hashbrown::hash_table::Entry;
 use rustc_hash::FxBuildHasher;
 use serde_json::{Map, Value as Json, json};
 
-use crate::game::strategy::attractor::{Selection, Start, Strategy};
+use crate::game::strategy::{Selection, Start, Strategy};
 use crate::game::strategy::closed_loop;
 use crate::game::{Player, Priorities};
 use crate::ir::{Network, Query};

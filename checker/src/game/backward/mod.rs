@@ -1,5 +1,6 @@
 //! Winning sets, computed backwards.
 
+pub(super) mod branch_points;
 pub mod budget;
 pub(super) mod forced_moves;
 pub(super) mod full_backward;

@@ -70,6 +70,17 @@ impl Solver<'_, '_, '_> {
         }
     }
 
+    /// Whether play has ended in a node, won by this player, whatever the clocks say.
+    pub(in crate::game) fn is_over(&self, winner: Player, node: u32) -> bool {
+        let (standing, depends_on_time) = match winner {
+            Player::Controller => (Standing::Goal, self.graph.latest.is_some()),
+            Player::Environment => (Standing::Broken, false),
+        };
+        self.graph.nodes[node as usize].standing == standing
+            && self.targets.is_none()
+            && !depends_on_time
+    }
+
     /// Where the goal holds, or what is sought lies, in a node that is neither a goal nor broken as
     /// a whole.
     pub(in crate::game) fn goal(&self, node: u32) -> Federation {

@@ -221,4 +221,21 @@ impl Solver<'_, '_, '_> {
     pub(in crate::game) fn whole(&self, node: u32) -> Federation {
         self.graph.whole(node)
     }
+
+    /// What is won of a node, as zones.
+    pub(in crate::game) fn federation_of(&self, node: u32, win: &Win) -> Federation {
+        match win {
+            Win::Nothing => Federation::empty(self.graph.dimension()),
+            Win::Everything => self.whole(node),
+            Win::Part(part) => part.clone(),
+        }
+    }
+
+    /// What a gain added to what is won of a node.
+    pub(in crate::game) fn gained_part(&self, node: u32, gain: &Gain) -> Federation {
+        match &gain.part {
+            Some(part) => part.clone(),
+            None => self.whole(node),
+        }
+    }
 }

@@ -147,25 +147,13 @@ fn as_win(part: Federation) -> Win {
     }
 }
 
-pub(in crate::game) fn to_federation(
-    solver: &Solver<'_, '_, '_>,
-    node: u32,
-    win: &Win,
-) -> Federation {
-    match win {
-        Win::Nothing => Federation::empty(solver.graph.dimension()),
-        Win::Everything => solver.whole(node),
-        Win::Part(part) => part.clone(),
-    }
-}
-
 fn is_within(solver: &Solver<'_, '_, '_>, node: u32, (one, other): (&Win, &Win)) -> bool {
     match (one, other) {
         (Win::Nothing, _) | (_, Win::Everything) => true,
         (_, Win::Nothing) => false,
         _ => {
-            let other = to_federation(solver, node, other);
-            to_federation(solver, node, one).is_subset(&other)
+            let other = solver.federation_of(node, other);
+            solver.federation_of(node, one).is_subset(&other)
         }
     }
 }
@@ -198,7 +186,7 @@ pub(in crate::game) fn leave(
     kept: &[Win],
 ) -> Result<Federation, Failure> {
     let mut out = solver.whole(node);
-    out.subtract(&to_federation(solver, node, &kept[node as usize]));
+    out.subtract(&solver.federation_of(node, &kept[node as usize]));
     let mut back = Federation::empty(solver.graph.dimension());
     for index in solver.graph.edges_of(node) {
         let edge = solver.graph.edges[index];

@@ -9,7 +9,6 @@ use crate::search::StateStore;
 use crate::search::reachability::goal::Goal;
 use crate::zones::{Federation, Zone};
 
-use super::buchi::to_federation;
 use crate::game::Player;
 use crate::game::backward::solver::{Solver, Win};
 
@@ -43,7 +42,7 @@ impl Winning {
             if is_new {
                 winning.parts.push(Vec::new());
             }
-            winning.parts[id.0 as usize].push((node, to_federation(solver, node, &win)));
+            winning.parts[id.0 as usize].push((node, solver.federation_of(node, &win)));
         }
         winning
     }

@@ -22,11 +22,12 @@ use crate::zones::future::{self, Barriers};
 use crate::zones::{Bound, ClockSet, Federation, Zone, dbm};
 
 use super::place::{Place, Places};
-use super::{Action, Knowledge, Observation, Question};
+use super::knowledge::{Knowledge, Observation};
+use super::machine::{Action, Question};
 use crate::game::Forced;
 
 /// Where an action leads.
-pub(super) enum Outcome {
+pub(super) enum Consequence {
     /// To one of these knowledge sets, or past the goal.
     Next(Vec<Knowledge>),
     /// The environment can win before the observation changes, or keep it from changing.
@@ -88,10 +89,10 @@ impl Explorer<'_, '_, '_> {
         action: Action,
         offers: &mut Vec<Action>,
         look: &mut Look<'_>,
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<Consequence, Failure> {
         let mut class = match self.explore(knowledge, action, Sameness::Inclusion, look)? {
             Ok(class) => class,
-            Err(reason) => return Ok(Outcome::Stopped(reason)),
+            Err(reason) => return Ok(Consequence::Stopped(reason)),
         };
         offers.extend(class.offers.drain());
         offers.sort_unstable();
@@ -99,15 +100,15 @@ impl Explorer<'_, '_, '_> {
             let again = self.explore(knowledge, action, Sameness::Equality, look)?;
             match again {
                 Ok(again) => class.is_lost = has_cycle(&again.edges),
-                Err(reason) => return Ok(Outcome::Stopped(reason)),
+                Err(reason) => return Ok(Consequence::Stopped(reason)),
             }
         }
         if class.is_lost {
-            return Ok(Outcome::Lost);
+            return Ok(Consequence::Lost);
         }
         let mut exits: Vec<Knowledge> = class.exits.into_values().collect();
         exits.iter_mut().for_each(Knowledge::reduce);
-        Ok(Outcome::Next(exits))
+        Ok(Consequence::Next(exits))
     }
 
     fn explore<'c>(

@@ -38,81 +38,10 @@
 
 mod class;
 mod knowledge;
+mod machine;
 mod place;
 mod solver;
 
 pub use knowledge::{Knowledge, Observation};
-pub use solver::{Answer, Solver};
-
-use crate::ir::{ChannelId, Predicate};
-use crate::network::MoveRef;
-
-use crate::game::Forced;
-
-/// What the controller proposes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Action {
-    /// Nothing.
-    Wait,
-    /// A synchronisation on this channel between controllable edges.
-    Channel(ChannelId),
-    /// A controllable edge without a channel.
-    Edge {
-        /// Index of the process.
-        process: u32,
-        /// Index of the edge in its process.
-        edge: u32,
-        /// Which combination of `select` values.
-        select: u32,
-    },
-}
-
-impl Action {
-    /// The action that allows a move; `None` if the move is the environment's.
-    fn of(one: MoveRef<'_>) -> Option<Action> {
-        if !one.controllable {
-            return None;
-        }
-        Some(match one.channel {
-            Some(channel) => Action::Channel(channel),
-            None => Action::Edge {
-                process: one.parts[0].process,
-                edge: one.parts[0].edge,
-                select: one.parts[0].select,
-            },
-        })
-    }
-}
-
-/// A game under partial observation.
-#[derive(Clone, Copy, Debug)]
-pub struct Question<'q> {
-    /// What the controller sees.
-    pub observations: &'q [Predicate],
-    /// Where play ends, won; `None`: nowhere.
-    pub goal: Option<&'q Predicate>,
-    /// What must hold until then; `None`: nothing.
-    pub keep: Option<&'q Predicate>,
-    /// Whether the goal must be reached; otherwise keeping is enough.
-    pub must_reach: bool,
-    /// When the environment must move where time stops.
-    pub forced: Forced,
-}
-
-/// A strategy of the controller: what to propose in which state of the machine.
-#[derive(Clone, Debug)]
-pub struct Machine {
-    /// The states, the initial one first; none if the game is won before it begins.
-    pub states: Vec<MachineState>,
-}
-
-/// A state of the machine.
-#[derive(Clone, Debug)]
-pub struct MachineState {
-    /// The states from which it goes on so, among them all in which play may be on entry.
-    pub knowledge: Knowledge,
-    /// What it proposes.
-    pub action: Action,
-    /// By next observation: the state in which play goes on.
-    pub next: Vec<(Observation, usize)>,
-}
+pub use machine::{Action, Machine, MachineState, Question};
+pub use solver::{Outcome, Solver};

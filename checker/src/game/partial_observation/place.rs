@@ -12,7 +12,8 @@ use rustc_hash::FxHashMap;
 use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
 use crate::zones::{Federation, Zone};
 
-use super::{Action, Observation, Question};
+use super::knowledge::Observation;
+use super::machine::{Action, Question};
 use crate::game::backward::forced_moves::stops;
 
 /// A discrete state.

@@ -27,9 +27,10 @@ use crate::network::{Failure, Symbolic};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::Federation;
 
-use super::class::{Explorer, Outcome};
+use super::class::{Explorer, Consequence};
 use super::place::Places;
-use super::{Action, Knowledge, Machine, MachineState, Observation, Question};
+use super::knowledge::{Knowledge, Observation};
+use super::machine::{Action, Machine, MachineState, Question};
 
 /// How often limits are looked at: after so many symbolic states inside an observation, and after
 /// each knowledge set.
@@ -37,7 +38,7 @@ const STATES_BETWEEN_LOOKS: usize = 64;
 
 /// Who wins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answer {
+pub enum Outcome {
     /// The controller.
     Won,
     /// The environment.
@@ -48,17 +49,17 @@ pub enum Answer {
 
 /// What is known of a knowledge set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Standing {
+enum Decided {
     Open,
     Won,
     Lost,
 }
 
-struct Node {
+struct KnowledgeNode {
     knowledge: Knowledge,
     /// See [`Knowledge::signature`].
     signature: u64,
-    standing: Standing,
+    standing: Decided,
     is_expanded: bool,
     /// Whether all of its choices are known.
     is_complete: bool,
@@ -77,7 +78,7 @@ struct Node {
 }
 
 /// How a knowledge set relates to those that are there.
-enum Place {
+enum Relation {
     /// This node has the same set, or one that decides who wins from it.
     Of(usize),
     /// This node covers it.
@@ -99,7 +100,7 @@ struct Choice {
 /// The game on knowledge sets.
 pub struct Solver<'e, 'a, 'q> {
     explorer: Explorer<'e, 'a, 'q>,
-    nodes: Vec<Node>,
+    nodes: Vec<KnowledgeNode>,
     choices: Vec<Choice>,
     /// By hash: the nodes.
     known: FxHashMap<u64, Vec<usize>>,
@@ -142,38 +143,38 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     }
 
     /// Solves the game.
-    pub fn solve(&mut self, watch: &mut dyn Watch) -> Result<Answer, Failure> {
+    pub fn solve(&mut self, watch: &mut dyn Watch) -> Result<Outcome, Failure> {
         let Some(standing) = self.start()? else {
-            return Ok(Answer::Won);
+            return Ok(Outcome::Won);
         };
-        if standing == Standing::Lost {
-            return Ok(Answer::Lost);
+        if standing == Decided::Lost {
+            return Ok(Outcome::Lost);
         }
         while let Some(node) = self.waiting.pop_front() {
             self.nodes[node].is_waiting = false;
             if let Some(reason) = watch.look(&self.counters()) {
-                return Ok(Answer::Stopped(reason));
+                return Ok(Outcome::Stopped(reason));
             }
             if self.matters(node)
                 && let Some(reason) = self.expand(node, watch)?
             {
-                return Ok(Answer::Stopped(reason));
+                return Ok(Outcome::Stopped(reason));
             }
             match self.nodes[0].standing {
-                Standing::Open => {}
-                Standing::Won => return Ok(Answer::Won),
-                Standing::Lost => return Ok(Answer::Lost),
+                Decided::Open => {}
+                Decided::Won => return Ok(Outcome::Won),
+                Decided::Lost => return Ok(Outcome::Lost),
             }
         }
         Ok(if self.explorer.question.must_reach {
-            Answer::Lost
+            Outcome::Lost
         } else {
-            Answer::Won
+            Outcome::Won
         })
     }
 
     /// Makes the node of the initial state; `None` if the goal holds in it.
-    fn start(&mut self) -> Result<Option<Standing>, Failure> {
+    fn start(&mut self) -> Result<Option<Decided>, Failure> {
         let explorer = &mut self.explorer;
         let (words, zone, _) = explorer.symbolic.start()?;
         let place = explorer
@@ -196,9 +197,9 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         let initial = self.node_of(knowledge);
         self.wait_for(initial);
         Ok(Some(if is_broken {
-            Standing::Lost
+            Decided::Lost
         } else {
-            Standing::Open
+            Decided::Open
         }))
     }
 
@@ -210,9 +211,9 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
         let signature = knowledge.signature();
         let cover = match self.place_of(&knowledge, signature) {
-            Place::Of(node) => return node,
-            Place::Under(cover) => Some(cover),
-            Place::New => None,
+            Relation::Of(node) => return node,
+            Relation::Under(cover) => Some(cover),
+            Relation::New => None,
         };
         let node = self.nodes.len();
         self.known.entry(hash).or_default().push(node);
@@ -220,10 +221,10 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         alike.or_default().push(node);
         self.zones += knowledge.zone_count() as u64;
         self.bytes += 240 + knowledge.bytes();
-        self.nodes.push(Node {
+        self.nodes.push(KnowledgeNode {
             knowledge,
             signature,
-            standing: Standing::Open,
+            standing: Decided::Open,
             is_expanded: false,
             is_complete: false,
             is_waiting: false,
@@ -240,29 +241,29 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     }
 
     /// How a set that no node has relates to those of the nodes.
-    fn place_of(&self, knowledge: &Knowledge, signature: u64) -> Place {
+    fn place_of(&self, knowledge: &Knowledge, signature: u64) -> Relation {
         let must_reach = self.explorer.question.must_reach;
-        let mut place = Place::New;
+        let mut place = Relation::New;
         for &node in self.alike.get(&knowledge.observation).into_iter().flatten() {
             let other = &self.nodes[node];
             let is_smaller = match other.standing {
-                Standing::Won => false,
-                Standing::Lost => true,
-                Standing::Open if other.cover.is_none() && matches!(place, Place::New) => {
+                Decided::Won => false,
+                Decided::Lost => true,
+                Decided::Open if other.cover.is_none() && matches!(place, Relation::New) => {
                     must_reach
                 }
-                Standing::Open => continue,
+                Decided::Open => continue,
             };
             let is_related = if is_smaller {
                 other.signature & !signature == 0 && other.knowledge.is_subset(knowledge)
             } else {
                 signature & !other.signature == 0 && knowledge.is_subset(&other.knowledge)
             };
-            if is_related && other.standing != Standing::Open {
-                return Place::Of(node);
+            if is_related && other.standing != Decided::Open {
+                return Relation::Of(node);
             }
             if is_related {
-                place = Place::Under(node);
+                place = Relation::Under(node);
             }
         }
         place
@@ -272,7 +273,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     fn wait_for(&mut self, node: usize) {
         let node = self.nodes[node].cover.unwrap_or(node);
         let one = &mut self.nodes[node];
-        if !one.is_expanded && !one.is_waiting && one.standing == Standing::Open {
+        if !one.is_expanded && !one.is_waiting && one.standing == Decided::Open {
             one.is_waiting = true;
             self.waiting.push_back(node);
         }
@@ -282,14 +283,14 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     /// leads to it, or to one that it covers.
     fn matters(&self, node: usize) -> bool {
         let one = &self.nodes[node];
-        if one.is_expanded || one.standing != Standing::Open {
+        if one.is_expanded || one.standing != Decided::Open {
             return false;
         }
         let is_wanted = |node: usize| {
             let mut choices = self.nodes[node].comes_from.iter();
             choices.any(|&choice| {
                 let choice = &self.choices[choice];
-                !choice.is_lost && self.nodes[choice.source].standing == Standing::Open
+                !choice.is_lost && self.nodes[choice.source].standing == Decided::Open
             })
         };
         node == 0 || is_wanted(node) || one.covered.iter().any(|&node| is_wanted(node))
@@ -328,18 +329,18 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
                 actions.append(&mut offers);
             }
             let (exits, is_lost) = match outcome {
-                Outcome::Stopped(reason) => return Ok(Some(reason)),
-                Outcome::Lost => (Vec::new(), true),
-                Outcome::Next(exits) => (exits, false),
+                Consequence::Stopped(reason) => return Ok(Some(reason)),
+                Consequence::Lost => (Vec::new(), true),
+                Consequence::Next(exits) => (exits, false),
             };
             self.add_choice(node, action, exits, is_lost);
-            if self.nodes[node].standing == Standing::Won {
+            if self.nodes[node].standing == Decided::Won {
                 return Ok(None);
             }
         }
         self.nodes[node].is_complete = true;
         if self.is_hopeless(node) {
-            self.spread(node, Standing::Lost);
+            self.spread(node, Decided::Lost);
         }
         Ok(None)
     }
@@ -347,9 +348,9 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     fn add_choice(&mut self, source: usize, action: Action, exits: Vec<Knowledge>, is_lost: bool) {
         let choice = self.choices.len();
         let targets: Vec<usize> = exits.into_iter().map(|one| self.node_of(one)).collect();
-        let is_won = |&&target: &&usize| self.nodes[target].standing == Standing::Won;
+        let is_won = |&&target: &&usize| self.nodes[target].standing == Decided::Won;
         let open = targets.len() - targets.iter().filter(is_won).count();
-        let meets_lost = |&target: &usize| self.nodes[target].standing == Standing::Lost;
+        let meets_lost = |&target: &usize| self.nodes[target].standing == Decided::Lost;
         let is_lost = is_lost || targets.iter().any(meets_lost);
         for &target in &targets {
             self.nodes[target].comes_from.push(choice);
@@ -372,9 +373,9 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     /// Spreads that the source of a choice is won.
     fn win(&mut self, choice: usize) {
         let source = self.choices[choice].source;
-        if self.nodes[source].standing == Standing::Open {
+        if self.nodes[source].standing == Decided::Open {
             self.nodes[source].won_by = Some(choice);
-            self.spread(source, Standing::Won);
+            self.spread(source, Decided::Won);
         }
     }
 
@@ -382,7 +383,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     fn is_hopeless(&self, node: usize) -> bool {
         let node = &self.nodes[node];
         node.is_complete
-            && node.standing == Standing::Open
+            && node.standing == Decided::Open
             && node
                 .choices
                 .iter()
@@ -390,10 +391,10 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     }
 
     /// Spreads that an open node is won or lost.
-    fn spread(&mut self, node: usize, standing: Standing) {
+    fn spread(&mut self, node: usize, standing: Decided) {
         let mut decided = vec![(node, standing)];
         while let Some((node, standing)) = decided.pop() {
-            if self.nodes[node].standing != Standing::Open {
+            if self.nodes[node].standing != Decided::Open {
                 continue;
             }
             self.nodes[node].standing = standing;
@@ -401,24 +402,24 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
                 let before = self.nodes[node].comes_from[index];
                 let choice = &mut self.choices[before];
                 let source = choice.source;
-                if standing == Standing::Lost {
+                if standing == Decided::Lost {
                     choice.is_lost = true;
                     if self.is_hopeless(source) {
-                        decided.push((source, Standing::Lost));
+                        decided.push((source, Decided::Lost));
                     }
                     continue;
                 }
                 choice.open -= 1;
                 if choice.open == 0
                     && !choice.is_lost
-                    && self.nodes[source].standing == Standing::Open
+                    && self.nodes[source].standing == Decided::Open
                 {
                     self.nodes[source].won_by.get_or_insert(before);
-                    decided.push((source, Standing::Won));
+                    decided.push((source, Decided::Won));
                 }
             }
             let covered = std::mem::take(&mut self.nodes[node].covered);
-            let is_decisive = (standing == Standing::Lost) == self.explorer.question.must_reach;
+            let is_decisive = (standing == Decided::Lost) == self.explorer.question.must_reach;
             for one in covered {
                 if is_decisive {
                     decided.push((one, standing));
@@ -430,19 +431,19 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
     }
 
     /// Looks anew for what covers or decides an open node, since what covered it does so no more.
-    fn uncover(&mut self, node: usize) -> Option<(usize, Standing)> {
+    fn uncover(&mut self, node: usize) -> Option<(usize, Decided)> {
         // As long as it has a cover, it covers nothing, itself included.
         let one = &self.nodes[node];
         match self.place_of(&one.knowledge, one.signature) {
-            Place::Of(other) => {
+            Relation::Of(other) => {
                 self.nodes[node].cover = Some(other);
                 return Some((node, self.nodes[other].standing));
             }
-            Place::Under(cover) => {
+            Relation::Under(cover) => {
                 self.nodes[node].cover = Some(cover);
                 self.nodes[cover].covered.push(node);
             }
-            Place::New => self.nodes[node].cover = None,
+            Relation::New => self.nodes[node].cover = None,
         }
         self.wait_for(node);
         None

@@ -12,7 +12,7 @@ use crate::search::StateStore;
 use crate::zones::future::Barriers;
 use crate::zones::{Bound, Federation};
 
-use super::attractor::{Decision, Selection, Strategy};
+use super::{Decision, Selection, Strategy};
 use crate::game::Player;
 
 /// A strategy as a restriction.

@@ -17,17 +17,15 @@
 
 use crate::network::{Failure, Part};
 use crate::search::limits::{StopReason, Watch};
-use crate::zones::{ClockSet, Federation};
+use crate::zones::Federation;
 
-use super::attractor::{
-    Choices, Decision, Selection, Start, Strategy, StrategyState, keep, moves_of, walk,
-    whole_or_part,
-};
-use super::safety::{new_decision, spoiling, within_invariant};
+use super::chains::walk;
+use super::extraction::{self, Choices, Chooser, moves_of};
+use super::{Decision, Selection, Strategy, StrategyState};
 use crate::game::Player;
 use crate::game::backward::solver::{Solver, Win};
 use crate::game::forward::node::{Edge, Standing};
-use crate::game::objectives::buchi::{leave, to_federation};
+use crate::game::objectives::buchi::leave;
 
 /// Reads the strategy of the environment, which wins from these nodes, from the rounds of the
 /// solution.
@@ -37,51 +35,39 @@ use crate::game::objectives::buchi::{leave, to_federation};
 pub fn extract(
     solver: &mut Solver<'_, '_, '_>,
     rounds: &[Vec<Win>],
-    mut waiting: Vec<u32>,
+    waiting: Vec<u32>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
-    if let Some(reason) = solver.tell(watch) {
-        return Ok(Err(reason));
+    let result = extraction::extract(solver, &Denying { rounds }, waiting, watch)?;
+    Ok(result.map(|all| all.strategy))
+}
+
+/// How the environment chooses.
+struct Denying<'r> {
+    rounds: &'r [Vec<Win>],
+}
+
+impl Chooser for Denying<'_> {
+    fn strategy(&self) -> Strategy {
+        Strategy::empty(Player::Environment, Selection::First)
     }
-    let mut bytes = 0;
-    let mut strategy = Strategy {
-        owner: Player::Environment,
-        selection: Selection::First,
-        time_limit: None,
-        under: None,
-        start: Start::default(),
-        states: Vec::new(),
-    };
-    let mut seen = vec![false; solver.graph.nodes.len()];
-    for &node in &waiting {
-        seen[node as usize] = true;
+
+    fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
+        choices(solver, node, self.rounds)
     }
-    while let Some(node) = waiting.pop() {
-        let known = strategy.states.len();
-        let mut words = solver.graph.symbolic.stepper.network().initial.clone();
-        solver.graph.load(node, &mut words);
-        let Choices {
-            decisions,
-            legs,
-            taken,
-        } = choices(solver, node, rounds)?;
-        strategy.states.push(StrategyState {
-            words: words.clone(),
-            decisions,
-            legs,
-            is_goal: solver.graph.nodes[node as usize].standing == Standing::Broken,
-        });
-        for edge in taken {
-            let edge = solver.graph.edges[edge as usize];
-            let inner = inner_states(solver, &edge, &words, rounds)?;
-            strategy.states.extend(inner);
-            if !std::mem::replace(&mut seen[edge.target as usize], true) {
-                waiting.push(edge.target);
-            }
-        }
-        keep(&strategy.states[known..], &mut bytes);
+
+    fn inside(
+        &self,
+        solver: &mut Solver<'_, '_, '_>,
+        edge: &Edge,
+        source: &[i32],
+    ) -> Result<Vec<StrategyState>, Failure> {
+        inside(solver, edge, source, self.rounds)
     }
-    Ok(Ok(strategy))
+
+    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
+        solver.graph.nodes[node as usize].standing == Standing::Broken
+    }
 }
 
 /// What the environment chooses in a node.
@@ -98,8 +84,8 @@ fn choices(
     } = &mut chosen;
     let moves = moves_of(solver, node)?;
     for (after, before) in (1..rounds.len()).zip(rounds) {
-        let mut lost = to_federation(solver, node, &before[node as usize]);
-        let left = to_federation(solver, node, &rounds[after][node as usize]);
+        let mut lost = solver.federation_of(node, &before[node as usize]);
+        let left = solver.federation_of(node, &rounds[after][node as usize]);
         lost.subtract(&left);
         if lost.is_empty() {
             continue;
@@ -153,14 +139,15 @@ fn push(
         zones.reduce();
         decisions.push(Decision {
             rank: rank as u32,
-            ..new_decision(zones, action)
+            ..Decision::new(zones, action)
         });
     }
 }
 
-/// The states inside a chain, where the goal holds nowhere. Each has one move, which the
-/// environment takes, if it owns it, where the rest of the chain does not lead into what is kept.
-fn inner_states(
+/// What the environment does in the states inside a chain, where the goal holds nowhere. Each has
+/// one move, which the environment takes, if it owns it, where the rest of the chain does not lead
+/// into what is kept.
+fn inside(
     solver: &mut Solver<'_, '_, '_>,
     edge: &Edge,
     source: &[i32],
@@ -172,25 +159,9 @@ fn inner_states(
     // What the rounds so far have taken away.
     let mut taken: Vec<Federation> = vec![Federation::empty(dimension); inside.len()];
     for (rank, kept) in rounds.iter().enumerate().skip(1) {
-        let mut kept = match &kept[edge.target as usize] {
-            Win::Nothing => Federation::empty(dimension),
-            Win::Everything => whole_or_part(solver, edge.target, None),
-            Win::Part(part) => part.clone(),
-        };
+        let mut kept = solver.federation_of(edge.target, &kept[edge.target as usize]);
         for (index, inner) in inside.iter().enumerate().rev() {
-            inner.effect.preimage(&mut kept);
-            kept.constrain_all(&inner.invariant);
-            let acting = if inner.controllable {
-                Federation::empty(dimension)
-            } else {
-                spoiling(inner, &kept)
-            };
-            if inner.delays {
-                kept.down(&ClockSet::EMPTY);
-                kept.constrain_all(&inner.invariant);
-            }
-            let mut lost = within_invariant(inner, dimension);
-            lost.subtract(&kept);
+            let (acting, mut lost) = inner.evaded(&mut kept, !inner.controllable);
             lost.subtract(&taken[index]);
             taken[index].unite(&lost);
             let acting = acting.intersection(&lost);
@@ -201,12 +172,5 @@ fn inner_states(
         }
     }
     let states = inside.into_iter().zip(decisions);
-    Ok(states
-        .map(|(inner, decisions)| StrategyState {
-            words: inner.words,
-            decisions,
-            legs: Vec::new(),
-            is_goal: false,
-        })
-        .collect())
+    Ok(states.map(|(inner, decisions)| inner.with(decisions)).collect())
 }

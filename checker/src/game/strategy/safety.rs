@@ -4,25 +4,57 @@
 //! waiting. The environment moves where it can, since the controller might get away later. The
 //! controller allows everything that stays outside.
 
-use crate::network::{Failure, Part};
-use crate::zones::{ClockSet, Federation, Zone, instants, past};
+use crate::network::Failure;
+use crate::zones::{Federation, instants, past};
 
-use super::attractor::{
-    Choices, Decision, Inner, Strategy, StrategyState, moves_of, named, walk, whole_or_part,
-};
+use super::chains::walk;
+use super::extraction::{Choices, Chooser, moves_of, named};
+use super::{Decision, Selection, Strategy, StrategyState};
 use crate::game::Player;
-use crate::game::backward::solver::{Solver, Win};
-use crate::game::forward::node::Standing;
+use crate::game::backward::solver::Solver;
+use crate::game::forward::node::{Edge, Standing};
+
+/// How the evader chooses.
+pub(super) struct Evading {
+    pub(super) owner: Player,
+}
+
+impl Chooser for Evading {
+    fn strategy(&self) -> Strategy {
+        let selection = match self.owner {
+            Player::Controller => Selection::Any,
+            Player::Environment => Selection::First,
+        };
+        Strategy::empty(self.owner, selection)
+    }
+
+    fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
+        choices(solver, node)
+    }
+
+    fn inside(
+        &self,
+        solver: &mut Solver<'_, '_, '_>,
+        edge: &Edge,
+        source: &[i32],
+    ) -> Result<Vec<StrategyState>, Failure> {
+        inside(solver, edge, source)
+    }
+
+    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
+        solver.is_over(self.owner, node)
+    }
+}
 
 /// What the evader chooses in a node.
-pub(super) fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
+fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
     let mut chosen = Choices::default();
     let Choices {
         decisions,
         legs,
         taken,
     } = &mut chosen;
-    let mut free = rest_of(solver, node);
+    let mut free = solver.federation_of(node, &solver.lost(node));
     free.subtract(&ended(solver, node));
     if free.is_empty() {
         return Ok(chosen);
@@ -45,7 +77,7 @@ pub(super) fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choi
         if !zones.is_empty() {
             acting.unite(&zones);
             let action = Some(named(solver, &moves, &edge));
-            decisions.push(new_decision(zones, action));
+            decisions.push(Decision::new(zones, action));
             taken.push(index as u32);
         }
     }
@@ -56,7 +88,7 @@ pub(super) fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choi
             if !zones.is_empty() {
                 acting.unite(&zones);
                 let first = &solver.graph.edges[entry[0] as usize];
-                decisions.push(new_decision(zones, Some(named(solver, &moves, first))));
+                decisions.push(Decision::new(zones, Some(named(solver, &moves, first))));
                 taken.extend(entry);
             }
         }
@@ -75,33 +107,16 @@ pub(super) fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choi
     };
     if !waiting.is_empty() {
         waiting.reduce();
-        decisions.push(new_decision(waiting, None));
+        decisions.push(Decision::new(waiting, None));
     }
     Ok(chosen)
-}
-
-pub(super) fn new_decision(zones: Federation, action: Option<Vec<Part>>) -> Decision {
-    Decision {
-        zones,
-        action,
-        rank: 0,
-    }
-}
-
-/// The valuations of a node that the seeker does not win.
-fn rest_of(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
-    match solver.lost(node) {
-        Win::Nothing => Federation::empty(solver.graph.dimension()),
-        Win::Everything => whole_or_part(solver, node, None),
-        Win::Part(rest) => rest,
-    }
 }
 
 /// The valuations of a node in which play has ended without the seeker's having won.
 fn ended(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
     match (solver.graph.nodes[node as usize].standing, solver.seeker) {
         (Standing::Goal, Player::Environment) | (Standing::Broken, Player::Controller) => {
-            whole_or_part(solver, node, None)
+            solver.whole(node)
         }
         (Standing::Mixed, Player::Environment) => solver.goal(node),
         (Standing::Mixed, Player::Controller) => solver.broken(node),
@@ -124,7 +139,7 @@ fn allowed_waiting(
     if !solver.graph.nodes[node as usize].delays {
         return Ok(at_rest);
     }
-    let safe = rest_of(solver, node);
+    let safe = solver.federation_of(node, &solver.lost(node));
     let stopped = situation.stopped;
     let before = instants::before(&safe, &stopped);
     let mut waiting = before.intersection(free);
@@ -140,7 +155,7 @@ fn allowed_waiting(
     }
     // What is safe may end in a limit that is not itself safe. Before such an end, the last
     // valuations with a move must use it.
-    let mut unsafe_ones = whole_or_part(solver, node, None);
+    let mut unsafe_ones = solver.whole(node);
     unsafe_ones.subtract(&safe);
     let after = instants::after(&passing, &stopped);
     let ends = unsafe_ones.intersection(&after);
@@ -161,65 +176,27 @@ fn allowed_waiting(
     Ok(waiting)
 }
 
-/// Adds the states inside a chain, as far as the seeker does not win there.
-pub(super) fn inner_states(
+/// What the evader does in the states inside a chain, as far as the seeker does not win there.
+fn inside(
     solver: &mut Solver<'_, '_, '_>,
-    edge: u32,
+    edge: &Edge,
     source: &[i32],
-    strategy: &mut Strategy,
-) -> Result<(), Failure> {
-    let edge = solver.graph.edges[edge as usize];
-    let inside = walk(solver, &edge, source)?;
-    let mut won = match &solver.win[edge.target as usize] {
-        Win::Nothing => Federation::empty(solver.graph.dimension()),
-        Win::Everything => whole_or_part(solver, edge.target, None),
-        Win::Part(part) => part.clone(),
-    };
+) -> Result<Vec<StrategyState>, Failure> {
+    let inside = walk(solver, edge, source)?;
+    let mut won = solver.federation_of(edge.target, &solver.win[edge.target as usize]);
     let mut states = Vec::new();
     for inner in inside.into_iter().rev() {
-        inner.effect.preimage(&mut won);
-        won.constrain_all(&inner.invariant);
-        let is_own = !solver.seeker.owns(inner.controllable);
-        let mut decisions = Vec::new();
-        let acting = if is_own {
-            spoiling(&inner, &won)
-        } else {
-            Federation::empty(won.dimension())
-        };
-        if inner.delays {
-            won.down(&ClockSet::EMPTY);
-            won.constrain_all(&inner.invariant);
-        }
-        let mut waiting = within_invariant(&inner, won.dimension());
-        waiting.subtract(&won);
+        let (acting, mut waiting) = inner.evaded(&mut won, !solver.seeker.owns(inner.controllable));
         waiting.subtract(&acting);
+        let mut decisions = Vec::new();
         if !acting.is_empty() {
-            decisions.push(new_decision(acting, Some(inner.parts)));
+            decisions.push(Decision::new(acting, Some(inner.parts.clone())));
         }
         if !waiting.is_empty() {
-            decisions.push(new_decision(waiting, None));
+            decisions.push(Decision::new(waiting, None));
         }
-        states.push(StrategyState {
-            words: inner.words,
-            decisions,
-            legs: Vec::new(),
-            is_goal: false,
-        });
+        states.push(inner.with(decisions));
     }
-    strategy.states.extend(states.into_iter().rev());
-    Ok(())
-}
-
-/// Where the move of a state inside a chain is possible, and leads to none of the valuations that
-/// are won.
-pub(super) fn spoiling(inner: &Inner, won: &Federation) -> Federation {
-    let zone = Zone::of_constraints(won.dimension(), &inner.invariant);
-    let mut acting = inner.effect.enabled_part(zone.bounds(), won.dimension());
-    acting.subtract(won);
-    acting
-}
-
-pub(super) fn within_invariant(inner: &Inner, dimension: usize) -> Federation {
-    let zone = Zone::of_constraints(dimension, &inner.invariant);
-    Federation::of_zone(dimension, zone.bounds())
+    states.reverse();
+    Ok(states)
 }

@@ -1,0 +1,165 @@
+//! How a strategy is read from a solved game: node by node, as far as play under it gets.
+
+use crate::cancellation;
+use crate::network::{Failure, Moves, Part};
+use crate::search::limits::{StopReason, Watch};
+use crate::zones::Federation;
+
+use super::{Decision, Strategy, StrategyState};
+use crate::game::backward::solver::Solver;
+use crate::game::forward::chance::entry_of;
+use crate::game::forward::node::Edge;
+
+/// How the player chooses whose strategy is read.
+pub(super) trait Chooser {
+    /// The strategy without states.
+    fn strategy(&self) -> Strategy;
+
+    /// What is chosen in a node.
+    fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure>;
+
+    /// What is done in the states inside the chain of an edge, in order.
+    fn inside(
+        &self,
+        solver: &mut Solver<'_, '_, '_>,
+        edge: &Edge,
+        source: &[i32],
+    ) -> Result<Vec<StrategyState>, Failure>;
+
+    /// Whether play has ended in a node, won, whatever the clocks say.
+    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool;
+}
+
+/// What is chosen in a node.
+#[derive(Default)]
+pub(super) struct Choices {
+    pub(super) decisions: Vec<Decision>,
+    /// See [`StrategyState::legs`].
+    pub(super) legs: Vec<Decision>,
+    /// The edges that play may take from it.
+    pub(super) taken: Vec<u32>,
+}
+
+/// A strategy, with how many moves lead from each state inside a chain to the end of it.
+pub(super) struct Extracted {
+    pub(super) strategy: Strategy,
+    pub(super) steps_to_end: Vec<u32>,
+}
+
+/// Reads the strategy of a player who wins from these nodes.
+///
+/// # Errors
+/// The model fails in a state of it. An error of the inner result says why it was not finished.
+pub(super) fn extract(
+    solver: &mut Solver<'_, '_, '_>,
+    chooser: &dyn Chooser,
+    mut waiting: Vec<u32>,
+    watch: &mut dyn Watch,
+) -> Result<Result<Extracted, StopReason>, Failure> {
+    if let Some(reason) = solver.tell(watch) {
+        return Ok(Err(reason));
+    }
+    let mut strategy = chooser.strategy();
+    let mut steps_to_end = Vec::new();
+    let mut bytes = 0;
+    let mut seen = vec![false; solver.graph.nodes.len()];
+    for &node in &waiting {
+        seen[node as usize] = true;
+    }
+    while let Some(node) = waiting.pop() {
+        let known = strategy.states.len();
+        let mut words = solver.graph.symbolic.stepper.network().initial.clone();
+        solver.graph.load(node, &mut words);
+        let Choices {
+            decisions,
+            legs,
+            taken,
+        } = chooser.choices(solver, node)?;
+        strategy.states.push(StrategyState {
+            words: words.clone(),
+            decisions,
+            legs,
+            is_goal: chooser.is_over(solver, node),
+        });
+        steps_to_end.push(0);
+        for edge in taken {
+            let edge = solver.graph.edges[edge as usize];
+            let inside = chooser.inside(solver, &edge, &words)?;
+            steps_to_end.extend((1..=inside.len() as u32).rev());
+            strategy.states.extend(inside);
+            if !std::mem::replace(&mut seen[edge.target as usize], true) {
+                waiting.push(edge.target);
+            }
+        }
+        let new = strategy.states[known..].iter();
+        bytes += new.map(StrategyState::bytes).sum::<usize>();
+        cancellation::ask_for(bytes);
+    }
+    Ok(Ok(Extracted {
+        strategy,
+        steps_to_end,
+    }))
+}
+
+/// How a strategy names the first move of an edge, of a node with these moves, if the player who
+/// owns the move takes it.
+pub(super) fn named(solver: &Solver<'_, '_, '_>, moves: &Moves, edge: &Edge) -> Vec<Part> {
+    let parts = moves.get(edge.ordinal as usize).parts;
+    if solver.graph.chances.is_possible() && edge.controllable {
+        entry_of(parts)
+    } else {
+        parts.to_vec()
+    }
+}
+
+/// The moves of a node.
+pub(super) fn moves_of(
+    solver: &mut Solver<'_, '_, '_>,
+    node: u32,
+) -> Result<Moves, Failure> {
+    let mut words = solver.graph.symbolic.stepper.network().initial.clone();
+    solver.graph.load(node, &mut words);
+    let mut moves = Moves::default();
+    solver
+        .graph
+        .symbolic
+        .remembered_moves(&mut words, &mut moves)?;
+    Ok(moves)
+}
+
+impl Solver<'_, '_, '_> {
+    /// Adds the legs that the environment picks in some valuations of a node, each where the ones
+    /// before it are not picked; `picked` says where a leg is good for it. Adds their edges to
+    /// those that play may take.
+    pub(super) fn pick_legs(
+        &mut self,
+        node: u32,
+        (part, rank): (&Federation, u32),
+        picked: &mut dyn FnMut(&Self, u32) -> Federation,
+        (legs, taken): (&mut Vec<Decision>, &mut Vec<u32>),
+    ) -> Result<(), Failure> {
+        if self.graph.chances.of(node).is_empty() {
+            return Ok(());
+        }
+        let moves = moves_of(self, node)?;
+        for entry in self.graph.chances.of(node).to_vec() {
+            let mut left = part.clone();
+            for leg in entry {
+                let zones = picked(self, leg).intersection(&left);
+                if zones.is_empty() {
+                    continue;
+                }
+                left.subtract(&zones);
+                let ordinal = self.graph.edges[leg as usize].ordinal;
+                let action = moves.get(ordinal as usize).parts.to_vec();
+                legs.push(Decision {
+                    zones,
+                    action: Some(action),
+                    rank,
+                });
+                taken.push(leg);
+            }
+        }
+        Ok(())
+    }
+}
