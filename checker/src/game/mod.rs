@@ -9,7 +9,10 @@ pub mod exploration;
 pub mod forward;
 pub mod objectives;
 pub mod partial_observation;
+pub mod solver;
 pub mod strategy;
+
+use crate::search::limits::StopReason;
 
 /// Who plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,4 +77,36 @@ pub enum Nodes {
     Symbolic,
     /// Discrete states with all that their invariants allow, where that is possible.
     Discrete,
+}
+
+/// How much is to be computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Until the verdict is known.
+    Verdict,
+    /// Until the verdict is known, and if the seeker loses, until nothing is left out that the
+    /// evader may do.
+    Permissive,
+    /// The winning valuations of all nodes that can be reached.
+    Everything,
+}
+
+/// Who wins a game.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solution {
+    /// This player wins from the initial valuation.
+    Won(Player),
+    /// A limit came first.
+    Stopped(StopReason),
+}
+
+/// What becomes of play in the goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum AfterGoal {
+    /// It ends.
+    Ends,
+    /// It goes on, and what comes is to be known too.
+    GoesOn,
+    /// It goes on, and the goal makes no difference to it.
+    IsLikeBefore,
 }

@@ -13,8 +13,8 @@ use std::process::{Command, Stdio};
 use checker::engine::format::{strategy_c, text};
 use checker::engine::query::time_clock;
 use checker::game::Player;
-use checker::game::strategy::{Decision, Selection, Strategy};
 use checker::game::strategy::closed_loop;
+use checker::game::strategy::{Decision, Selection, Strategy};
 use checker::network::{Part, is_same_entry};
 
 use crate::c_programs::{compiled, games, in_folder};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use checker::engine::format::strategy_json;
 use checker::engine::{Answer, LoadedModel, NamedStrategy, Options, Verdict};
-use checker::game::strategy::{Start, Strategy};
+use checker::game::strategy::{self, Start};
 use checker::game::{Forced, Nodes, Player, Priorities};
 use checker::search::limits::StopReason;
 use checker::search::optimum::extremum::Extreme;
@@ -205,7 +205,7 @@ fn enforced(kind: Kind, owner: Player, (goal, keep): (&str, &str)) -> Vec<String
 /// Under a strategy, what it was made for must hold.
 fn check_under(
     model: &mut LoadedModel,
-    strategy: Arc<Strategy>,
+    strategy: Arc<strategy::Strategy>,
     query: &str,
     tally: &Tally,
 ) -> Result<(), TestCaseError> {

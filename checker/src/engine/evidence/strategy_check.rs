@@ -1,7 +1,7 @@
 //! From a strategy of the solver to the independent check, and from its outcome to words.
 
-use crate::game::strategy::{Decision, Selection, Start, Strategy, Under, Way};
 use crate::game::strategy::closed_loop;
+use crate::game::strategy::{Decision, Selection, Start, Strategy, Under, Way};
 use crate::game::{Forced, Player, Priorities};
 use crate::ir::{FunctionId, Network, Objective, Predicate, QueryKind};
 use crate::network::Part;

@@ -12,8 +12,8 @@ use std::sync::Arc;
 use serde_json::{Value as Json, json};
 
 use crate::game::Player;
-use crate::game::strategy::{Decision, Selection, Start, Strategy, StrategyState, Under, Way};
 use crate::game::strategy::closed_loop::{self, Joined};
+use crate::game::strategy::{Decision, Selection, Start, Strategy, StrategyState, Under, Way};
 use crate::ir::{EdgeId, Network, Shape};
 use crate::network::Part;
 use crate::network::discrete::selects::{select_count, select_values};

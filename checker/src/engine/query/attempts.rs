@@ -3,7 +3,7 @@
 
 use crate::analysis::Abstraction;
 use crate::game::Nodes;
-use crate::game::backward::budget::Allowance;
+use crate::game::backward::budget::Budget;
 
 /// The first result that is of use. The last attempt always counts.
 ///
@@ -42,7 +42,7 @@ pub(super) struct Attempt {
     /// What the nodes of the graph are.
     pub(super) nodes: Nodes,
     /// What it may take before it is given up.
-    pub(super) allowance: Option<Allowance>,
+    pub(super) allowance: Option<Budget>,
     /// Which failure may be none of the game.
     pub(super) doubt: Doubt,
 }

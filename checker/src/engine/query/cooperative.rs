@@ -2,10 +2,11 @@
 //! from there, and of the environment from everywhere if it wins from nowhere.
 
 use crate::game::Player;
-use crate::game::backward::solver::{Solver, Win};
+use crate::game::backward::winning_sets::Win;
 use crate::game::objectives::cooperative::Winning;
-use crate::game::strategy::{Start, Strategy, Way, attractor};
+use crate::game::solver::Solver;
 use crate::game::strategy::co_buchi;
+use crate::game::strategy::{Start, Strategy, Way, attractor};
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
 use crate::search::limits::{StopReason, Watch};

@@ -8,12 +8,14 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::analysis::{Abstraction, LiveVariables};
-use crate::game::backward::solver::{Answer as GameAnswer, Extent, Solver, Win};
+use crate::game::backward::winning_sets::Win;
 use crate::game::forward::graph::Graph;
 use crate::game::forward::objective::Objective as GameObjective;
 use crate::game::objectives::buchi;
-use crate::game::strategy::{Strategy, attractor};
+use crate::game::solver::Solver;
 use crate::game::strategy::co_buchi;
+use crate::game::strategy::{Strategy, attractor};
+use crate::game::{Extent, Solution};
 use crate::game::{Nodes, Player};
 use crate::ir::{ClockAtom, Objective, Predicate, QueryKind};
 use crate::network::symbolic::predicate;
@@ -252,11 +254,11 @@ impl<'a> Game<'a> {
         let result = self.solve(&mut solver, sides.seeker, &mut rounds, watch);
         let counters = solver.counters();
         let winner = match result {
-            Ok(GameAnswer::Won(winner)) => winner,
-            Ok(GameAnswer::Stopped(reason)) => {
+            Ok(Solution::Won(winner)) => winner,
+            Ok(Solution::Stopped(reason)) => {
                 return AttemptEnd {
                     answer: Answer::new(Verdict::Unknown(reason), counters),
-                    has_given_up: solver.has_given_up,
+                    has_given_up: solver.has_given_up(),
                 };
             }
             Err(failure) => return Answer::new(Verdict::Error(failure), counters).into(),
@@ -307,7 +309,7 @@ impl<'a> Game<'a> {
         } else {
             let explored = cut_as_interrupted(|| solver.explore_dead_ends(watch));
             answer.counters = solver.counters();
-            if solver.has_given_up {
+            if solver.has_given_up() {
                 return true;
             }
             let strategy = match explored {
@@ -373,7 +375,7 @@ impl<'a> Game<'a> {
         seeker: Player,
         rounds: &mut Vec<Vec<Win>>,
         watch: &mut dyn Watch,
-    ) -> Result<GameAnswer, Failure> {
+    ) -> Result<Solution, Failure> {
         let is_strategy_wanted = self.is_strategy_wanted();
         let is_cooperative = self.asked.is_cooperative;
         if is_cooperative && is_strategy_wanted {

@@ -2,7 +2,7 @@
 
 use crate::analysis::{Abstraction, ClockBounds};
 use crate::game::Priorities;
-use crate::game::strategy::attractor::Strategy;
+use crate::game::strategy::Strategy;
 use crate::ir::{ClockAtom, Network, Objective};
 use crate::network::symbolic::predicate;
 use crate::network::{Restriction, Stepper, Symbolic};

@@ -1,7 +1,7 @@
 //! The plans of a solved game, as many as are wanted.
 
 use crate::cancellation::{self, Cut};
-use crate::game::backward::solver::Solver;
+use crate::game::solver::Solver;
 use crate::game::strategy::plans::{NoPlans, Plan, Plans};
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};

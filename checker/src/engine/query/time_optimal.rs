@@ -19,10 +19,12 @@
 use std::sync::Arc;
 
 use crate::analysis::Abstraction;
-use crate::game::backward::solver::{Answer as GameAnswer, Extent, Solver, Win};
+use crate::game::backward::winning_sets::Win;
 use crate::game::forward::graph::Graph;
 use crate::game::forward::objective::{Deadline, Objective as GameObjective};
+use crate::game::solver::Solver;
 use crate::game::strategy::{Strategy, attractor};
+use crate::game::{Extent, Solution};
 use crate::game::{Nodes, Player};
 use crate::ir::{ClockAtom, ClockId, ClockRange, FunctionId, Objective, Predicate};
 use crate::network::{Failure, Stepper};
@@ -262,12 +264,10 @@ impl ClockedGame<'_, '_> {
         let conclude = |result, solver: &mut Solver<'_, '_, '_>, _: &mut dyn Watch| {
             tried.counters = tried.counters + solver.counters();
             Ok(match result {
-                GameAnswer::Stopped(_) if solver.has_given_up => RaceEnd::GivenUp,
-                GameAnswer::Stopped(reason) => RaceEnd::Stopped(reason),
-                GameAnswer::Won(_) if solver.graph.symbolic.is_approximate() => {
-                    RaceEnd::Approximate
-                }
-                GameAnswer::Won(_) => RaceEnd::Time(needed(solver, self.clock, limit)),
+                Solution::Stopped(_) if solver.has_given_up() => RaceEnd::GivenUp,
+                Solution::Stopped(reason) => RaceEnd::Stopped(reason),
+                Solution::Won(_) if solver.graph.symbolic.is_approximate() => RaceEnd::Approximate,
+                Solution::Won(_) => RaceEnd::Time(needed(solver, self.clock, limit)),
             })
         };
         self.solve(limit, Some(nodes), watch, conclude)
@@ -320,7 +320,7 @@ impl ClockedGame<'_, '_> {
         watch: &mut dyn Watch,
     ) -> Result<Result<Strategy, StopReason>, Failure> {
         self.solve(limit, None, watch, |result, solver, watch| {
-            if let GameAnswer::Stopped(reason) = result {
+            if let Solution::Stopped(reason) = result {
                 return Ok(Err(reason));
             }
             if let Some(reason) = solver.explore_dead_ends(watch)? {
@@ -342,7 +342,7 @@ impl ClockedGame<'_, '_> {
         limit: i32,
         nodes: Option<Nodes>,
         watch: &mut dyn Watch,
-        conclude: impl FnOnce(GameAnswer, &mut Solver<'_, '_, '_>, &mut dyn Watch) -> Result<R, Failure>,
+        conclude: impl FnOnce(Solution, &mut Solver<'_, '_, '_>, &mut dyn Watch) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
         let Subject {
             network, options, ..
@@ -420,7 +420,7 @@ fn needed(solver: &Solver<'_, '_, '_>, clock: usize, limit: i32) -> Option<Time>
         start.constrain(0, other, Bound::weak(-value)?);
     }
     start.constrain(clock, 0, Bound::weak(limit)?);
-    let latest = match &solver.win[0] {
+    let latest = match &solver.won.win[0] {
         Win::Nothing => None,
         Win::Everything => Some(start.bound(clock, 0)),
         Win::Part(part) => {

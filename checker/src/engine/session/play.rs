@@ -13,8 +13,8 @@ use hashbrown::hash_table::Entry;
 use rustc_hash::FxBuildHasher;
 use serde_json::{Map, Value as Json, json};
 
-use crate::game::strategy::{Selection, Start, Strategy};
 use crate::game::strategy::closed_loop;
+use crate::game::strategy::{Selection, Start, Strategy};
 use crate::game::{Player, Priorities};
 use crate::ir::{Network, Query};
 use crate::verify::play::{self, Ending, Gap, Next, Situation, Timing, Window};

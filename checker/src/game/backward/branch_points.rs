@@ -1,10 +1,11 @@
-//! What is won through branch points ([`crate::game::forward::chance`]): the controller gets into
-//! some valuations by an entry where one of its legs is possible and all that are lead there.
+//! What is won through branch points ([`crate::game::forward::branch_points`]): the controller gets
+//! into some valuations by an entry where one of its legs is possible and all that are lead there.
 
 use crate::zones::Federation;
 
-use super::solver::{Solver, Win};
 use crate::game::Player;
+use crate::game::backward::winning_sets::Win;
+use crate::game::solver::Solver;
 
 impl Solver<'_, '_, '_> {
     /// The valuations from which all legs of an entry that are possible lead into the given
@@ -32,7 +33,7 @@ impl Solver<'_, '_, '_> {
         for &leg in legs {
             let edge = &self.graph.edges[leg as usize];
             away.unite(&self.spoiling(edge));
-            back.unite(&self.won_by_leg(leg, &self.win[edge.target as usize]));
+            back.unite(&self.won_by_leg(leg, &self.won.win[edge.target as usize]));
         }
         away.subtract(&back);
         away
@@ -66,10 +67,10 @@ impl Solver<'_, '_, '_> {
         let is_won = |leg: &u32| {
             let edge = &self.graph.edges[*leg as usize];
             let is_whole = edge.is_total || edge.length == 1;
-            is_whole && matches!(self.win[edge.target as usize], Win::Everything)
+            is_whole && matches!(self.won.win[edge.target as usize], Win::Everything)
         };
         let is_total = |leg: &u32| self.graph.edges[*leg as usize].is_total;
-        let mut entries = self.graph.chances.of(node).iter();
+        let mut entries = self.graph.branch_points.of(node).iter();
         self.seeker == Player::Controller
             && entries.any(|legs| legs.iter().all(is_won) && legs.iter().any(is_total))
     }

@@ -3,13 +3,9 @@
 //! What is looked at does not depend on the number of threads: work is counted by task, and what
 //! threads have at hand does not count.
 
-use crate::search::limits::{StopReason, Watch};
-
-use super::solver::Solver;
-
 /// What a way to play may take.
 #[derive(Clone, Copy, Debug)]
-pub struct Allowance {
+pub struct Budget {
     /// States that are explored.
     pub explored: u64,
     /// Bytes of a stored state, on average.
@@ -20,40 +16,39 @@ pub struct Allowance {
     pub states_of_grace: u64,
 }
 
-impl Solver<'_, '_, '_> {
-    /// Lets the solver give up when it has taken more than this: it stops then for the number of
-    /// states, and [`Solver::has_given_up`] is set.
-    pub fn give_up_beyond(&mut self, allowance: Option<Allowance>) {
-        self.allowance = allowance;
-    }
+/// What can stop a solver before it has an answer, beside what the watch says.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::game) struct Stops {
+    pub(super) budget: Option<Budget>,
+    /// After how many explored states it is looked whether there are many nodes for each discrete
+    /// state.
+    pub(super) crowded_from: u64,
+    /// How many nodes for each discrete state are many.
+    pub(super) crowd: usize,
+    /// When that is looked at next.
+    pub(in crate::game) next_crowd: u64,
+    /// Whether the solver has given up: for having many nodes for each discrete state, or for what
+    /// it has taken.
+    pub(in crate::game) has_given_up: bool,
+    /// The units of work that computing what nodes win has taken.
+    pub(super) work: u64,
+    /// How many states may be explored,
+    pub(in crate::game) next_look: u64,
+    /// and how many zones stored, before the watch is asked again.
+    pub(in crate::game) zones_at_look: usize,
+}
 
-    /// Tells the watch what was done so far; it may give a reason to stop.
-    pub(in crate::game) fn tell(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
-        self.graph.counted_zones = self.graph.zones.len();
-        watch.look(&self.counters())
-    }
-
-    /// Looks whether to go on, between operations.
-    pub(in crate::game) fn look(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
-        let reason = self.tell(watch);
-        if reason.is_some() {
-            return reason;
+impl Default for Stops {
+    fn default() -> Stops {
+        Stops {
+            budget: None,
+            crowded_from: u64::MAX,
+            crowd: usize::MAX,
+            next_crowd: 1,
+            has_given_up: false,
+            work: 0,
+            next_look: 0,
+            zones_at_look: 0,
         }
-        let counters = self.counters();
-        let allowance = self.allowance?;
-        let states = counters.stored + allowance.states_of_grace;
-        let is_beyond = counters.explored > allowance.explored
-            || counters.bytes > states.saturating_mul(allowance.bytes_each)
-            || self.work > self.most_work();
-        self.has_given_up |= is_beyond;
-        is_beyond.then_some(StopReason::States)
-    }
-
-    /// So many units of work may be done with the states that are stored now.
-    pub(super) fn most_work(&self) -> u64 {
-        self.allowance.map_or(u64::MAX, |allowance| {
-            let states = self.graph.nodes.len() as u64 + allowance.states_of_grace;
-            states.saturating_mul(allowance.work_each)
-        })
     }
 }

@@ -4,7 +4,7 @@ use crate::network::{Failure, Symbolic};
 use crate::zones::{Bound, Federation};
 
 use super::predecessors::Situation;
-use super::solver::Solver;
+use crate::game::solver::Solver;
 use crate::game::{Forced, Player};
 
 impl Solver<'_, '_, '_> {

@@ -15,9 +15,13 @@ use std::collections::VecDeque;
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch, states_between_looks};
 
-use super::solver::{Answer, Extent, LOOK_EVERY, MOST_TASKS, Solver, Win};
+use crate::game::backward::account::LOOK_EVERY;
+use crate::game::backward::propagation::MOST_TASKS;
+use crate::game::backward::winning_sets::Win;
 use crate::game::forward::graph::Graph;
 use crate::game::forward::node::NONE;
+use crate::game::solver::Solver;
+use crate::game::{Extent, Solution};
 
 /// Batches of nodes between two looks at the limits.
 const BATCHES_BETWEEN_LOOKS: u32 = 16;
@@ -73,17 +77,17 @@ impl Solver<'_, '_, '_> {
     ///
     /// # Errors
     /// The model fails in one of their states.
-    pub fn solve_backward(&mut self, watch: &mut dyn Watch) -> Result<Answer, Failure> {
+    pub fn solve_backward(&mut self, watch: &mut dyn Watch) -> Result<Solution, Failure> {
         if !self.graph.symbolic.tuning().full_backward {
             return self.solve(Extent::Everything, watch);
         }
         if let Some(reason) = self.explore(watch)? {
-            return Ok(Answer::Stopped(reason));
+            return Ok(Solution::Stopped(reason));
         }
         if let Some(reason) = self.sweep(watch)? {
-            return Ok(Answer::Stopped(reason));
+            return Ok(Solution::Stopped(reason));
         }
-        Ok(Answer::Won(if self.is_won() {
+        Ok(Solution::Won(if self.is_won() {
             self.seeker
         } else {
             self.seeker.opponent()
@@ -97,13 +101,14 @@ impl Solver<'_, '_, '_> {
     ) -> Result<Option<StopReason>, Failure> {
         let look_every = states_between_looks(LOOK_EVERY, self.graph.dimension());
         let mut next_look = look_every;
-        while let Some(node) = self.next_waiting() {
+        let tuning = self.graph.symbolic.tuning();
+        while let Some(node) = self.exploration.waiting.next(&self.graph.nodes, tuning) {
             if self.graph.nodes[node as usize].is_expanded {
                 continue;
             }
             self.expand(node)?;
             if self.is_crowded() {
-                self.has_given_up = true;
+                self.stops.has_given_up = true;
                 return Ok(Some(StopReason::States));
             }
             if self.graph.explored >= next_look {
@@ -124,7 +129,7 @@ impl Solver<'_, '_, '_> {
         let mut sweep = Sweep::new(self.graph);
         let mut until_look = BATCHES_BETWEEN_LOOKS;
         loop {
-            for node in self.take_updates() {
+            for node in self.agenda.take_updates() {
                 sweep.add(node);
             }
             let batch = sweep.next_batch();
@@ -134,7 +139,7 @@ impl Solver<'_, '_, '_> {
             let mut tasks = Vec::new();
             for node in batch {
                 let is_settled =
-                    self.is_decided(node) || matches!(self.win[node as usize], Win::Everything);
+                    self.is_decided(node) || matches!(self.won.win[node as usize], Win::Everything);
                 if is_settled || !self.graph.nodes[node as usize].is_expanded {
                     continue;
                 }

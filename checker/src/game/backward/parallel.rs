@@ -16,15 +16,19 @@ use crate::search::limits::{StopReason, Watch};
 use crate::zones::federation::block_bytes;
 
 use super::predecessors::Situation;
-use super::solver::{Solver, Win};
 use super::winning_sets::Gained;
-use crate::game::exploration::lazy_safety::Defence;
+use crate::game::backward::winning_sets::Win;
+use crate::game::exploration::held_moves::Defence;
+use crate::game::solver::Solver;
 
 /// How often the limits are looked at while others work.
 const PULSE: Duration = Duration::from_millis(20);
 
 /// Bounds of all the zones that tasks start from, at least, for threads to be worth starting.
 const WORTH_STARTING: usize = 1 << 15;
+
+/// Bytes of what was computed between two questions whether there may be so many.
+const BETWEEN_QUESTIONS: u64 = 1 << 20;
 
 /// The stack of a thread: as much as that of the first thread of a program.
 const STACK_BYTES: usize = 8 << 20;
@@ -67,7 +71,7 @@ struct Progress {
     done_bytes: AtomicU64,
     /// The units of work that were done: see [`cancellation::work`].
     work: AtomicU64,
-    /// After so many units the game is given up: see [`super::budget`].
+    /// After this many units the game is given up: see [`super::budget`].
     most_work: u64,
     /// What is looked at beside.
     beside: Option<Look>,
@@ -124,6 +128,15 @@ impl Progress {
         work_told.store(cancellation::done(), Ordering::Relaxed);
     }
 
+    /// Counts bytes that are kept until all tasks are done; asks where they have become many more.
+    fn keep(&self, bytes: u64) {
+        let before = self.done_bytes.load(Ordering::Relaxed);
+        if (before + bytes) / BETWEEN_QUESTIONS > before / BETWEEN_QUESTIONS {
+            cancellation::ask_for(bytes as usize);
+        }
+        self.done_bytes.fetch_add(bytes, Ordering::Relaxed);
+    }
+
     /// Adds what a thread has done since it told last.
     fn tell_work(&self, thread: usize) {
         let done = cancellation::done();
@@ -156,14 +169,14 @@ impl Solver<'_, '_, '_> {
             next: AtomicUsize::new(0),
             threads: (0..threads).map(|_| ThreadProgress::default()).collect(),
             done_bytes: AtomicU64::new(tasks.iter().map(Task::heap_bytes).sum()),
-            work: AtomicU64::new(self.work),
+            work: AtomicU64::new(self.stops.work),
             most_work: self.most_work(),
             beside: cancellation::current(),
         });
         let done = cancellation::unless_cut(|| self.share(&tasks, &progress));
-        self.work = progress.work.load(Ordering::Relaxed);
+        self.stops.work = progress.work.load(Ordering::Relaxed);
         if progress.is_beyond() {
-            self.has_given_up = true;
+            self.stops.has_given_up = true;
             return Some(StopReason::States);
         }
         let mut done = done.unwrap_or_else(|Cut| cancellation::cut());
@@ -186,8 +199,8 @@ impl Solver<'_, '_, '_> {
         let edges = tasks.iter().flat_map(|task| self.graph.edges_of(task.node));
         let zones = edges.map(|edge| {
             let target = self.graph.edges[edge].target;
-            match &self.win[target as usize] {
-                Win::Part(part) => part.zone_count() + self.rest[&target].zone_count(),
+            match &self.won.win[target as usize] {
+                Win::Part(part) => part.zone_count() + self.won.rest[&target].zone_count(),
                 Win::Nothing | Win::Everything => 1,
             }
         });
@@ -241,9 +254,7 @@ impl Solver<'_, '_, '_> {
                 let (won, defence) = self.winnable_against_defence(task.node, &task.situation);
                 let gained = self.gained(task.node, won);
                 progress.tell_work(thread);
-                let bytes = gained.heap_bytes();
-                cancellation::ask_for(bytes as usize);
-                progress.done_bytes.fetch_add(bytes, Ordering::Relaxed);
+                progress.keep(gained.heap_bytes());
                 done.push(Done {
                     index,
                     gained,

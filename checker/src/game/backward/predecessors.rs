@@ -1,11 +1,12 @@
 //! What a node wins by what is known of its successors: the formulas at the head of
-//! [`super::solver`].
+//! [`crate::game::solver`].
 
 use crate::network::Failure;
 use crate::zones::{ClockSet, Federation, past};
 
-use super::solver::{Solver, Win};
 use crate::game::Player;
+use crate::game::backward::winning_sets::Win;
+use crate::game::solver::Solver;
 
 /// What the formulas for a node need to know of its words.
 #[derive(Debug)]
@@ -77,7 +78,7 @@ impl Solver<'_, '_, '_> {
         (won, decided)
     }
 
-    /// What the controller wins as the seeker, as far as known.
+    /// What the controller wins as the seeker, if it is known.
     fn controllers_gain(&self, node: u32, situation: &Situation) -> Federation {
         let mut good = self.known(node);
         let goal = self.goal(node);
@@ -88,15 +89,15 @@ impl Solver<'_, '_, '_> {
                 continue;
             }
             if edge.controllable {
-                let before = self.before(&edge, &self.win[edge.target as usize]);
+                let before = self.before(&edge, &self.won.win[edge.target as usize]);
                 good.unite(&before);
             } else {
                 let spoiling = self.spoiling(&edge);
                 bad.unite(&spoiling);
             }
         }
-        for legs in self.graph.chances.of(node) {
-            let legs = self.targets_of(legs, &self.win);
+        for legs in self.graph.branch_points.of(node) {
+            let legs = self.targets_of(legs, &self.won.win);
             good.unite(&self.before_all(legs));
         }
         bad.subtract(&goal);
@@ -107,7 +108,7 @@ impl Solver<'_, '_, '_> {
         won
     }
 
-    /// What the environment wins as the seeker, as far as known, and what of it it has at once.
+    /// What the environment wins as the seeker, if it is known, and what of it it has at once.
     fn environments_gain(
         &self,
         node: u32,
@@ -126,11 +127,11 @@ impl Solver<'_, '_, '_> {
                 let spoiling = self.spoiling(&edge);
                 escape.unite(&spoiling);
             } else {
-                let before = self.before(&edge, &self.win[edge.target as usize]);
+                let before = self.before(&edge, &self.won.win[edge.target as usize]);
                 now.unite(&before);
             }
         }
-        for legs in self.graph.chances.of(node) {
+        for legs in self.graph.branch_points.of(node) {
             escape.unite(&self.spoiling_all(legs));
         }
         now.subtract(&goal);
@@ -146,7 +147,7 @@ impl Solver<'_, '_, '_> {
 
     /// What was won in a node so far, as far as it is a part of it.
     fn known(&self, node: u32) -> Federation {
-        match &self.win[node as usize] {
+        match &self.won.win[node as usize] {
             Win::Part(part) => part.clone(),
             _ => Federation::empty(self.graph.dimension()),
         }

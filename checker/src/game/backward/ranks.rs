@@ -11,10 +11,9 @@
 use crate::cancellation::{self, Cut};
 use crate::network::Failure;
 use crate::search::limits::Watch;
-use crate::zones::Federation;
 
-use super::solver::{Gain, Solver, Win};
-use crate::zones::federation::table_bytes;
+use crate::game::backward::winning_sets::Win;
+use crate::game::solver::Solver;
 
 /// Computations between two looks at the limits.
 const BETWEEN_LOOKS: u32 = 64;
@@ -27,27 +26,20 @@ impl Solver<'_, '_, '_> {
     /// # Errors
     /// The model fails in computing what a node wins.
     pub fn put_into_layers(&mut self, watch: &mut dyn Watch) -> Result<(), Failure> {
-        if self.targets.is_some() || !self.is_won() {
+        if self.sought.targets.is_some() || !self.is_won() {
             return Ok(());
         }
-        let win = std::mem::take(&mut self.win);
-        let gains = std::mem::take(&mut self.gains);
-        let rest = std::mem::take(&mut self.rest);
-        let (gained_bytes, stamp) = (self.gained_bytes, self.stamp);
-        let by_node = size_of::<Win>() + size_of::<Vec<Gain>>();
-        let tables = win.len() * by_node + table_bytes::<(u32, Federation)>(rest.capacity());
-        self.aside_bytes += gained_bytes + tables as u64;
+        let before = std::mem::take(&mut self.won);
+        let before_bytes = before.all_bytes();
+        self.aside_bytes += before_bytes;
         self.begin_anew();
         let is_layered = match cancellation::unless_cut(|| self.gain_in_layers(watch)) {
             Ok(Err(Failure::Interrupted)) | Err(Cut) => false,
             Ok(result) => result?,
         };
-        self.aside_bytes -= gained_bytes + tables as u64;
+        self.aside_bytes -= before_bytes;
         if !is_layered {
-            self.win = win;
-            self.gains = gains;
-            self.rest = rest;
-            (self.gained_bytes, self.stamp) = (gained_bytes, stamp);
+            self.won = before;
         }
         Ok(())
     }
@@ -59,14 +51,14 @@ impl Solver<'_, '_, '_> {
             if self.is_won() {
                 break;
             }
-            let nodes = self.take_updates();
+            let nodes = self.agenda.take_updates();
             if nodes.is_empty() {
                 return Ok(false);
             }
             let mut gained = Vec::new();
             for node in nodes {
                 let is_settled = self.is_decided(node)
-                    || matches!(self.win[node as usize], Win::Everything)
+                    || matches!(self.won.win[node as usize], Win::Everything)
                     || !self.graph.nodes[node as usize].is_expanded;
                 if is_settled {
                     continue;
@@ -90,7 +82,7 @@ impl Solver<'_, '_, '_> {
             }
             for (node, one) in gained {
                 // What is gained in a layer has one stamp.
-                self.stamp = layer;
+                self.won.stamp = layer;
                 match one {
                     None => self.gain_everything(node),
                     Some(one) => self.gain(node, one),

@@ -2,39 +2,28 @@
 
 use crate::zones::Federation;
 
-use super::memory::gains_bytes;
-use super::solver::{AfterGoal, Gain, Pending, Solver, Win};
+use crate::game::AfterGoal;
 use crate::game::Player;
+use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::Standing;
+use crate::game::solver::Solver;
 
 impl Solver<'_, '_, '_> {
     /// Gives nodes that were just made their place: what is sought is won from the start.
     pub(in crate::game) fn adopt_new_nodes(&mut self) {
-        for node in self.win.len()..self.graph.nodes.len() {
+        for node in self.won.win.len()..self.graph.nodes.len() {
             let win = self.sought(node as u32);
-            if let Win::Part(part) = &win {
-                let mut rest = self.whole(node as u32);
-                rest.subtract(part);
-                rest.shrink();
-                self.replace_rest(node as u32, Some(rest));
-            }
-            let gains = match &win {
-                Win::Nothing => Vec::new(),
-                Win::Everything => vec![Gain {
-                    stamp: 0,
-                    part: None,
-                }],
-                Win::Part(part) => vec![Gain {
-                    stamp: 0,
-                    part: Some(part.clone()),
-                }],
+            let rest = match &win {
+                Win::Part(part) => {
+                    let mut rest = self.whole(node as u32);
+                    rest.subtract(part);
+                    Some(rest)
+                }
+                Win::Nothing | Win::Everything => None,
             };
-            self.gained_bytes += win.heap_bytes() + gains_bytes(&gains);
-            self.win.push(win);
-            self.gains.push(gains);
-            self.frontier.add_node();
-            self.pending.push(Pending::No);
-            self.defences.add_node();
+            self.won.add_node(win, rest);
+            self.exploration.add_node();
+            self.agenda.add_node();
             if node == 0 {
                 self.wait_for(0);
             }
@@ -43,7 +32,7 @@ impl Solver<'_, '_, '_> {
 
     /// The valuations of a node that the seeker wants to get to.
     fn sought(&self, node: u32) -> Win {
-        if let Some(targets) = &self.targets {
+        if let Some(targets) = &self.sought.targets {
             return targets[node as usize].clone();
         }
         let part = match (self.graph.nodes[node as usize].standing, self.seeker) {
@@ -65,7 +54,9 @@ impl Solver<'_, '_, '_> {
     pub(in crate::game) fn is_decided(&self, node: u32) -> bool {
         match self.graph.nodes[node as usize].standing {
             Standing::Broken | Standing::Dead => true,
-            Standing::Goal => self.targets.is_none() && self.after_goal != AfterGoal::IsLikeBefore,
+            Standing::Goal => {
+                self.sought.targets.is_none() && self.sought.after_goal != AfterGoal::IsLikeBefore
+            }
             Standing::Open | Standing::Mixed => false,
         }
     }
@@ -77,7 +68,7 @@ impl Solver<'_, '_, '_> {
             Player::Environment => (Standing::Broken, false),
         };
         self.graph.nodes[node as usize].standing == standing
-            && self.targets.is_none()
+            && self.sought.targets.is_none()
             && !depends_on_time
     }
 
@@ -85,7 +76,7 @@ impl Solver<'_, '_, '_> {
     /// a whole.
     pub(in crate::game) fn goal(&self, node: u32) -> Federation {
         let dimension = self.graph.dimension();
-        if let Some(targets) = &self.targets {
+        if let Some(targets) = &self.sought.targets {
             return match &targets[node as usize] {
                 Win::Nothing => Federation::empty(dimension),
                 Win::Everything => self.whole(node),
@@ -93,7 +84,7 @@ impl Solver<'_, '_, '_> {
             };
         }
         let none = || Federation::empty(dimension);
-        if self.after_goal == AfterGoal::IsLikeBefore {
+        if self.sought.after_goal == AfterGoal::IsLikeBefore {
             return none();
         }
         let parts = self.graph.parts(node);

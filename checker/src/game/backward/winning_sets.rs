@@ -1,11 +1,35 @@
-//! The valuations that nodes win, the rest of them, and where edges lead into either.
+//! The winning sets: by node, the valuations from which the seeker wins, the rest of them, and what
+//! was gained when.
+//!
+//! Invariants:
+//! * Only nodes of which a part is won have a rest, and with it they make up the whole node.
+//! * Gains stand by ascending stamp; together they are what is won.
+//! * The valuations that are kept have no room to spare.
+
+use rustc_hash::FxHashMap;
 
 use crate::zones::Federation;
-use crate::zones::federation::block_bytes;
+use crate::zones::federation::{block_bytes, table_bytes};
 
-use super::solver::{Gain, Solver, Win};
-use crate::game::Player;
-use crate::game::forward::node::{Edge, NONE};
+/// The valuations of a node from which the seeker wins.
+#[derive(Clone, Debug)]
+pub enum Win {
+    /// None, if it is known.
+    Nothing,
+    /// All.
+    Everything,
+    /// These.
+    Part(Federation),
+}
+
+/// What a stamp added to the winning valuations of a node.
+#[derive(Clone, Debug)]
+pub struct Gain {
+    /// Greater stamps came later.
+    pub stamp: u32,
+    /// What was added; `None` is the whole zone.
+    pub part: Option<Federation>,
+}
 
 /// What a node gains.
 #[derive(Clone, Debug)]
@@ -25,102 +49,100 @@ pub(super) enum Gained {
     },
 }
 
-impl Solver<'_, '_, '_> {
-    /// What a node gains if these valuations are won.
-    pub(super) fn gained(&self, node: u32, mut won: Federation) -> Gained {
-        let (mut rest, is_first) = match &self.win[node as usize] {
-            Win::Everything => return Gained::Nothing,
-            Win::Part(_) => (self.rest[&node].clone(), false),
-            Win::Nothing => (self.whole(node), true),
-        };
-        if !rest.intersects(&won) {
-            return Gained::Nothing;
+/// What is won of all nodes.
+#[derive(Debug, Default)]
+pub struct WinningSets {
+    /// By node: the valuations from which the seeker wins.
+    pub win: Vec<Win>,
+    /// The rest of each node of which a part is won.
+    pub(in crate::game) rest: FxHashMap<u32, Federation>,
+    /// By node: the gains, by ascending stamp. What is sought has stamp 0.
+    pub gains: Vec<Vec<Gain>>,
+    /// The stamp of the last gain.
+    pub(in crate::game) stamp: u32,
+    /// The bytes that zones of the gains, the winning valuations and the rests take.
+    pub(in crate::game) bytes: u64,
+}
+
+impl WinningSets {
+    /// Adds a node of which this is won from the start, and the rest of it if that is a part.
+    pub(in crate::game) fn add_node(&mut self, win: Win, rest: Option<Federation>) {
+        let node = self.win.len() as u32;
+        if let Some(mut rest) = rest {
+            rest.shrink();
+            self.replace_rest(node, Some(rest));
         }
-        won.reduce();
-        let part = if is_first {
-            won.clone()
-        } else {
-            rest.intersection(&won)
+        let part = match &win {
+            Win::Nothing => None,
+            Win::Everything => Some(None),
+            Win::Part(part) => Some(Some(part.clone())),
         };
-        rest.subtract(&won);
-        let mut gained = if rest.is_empty() {
-            Gained::Everything((!is_first).then_some(part))
-        } else {
-            rest.merge();
-            Gained::Part { won, part, rest }
-        };
-        gained.shrink();
-        gained
+        let gains: Vec<Gain> = part
+            .map(|part| Gain { stamp: 0, part })
+            .into_iter()
+            .collect();
+        self.bytes += win.heap_bytes() + gains_bytes(&gains);
+        self.win.push(win);
+        self.gains.push(gains);
     }
 
-    /// Records what a node gains, whose predecessors are to be updated then.
-    pub(super) fn gain(&mut self, node: u32, gained: Gained) {
-        match gained {
-            Gained::Nothing => {}
-            Gained::Everything(part) => {
-                self.replace_rest(node, None);
-                self.record(node, Win::Everything, part);
-            }
-            Gained::Part { won, part, rest } => {
-                self.replace_rest(node, Some(rest));
-                self.record(node, Win::Part(won), Some(part));
-            }
+    /// The bytes of the tables and of all that is in them.
+    pub(in crate::game) fn all_bytes(&self) -> u64 {
+        self.table_bytes() + self.bytes
+    }
+
+    fn table_bytes(&self) -> u64 {
+        let by_node = size_of::<Win>() + size_of::<Vec<Gain>>();
+        let tables = self.win.len() * by_node;
+        (tables + table_bytes::<(u32, Federation)>(self.rest.capacity())) as u64
+    }
+
+    /// Whether the valuation of a node is won; values are in whole units.
+    pub(in crate::game) fn contains(&self, node: u32, values: &[i64]) -> bool {
+        match &self.win[node as usize] {
+            Win::Nothing => false,
+            Win::Everything => true,
+            Win::Part(part) => part.contains(values, 1),
         }
     }
 
-    /// Records that all of a node is won.
-    pub(super) fn gain_everything(&mut self, node: u32) {
-        let rest = self.replace_rest(node, None);
-        self.record(node, Win::Everything, rest);
+    /// The valuations of a node that are not known to be won.
+    pub(in crate::game) fn lost(&self, node: u32) -> Win {
+        match &self.win[node as usize] {
+            Win::Nothing => Win::Everything,
+            Win::Everything => Win::Nothing,
+            Win::Part(_) => Win::Part(self.rest[&node].clone()),
+        }
     }
 
     /// Replaces what is left of a node, of which a part is won if there is a rest; gives what it
     /// was.
-    pub(super) fn replace_rest(
+    pub(in crate::game) fn replace_rest(
         &mut self,
         node: u32,
         rest: Option<Federation>,
     ) -> Option<Federation> {
         let old = match rest {
             Some(rest) => {
-                self.gained_bytes += rest.heap_bytes() as u64;
+                self.bytes += rest.heap_bytes() as u64;
                 self.rest.insert(node, rest)
             }
             None => self.rest.remove(&node),
         };
         let old_bytes = old.as_ref().map_or(0, Federation::heap_bytes);
-        self.gained_bytes -= old_bytes as u64;
+        self.bytes -= old_bytes as u64;
         old
     }
 
     /// Replaces what a node wins.
     pub(in crate::game) fn replace_win(&mut self, node: usize, win: Win) {
-        self.gained_bytes += win.heap_bytes();
+        self.bytes += win.heap_bytes();
         let old = std::mem::replace(&mut self.win[node], win);
-        self.gained_bytes -= old.heap_bytes();
-    }
-
-    /// Records what a node gains.
-    fn record(&mut self, node: u32, win: Win, part: Option<Federation>) {
-        if !self.schedule.is_running {
-            self.note_gain(node, part);
-        }
-        if self.frontier.reserve.is_used || self.schedule.is_running {
-            self.note_attackers(node);
-        }
-        self.replace_win(node as usize, win);
-        let mut edge = self.graph.nodes[node as usize].first_in;
-        while edge != NONE {
-            let Edge {
-                source, next_in, ..
-            } = self.graph.edges[edge as usize];
-            self.mark(source);
-            edge = next_in;
-        }
+        self.bytes -= old.heap_bytes();
     }
 
     /// Records what a node gains with a new stamp.
-    fn note_gain(&mut self, node: u32, part: Option<Federation>) {
+    pub(super) fn note_gain(&mut self, node: u32, part: Option<Federation>) {
         self.stamp += 1;
         let gains = &mut self.gains[node as usize];
         // Most nodes gain once.
@@ -135,107 +157,56 @@ impl Solver<'_, '_, '_> {
         });
         let bytes = |room: usize| block_bytes(room * size_of::<Gain>());
         let is_first = gains.len() == 1;
-        self.gained_bytes += (bytes(gains.capacity()) + part_bytes) as u64;
-        self.gained_bytes -= if is_first { 0 } else { bytes(room) as u64 };
+        self.bytes += (bytes(gains.capacity()) + part_bytes) as u64;
+        self.bytes -= if is_first { 0 } else { bytes(room) as u64 };
     }
+}
 
-    /// The valuations of an edge's source from which it leads into the given valuations of its
-    /// target.
-    pub fn before(&self, edge: &Edge, target: &Win) -> Federation {
-        let dimension = self.graph.dimension();
-        let mut part = match target {
-            Win::Nothing => return Federation::empty(dimension),
-            Win::Everything if edge.is_total => {
-                return self.whole(edge.source);
+impl Win {
+    /// The bytes that it takes beside the value itself.
+    pub(super) fn heap_bytes(&self) -> u64 {
+        match self {
+            Win::Nothing | Win::Everything => 0,
+            Win::Part(part) => part.heap_bytes() as u64,
+        }
+    }
+}
+
+impl Gained {
+    /// The bytes that it takes beside the value itself.
+    pub(super) fn heap_bytes(&self) -> u64 {
+        let bytes = match self {
+            Gained::Nothing | Gained::Everything(None) => 0,
+            Gained::Everything(Some(part)) => part.heap_bytes(),
+            Gained::Part { won, part, rest } => {
+                won.heap_bytes() + part.heap_bytes() + rest.heap_bytes()
             }
-            Win::Everything => self.whole(edge.target),
-            Win::Part(part) => part.clone(),
         };
-        self.graph.programs.preimage(edge.program, &mut part);
-        match self.graph.urgent(edge.source) {
-            None => part.intersect_zone(self.graph.zone(edge.source)),
-            Some(urgent) => part = part.intersection(&urgent.reached),
-        }
-        part
+        bytes as u64
     }
 
-    /// The valuations of an edge's source in which its first move is possible.
-    pub(in crate::game) fn enabled(&self, edge: &Edge) -> Federation {
-        self.graph.programs.enabled(
-            edge.program,
-            self.graph.zone(edge.source),
-            self.graph.dimension(),
-        )
-    }
-
-    /// The valuations from which a move of the evader is not known to lead into won ones.
-    pub(in crate::game) fn spoiling(&self, edge: &Edge) -> Federation {
-        if self.seeker == Player::Environment && self.graph.programs.waits(edge.program) {
-            return self.enabled(edge);
-        }
-        let is_missed = (edge.length == 1).then(|| self.lost(edge.target));
-        self.missing(edge, (&self.win[edge.target as usize], is_missed))
-    }
-
-    /// The valuations from which an edge is possible and does not lead into the given valuations of
-    /// its target, whose others are computed unless they are given too. In a chain somebody may
-    /// still wait or get stuck, so there it is what is not led into them; other edges may be pieces
-    /// of a move, and lead into the rest of their own target.
-    pub(in crate::game) fn missing(
-        &self,
-        edge: &Edge,
-        (hit, missed): (&Win, Option<Win>),
-    ) -> Federation {
-        if edge.length == 1 {
-            let missed = missed.unwrap_or_else(|| self.complement(edge.target, hit));
-            return self.before(edge, &missed);
-        }
-        let mut missing = self.enabled(edge);
-        missing.subtract(&self.before(edge, hit));
-        missing
-    }
-
-    /// The valuations of a node that are not known to be won.
-    pub(in crate::game) fn lost(&self, node: u32) -> Win {
-        match &self.win[node as usize] {
-            Win::Nothing => Win::Everything,
-            Win::Everything => Win::Nothing,
-            Win::Part(_) => Win::Part(self.rest[&node].clone()),
-        }
-    }
-
-    /// The other valuations of a node.
-    fn complement(&self, node: u32, part: &Win) -> Win {
-        match part {
-            Win::Nothing => Win::Everything,
-            Win::Everything => Win::Nothing,
-            Win::Part(part) => {
-                let mut rest = self.whole(node);
-                rest.subtract(part);
-                Win::Part(rest)
+    /// Gives up room to spare.
+    pub(super) fn shrink(&mut self) {
+        match self {
+            Gained::Nothing | Gained::Everything(None) => {}
+            Gained::Everything(Some(part)) => part.shrink(),
+            Gained::Part { won, part, rest } => {
+                won.shrink();
+                part.shrink();
+                rest.shrink();
             }
         }
     }
+}
 
-    /// All valuations of a node.
-    pub(in crate::game) fn whole(&self, node: u32) -> Federation {
-        self.graph.whole(node)
-    }
+/// The bytes that the gains of a node take beside the value itself.
+pub(super) fn gains_bytes(gains: &Vec<Gain>) -> u64 {
+    let parts = gains.iter().filter_map(|gain| gain.part.as_ref());
+    let zones: usize = parts.map(Federation::heap_bytes).sum();
+    (block_bytes(gains.capacity() * size_of::<Gain>()) + zones) as u64
+}
 
-    /// What is won of a node, as zones.
-    pub(in crate::game) fn federation_of(&self, node: u32, win: &Win) -> Federation {
-        match win {
-            Win::Nothing => Federation::empty(self.graph.dimension()),
-            Win::Everything => self.whole(node),
-            Win::Part(part) => part.clone(),
-        }
-    }
-
-    /// What a gain added to what is won of a node.
-    pub(in crate::game) fn gained_part(&self, node: u32, gain: &Gain) -> Federation {
-        match &gain.part {
-            Some(part) => part.clone(),
-            None => self.whole(node),
-        }
-    }
+/// The bytes that winning valuations by node take.
+pub(in crate::game) fn wins_bytes(wins: &[Win]) -> u64 {
+    size_of_val(wins) as u64 + wins.iter().map(Win::heap_bytes).sum::<u64>()
 }

@@ -1,10 +1,10 @@
-//! What follows after dead ends ([`crate::game::forward::dead_ends`]), where a strategy must say what
-//! to do there too.
+//! What follows after dead ends ([`crate::game::forward::dead_ends`]), where a strategy must say
+//! what to do there too.
 
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch, states_between_looks};
 
-use crate::game::backward::solver::Solver;
+use crate::game::solver::Solver;
 
 /// Expanded nodes between two looks at the limits, at most.
 const BETWEEN_LOOKS: u64 = 64;

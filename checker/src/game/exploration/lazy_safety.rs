@@ -1,5 +1,5 @@
-//! Which moves the evader defends itself with where time passes: as few as it needs, as far as
-//! known.
+//! Which moves the evader defends itself with where time passes: as few as it is known
+//! to need.
 //!
 //! Where time passes, the evader may wait, and as long as the seeker has no way to win it needs no
 //! move, but for one wherever it must move because time stops. So in a safety game for a verdict
@@ -8,12 +8,12 @@
 //! valuations that it has not won. Then those of them that help are taken, one after the other:
 //! first such in which a process takes part that also takes part in the attack. Moves that share no
 //! process with the attack are *weak*. They rather put things off, and there may be many of them,
-//! so a node against which nothing else helps is left *pressed*, until a look at the whole game
+//! so a node against which nothing else helps is left *undefended*, until a look at the whole game
 //! says what to do ([`crate::game::backward::losing_timed`]).
 //!
 //! A held move counts as an escape for what the seeker wins, and what is won is recorded only where
 //! it does not help. So all that is known stays sound, and when nothing is left to be explored or
-//! computed and no node is pressed, then the seeker wins nothing that is not known: as in
+//! computed and no node is undefended, then the seeker wins nothing that is not known: as in
 //! [`super::lazy_zero_time`], what it wins of the nodes in play follows from what it wins of each
 //! other.
 //!
@@ -22,103 +22,16 @@
 
 use crate::network::Failure;
 use crate::zones::Federation;
-use crate::zones::federation::block_bytes;
 
+use super::held_moves::{Defence, Hold};
 use crate::game::Player;
 use crate::game::backward::predecessors::Situation;
-use crate::game::backward::solver::{Solver, Win};
+use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::Edge;
+use crate::game::solver::Solver;
 
 /// Hubs are counted anew when the edges have grown by this part of them.
 const BETWEEN_COUNTS: usize = 4;
-
-/// Whether the evader uses a move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::game) enum Hold {
-    /// Always.
-    None,
-    /// Not yet.
-    Held,
-    /// It was held back, and is used.
-    Used,
-}
-
-/// What is held back.
-#[derive(Debug, Default)]
-pub(in crate::game) struct Defences {
-    /// By edge; edges behind the last one are not held.
-    holds: Vec<Hold>,
-    /// By node: the processes that take part in the moves by which the seeker wins something of it,
-    /// as in [`Edge::movers`].
-    pub(in crate::game) attackers: Vec<u32>,
-    /// The processes that take part in most moves, so that they tell nothing.
-    hubs: u32,
-    /// How many edges there are when hubs are counted anew.
-    next_count: usize,
-    /// Nodes that were pressed when they were computed last, and others.
-    pressed: Vec<u32>,
-    /// Whether weak moves are taken as well.
-    pub(in crate::game) uses_weak: bool,
-}
-
-/// What the evader does against a threat.
-#[derive(Clone, Debug, Default)]
-pub(in crate::game) struct Defence {
-    /// The moves that it is to use, counted from the first edge of the node.
-    moves: Box<[u32]>,
-    /// Whether only weak moves help against the rest.
-    is_pressed: bool,
-}
-
-impl Defences {
-    /// The bytes that it takes.
-    pub(in crate::game) fn bytes(&self) -> usize {
-        self.holds.len() + (self.attackers.len() + self.pressed.len()) * size_of::<u32>()
-    }
-
-    /// Whether a move is held back.
-    pub(in crate::game) fn holds(&self, edge: usize) -> bool {
-        self.holds.get(edge) == Some(&Hold::Held)
-    }
-
-    /// Forgets all nodes; nothing is held back any more.
-    pub(in crate::game) fn forget_nodes(&mut self) {
-        *self = Defences::default();
-    }
-
-    /// Holds nothing back any more.
-    pub(super) fn release(&mut self) {
-        self.holds.clear();
-        self.pressed.clear();
-    }
-
-    /// Makes room for one more node, against which nobody takes part in anything.
-    pub(in crate::game) fn add_node(&mut self) {
-        self.attackers.push(0);
-    }
-
-    /// Takes out what is held back, so that nothing is meanwhile.
-    pub(in crate::game) fn take_holds(&mut self) -> Vec<Hold> {
-        std::mem::take(&mut self.holds)
-    }
-
-    /// Puts back what was taken out.
-    pub(in crate::game) fn put_holds_back(&mut self, holds: Vec<Hold>) {
-        self.holds = holds;
-    }
-
-    /// Whether some node may be pressed.
-    pub(in crate::game) fn is_pressed(&self) -> bool {
-        !self.pressed.is_empty()
-    }
-}
-
-impl Defence {
-    /// The bytes that it takes beside the value itself.
-    pub(in crate::game) fn heap_bytes(&self) -> u64 {
-        block_bytes(size_of_val(&*self.moves)) as u64
-    }
-}
 
 impl Solver<'_, '_, '_> {
     /// Holds the evader's moves from a node back that was just expanded, if it may wait there;
@@ -130,11 +43,11 @@ impl Solver<'_, '_, '_> {
         let edges = self.graph.edges_of(node);
         let mut own = self.graph.edges[edges.clone()].iter();
         if self.seeker == Player::Controller
-            || !self.frontier.reserve.is_kept
+            || !self.exploration.reserve.is_kept
             || !self.graph.symbolic.tuning().lazy_safety
             || !self.graph.nodes[node as usize].delays
             || self.graph.urgent(node).is_some()
-            || !self.graph.chances.of(node).is_empty()
+            || !self.graph.branch_points.of(node).is_empty()
             || self.graph.symbolic.stepper.network().features.stopwatches
             || !own.any(|edge| !self.seeker.owns(edge.controllable))
         {
@@ -145,8 +58,8 @@ impl Solver<'_, '_, '_> {
             let situation = self.situation(node)?;
             forced = self.forced_controller(node, &situation);
         }
-        self.frontier.reserve.is_used = true;
-        let holds = &mut self.defences.holds;
+        self.exploration.reserve.is_used = true;
+        let holds = &mut self.exploration.held.holds;
         holds.resize(edges.start, Hold::None);
         for edge in &self.graph.edges[edges.clone()] {
             holds.push(if self.seeker.owns(edge.controllable) {
@@ -162,7 +75,7 @@ impl Solver<'_, '_, '_> {
                 break;
             }
             let enabled = self.enabled(&edge);
-            if self.defences.holds(index) && enabled.intersects(&forced) {
+            if self.exploration.held.holds(index) && enabled.intersects(&forced) {
                 forced.subtract(&enabled);
                 self.use_move(index);
             }
@@ -172,11 +85,11 @@ impl Solver<'_, '_, '_> {
 
     /// Lets the evader use a move that is held back.
     pub(in crate::game) fn use_move(&mut self, edge: usize) {
-        self.defences.holds[edge] = Hold::Used;
+        self.exploration.held.holds[edge] = Hold::Used;
         let target = self.graph.edges[edge].target;
         if self.is_unexplored(target) {
             self.wait_for(target);
-            self.frontier.add_spoiler(target);
+            self.exploration.waiting.add_spoiler(target);
         }
     }
 
@@ -186,36 +99,36 @@ impl Solver<'_, '_, '_> {
         for edge in &defence.moves {
             self.use_move(first + *edge as usize);
         }
-        if defence.is_pressed {
-            self.defences.pressed.push(node);
+        if defence.is_undefended {
+            self.exploration.held.undefended.push(node);
         }
     }
 
-    /// Takes weak moves from now on, and lets the nodes be computed that were pressed.
+    /// Takes weak moves from now on, and lets the nodes be computed that were undefended.
     pub(in crate::game) fn use_weak_moves(&mut self) {
-        self.defences.uses_weak = true;
-        for node in std::mem::take(&mut self.defences.pressed) {
-            self.mark(node);
+        self.exploration.held.uses_weak = true;
+        for node in std::mem::take(&mut self.exploration.held.undefended) {
+            self.agenda.mark(node);
         }
     }
 
     /// Takes no weak moves any more, and holds the moves back again that lead to what is not
     /// explored.
     pub(in crate::game) fn hold_back_again(&mut self) {
-        self.defences.uses_weak = false;
-        for index in 0..self.defences.holds.len() {
+        self.exploration.held.uses_weak = false;
+        for index in 0..self.exploration.held.holds.len() {
             let Edge { source, target, .. } = self.graph.edges[index];
-            if self.defences.holds[index] == Hold::Used && self.is_unexplored(target) {
-                self.defences.holds[index] = Hold::Held;
-                self.mark(source);
+            if self.exploration.held.holds[index] == Hold::Used && self.is_unexplored(target) {
+                self.exploration.held.holds[index] = Hold::Held;
+                self.agenda.mark(source);
             }
         }
     }
 
     /// Notes who takes part in what the seeker wins of a node.
     pub(in crate::game) fn note_attackers(&mut self, node: u32) {
-        self.defences.attackers[node as usize] |=
-            self.attack(node, &self.win, &self.defences.attackers);
+        self.exploration.held.attackers[node as usize] |=
+            self.attack(node, &self.won.win, &self.exploration.held.attackers);
     }
 
     /// The processes that take part in moves of the seeker that win, or in how it wins after them.
@@ -234,7 +147,7 @@ impl Solver<'_, '_, '_> {
     /// in most moves, if there are others.
     pub(in crate::game) fn aims(&self, node: u32, win: &[Win], attackers: &[u32]) -> u32 {
         let attack = self.attack(node, win, attackers);
-        match attack & !self.defences.hubs {
+        match attack & !self.exploration.held.hubs {
             0 => attack,
             telling => telling,
         }
@@ -243,10 +156,10 @@ impl Solver<'_, '_, '_> {
     /// Counts who takes part in moves, if there are many new ones.
     pub(in crate::game) fn count_hubs(&mut self) {
         let count = self.graph.edges.len();
-        if !self.frontier.reserve.is_used || count < self.defences.next_count {
+        if !self.exploration.reserve.is_used || count < self.exploration.held.next_count {
             return;
         }
-        self.defences.next_count = count + count / BETWEEN_COUNTS + 1;
+        self.exploration.held.next_count = count + count / BETWEEN_COUNTS + 1;
         let mut moves = [0; u32::BITS as usize];
         for edge in &self.graph.edges {
             for (bit, moves) in moves.iter_mut().enumerate() {
@@ -254,7 +167,7 @@ impl Solver<'_, '_, '_> {
             }
         }
         let hubs = (0..u32::BITS).filter(|&bit| 2 * moves[bit as usize] > count);
-        self.defences.hubs = hubs.fold(0, |all, bit| all | 1 << bit);
+        self.exploration.held.hubs = hubs.fold(0, |all, bit| all | 1 << bit);
     }
 
     /// What a node wins by what is known of its successors, and which moves that the evader holds
@@ -266,14 +179,16 @@ impl Solver<'_, '_, '_> {
     ) -> (Federation, Defence) {
         let edges = self.graph.edges_of(node);
         let first = edges.start;
-        let mut held: Vec<usize> = edges.filter(|&edge| self.defences.holds(edge)).collect();
+        let mut held: Vec<usize> = edges
+            .filter(|&edge| self.exploration.held.holds(edge))
+            .collect();
         if held.is_empty() {
             let won = self.winnable(node, situation);
             return (won, Defence::default());
         }
-        let aims = self.aims(node, &self.win, &self.defences.attackers);
+        let aims = self.aims(node, &self.won.win, &self.exploration.held.attackers);
         let mut moves = Vec::new();
-        let mut is_pressed = false;
+        let mut is_undefended = false;
         let won = loop {
             let (won, decided) = self.winnable_without(node, situation, &held);
             let Some(mut threatened) = self.new_part(node, &won) else {
@@ -282,8 +197,8 @@ impl Solver<'_, '_, '_> {
             threatened.subtract(&decided);
             match self.strongest(&held, aims, &threatened) {
                 None => break won,
-                Some((_, 0)) if !self.defences.uses_weak => {
-                    is_pressed = true;
+                Some((_, 0)) if !self.exploration.held.uses_weak => {
+                    is_undefended = true;
                     break self.winnable(node, situation);
                 }
                 Some((index, _)) => moves.push((held.remove(index) - first) as u32),
@@ -291,23 +206,23 @@ impl Solver<'_, '_, '_> {
         };
         let defence = Defence {
             moves: moves.into(),
-            is_pressed,
+            is_undefended,
         };
         (won, defence)
     }
 
     /// What of these valuations a node has not won; `None` if there are none.
     pub(in crate::game) fn new_part(&self, node: u32, won: &Federation) -> Option<Federation> {
-        let part = match &self.win[node as usize] {
+        let part = match &self.won.win[node as usize] {
             Win::Everything => return None,
-            Win::Part(_) => self.rest[&node].intersection(won),
+            Win::Part(_) => self.won.rest[&node].intersection(won),
             Win::Nothing => won.clone(),
         };
         (!part.is_empty()).then_some(part)
     }
 
-    /// Of some moves that are held back the first one, of those that help somewhere in these
-    /// valuations, in which most of the processes take part; with how many that are.
+    /// The first of some held moves that helps somewhere in these valuations and in which most of
+    /// the processes take part; with how many that are.
     pub(in crate::game) fn strongest(
         &self,
         held: &[usize],
@@ -319,7 +234,7 @@ impl Solver<'_, '_, '_> {
             let edge = &self.graph.edges[edge];
             let strength = (edge.movers & aims).count_ones();
             if best.is_none_or(|(_, most)| strength > most)
-                && !matches!(self.win[edge.target as usize], Win::Everything)
+                && !matches!(self.won.win[edge.target as usize], Win::Everything)
                 && self.spoiling(edge).intersects(threatened)
             {
                 best = Some((index, strength));

@@ -1,4 +1,4 @@
-//! Which moves of the evader are explored: as many as it needs, as far as known.
+//! Which moves of the evader are explored: as many as it needs, if it is known.
 //!
 //! When only a verdict is wanted, a single way to evade is enough. So where time does not pass, and
 //! the evader has moves that lead on from everywhere, one of these after the other is explored, in
@@ -7,61 +7,34 @@
 //!
 //! The nodes *in play* are those that play gets to by moves of the seeker, and by those of the
 //! evader that are neither in reserve nor held back; it does not go on where the seeker has won
-//! everything, or has no hope ([`crate::game::backward::losing_untimed`]). Only they need to be
-//! explored. If all of them are, and no wins are to be computed any more, but the initial valuation
-//! is not won, then the evader wins. For in the game in which it never moves to what is in reserve,
-//! what the seeker wins of the nodes in play follows from what it wins of each other, and it wins
-//! nothing that is not known; and more moves do the evader no harm.
+//! everything, or cannot win any more ([`crate::game::backward::losing_untimed`]). Only they need
+//! to be explored. If all of them are, and no wins are to be computed any more, but the initial
+//! valuation is not won, then the evader wins. For in the game in which it never moves to what is
+//! in reserve, what the seeker wins of the nodes in play follows from what it wins of each other,
+//! and it wins nothing that is not known; and more moves do the evader no harm.
 
-use crate::game::backward::solver::{Solver, Win};
+use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::Edge;
+use crate::game::solver::Solver;
 
-/// So many nodes may be looked at for each explored state to find those in play; if that is not
-/// enough, reserves do not pay.
+/// At most this many nodes are looked at for each explored state to find those in play; if that is
+/// not enough, reserves do not pay.
 const MOST_LOOKS: u64 = 32;
 
 /// States that are counted beside those that are explored, for that.
 const STATES_OF_GRACE: u64 = 1 << 10;
 
-/// The nodes of which some that the evader may move to are kept in reserve.
-#[derive(Debug, Default)]
-pub(in crate::game) struct Reserve {
-    /// Whether anything more is to be kept.
-    pub(in crate::game) is_kept: bool,
-    /// Whether anything was ever kept.
-    pub(in crate::game) is_used: bool,
-    /// By node: whether it leads to something in reserve.
-    sources: Vec<bool>,
-    /// How many nodes were looked at to find those in play.
-    looks: u64,
-}
-
-impl Reserve {
-    pub(super) fn add_node(&mut self) {
-        self.sources.push(false);
-    }
-
-    pub(super) fn forget_nodes(&mut self) {
-        self.sources.clear();
-    }
-
-    /// The bytes that it takes.
-    pub(super) fn bytes(&self) -> usize {
-        self.sources.len()
-    }
-}
-
 impl Solver<'_, '_, '_> {
     /// Whether moves of the evader from a node that was just expanded are kept in reserve.
     pub(super) fn begin_reserve(&mut self, node: u32) -> bool {
         let is_kept = self.graph.symbolic.tuning().lazy_zero_time
-            && self.frontier.reserve.is_kept
-            && self.graph.chances.of(node).is_empty()
+            && self.exploration.reserve.is_kept
+            && self.graph.branch_points.of(node).is_empty()
             && !self.graph.nodes[node as usize].delays
             && self.chosen(node).is_some();
         if is_kept {
-            self.frontier.reserve.sources[node as usize] = true;
-            self.frontier.reserve.is_used = true;
+            self.exploration.reserve.sources[node as usize] = true;
+            self.exploration.reserve.is_used = true;
         }
         is_kept
     }
@@ -69,13 +42,13 @@ impl Solver<'_, '_, '_> {
     /// Lets the node be explored that the evader is to move to from a node with a reserve; all, if
     /// it wins nowhere for sure.
     pub(in crate::game) fn choose(&mut self, node: u32) {
-        if !self.frontier.reserve.sources[node as usize] {
+        if !self.exploration.reserve.sources[node as usize] {
             return;
         }
         match self.chosen(node) {
             Some(target) if self.is_unexplored(target) => {
                 self.wait_for(target);
-                self.frontier.add_spoiler(target);
+                self.exploration.waiting.add_spoiler(target);
             }
             Some(_) => {}
             None => self.use_reserve(node),
@@ -89,13 +62,13 @@ impl Solver<'_, '_, '_> {
         let open = edges.find(|edge| {
             self.is_evasion(edge)
                 && edge.is_total
-                && matches!(self.win[edge.target as usize], Win::Nothing)
+                && matches!(self.won.win[edge.target as usize], Win::Nothing)
         });
         open.map(|edge| edge.target)
     }
 
     fn use_reserve(&mut self, node: u32) {
-        self.frontier.reserve.sources[node as usize] = false;
+        self.exploration.reserve.sources[node as usize] = false;
         for index in self.graph.edges_of(node) {
             let edge = self.graph.edges[index];
             if self.is_evasion(&edge) {
@@ -107,36 +80,36 @@ impl Solver<'_, '_, '_> {
     /// Lets the unexplored nodes wait that are in play, and no others; returns by node whether it
     /// is in play.
     pub(in crate::game) fn wait_for_nodes_in_play(&mut self) -> Vec<bool> {
-        let reserve = &mut self.frontier.reserve;
+        let reserve = &mut self.exploration.reserve;
         if reserve.looks > MOST_LOOKS * (self.graph.explored + STATES_OF_GRACE) {
             reserve.is_kept = false;
             reserve.sources.fill(false);
-            self.defences.release();
+            self.exploration.held.release();
         }
         let mut is_in_play = vec![false; self.graph.nodes.len()];
         is_in_play[0] = true;
         let mut stack = vec![0];
         let mut unexplored = Vec::new();
         while let Some(node) = stack.pop() {
-            self.frontier.reserve.looks += 1;
+            self.exploration.reserve.looks += 1;
             if self.is_unexplored(node) {
                 unexplored.push(node);
             }
-            if !self.may_have_hope(node) || matches!(self.win[node as usize], Win::Everything) {
+            if !self.may_win(node) || matches!(self.won.win[node as usize], Win::Everything) {
                 continue;
             }
-            let has_reserve = self.frontier.reserve.sources[node as usize];
+            let has_reserve = self.exploration.reserve.sources[node as usize];
             let chosen = has_reserve.then(|| self.chosen(node)).flatten();
             for index in self.graph.edges_of(node) {
                 let edge = &self.graph.edges[index];
                 let is_left = has_reserve && self.is_evasion(edge) && chosen != Some(edge.target)
-                    || self.defences.holds(index);
+                    || self.exploration.held.holds(index);
                 if !is_left && !std::mem::replace(&mut is_in_play[edge.target as usize], true) {
                     stack.push(edge.target);
                 }
             }
         }
-        self.frontier.clear();
+        self.exploration.waiting.clear();
         for node in unexplored.into_iter().rev() {
             self.wait_for(node);
         }
@@ -147,8 +120,8 @@ impl Solver<'_, '_, '_> {
     /// and it has no need of them.
     pub(in crate::game) fn keep_in_play(&mut self, is_in_play: &[bool]) {
         for (node, is_in_play) in is_in_play.iter().enumerate() {
-            if !is_in_play && self.may_have_hope(node as u32) && !self.is_decided(node as u32) {
-                self.replace_win(node, Win::Everything);
+            if !is_in_play && self.may_win(node as u32) && !self.is_decided(node as u32) {
+                self.won.replace_win(node, Win::Everything);
             }
         }
     }

@@ -1,13 +1,14 @@
 //! Chains of moves that were followed before, remembered.
 //!
-//! What a move does to clocks mostly hangs on the locations, the zone and the answers of guards,
+//! What a move does to clocks mostly depends on the locations, the zone and the answers of guards,
 //! not on variables. A *trail* is what is known at a point of a chain: the zone there and what the
 //! moves so far do to clocks. Trails make trees; their roots are moves of nodes, by offer and zone.
 //! Following a chain along its trail evaluates guards and runs updates, and handles no zone at all.
 //!
 //! Invariants:
 //! * A trail says what [`super::graph::Graph`] would find by following the chain move by move;
-//!   where that hangs on variables, the trail ends and the graph goes on from its end in that way.
+//!   where that depends on variables, the trail ends and the graph goes on from its end in that
+//!   way.
 //! * Trails never decide which states there are, only how fast they are found. Their memory is
 //!   bounded.
 
@@ -22,7 +23,7 @@ use crate::zones::{Bound, Zone};
 use super::clock_programs::{ProgramId, ProgramStep, steps_bytes};
 use super::objective::Objective;
 
-/// Trails take at most about so many bytes.
+/// Trails take at most about this many bytes.
 pub(super) const MOST_BYTES: usize = 32 << 20;
 
 /// The index of a trail.
@@ -78,7 +79,7 @@ pub(super) struct Ending {
 
 /// The trails of a graph.
 #[derive(Debug, Default)]
-pub(super) struct Trails {
+pub(super) struct ChainCache {
     /// Whether locations and zones decide how time passes, so that there can be trails.
     pub(super) is_useful: bool,
     /// Whether locations alone decide where the objective holds.
@@ -97,15 +98,15 @@ pub(super) struct Trails {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Root(pub(super) u32);
 
-impl Trails {
+impl ChainCache {
     /// No trails yet. `is_useful` says whether locations and zones alone decide how time passes.
-    pub(super) fn new(is_useful: bool, objective: &Objective<'_>) -> Trails {
+    pub(super) fn new(is_useful: bool, objective: &Objective<'_>) -> ChainCache {
         let mut predicates = objective.goal.iter().chain(&objective.keep);
-        Trails {
+        ChainCache {
             is_useful,
             is_objective_fixed: objective.deadline.is_none()
-                && predicates.all(|predicate| hangs_on_locations(predicate)),
-            ..Trails::default()
+                && predicates.all(|predicate| depends_on_locations(predicate)),
+            ..ChainCache::default()
         }
     }
 
@@ -155,11 +156,11 @@ impl Trails {
 }
 
 /// Whether locations alone decide where a predicate holds.
-fn hangs_on_locations(predicate: &Predicate) -> bool {
+fn depends_on_locations(predicate: &Predicate) -> bool {
     match predicate {
         Predicate::Constant(_) | Predicate::Location(..) => true,
         Predicate::Data(_) | Predicate::Clock(_) | Predicate::Deadlock => false,
-        Predicate::Not(inner) => hangs_on_locations(inner),
-        Predicate::And(parts) | Predicate::Or(parts) => parts.iter().all(hangs_on_locations),
+        Predicate::Not(inner) => depends_on_locations(inner),
+        Predicate::And(parts) | Predicate::Or(parts) => parts.iter().all(depends_on_locations),
     }
 }

@@ -3,7 +3,7 @@
 use crate::network::{Failure, FixedMove, Moves, OfferId};
 use crate::zones::Zone;
 
-use super::chain_cache::{Ending, MOST_BYTES, Onward, Root, Trail, TrailId, Trails};
+use super::chain_cache::{ChainCache, Ending, MOST_BYTES, Onward, Root, Trail, TrailId};
 use super::clock_programs::ProgramStep;
 use super::expansion::{delay_after, push_step};
 use super::graph::Graph;
@@ -27,7 +27,7 @@ impl Graph<'_, '_> {
 
     fn follow_trail_in(
         &mut self,
-        trails: &mut Trails,
+        trails: &mut ChainCache,
         Root(first): Root,
         moves: &Moves,
         origin: Origin,
@@ -71,7 +71,7 @@ impl Graph<'_, '_> {
     /// What a move of a node leads to.
     fn first_onward(
         &mut self,
-        trails: &mut Trails,
+        trails: &mut ChainCache,
         moves: &Moves,
         origin: Origin,
         words: &[i32],
@@ -96,7 +96,7 @@ impl Graph<'_, '_> {
     /// How a chain goes on from the end of a trail, in a state with these words.
     fn onward(
         &mut self,
-        trails: &mut Trails,
+        trails: &mut ChainCache,
         at: TrailId,
         words: &mut [i32],
     ) -> Result<Onward, Failure> {
@@ -126,7 +126,7 @@ impl Graph<'_, '_> {
     /// As [`Graph::onward`], where it is not known what the offer leads to.
     fn new_onward(
         &mut self,
-        trails: &mut Trails,
+        trails: &mut ChainCache,
         at: TrailId,
         offer: OfferId,
         words: &[i32],
@@ -161,7 +161,7 @@ impl Graph<'_, '_> {
     /// Adds the trail that ends with `last`, taken in a state with these words, and enters `zone`.
     fn add_trail(
         &mut self,
-        trails: &mut Trails,
+        trails: &mut ChainCache,
         words: &[i32],
         last: FixedMove,
         mut zone: Zone,

@@ -7,11 +7,9 @@ use rustc_hash::FxHashMap;
 
 use crate::network::ClockEffect;
 use crate::zones::dbm::Constraint;
-use crate::zones::federation::block_bytes;
+use crate::zones::federation::{block_bytes, table_bytes};
 use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, ClockSet, Federation, Zone};
-
-use crate::zones::federation::table_bytes;
 
 /// The index of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -53,7 +53,7 @@ impl Graph<'_, '_> {
             self.target = target;
             result?;
         }
-        self.chances
+        self.branch_points
             .find(node, (&mut self.edges, first as usize), moves);
         let node = &mut self.nodes[node as usize];
         node.edges = (first, self.edges.len() as u32);

@@ -10,11 +10,11 @@
 //!   inside is stored. The winning valuations of the inside follow from those of the end, since
 //!   nobody has a choice.
 //! * Where a move of the controller leads to a branch point, its edges are the *legs* of one entry
-//!   ([`super::chance`]): the controller chooses among entries only.
+//!   ([`super::branch_points`]): the controller chooses among entries only.
 //! * An edge leads to a node whose zone contains the zone that the moves reach.
 //! * In a graph of discrete states ([`Graph::of_discrete_states`]) there is one node for each
 //!   discrete state, whose zone is all that its invariants allow. Who wins from a valuation does
-//!   not hang on how it is reached, so the answer is the same. There may be far fewer nodes, but
+//!   not depend on how it is reached, so the answer is the same. There may be far fewer nodes, but
 //!   also ones that no run reaches, so a run-time error in such a graph means nothing.
 //! * All states from which what is sought cannot come any more are one node ([`super::dead_ends`]),
 //!   unless the initial one is among them; what follows after them is left out.
@@ -29,17 +29,17 @@
 use crate::network::{ClockEffect, Failure, Moves, Symbolic};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 use crate::zones::dbm::{self, Constraint};
+use crate::zones::federation::table_bytes;
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Federation, Zone, clocks};
 
-use super::chain_cache::Trails;
-use super::chance::Chances;
+use super::branch_points::BranchPoints;
+use super::chain_cache::ChainCache;
 use super::clock_programs::{ProgramStep, Programs};
 use super::dead_ends::DeadEnds;
 use super::node::{Edge, LONGEST_CHAIN, NONE, Node, Parts, Standing};
 use super::objective::Objective;
 use super::urgent_nodes::Urgent;
-use crate::zones::federation::table_bytes;
 
 /// The game graph.
 pub struct Graph<'s, 'a> {
@@ -76,8 +76,8 @@ pub struct Graph<'s, 'a> {
     pub(super) effect: ClockEffect,
     pub(super) entries: Vec<Zone>,
     pub(super) chains_delays: bool,
-    pub(super) trails: Trails,
-    pub(in crate::game) chances: Chances,
+    pub(super) trails: ChainCache,
+    pub(in crate::game) branch_points: BranchPoints,
     /// Whether there is one node for each discrete state.
     pub(super) has_discrete_nodes: bool,
     pub(super) dead_ends: DeadEnds,
@@ -113,7 +113,7 @@ impl<'s, 'a> Graph<'s, 'a> {
     ) -> Result<Graph<'s, 'a>, Failure> {
         let mut graph = Graph::without_nodes(symbolic, objective)?;
         graph.has_discrete_nodes = true;
-        graph.trails = Trails::new(false, &graph.objective);
+        graph.trails = ChainCache::new(false, &graph.objective);
         let (mut words, _, invariant) = graph.symbolic.start()?;
         let zone = graph.anything_within(&invariant);
         let id = graph.zones.intern(zone.bounds());
@@ -124,7 +124,7 @@ impl<'s, 'a> Graph<'s, 'a> {
     /// Makes a node of every state, instead of chains; before the first node is expanded.
     pub fn leave_out_chains(&mut self) {
         self.longest_chain = 1;
-        self.trails = Trails::new(false, &self.objective);
+        self.trails = ChainCache::new(false, &self.objective);
     }
 
     fn without_nodes(
@@ -158,8 +158,8 @@ impl<'s, 'a> Graph<'s, 'a> {
             effect: ClockEffect::default(),
             entries: Vec::new(),
             chains_delays: objective.must_progress && !network.features.stopwatches,
-            trails: Trails::new(has_trails, &objective),
-            chances: Chances::new(network),
+            trails: ChainCache::new(has_trails, &objective),
+            branch_points: BranchPoints::new(network),
             has_discrete_nodes: false,
             dead_ends: if objective.leaves_dead_ends && symbolic.tuning().dead_ends {
                 DeadEnds::new(network, &objective)
@@ -233,7 +233,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             + self.zones.bytes()
             + self.programs.bytes()
             + self.trails.bytes()
-            + self.chances.bytes()
+            + self.branch_points.bytes()
             + self.symbolic.bytes()
             + nodes
             + size_of_val(&*self.edges)

@@ -1,8 +1,8 @@
 //! The game graph and how it is made forwards.
 
+pub(super) mod branch_points;
 pub(super) mod chain_cache;
 pub(super) mod chain_following;
-pub(super) mod chance;
 pub mod clock_programs;
 pub(super) mod dead_end_node;
 pub(super) mod dead_ends;

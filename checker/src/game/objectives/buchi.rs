@@ -9,7 +9,7 @@
 //!          (what the controller cannot keep from leaving X)
 //! target = p ∩ q, less leave
 //! X      = from where the controller can force play into the target, within p
-//!          (see [`crate::game::backward::solver`])
+//!          (see [`crate::game::solver`])
 //! ```
 //!
 //! The graph is explored before. X begins with what the controller wins of the game in which it has
@@ -28,9 +28,11 @@ use crate::search::limits::Watch;
 use crate::zones::Federation;
 
 use crate::game::Player;
-use crate::game::backward::memory::wins_bytes;
-use crate::game::backward::solver::{Answer, Solver, Win};
+use crate::game::Solution;
+use crate::game::backward::winning_sets::Win;
+use crate::game::backward::winning_sets::wins_bytes;
 use crate::game::forward::node::Standing;
+use crate::game::solver::Solver;
 
 /// Nodes between two looks at the limits.
 const NODES_BETWEEN_LOOKS: u32 = 64;
@@ -44,20 +46,20 @@ pub fn solve(
     is_cooperative: bool,
     rounds: Option<&mut Vec<Vec<Win>>>,
     watch: &mut dyn Watch,
-) -> Result<Answer, Failure> {
+) -> Result<Solution, Failure> {
     solver.go_on(is_cooperative);
     if let Some(reason) = solver.explore(watch)? {
-        return Ok(Answer::Stopped(reason));
+        return Ok(Solution::Stopped(reason));
     }
     if let Some(reason) = solver.seek_to_break(watch)? {
-        return Ok(Answer::Stopped(reason));
+        return Ok(Solution::Stopped(reason));
     }
     let nodes = 0..solver.graph.nodes.len() as u32;
-    let safe: Vec<Win> = nodes.clone().map(|node| solver.lost(node)).collect();
+    let safe: Vec<Win> = nodes.clone().map(|node| solver.won.lost(node)).collect();
     solver.seeker = Player::Controller;
     let answer = shrink(solver, safe, is_cooperative, None, watch)?;
     match rounds {
-        Some(rounds) if answer == Answer::Won(Player::Environment) => {
+        Some(rounds) if answer == Solution::Won(Player::Environment) => {
             let unbroken = nodes.map(|node| unbroken(solver, node)).collect();
             shrink(solver, unbroken, is_cooperative, Some(rounds), watch)
         }
@@ -72,7 +74,7 @@ fn shrink(
     is_cooperative: bool,
     mut rounds: Option<&mut Vec<Vec<Win>>>,
     watch: &mut dyn Watch,
-) -> Result<Answer, Failure> {
+) -> Result<Solution, Failure> {
     let mut rounds_bytes = 0;
     loop {
         let mut targets = Vec::with_capacity(kept.len());
@@ -81,7 +83,7 @@ fn shrink(
             if node.is_multiple_of(NODES_BETWEEN_LOOKS)
                 && let Some(reason) = solver.look(watch)
             {
-                return Ok(Answer::Stopped(reason));
+                return Ok(Solution::Stopped(reason));
             }
         }
         let kept_bytes = wins_bytes(&kept);
@@ -92,21 +94,21 @@ fn shrink(
         solver.aside_bytes = wins_bytes(&targets) + kept_bytes + rounds_bytes;
         solver.restart(targets);
         if let Some(reason) = solver.sweep(watch)? {
-            return Ok(Answer::Stopped(reason));
+            return Ok(Solution::Stopped(reason));
         }
         if !is_cooperative && !solver.is_won() {
             if let Some(rounds) = rounds {
-                rounds.push(solver.win.clone());
+                rounds.push(solver.won.win.clone());
             }
-            return Ok(Answer::Won(Player::Environment));
+            return Ok(Solution::Won(Player::Environment));
         }
         let mut has_shrunk = false;
         for (node, old) in kept.iter_mut().enumerate() {
             if !has_shrunk {
                 let node = node as u32;
-                has_shrunk = !is_within(solver, node, (old, &solver.win[node as usize]));
+                has_shrunk = !is_within(solver, node, (old, &solver.won.win[node as usize]));
             }
-            old.clone_from(&solver.win[node]);
+            old.clone_from(&solver.won.win[node]);
         }
         if !has_shrunk {
             let is_won = if is_cooperative {
@@ -114,14 +116,14 @@ fn shrink(
             } else {
                 solver.is_won()
             };
-            return Ok(Answer::Won(if is_won {
+            return Ok(Solution::Won(if is_won {
                 Player::Controller
             } else {
                 Player::Environment
             }));
         }
         if let Some(reason) = solver.look(watch) {
-            return Ok(Answer::Stopped(reason));
+            return Ok(Solution::Stopped(reason));
         }
     }
 }
@@ -201,7 +203,7 @@ pub(in crate::game) fn leave(
             out.unite(&missing);
         }
     }
-    for legs in solver.graph.chances.of(node) {
+    for legs in solver.graph.branch_points.of(node) {
         let legs = solver.targets_of(legs, kept);
         back.unite(&solver.before_all(legs));
     }

@@ -10,7 +10,8 @@ use crate::search::reachability::goal::Goal;
 use crate::zones::{Federation, Zone};
 
 use crate::game::Player;
-use crate::game::backward::solver::{Solver, Win};
+use crate::game::backward::winning_sets::Win;
+use crate::game::solver::Solver;
 
 /// Where the controller wins, by words; a search for it ends where it wins somewhere.
 #[derive(Debug)]
@@ -31,8 +32,8 @@ impl Winning {
         let mut words = network.initial.clone();
         for node in 0..solver.graph.nodes.len() as u32 {
             let win = match solver.seeker {
-                Player::Controller => solver.win[node as usize].clone(),
-                Player::Environment => solver.lost(node),
+                Player::Controller => solver.won.win[node as usize].clone(),
+                Player::Environment => solver.won.lost(node),
             };
             if matches!(win, Win::Nothing) {
                 continue;

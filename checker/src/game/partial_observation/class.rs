@@ -21,9 +21,9 @@ use crate::search::limits::StopReason;
 use crate::zones::future::{self, Barriers};
 use crate::zones::{Bound, ClockSet, Federation, Zone, dbm};
 
-use super::place::{Place, Places};
 use super::knowledge::{Knowledge, Observation};
 use super::machine::{Action, Question};
+use super::place::{Place, Places};
 use crate::game::Forced;
 
 /// Where an action leads.

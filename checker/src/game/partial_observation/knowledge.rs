@@ -44,8 +44,8 @@ impl Knowledge {
         self.states.values_mut().for_each(Federation::reduce);
     }
 
-    /// A hash of what does not hang on how federations are described: of each, the least zone that
-    /// contains it.
+    /// A hash of what does not depend on how federations are described: of each, the least zone
+    /// that contains it.
     pub(super) fn hash(&self) -> u64 {
         let mut hasher = rustc_hash::FxHasher::default();
         self.observation.hash(&mut hasher);

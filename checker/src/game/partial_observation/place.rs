@@ -1,5 +1,5 @@
-//! Discrete states with what does not hang on how they are reached: observations, goal, moves, and
-//! where time stops.
+//! Discrete states with what does not depend on how they are reached: observations, goal, moves,
+//! and where time stops.
 //!
 //! All federations are parts of what the invariants allow. Moves are evaluated when a zone first
 //! meets their guards, so that no update runs that cannot happen.

@@ -6,7 +6,7 @@
 //! everything that matters is explored, what is still open is lost if the goal must be reached,
 //! since play could go from one observation to the next for ever, and won if it is enough to keep.
 //!
-//! Sets are explored breadth first, and only where the answer can still hang on them. Equal sets
+//! Sets are explored breadth first, and only where the answer can still depend on them. Equal sets
 //! are one. With what wins from a set the controller wins from its subsets, and if it loses from a
 //! set it loses from what contains it. So
 //! * in place of a set comes one that is won and contains it, or one that is lost and is contained
@@ -27,10 +27,10 @@ use crate::network::{Failure, Symbolic};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::zones::Federation;
 
-use super::class::{Explorer, Consequence};
-use super::place::Places;
+use super::class::{Consequence, Explorer};
 use super::knowledge::{Knowledge, Observation};
 use super::machine::{Action, Machine, MachineState, Question};
+use super::place::Places;
 
 /// How often limits are looked at: after so many symbolic states inside an observation, and after
 /// each knowledge set.
@@ -279,7 +279,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// Whether the answer may hang on an open node: some choice of an open node that is not lost
+    /// Whether the answer may depend on an open node: some choice of an open node that is not lost
     /// leads to it, or to one that it covers.
     fn matters(&self, node: usize) -> bool {
         let one = &self.nodes[node];

@@ -1,5 +1,5 @@
-//! The strategy of the player who seeks something and wins: from valuations of stamp k it moves into
-//! valuations of smaller stamps, or waits for them.
+//! The strategy of the player who seeks something and wins: from valuations of stamp k it moves
+//! into valuations of smaller stamps, or waits for them.
 
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
@@ -10,8 +10,9 @@ use super::extraction::{Choices, Chooser, Extracted, extract as extracted, moves
 use super::safety::Evading;
 use super::{Decision, Selection, Strategy, StrategyState};
 use crate::game::Player;
-use crate::game::backward::solver::{Gain, Solver, Win};
-use crate::game::forward::node::{Edge, Standing};
+use crate::game::backward::winning_sets::{Gain, Win};
+use crate::game::forward::node::Edge;
+use crate::game::solver::Solver;
 
 /// Reads the strategy of the player who wins a solved game.
 ///
@@ -116,17 +117,17 @@ fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failur
         taken,
     } = &mut chosen;
     let moves = moves_of(solver, node)?;
-    for gain in &solver.gains[node as usize].clone() {
+    for gain in &solver.won.gains[node as usize].clone() {
         let mut rest = solver.gained_part(node, gain);
         // Where what is sought is to come again and again, play goes on from there into anything
         // that is won.
-        let goes_on = solver.targets.is_some();
+        let goes_on = solver.sought.targets.is_some();
         let earlier = |solver: &Solver<'_, '_, '_>, edge: u32| {
             let target = solver.graph.edges[edge as usize].target;
             if gain.stamp > 0 {
                 won_before(solver, target, gain.stamp)
             } else {
-                solver.win[target as usize].clone()
+                solver.won.win[target as usize].clone()
             }
         };
         if gain.stamp > 0 || goes_on {
@@ -182,7 +183,7 @@ fn own_choices(solver: &Solver<'_, '_, '_>, node: u32) -> Vec<Vec<u32>> {
     });
     let mut choices: Vec<Vec<u32>> = edges.map(|edge| vec![edge as u32]).collect();
     if solver.seeker == Player::Controller {
-        choices.extend_from_slice(solver.graph.chances.of(node));
+        choices.extend_from_slice(solver.graph.branch_points.of(node));
         choices.sort_unstable();
     }
     choices
@@ -191,7 +192,7 @@ fn own_choices(solver: &Solver<'_, '_, '_>, node: u32) -> Vec<Vec<u32>> {
 /// The valuations of a node that were won before a stamp.
 fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
     let mut won: Option<Federation> = None;
-    for Gain { stamp: _, part } in solver.gains[node as usize]
+    for Gain { stamp: _, part } in solver.won.gains[node as usize]
         .iter()
         .filter(|gain| gain.stamp < stamp)
     {
@@ -219,7 +220,7 @@ fn inside(
     let inside = walk(solver, edge, source)?;
     let is_own = |inner: &Inner| solver.seeker.owns(inner.controllable);
     let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
-    for gain in &solver.gains[edge.target as usize] {
+    for gain in &solver.won.gains[edge.target as usize] {
         let mut won = solver.gained_part(edge.target, gain);
         for (inner, decisions) in inside.iter().zip(&mut decisions).rev() {
             inner.effect.preimage(&mut won);

@@ -5,8 +5,8 @@ use crate::zones::dbm::Constraint;
 use crate::zones::{ClockSet, Federation, Zone};
 
 use super::{Decision, StrategyState};
-use crate::game::backward::solver::Solver;
 use crate::game::forward::node::Edge;
+use crate::game::solver::Solver;
 
 /// A state inside a chain, with its only move.
 pub(super) struct Inner {

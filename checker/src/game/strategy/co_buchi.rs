@@ -23,9 +23,10 @@ use super::chains::walk;
 use super::extraction::{self, Choices, Chooser, moves_of};
 use super::{Decision, Selection, Strategy, StrategyState};
 use crate::game::Player;
-use crate::game::backward::solver::{Solver, Win};
+use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::{Edge, Standing};
 use crate::game::objectives::buchi::leave;
+use crate::game::solver::Solver;
 
 /// Reads the strategy of the environment, which wins from these nodes, from the rounds of the
 /// solution.
@@ -172,5 +173,7 @@ fn inside(
         }
     }
     let states = inside.into_iter().zip(decisions);
-    Ok(states.map(|(inner, decisions)| inner.with(decisions)).collect())
+    Ok(states
+        .map(|(inner, decisions)| inner.with(decisions))
+        .collect())
 }

@@ -6,9 +6,9 @@ use crate::search::limits::{StopReason, Watch};
 use crate::zones::Federation;
 
 use super::{Decision, Strategy, StrategyState};
-use crate::game::backward::solver::Solver;
-use crate::game::forward::chance::entry_of;
+use crate::game::forward::branch_points::entry_of;
 use crate::game::forward::node::Edge;
+use crate::game::solver::Solver;
 
 /// How the player chooses whose strategy is read.
 pub(super) trait Chooser {
@@ -105,7 +105,7 @@ pub(super) fn extract(
 /// owns the move takes it.
 pub(super) fn named(solver: &Solver<'_, '_, '_>, moves: &Moves, edge: &Edge) -> Vec<Part> {
     let parts = moves.get(edge.ordinal as usize).parts;
-    if solver.graph.chances.is_possible() && edge.controllable {
+    if solver.graph.branch_points.is_possible() && edge.controllable {
         entry_of(parts)
     } else {
         parts.to_vec()
@@ -113,10 +113,7 @@ pub(super) fn named(solver: &Solver<'_, '_, '_>, moves: &Moves, edge: &Edge) -> 
 }
 
 /// The moves of a node.
-pub(super) fn moves_of(
-    solver: &mut Solver<'_, '_, '_>,
-    node: u32,
-) -> Result<Moves, Failure> {
+pub(super) fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Moves, Failure> {
     let mut words = solver.graph.symbolic.stepper.network().initial.clone();
     solver.graph.load(node, &mut words);
     let mut moves = Moves::default();
@@ -138,11 +135,11 @@ impl Solver<'_, '_, '_> {
         picked: &mut dyn FnMut(&Self, u32) -> Federation,
         (legs, taken): (&mut Vec<Decision>, &mut Vec<u32>),
     ) -> Result<(), Failure> {
-        if self.graph.chances.of(node).is_empty() {
+        if self.graph.branch_points.of(node).is_empty() {
             return Ok(());
         }
         let moves = moves_of(self, node)?;
-        for entry in self.graph.chances.of(node).to_vec() {
+        for entry in self.graph.branch_points.of(node).to_vec() {
             let mut left = part.clone();
             for leg in entry {
                 let zones = picked(self, leg).intersection(&left);

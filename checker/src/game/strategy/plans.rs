@@ -13,8 +13,9 @@ use crate::network::{Failure, Moves, Part};
 use crate::zones::Zone;
 use crate::zones::federation::block_bytes;
 
-use crate::game::backward::solver::{Solver, Win};
+use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::Standing;
+use crate::game::solver::Solver;
 
 /// One transition of a plan.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,7 +85,7 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
             edges: Vec::new(),
             solver,
         };
-        if !matches!(plans.solver.win[0], Win::Nothing) {
+        if !matches!(plans.solver.won.win[0], Win::Nothing) {
             let zones = plans.solver.graph.whole(0);
             let zones = zones.zones().map(|zone| Zone::from_bounds(dimension, zone));
             plans.enter(0, zones.collect());
@@ -134,7 +135,7 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
         let graph = &*self.solver.graph;
         let edge = graph.edges[edge];
         if self.on_path[edge.target as usize]
-            || matches!(self.solver.win[edge.target as usize], Win::Nothing)
+            || matches!(self.solver.won.win[edge.target as usize], Win::Nothing)
         {
             return None;
         }

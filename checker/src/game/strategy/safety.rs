@@ -11,8 +11,8 @@ use super::chains::walk;
 use super::extraction::{Choices, Chooser, moves_of, named};
 use super::{Decision, Selection, Strategy, StrategyState};
 use crate::game::Player;
-use crate::game::backward::solver::Solver;
 use crate::game::forward::node::{Edge, Standing};
+use crate::game::solver::Solver;
 
 /// How the evader chooses.
 pub(super) struct Evading {
@@ -54,7 +54,7 @@ fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failur
         legs,
         taken,
     } = &mut chosen;
-    let mut free = solver.federation_of(node, &solver.lost(node));
+    let mut free = solver.federation_of(node, &solver.won.lost(node));
     free.subtract(&ended(solver, node));
     if free.is_empty() {
         return Ok(chosen);
@@ -82,7 +82,7 @@ fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failur
         }
     }
     if solver.seeker == Player::Environment {
-        for entry in solver.graph.chances.of(node) {
+        for entry in solver.graph.branch_points.of(node) {
             let spoiling = solver.spoiling_all(entry);
             let zones = spoiling.intersection(&free);
             if !zones.is_empty() {
@@ -139,7 +139,7 @@ fn allowed_waiting(
     if !solver.graph.nodes[node as usize].delays {
         return Ok(at_rest);
     }
-    let safe = solver.federation_of(node, &solver.lost(node));
+    let safe = solver.federation_of(node, &solver.won.lost(node));
     let stopped = situation.stopped;
     let before = instants::before(&safe, &stopped);
     let mut waiting = before.intersection(free);
@@ -183,7 +183,7 @@ fn inside(
     source: &[i32],
 ) -> Result<Vec<StrategyState>, Failure> {
     let inside = walk(solver, edge, source)?;
-    let mut won = solver.federation_of(edge.target, &solver.win[edge.target as usize]);
+    let mut won = solver.federation_of(edge.target, &solver.won.win[edge.target as usize]);
     let mut states = Vec::new();
     for inner in inside.into_iter().rev() {
         let (acting, mut waiting) = inner.evaded(&mut won, !solver.seeker.owns(inner.controllable));

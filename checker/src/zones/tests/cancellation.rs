@@ -41,7 +41,7 @@ fn ended(at: u32, operation: &Operation) -> (Result<Federation, Cut>, u32) {
 
 #[test]
 fn operations_look_and_end() {
-    let (one, other, few) = (boxes(0, 8), boxes(1, 8), boxes(0, 2));
+    let (one, other, few) = (boxes(0, 8), boxes(1, 8), boxes(0, 6));
     let operations: [(&str, Operation); 4] = [
         ("intersection", {
             let (one, other) = (one.clone(), other.clone());

@@ -3,5 +3,4 @@
 
 mod cancellation;
 mod limits;
-
 mod points;

@@ -12,14 +12,13 @@ use rustc_hash::FxHashMap;
 
 use crate::ir::Network;
 use crate::network::{Moves, Part, is_same_entry};
-use crate::zones::federation::block_bytes;
+use crate::zones::federation::{block_bytes, table_bytes};
 
 use super::node::Edge;
-use crate::zones::federation::table_bytes;
 
 /// The entries with several legs that the controller owns.
 #[derive(Debug, Default)]
-pub(in crate::game) struct Chances {
+pub(in crate::game) struct BranchPoints {
     /// Whether the network has any.
     is_possible: bool,
     /// By node: the edges of each.
@@ -27,13 +26,13 @@ pub(in crate::game) struct Chances {
     bytes: usize,
 }
 
-impl Chances {
+impl BranchPoints {
     /// None yet.
-    pub(super) fn new(network: &Network) -> Chances {
+    pub(super) fn new(network: &Network) -> BranchPoints {
         let mut edges = network.processes.iter().flat_map(|process| &process.edges);
-        Chances {
+        BranchPoints {
             is_possible: edges.any(|edge| edge.controllable && edge.branches.len() > 1),
-            ..Chances::default()
+            ..BranchPoints::default()
         }
     }
 

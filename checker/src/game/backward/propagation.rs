@@ -1,0 +1,181 @@
+//! Backwards: nodes are updated until nothing grows, by words where these decide, and else with
+//! zones.
+
+use crate::network::Failure;
+use crate::search::limits::{StopReason, Watch};
+
+use super::parallel::Task;
+use super::result_cache::Case;
+use super::winning_sets::{Gained, Win};
+use crate::game::forward::node::Standing;
+use crate::game::solver::Solver;
+use crate::game::{AfterGoal, Player};
+
+/// Nodes that are computed from the same winning valuations, at most. Some of them may gain more
+/// from each other, and are computed again; among so many that is rare.
+pub(super) const MOST_TASKS: usize = 64;
+
+/// Updates by words between two looks at the limits, where no node is expanded.
+const UPDATES_BETWEEN_LOOKS: u32 = 1024;
+
+/// Computations with few zones between two looks at the limits.
+const COMPUTATIONS_BETWEEN_LOOKS: u32 = 16;
+
+impl Solver<'_, '_, '_> {
+    /// Updates nodes until nothing grows.
+    pub(in crate::game) fn propagate(
+        &mut self,
+        watch: &mut dyn Watch,
+    ) -> Result<Option<StopReason>, Failure> {
+        let mut until_look = COMPUTATIONS_BETWEEN_LOOKS;
+        self.count_hubs();
+        loop {
+            if let Some(reason) = self.propagate_words(watch) {
+                return Ok(Some(reason));
+            }
+            let tasks = self.next_tasks()?;
+            // Known cases that gained something have left updates.
+            if tasks.is_empty() && self.agenda.is_empty() {
+                return Ok(None);
+            }
+            until_look = until_look.saturating_sub(tasks.len() as u32);
+            if let Some(reason) = self.compute(tasks, watch) {
+                return Ok(Some(reason));
+            }
+            if until_look == 0 {
+                until_look = COMPUTATIONS_BETWEEN_LOOKS;
+                let reason = self.look(watch);
+                if reason.is_some() {
+                    return Ok(reason);
+                }
+            }
+        }
+    }
+
+    /// Takes some deferred nodes whose winning valuations are to be computed; those of nodes that
+    /// are known cases are recorded.
+    fn next_tasks(&mut self) -> Result<Vec<Task>, Failure> {
+        let mut tasks = Vec::new();
+        while tasks.len() < MOST_TASKS
+            && let Some(node) = self.agenda.next_computed()
+        {
+            tasks.extend(self.task_of(node)?);
+        }
+        Ok(tasks)
+    }
+
+    /// The task to compute what a node wins; if it is a known case, that is recorded, and there is
+    /// none.
+    pub(super) fn task_of(&mut self, node: u32) -> Result<Option<Task>, Failure> {
+        let key = match self.case_of(node)? {
+            Case::Known(gained, defence) => {
+                self.defend(node, &defence);
+                self.gain_computed(node, gained);
+                return Ok(None);
+            }
+            Case::New(key) => Some(key),
+            Case::None => None,
+        };
+        let situation = self.situation_for_win(node)?;
+        Ok(Some(Task {
+            node,
+            situation,
+            key,
+        }))
+    }
+
+    /// Records what a node gains that was computed.
+    pub(super) fn gain_computed(&mut self, node: u32, gained: Gained) {
+        self.gain(node, gained);
+        if !self.exploration.schedule.is_running
+            && !matches!(self.won.win[node as usize], Win::Everything)
+        {
+            self.note_spoilers(node);
+        }
+    }
+
+    /// Updates nodes until nothing grows as far as words decide, and puts the other nodes off.
+    pub(in crate::game) fn propagate_words(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
+        let mut until_look = UPDATES_BETWEEN_LOOKS;
+        while let Some(node) = self.agenda.next_update() {
+            let is_settled =
+                self.is_decided(node) || matches!(self.won.win[node as usize], Win::Everything);
+            if is_settled || !self.graph.nodes[node as usize].is_expanded {
+                continue;
+            }
+            let decision = self.quick(node);
+            if decision != Some(true) {
+                self.on_update(node);
+            }
+            match decision {
+                Some(true) => self.gain_everything(node),
+                Some(false) => {}
+                None => self.agenda.defer(node),
+            }
+            until_look -= 1;
+            if until_look == 0 {
+                until_look = UPDATES_BETWEEN_LOOKS;
+                let reason = self.look(watch);
+                if reason.is_some() {
+                    return reason;
+                }
+            }
+        }
+        None
+    }
+
+    /// Decides without zones whether the node is won as a whole (`true`) or nothing new is won
+    /// (`false`); `None` if zones are needed.
+    pub(super) fn quick(&self, node: u32) -> Option<bool> {
+        let mut can_move = false;
+        let mut is_spoiled = false;
+        let mut has_evader = false;
+        for index in self.graph.edges_of(node) {
+            let edge = &self.graph.edges[index];
+            let is_own = self.seeker.owns(edge.controllable);
+            match (&self.won.win[edge.target as usize], is_own) {
+                (Win::Part(_), _) => return None,
+                (Win::Everything, true) => can_move |= edge.is_total && !edge.is_leg,
+                (Win::Nothing, true) => {}
+                (Win::Everything, false) if edge.length > 1 && !edge.is_total => return None,
+                (Win::Everything, false) => has_evader = true,
+                (Win::Nothing, false) => {
+                    has_evader = true;
+                    is_spoiled = true;
+                }
+            }
+        }
+        let is_open = match &self.sought.targets {
+            None => match self.graph.nodes[node as usize].standing {
+                Standing::Open => true,
+                Standing::Goal => self.sought.after_goal == AfterGoal::IsLikeBefore,
+                Standing::Broken | Standing::Mixed | Standing::Dead => false,
+            },
+            Some(targets) => {
+                matches!(targets[node as usize], Win::Nothing)
+                    && self.graph.nodes[node as usize].standing != Standing::Mixed
+            }
+        };
+        if !is_open {
+            return None;
+        }
+        can_move |= self.wins_by_an_entry(node);
+        if can_move && (!is_spoiled || self.seeker == Player::Environment) {
+            return Some(true);
+        }
+        let wins_nothing = |index: usize| {
+            let edge = &self.graph.edges[index];
+            !matches!(self.won.win[edge.target as usize], Win::Everything)
+        };
+        // Who is obliged to move and cannot has lost.
+        if self.seeker == Player::Environment && self.is_obliged(node) {
+            return None;
+        }
+        // Without a winning move and without an evader that could be forced, there is nothing to
+        // gain.
+        if self.graph.edges_of(node).all(wins_nothing) && (!has_evader || is_spoiled) {
+            return Some(false);
+        }
+        None
+    }
+}

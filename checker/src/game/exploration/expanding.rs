@@ -1,0 +1,121 @@
+//! How a node is expanded, and which nodes are to be expanded then.
+
+use crate::network::Failure;
+
+use crate::game::AfterGoal;
+use crate::game::backward::winning_sets::Win;
+use crate::game::forward::node::{Edge, NONE, Standing};
+use crate::game::solver::Solver;
+
+impl Solver<'_, '_, '_> {
+    /// Expands a node, and lets the nodes wait that this makes.
+    pub(in crate::game) fn expand(&mut self, node: u32) -> Result<(), Failure> {
+        self.graph.expand(node)?;
+        self.adopt_new_nodes();
+        let waiting = self.exploration.waiting.len();
+        let edges = self.graph.edges_of(node);
+        let has_dives = self.graph.symbolic.tuning().dives;
+        let first = if has_dives {
+            edges.start + self.exploration.waiting.random.below(edges.len().max(1))
+        } else {
+            edges.start
+        };
+        let has_reserve = self.begin_reserve(node);
+        let is_held = !has_reserve && self.hold_back(node)?;
+        let turns: &[Option<bool>] = if self.exploration.waiting.is_impartial || !has_dives {
+            &[None]
+        } else {
+            &[Some(false), Some(true)]
+        };
+        for turn in turns {
+            for edge in (first..edges.end).chain(edges.start..first) {
+                let Edge {
+                    target,
+                    controllable,
+                    ..
+                } = self.graph.edges[edge];
+                let is_own = self.seeker.owns(controllable);
+                if (is_own || !has_reserve && !is_held) && turn.is_none_or(|it| it == is_own) {
+                    self.wait_for(target);
+                }
+            }
+            if has_reserve && *turn != Some(true) {
+                self.choose(node);
+            }
+        }
+        let frontier = &mut self.exploration.waiting;
+        frontier.is_over = frontier.len() == waiting;
+        frontier.is_impartial ^= frontier.is_over;
+        self.agenda.mark(node);
+        Ok(())
+    }
+
+    /// Lets a node wait for its expansion unless it is decided.
+    pub(in crate::game) fn wait_for(&mut self, node: u32) {
+        let Some(known) = self.graph.nodes.get(node as usize) else {
+            return;
+        };
+        let is_left = match known.standing {
+            Standing::Goal => self.sought.after_goal == AfterGoal::Ends,
+            Standing::Broken => !self.sought.is_cooperative,
+            Standing::Dead => true,
+            Standing::Open | Standing::Mixed => false,
+        };
+        if !known.is_expanded && !is_left {
+            self.exploration.waiting.add(node);
+        }
+    }
+
+    /// Lets the nodes be expanded soon to which the evader may move from a node of which more may
+    /// be won.
+    pub(in crate::game) fn note_spoilers(&mut self, node: u32) {
+        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        if edges.all(|edge| matches!(self.won.win[edge.target as usize], Win::Nothing)) {
+            return;
+        }
+        for index in self.graph.edges_of(node) {
+            let edge = &self.graph.edges[index];
+            let target = edge.target as usize;
+            if !self.seeker.owns(edge.controllable)
+                && self.exploration.waiting.is_waiting[target]
+                && !self.graph.nodes[target].is_expanded
+            {
+                self.exploration.waiting.spoilers.push(edge.target);
+            }
+        }
+    }
+
+    /// Whether the winning valuations of some predecessor that may be won may still grow by those
+    /// of the node.
+    pub(in crate::game) fn is_relevant(&self, node: u32) -> bool {
+        if node == 0 || !self.graph.symbolic.tuning().relevance {
+            return true;
+        }
+        let mut edge = self.graph.nodes[node as usize].first_in;
+        while edge != NONE {
+            let Edge {
+                source, next_in, ..
+            } = self.graph.edges[edge as usize];
+            let may_win = self.may_win(source);
+            if may_win && !matches!(self.won.win[source as usize], Win::Everything) {
+                return true;
+            }
+            edge = next_in;
+        }
+        false
+    }
+
+    /// What the parts do when a node was looked at, and is not won as a whole.
+    pub(in crate::game) fn on_update(&mut self, node: u32) {
+        if !self.exploration.schedule.is_running {
+            self.choose(node);
+        }
+    }
+
+    /// What the parts note when a node is about to gain something.
+    pub(in crate::game) fn on_gain(&mut self, node: u32) {
+        if self.exploration.reserve.is_used || self.exploration.schedule.is_running {
+            self.note_attackers(node);
+        }
+    }
+}

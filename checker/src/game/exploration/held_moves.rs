@@ -1,0 +1,91 @@
+//! The moves of the evader that are held back where time passes: see [`super::lazy_safety`].
+
+use crate::zones::federation::block_bytes;
+
+/// Whether the evader uses a move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::game) enum Hold {
+    /// Always.
+    None,
+    /// Not yet.
+    Held,
+    /// It was held back, and is used.
+    Used,
+}
+
+/// What is held back.
+#[derive(Debug, Default)]
+pub(in crate::game) struct HeldMoves {
+    /// By edge; edges behind the last one are not held.
+    pub(super) holds: Vec<Hold>,
+    /// By node: the processes that take part in the moves by which the seeker wins something of it,
+    /// as in [`Edge::movers`].
+    pub(in crate::game) attackers: Vec<u32>,
+    /// The processes that take part in most moves, so that they tell nothing.
+    pub(super) hubs: u32,
+    /// How many edges there are when hubs are counted anew.
+    pub(super) next_count: usize,
+    /// Nodes that were undefended when they were computed last, and others.
+    pub(super) undefended: Vec<u32>,
+    /// Whether weak moves are taken as well.
+    pub(in crate::game) uses_weak: bool,
+}
+
+/// What the evader does against a threat.
+#[derive(Clone, Debug, Default)]
+pub(in crate::game) struct Defence {
+    /// The moves that it is to use, counted from the first edge of the node.
+    pub(super) moves: Box<[u32]>,
+    /// Whether only weak moves help against the rest.
+    pub(super) is_undefended: bool,
+}
+
+impl HeldMoves {
+    /// The bytes that it takes.
+    pub(in crate::game) fn bytes(&self) -> usize {
+        self.holds.len() + (self.attackers.len() + self.undefended.len()) * size_of::<u32>()
+    }
+
+    /// Whether a move is held back.
+    pub(in crate::game) fn holds(&self, edge: usize) -> bool {
+        self.holds.get(edge) == Some(&Hold::Held)
+    }
+
+    /// Forgets all nodes; nothing is held back any more.
+    pub(in crate::game) fn forget_nodes(&mut self) {
+        *self = HeldMoves::default();
+    }
+
+    /// Holds nothing back any more.
+    pub(super) fn release(&mut self) {
+        self.holds.clear();
+        self.undefended.clear();
+    }
+
+    /// Makes room for one more node, against which nobody takes part in anything.
+    pub(in crate::game) fn add_node(&mut self) {
+        self.attackers.push(0);
+    }
+
+    /// Takes out what is held back, so that nothing is meanwhile.
+    pub(in crate::game) fn take_holds(&mut self) -> Vec<Hold> {
+        std::mem::take(&mut self.holds)
+    }
+
+    /// Puts back what was taken out.
+    pub(in crate::game) fn put_holds_back(&mut self, holds: Vec<Hold>) {
+        self.holds = holds;
+    }
+
+    /// Whether some node may be undefended.
+    pub(in crate::game) fn is_undefended(&self) -> bool {
+        !self.undefended.is_empty()
+    }
+}
+
+impl Defence {
+    /// The bytes that it takes beside the value itself.
+    pub(in crate::game) fn heap_bytes(&self) -> u64 {
+        block_bytes(size_of_val(&*self.moves)) as u64
+    }
+}

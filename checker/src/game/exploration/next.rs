@@ -1,0 +1,107 @@
+//! What comes next: a node to be expanded, or the end.
+
+use crate::network::Failure;
+use crate::search::limits::{StopReason, Watch};
+
+use super::schedule::LookAhead;
+use super::{Next, Turn};
+use crate::game::Extent;
+use crate::game::solver::Solver;
+
+/// It is looked what is still in play when the explored states have grown by this part of them.
+const BETWEEN_PLAYS: u64 = 3;
+
+impl Solver<'_, '_, '_> {
+    /// Says what comes next.
+    ///
+    /// # Errors
+    /// The model fails in computing what a node wins.
+    pub(in crate::game) fn next(
+        &mut self,
+        turn: Turn,
+        extent: Extent,
+        watch: &mut dyn Watch,
+    ) -> Result<Next, Failure> {
+        if extent == Extent::Verdict {
+            let has_reserve = self.exploration.reserve.is_used;
+            if let Some(next) = self.next_by_prospects(turn, watch)? {
+                return Ok(next);
+            }
+            if !self.may_win_untimed(has_reserve) {
+                return Ok(Next::Nothing);
+            }
+        }
+        if extent != Extent::Everything {
+            let has_reserve = self.exploration.reserve.is_used;
+            if self.gives_up_in_a_crowd() {
+                return Ok(Next::Stopped(StopReason::States));
+            }
+            if has_reserve && self.exploration.waiting.len() == 0 {
+                return self.next_from_reserve(turn, watch);
+            }
+        }
+        let tuning = self.graph.symbolic.tuning();
+        let Some(node) = self.exploration.waiting.next(&self.graph.nodes, tuning) else {
+            return Ok(Next::Nothing);
+        };
+        let is_skipped = self.graph.nodes[node as usize].is_expanded
+            || (extent != Extent::Everything && !self.is_relevant(node));
+        Ok(if is_skipped {
+            Next::Compute
+        } else {
+            Next::Expand(node)
+        })
+    }
+
+    /// Computes what the seeker may still win, if it is time to; says what comes next if that ends
+    /// the game.
+    fn next_by_prospects(
+        &mut self,
+        turn: Turn,
+        watch: &mut dyn Watch,
+    ) -> Result<Option<Next>, Failure> {
+        if !turn.is_computed || !self.is_look_ahead_due() {
+            return Ok(None);
+        }
+        Ok(match self.look_ahead(watch)? {
+            LookAhead::Open | LookAhead::Settled => None,
+            LookAhead::EvaderWins => Some(Next::Nothing),
+            LookAhead::Stopped(reason) => Some(Next::Stopped(reason)),
+        })
+    }
+
+    /// Whether the seeker may still win for all that the graph shows, if it is time to look at it.
+    fn may_win_untimed(&mut self, has_reserve: bool) -> bool {
+        let explored = self.graph.explored;
+        if explored < self.exploration.next_may_win {
+            return true;
+        }
+        if self.graph.symbolic.tuning().losing_untimed && !self.may_seeker_win() {
+            return false;
+        }
+        self.exploration.next_may_win = if has_reserve {
+            self.wait_for_nodes_in_play();
+            explored + explored / BETWEEN_PLAYS
+        } else {
+            2 * explored
+        };
+        true
+    }
+
+    /// Says what comes next where no node waits, but some moves of the evader are not explored.
+    fn next_from_reserve(&mut self, turn: Turn, watch: &mut dyn Watch) -> Result<Next, Failure> {
+        let is_in_play = self.wait_for_nodes_in_play();
+        if !turn.is_dry || self.exploration.waiting.len() > 0 {
+            return Ok(Next::Compute);
+        }
+        Ok(match self.look_at_all(watch)? {
+            LookAhead::Open => Next::Compute,
+            LookAhead::EvaderWins => Next::Nothing,
+            LookAhead::Settled => {
+                self.keep_in_play(&is_in_play);
+                Next::Nothing
+            }
+            LookAhead::Stopped(reason) => Next::Stopped(reason),
+        })
+    }
+}

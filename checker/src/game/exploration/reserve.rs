@@ -1,0 +1,30 @@
+//! The moves of the evader that are not explored where time does not pass: see
+//! [`super::lazy_zero_time`].
+
+/// The nodes of which some that the evader may move to are kept in reserve.
+#[derive(Debug, Default)]
+pub(in crate::game) struct Reserve {
+    /// Whether anything more is to be kept.
+    pub(in crate::game) is_kept: bool,
+    /// Whether anything was ever kept.
+    pub(in crate::game) is_used: bool,
+    /// By node: whether it leads to something in reserve.
+    pub(super) sources: Vec<bool>,
+    /// How many nodes were looked at to find those in play.
+    pub(super) looks: u64,
+}
+
+impl Reserve {
+    pub(super) fn add_node(&mut self) {
+        self.sources.push(false);
+    }
+
+    pub(super) fn forget_nodes(&mut self) {
+        self.sources.clear();
+    }
+
+    /// The bytes that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        self.sources.len()
+    }
+}

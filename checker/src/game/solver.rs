@@ -1,0 +1,208 @@
+//! Attractor games: can one player, the *seeker*, force play into a set, whatever the other one,
+//! the *evader*, does?
+//!
+//! For reachability the controller seeks the goal. For safety the environment seeks a valuation in
+//! which what must be kept is broken; the controller wins where it does not get there. In both,
+//! play ends in the goal, if there is one.
+//!
+//! The algorithm is on the fly and goes forward and backward in turns. Forward, nodes are expanded;
+//! backward, the valuations of a node from which the seeker wins are computed anew when those of a
+//! successor have grown. For the controller as the seeker:
+//!
+//! ```text
+//! good   = goal ∪ ⋃ Pre_c(win)                     what a controllable move reaches
+//! bad    = ⋃ Pre_u(not win) ∪ broken, less goal    what the environment can spoil
+//! forced = stop ∩ ⋃ enabled_u, less bad and less where the controller could move (see Forced)
+//! win    = Pred_t(good ∪ forced, bad)              wait into good without meeting bad
+//! ```
+//!
+//! For the environment, which is faster, and whose opponent must move where time stops and the
+//! environment need not:
+//!
+//! ```text
+//! now    = broken ∪ ⋃ Pre_u(win), less goal        what the environment has at once, in any case
+//! escape = ⋃ Pre_c(not win), less now              where the controller gets away, on any leg
+//! held   = stop ∩ ⋃ enabled_c, less escape and less where the environment must move (see Forced)
+//! win    = Pred_t(now ∪ held, escape ∪ goal)
+//! ```
+//!
+//! A move of the evader into a node that is not explored counts as an escape, so every intermediate
+//! result is sound, and the search ends as soon as the initial valuation is won. Each gain is
+//! recorded with a stamp: a strategy that moves from valuations of one stamp into those of smaller
+//! ones makes progress. Where the seeker wins nowhere any more, the evader has only to stay outside
+//! of what is won.
+//!
+//! Forward, the solver dives, and for a verdict explores only as many moves of the evader as it
+//! needs ([`super::exploration`]). From time to time it is looked whether the seeker may still win
+//! at all ([`super::backward::losing_untimed`], and with zones [`super::backward::losing_timed`]),
+//! so that both answers can come early.
+//!
+//! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not
+//! decide who wins, all are. What takes zones is put off until the graph has grown by a part of
+//! itself, and goes round in turns: so a node meets what several of its successors have gained at
+//! once.
+//!
+//! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms
+//! for the Analysis of Timed Games", CONCUR 2005; the forced moves are those of G. Behrmann et al.,
+//! "UPPAAL-TIGA: Time for Playing Games!", CAV 2007, and the tool's manual, section 3.1.
+
+use crate::network::Failure;
+use crate::search::limits::Watch;
+
+use super::backward::agenda::Agenda;
+use super::backward::budget::Stops;
+use super::backward::result_cache::ResultCache;
+use super::backward::winning_sets::{Win, WinningSets};
+use super::exploration::{Exploration, Next, Turn};
+use super::forward::graph::Graph;
+use super::{AfterGoal, Extent, Forced, Player, Solution};
+
+/// Nodes whose winning valuations depend on clocks are computed when the explored states have grown
+/// by this part of them. Each time costs more than looking at words, and the more is known by then,
+/// the fewer are computed twice.
+const BETWEEN_COMPUTATIONS: u64 = 4;
+
+/// A solver with its graph.
+pub struct Solver<'g, 's, 'a> {
+    /// The graph.
+    pub graph: &'g mut Graph<'s, 'a>,
+    /// Who seeks.
+    pub seeker: Player,
+    pub(in crate::game) forced: Forced,
+    /// What is sought.
+    pub(in crate::game) sought: Sought,
+    /// What is won.
+    pub won: WinningSets,
+    /// What is to be computed again.
+    pub(in crate::game) agenda: Agenda,
+    /// What is explored when.
+    pub(in crate::game) exploration: Exploration,
+    /// What was computed before.
+    pub(in crate::game) results: ResultCache,
+    pub(in crate::game) stops: Stops,
+    /// The bytes of what belongs to the game and is kept elsewhere meanwhile.
+    pub(in crate::game) aside_bytes: u64,
+    /// How many threads compute what nodes win.
+    pub(in crate::game) threads: usize,
+    /// The words of some node.
+    pub(in crate::game) words: Vec<i32>,
+}
+
+/// What is sought.
+#[derive(Debug)]
+pub(in crate::game) struct Sought {
+    /// By node, if it is not where the goal holds. Play does not end there, and all nodes are
+    /// expanded.
+    pub(in crate::game) targets: Option<Vec<Win>>,
+    pub(in crate::game) after_goal: AfterGoal,
+    /// Whether it matters what can be reached at all, through whatever has been won or lost.
+    pub(in crate::game) is_cooperative: bool,
+}
+
+impl<'g, 's, 'a> Solver<'g, 's, 'a> {
+    /// A solver that has looked at the initial node only.
+    pub fn new(graph: &'g mut Graph<'s, 'a>, seeker: Player, forced: Forced) -> Solver<'g, 's, 'a> {
+        let mut solver = Solver {
+            words: graph.symbolic.stepper.network().initial.clone(),
+            graph,
+            seeker,
+            forced,
+            sought: Sought {
+                targets: None,
+                after_goal: AfterGoal::Ends,
+                is_cooperative: false,
+            },
+            won: WinningSets::default(),
+            agenda: Agenda::default(),
+            exploration: Exploration::default(),
+            results: ResultCache::default(),
+            stops: Stops::default(),
+            aside_bytes: 0,
+            threads: 1,
+        };
+        solver.adopt_new_nodes();
+        solver
+    }
+
+    /// Sets how many threads compute what nodes win.
+    pub fn share_among(&mut self, threads: usize) {
+        self.threads = threads;
+    }
+
+    /// Solves the game.
+    ///
+    /// # Errors
+    /// The model fails in a state of it.
+    pub fn solve(&mut self, extent: Extent, watch: &mut dyn Watch) -> Result<Solution, Failure> {
+        self.begin(extent);
+        loop {
+            let turn = self.begin_turn();
+            let reason = if turn.is_computed {
+                self.propagate(watch)?
+            } else {
+                self.propagate_words(watch)
+            };
+            if let Some(reason) = reason {
+                return Ok(Solution::Stopped(reason));
+            }
+            if extent != Extent::Everything && self.is_won() {
+                break;
+            }
+            match self.next(turn, extent, watch)? {
+                Next::Expand(node) => self.expand(node)?,
+                Next::Compute => continue,
+                Next::Nothing => break,
+                Next::Stopped(reason) => return Ok(Solution::Stopped(reason)),
+            }
+            if let Some(reason) = self.look_if_due(watch) {
+                return Ok(Solution::Stopped(reason));
+            }
+        }
+        Ok(Solution::Won(self.winner(extent)))
+    }
+
+    fn begin(&mut self, extent: Extent) {
+        self.begin_looks();
+        self.stops.next_crowd = 1;
+        self.exploration.next_may_win = 1;
+        self.exploration.reserve.is_kept = extent == Extent::Verdict;
+    }
+
+    /// Begins a turn: what takes zones is computed if the graph has grown by a part of itself, or
+    /// if no node waits.
+    fn begin_turn(&mut self) -> Turn {
+        let explored = self.graph.explored;
+        let is_dry = self.exploration.waiting.len() == 0;
+        let is_computed = is_dry || explored >= self.agenda.next_computation;
+        if is_computed {
+            self.agenda.next_computation = if self.graph.symbolic.tuning().delayed_zones {
+                explored + explored / BETWEEN_COMPUTATIONS
+            } else {
+                explored
+            };
+        }
+        Turn {
+            is_dry,
+            is_computed,
+        }
+    }
+
+    /// Who wins, once nothing is left to do; the strategy of the evader keeps out of what was not
+    /// explored.
+    fn winner(&mut self, extent: Extent) -> Player {
+        if self.is_won() {
+            return self.seeker;
+        }
+        if extent == Extent::Verdict {
+            self.keep_out_of_unexpanded();
+        }
+        self.seeker.opponent()
+    }
+
+    /// Whether the seeker wins from the initial valuation.
+    pub fn is_won(&self) -> bool {
+        let values = self.graph.symbolic.stepper.network().initial_clocks.iter();
+        let values: Vec<i64> = values.map(|&value| i64::from(value)).collect();
+        self.won.contains(0, &values)
+    }
+}
