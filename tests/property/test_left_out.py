@@ -165,7 +165,7 @@ def starting(left_out: set[str]) -> dict[str, str]:
 def left_out_of(model: checker.Model) -> set[str]:
     """The doubles that the warnings say are left out."""
     warnings = [text for text in model.warnings if "W0213" in text]
-    return set(re.findall(r"the double '(\w+)' is abstracted away", "\n".join(warnings)))
+    return set(re.findall(r"the double '(\w+)' is ignored", "\n".join(warnings)))
 
 
 def answers(text: str) -> list[tuple[str, str, object, str | None, int]]:
