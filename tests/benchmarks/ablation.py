@@ -19,16 +19,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import statistics
-import subprocess
-import sys
-import tempfile
+from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import games
 import models
@@ -49,7 +47,7 @@ SLOWER = 10
 MOST_SECONDS = 10
 """Members that take longer with all heuristics are left out."""
 
-LEAST_SECONDS = 0.05
+LEAST_SECONDS = 0.15
 """Times below are not compared: they are mostly noise."""
 
 
@@ -175,8 +173,8 @@ def _searches() -> Iterator[Member]:
     yield of("samplers 3", models.samplers(3))
     yield of("beacons 6", models.beacons(6))
     yield of("couriers 4", models.couriers(4))
-    yield of("lamps 6", models.lamps(6))
-    yield of("relays 5", models.relays(5))
+    yield of("lamps 5", models.lamps(5))
+    yield of("relays 4", models.relays(4))
     yield of("sorters 2", models.sorters(2))
     yield of("fischer 7, deadlock", models.fischer(7), DEADLOCK)
     yield of("csmacd 7, deadlock", models.csmacd(7), DEADLOCK)
@@ -213,7 +211,7 @@ def _games() -> Iterator[Member]:
     yield family("trains", "control: A<> Train(0).Bridge", 8, "controllable")
     yield family("jobs", LEAST_TIME, 5)
     yield family("jobs", LEAST_TIME, 5, "controllable")
-    yield family("queue", bridge, 5)
+    yield family("queue", bridge, 4)
     yield family("standoff", "control: A[] not friend_fell[0]", 2)
     yield family("standoff", fell, 2)
     yield family("circuit", again, 3)
@@ -231,55 +229,74 @@ def _of_folder(folder: Path) -> Iterator[Member]:
         yield Member(path.stem, "search", path.read_text(encoding="utf-8"))
 
 
-def _answer(path: Path, without: str) -> None:
-    """Answers the question in a file in this process, and prints what it took."""
-    asked = json.loads(path.read_text(encoding="utf-8"))
-    name = "model.xml" if asked["text"].lstrip().startswith("<") else "model.xta"
-    model = checker.load(asked["text"], name)
+def _answered(member: Member, without: str, most_seconds: float) -> Measured:
+    """What the answer to a member's question takes in this process."""
+    name = "model.xml" if member.text.lstrip().startswith("<") else "model.xta"
+    model = checker.load(member.text, name)
     names = [without] if without else []
     start = resource.getrusage(resource.RUSAGE_SELF).ru_utime
-    most = SLOWER * asked["seconds"] if asked["seconds"] else MOST_SECONDS
-    most = int(start + most) + 2
+    most = int(start + most_seconds) + 2
     resource.setrlimit(resource.RLIMIT_CPU, (most, most))
-    answer = model.check(asked["query"], without=names, **asked["options"])
+    answer = model.check(member.query, without=names, **member.options)
     seconds = resource.getrusage(resource.RUSAGE_SELF).ru_utime - start
     value = f"{answer.value} {answer.plan_count}"
-    print(json.dumps([answer.verdict, value, answer.explored, answer.stored, seconds]))
+    return Measured(answer.verdict, value, answer.explored, answer.stored, seconds)
+
+
+Question: TypeAlias = tuple[Member, str]
+"""A member, and the heuristic that is switched off."""
 
 
 class Bench:
-    """Asks members in processes of their own."""
+    """Asks members, each in a process of its own."""
 
-    def __init__(self, folder: Path) -> None:
-        """Questions are written into the folder."""
-        self.folder = folder
+    def __init__(self, jobs: int) -> None:
+        """So many processes run side by side."""
+        self.jobs = jobs
         self.default: dict[str, Measured] = {}
 
-    def ask(self, member: Member, without: str = "", run: int = 0) -> Measured:
-        """The answer to a member's question without a heuristic."""
+    def _most_seconds(self, member: Member) -> float:
         default = self.default.get(member.name)
-        asked = {
-            "text": member.text,
-            "query": member.query,
-            "options": member.options,
-            "seconds": default.seconds if default else None,
-        }
-        path = self.folder / f"{abs(hash((member.name, without, run)))}.json"
-        path.write_text(json.dumps(asked), encoding="utf-8")
-        command = [sys.executable, __file__, "--answer", str(path), "--without", without]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        path.unlink()
-        if done.returncode > 0:
-            raise SystemExit(f"{member.name} without {without or 'nothing'}: {done.stderr}")
-        if done.returncode < 0:
-            return Measured(None, "", 0, 0, SLOWER * default.seconds if default else MOST_SECONDS)
-        return Measured(*json.loads(done.stdout))
+        return SLOWER * default.seconds if default else MOST_SECONDS
 
-    def median(self, member: Member, without: str, runs: int) -> Measured:
-        """The same, with the median of several times."""
-        all_runs = [self.ask(member, without, run) for run in range(runs)]
-        seconds = statistics.median(one.seconds for one in all_runs)
-        return replace(all_runs[0], seconds=seconds)
+    def _begin(self, question: Question) -> tuple[int, int]:
+        """Starts a process that answers: its number, and the end of a pipe from it."""
+        own, other = os.pipe()
+        child = os.fork()
+        if child:
+            os.close(other)
+            return child, own
+        try:
+            measured = _answered(*question, self._most_seconds(question[0]))
+            os.write(other, json.dumps(astuple(measured)).encode())
+            os._exit(0)
+        except BaseException as error:
+            os.write(2, f"{error}\n".encode())
+            os._exit(1)
+
+    def _end(self, question: Question, child: int, pipe: int) -> Measured:
+        with os.fdopen(pipe, "rb") as stream:
+            text = stream.read()
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        if status > 0:
+            raise SystemExit(f"{question[0].name} without {question[1] or 'nothing'} failed")
+        if status < 0:
+            return Measured(None, "", 0, 0, self._most_seconds(question[0]))
+        return Measured(*json.loads(text))
+
+    def ask(self, questions: list[Question]) -> list[Measured]:
+        """The answers to questions, in their order."""
+        running: deque[tuple[Question, int, int]] = deque()
+        answers: list[Measured] = []
+        for question in questions:
+            if len(running) == self.jobs:
+                answers.append(self._end(*running.popleft()))
+            running.append((question, *self._begin(question)))
+        return answers + [self._end(*one) for one in running]
+
+    def median_seconds(self, member: Member, without: str, runs: int) -> float:
+        """The median of several times."""
+        return statistics.median(one.seconds for one in self.ask([(member, without)] * runs))
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,19 +314,18 @@ class Row:
         return max(self.seconds, self.states)
 
 
-def _row(bench: Bench, member: Member, part: str, runs: int) -> Row:
+def _row(bench: Bench, question: Question, after: Measured, runs: int) -> Row:
     """Compares a member with and without a heuristic, again where the time decides."""
+    member, part = question
     before = bench.default[member.name]
-    after = bench.ask(member, part)
     if after.verdict is None:
         return Row(member, SLOWER, 1.0, True)
     states = max(after.explored / max(before.explored, 1), after.stored / max(before.stored, 1))
     is_same = (after.verdict, after.value) == (before.verdict, before.value)
     seconds = _ratio(after.seconds, before.seconds)
     if states < WORTH and seconds >= WORTH and runs > 1:
-        after = bench.median(member, part, runs)
-        before = bench.median(member, "", runs)
-        seconds = _ratio(after.seconds, before.seconds)
+        medians = (bench.median_seconds(member, one, runs) for one in (part, ""))
+        seconds = _ratio(*medians)
     return Row(member, seconds, states, is_same)
 
 
@@ -330,12 +346,12 @@ def _ablate(bench: Bench, name: str, members: list[Member], arguments: argparse.
     part = PARTS[name]
     wanted = [one for one in members if part.kinds in ("both", one.kind)]
     rows: list[Row] = []
-    with ThreadPoolExecutor(arguments.jobs) as pool:
-        for start in range(0, len(wanted), arguments.jobs):
-            some = wanted[start : start + arguments.jobs]
-            rows += pool.map(lambda one: _row(bench, one, name, arguments.runs), some)
-            if arguments.first and any(row.gain >= WORTH for row in rows):
-                break
+    for start in range(0, len(wanted), 2 * bench.jobs):
+        questions = [(one, name) for one in wanted[start : start + 2 * bench.jobs]]
+        pairs = zip(questions, bench.ask(questions), strict=True)
+        rows += [_row(bench, question, after, arguments.runs) for question, after in pairs]
+        if arguments.first and any(row.gain >= WORTH for row in rows):
+            break
     best = max(rows, key=lambda row: row.gain)
     is_worth = best.gain >= WORTH
     lines = _lines(part)
@@ -364,12 +380,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes side by side")
     parser.add_argument("--first", action="store_true", help="end at the first gain")
     parser.add_argument("--all", action="store_true", help="print members without a gain too")
-    parser.add_argument("--answer", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--without", default="", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    if arguments.answer:
-        _answer(arguments.answer, arguments.without)
-        return
     if unknown := set(PARTS) ^ set(checker.HEURISTICS):
         raise SystemExit(f"not in both tables: {', '.join(sorted(unknown))}")
     members = [*_searches(), *_games()]
@@ -377,21 +388,20 @@ def main() -> None:
         members += _of_folder(arguments.models)
     if arguments.member:
         members = [one for one in members if any(name in one.name for name in arguments.member)]
-    with tempfile.TemporaryDirectory() as folder:
-        bench = Bench(Path(folder))
-        print("With all heuristics:")
-        with ThreadPoolExecutor(arguments.jobs) as pool:
-            for member, measured in zip(members, pool.map(bench.ask, members), strict=True):
-                if measured.verdict is not None:
-                    bench.default[member.name] = measured
-                print(
-                    f"    {member.name:34} {measured.verdict!s:14} explored {measured.explored:8} "
-                    f"stored {measured.stored:8} s {measured.seconds:6.2f}",
-                    flush=True,
-                )
-        members = [one for one in members if one.name in bench.default]
-        names = arguments.part or list(PARTS)
-        same = [_ablate(bench, name, members, arguments) for name in names]
+    bench = Bench(arguments.jobs)
+    print("With all heuristics:")
+    answers = bench.ask([(member, "") for member in members])
+    for member, measured in zip(members, answers, strict=True):
+        if measured.verdict is not None:
+            bench.default[member.name] = measured
+        print(
+            f"    {member.name:34} {measured.verdict!s:14} explored {measured.explored:8} "
+            f"stored {measured.stored:8} s {measured.seconds:6.2f}",
+            flush=True,
+        )
+    members = [one for one in members if one.name in bench.default]
+    names = arguments.part or list(PARTS)
+    same = [_ablate(bench, name, members, arguments) for name in names]
     if not all(same):
         raise SystemExit("Answers depend on heuristics.")
 
