@@ -41,7 +41,6 @@ parts! {
     transition_cache: "Keep the moves of a location vector, by the answers of guards.";
     select_cache: "Keep the enabled instances of edges with select, by the words they read.";
     pairing: "Pair the kept instances of senders and receivers at once.";
-    listening: "Compute the channels of receiving instances once for each state.";
     broadcast_filter: "Leave out combinations of receivers that the zone does not allow.";
     broadcast_receivers: "Look for the receivers of a broadcast once for all its senders.";
     // Zones.

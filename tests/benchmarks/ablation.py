@@ -63,7 +63,6 @@ PARTS = {
     "transition_cache": Part("both", ("network/discrete/transition_cache.rs",)),
     "select_cache": Part("both", ("network/discrete/select_cache.rs",)),
     "pairing": Part("both", ("network/discrete/pairing.rs",)),
-    "listening": Part("both", ("network/discrete/listening.rs",)),
     "broadcast_filter": Part("both", ("network/discrete/broadcast_filter.rs",)),
     "broadcast_receivers": Part("both", ("network/discrete/broadcast_receivers.rs",)),
     "successor_cache": Part("search", ("network/symbolic/successor_cache.rs",)),
@@ -173,6 +172,7 @@ def _searches() -> Iterator[Member]:
     yield of("samplers 3", models.samplers(3))
     yield of("beacons 6", models.beacons(6))
     yield of("couriers 4", models.couriers(4))
+    yield of("switchboard 18", models.switchboard(18, 6), states=40_000)
     yield of("lamps 5", models.lamps(5))
     yield of("relays 4", models.relays(4))
     yield of("sorters 2", models.sorters(2))

@@ -487,3 +487,27 @@ process Sorter(const int[1, {count}] pid) {{
 }}
 system Sorter;
 """
+
+
+def switchboard(lines: int, callers: int) -> str:
+    """Callers who ring numbers of an operator, whose lines are plugged into other numbers."""
+    return f"""
+const int N = {lines};
+chan ring[N];
+int[0, N - 1] plugged[N];
+process Caller(const int[0, {callers} - 1] pid) {{
+    clock x;
+    int[0, N - 1] number;
+    state calm {{ x <= 5 }};
+    init calm;
+    trans calm -> calm {{ guard x >= 2; sync ring[number]!;
+        assign x = 0, number = (number + pid + 1) % N; }};
+}}
+process Operator() {{
+    state here;
+    init here;
+    trans here -> here {{ select line : int[0, N - 1]; sync ring[plugged[line]]?;
+        assign plugged[line] = (plugged[line] + line) % N; }};
+}}
+system Caller, Operator;
+"""

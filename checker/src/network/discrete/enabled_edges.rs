@@ -220,49 +220,34 @@ impl<'a> Stepper<'a> {
                 self.add_candidates(process, entry, set, Some(channel));
                 continue;
             }
-            if !self.hears(process, index, words)? {
-                self.enabled_instances(process, entry, words)?;
-                continue;
-            }
-            for place in self.listening[process as usize].listeners(index, channel) {
-                let select = self.listening[process as usize].instance(place);
-                self.enabled_instance(process, entry, select, words)?;
-            }
+            self.enabled_listeners(process, entry, channel, words)?;
         }
         Ok(())
     }
 
-    /// Makes sure that the channels of the instances of a receiving edge, the one with this index
-    /// in its location, are known; returns false if all have the same channel.
-    fn hears(
+    /// Adds every enabled instance of a receiving edge that listens to a channel to the candidates.
+    fn enabled_listeners(
         &mut self,
         process: u32,
-        index: usize,
+        entry: EdgeEntry<'a>,
+        channel: u32,
         words: &mut [i32],
-    ) -> Result<bool, RunTimeError> {
-        let receives = &self.tables[process as usize][words[process as usize] as usize].receives;
-        let entry = receives[index];
+    ) -> Result<(), RunTimeError> {
         let Some((sync, function)) = entry.edge.sync.and_then(|sync| Some((sync, sync.index?)))
         else {
-            return Ok(false);
+            return self.enabled_instances(process, entry, words);
         };
-        let listening = &mut self.listening[process as usize];
-        listening.turn_to(self.round, receives.len());
-        if self.tuning.listening && listening.knows(index) {
-            return Ok(true);
-        }
-        let mut channels = std::mem::take(&mut self.channels);
-        channels.clear();
         for select in 0..entry.instances {
             select_values(entry.edge, select, &mut self.arguments);
-            channels.push(match self.call(self.executor, function, words) {
+            let heard = match self.call(self.executor, function, words) {
                 Ok(offset) => sync.channel.0 + offset as u32,
                 Err(error) => self.unheard(entry, error, words)?,
-            });
+            };
+            if heard == channel {
+                self.enabled_instance(process, entry, select, words)?;
+            }
         }
-        self.listening[process as usize].learn(index, &channels);
-        self.channels = channels;
-        Ok(true)
+        Ok(())
     }
 
     /// What an instance of a receiving edge listens to whose channel cannot be computed: nothing if

@@ -6,7 +6,6 @@ pub(super) mod broadcast_filter;
 pub(super) mod broadcast_receivers;
 pub(super) mod edge_tables;
 pub(super) mod enabled_edges;
-pub(super) mod listening;
 pub(super) mod pairing;
 pub(super) mod select_cache;
 pub mod selects;

@@ -21,7 +21,6 @@ use super::broadcast_filter::{Scope, Sieve};
 use super::broadcast_receivers::Audience;
 use super::edge_tables::{LocationTable, receivers};
 use super::enabled_edges::Candidate;
-use super::listening::Listening;
 use super::pairing::{Pair, Partners, partners};
 use super::select_cache::Instances;
 use super::selects::select_values;
@@ -62,12 +61,8 @@ pub struct Stepper<'a> {
     pub(super) partners: Partners,
     /// The pairs of the sending edge at hand.
     pub(super) pairs: Vec<Pair<'a>>,
-    /// By process: the channels of its receiving instances in the state at hand, whose number is
-    /// `round`.
-    pub(super) listening: Vec<Listening>,
+    /// The number of the state at hand.
     pub(super) round: u64,
-    /// The channels of the instances of one edge.
-    pub(super) channels: Vec<u32>,
     /// The bytes of moves that whoever asks for more has at hand.
     pub(crate) moves_beside: usize,
     /// Moves that were put together before.
@@ -121,13 +116,7 @@ impl<'a> Stepper<'a> {
             sieve: Sieve::new(network.clocks.len().max(1)),
             audience: Audience::default(),
             heard: Vec::new(),
-            listening: network
-                .processes
-                .iter()
-                .map(|_| Listening::default())
-                .collect(),
             round: 0,
-            channels: Vec::new(),
             moves_beside: 0,
             offers: Offers::new(network.processes.len()),
             record: None,
