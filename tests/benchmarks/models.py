@@ -511,3 +511,32 @@ process Operator() {{
 }}
 system Caller, Operator;
 """
+
+
+def rumours(people: int) -> str:
+    """People who tell each other all that they know, on channels of pairs of what two know."""
+    return f"""
+const int N = {people};
+const int ALL = (1 << N) - 1;
+typedef int[0, ALL] known_t;
+chan tell[ALL + 1][ALL + 1];
+process Person(const int[0, N - 1] pid) {{
+    clock x;
+    known_t known = 1 << pid;
+    int[0, N + 1] lasts;
+    int[0, N + 1] length(known_t own, known_t other) {{
+        int[0, N + 1] count = 1;
+        for (i : int[0, N - 1]) count += ((own ^ other) >> i) & 1;
+        return count;
+    }}
+    state free, talking {{ x <= lasts }};
+    init free;
+    trans
+        free -> talking {{ select other : known_t; sync tell[known][other]!;
+            assign lasts = length(known, other), known = known | other, x = 0; }},
+        free -> talking {{ select other : known_t; sync tell[other][known]?;
+            assign lasts = length(known, other), known = known | other, x = 0; }},
+        talking -> free {{ guard x >= lasts; assign lasts = 0; }};
+}}
+system Person;
+"""
