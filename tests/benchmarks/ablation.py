@@ -9,8 +9,8 @@ what it gains at most; ``KEEP`` if that is at least 15 % of the time or of the s
 else ``GO``. A heuristic is asked about the members only that it can matter to: searches, games,
 or all.
 
-``--models`` adds ``E<> false`` for each model of a folder, up to 40,000 states. ``--first`` ends with a heuristic at the
-first member that shows that it is worth its lines. Seconds are user seconds of a process of its
+``--models`` adds ``E<> false`` for each model of a folder, up to 40,000 states. ``--first`` ends
+with a heuristic at the first member that shows that it is worth its lines. Seconds are user seconds of a process of its
 own; where they decide, the median of the runs counts. A verdict that depends on a heuristic is an
 error, and ends the program with 1.
 """
@@ -177,6 +177,7 @@ def _searches() -> Iterator[Member]:
     yield of("couriers 4", models.couriers(4))
     yield of("switchboard 18", models.switchboard(18, 6), states=40_000)
     yield of("rumours 5", models.rumours(5), states=20_000)
+    yield of("beacons 20", models.beacons(20), states=6_000)
     yield of("lamps 5", models.lamps(5))
     yield of("relays 4", models.relays(4))
     yield of("sorters 2", models.sorters(2))
