@@ -10,9 +10,9 @@ else ``GO``. A heuristic is asked about the members only that it can matter to: 
 or all.
 
 ``--models`` adds ``E<> false`` for each model of a folder, up to 40,000 states. ``--first`` ends
-with a heuristic at the first member that shows that it is worth its lines. Seconds are user seconds of a process of its
-own; where they decide, the median of the runs counts. A verdict that depends on a heuristic is an
-error, and ends the program with 1.
+with a heuristic at the first member that shows that it is worth its lines. Seconds are user seconds
+of a process of its own; where they decide, the median of the runs counts. A verdict that depends on
+a heuristic is an error, and ends the program with 1.
 """
 
 from __future__ import annotations
