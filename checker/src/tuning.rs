@@ -80,10 +80,8 @@ parts! {
     exact_first: "Try games that compare two clocks without abstraction first.";
     // Code.
     inlining: "Put the code of small functions where they are called.";
-    specialising: "Make functions to measure for constant arguments.";
     unrolling: "Write out loops of few rounds.";
     value_numbering: "Compute equal values once.";
-    dead_code: "Leave out code whose results nobody uses.";
     interpret_first: "Compile functions only once they have run for a while.";
 }
 

@@ -106,10 +106,8 @@ PARTS = {
     "full_backward": Part("game", ("game/backward/full_backward.rs",)),
     "exact_first": Part("game"),
     "inlining": Part("both", ("exec/optimise/inline.rs",)),
-    "specialising": Part("both"),
     "unrolling": Part("both", ("exec/optimise/unroll.rs",)),
     "value_numbering": Part("both", ("exec/optimise/numbering",)),
-    "dead_code": Part("both", ("exec/optimise/dead.rs",)),
     "interpret_first": Part("both", ("exec/jit/needs.rs",)),
 }
 

@@ -6,12 +6,10 @@
 //! are written out are no longer counted.
 //!
 //! A function is optimised after the functions that it calls: their code is taken in where they are
-//! small, or made to measure where they are called with constants ([`Optimiser::specialise`]); then
-//! values are numbered and loops of few rounds written out, innermost first.
+//! small; then values are numbered and loops of few rounds written out, innermost first.
 //!
 //! Cost: about a microsecond an instruction of the result.
 
-mod dead;
 mod graph;
 mod inline;
 mod numbering;
@@ -19,7 +17,7 @@ mod unroll;
 
 use std::collections::BTreeMap;
 
-use crate::ir::{Block, Function, FunctionId, Instruction, Register};
+use crate::ir::{Block, Function, FunctionId, Instruction};
 
 use super::rounds::count_rounds;
 use crate::tuning::Tuning;
@@ -28,39 +26,22 @@ use crate::tuning::Tuning;
 const MAX_SIZE_TO_INLINE: usize = 60;
 /// Inlining and writing out of loops stop at functions of this size.
 const MAX_SIZE: usize = 1500;
-/// Callees of at most this size are not made to measure, for they will be inlined.
-const MAX_SIZE_TO_LEAVE_GENERAL: usize = 12;
-/// A function is specialised for at most this number of different arguments.
-const MAX_VARIANTS: usize = 16;
 /// Larger functions are left as they are.
 const MAX_SIZE_TO_OPTIMISE: usize = 20_000;
 
-/// Optimises all functions of a program, which must not call each other thousands deep. Copies that
-/// were made to measure stand behind the functions that were given.
+/// Optimises all functions of a program, which must not call each other thousands deep.
 pub fn optimise(functions: &[Function], constants: &[i32]) -> Vec<Function> {
     let mut optimiser = Optimiser::default();
     optimiser.extend(functions, constants);
-    let known = functions.len() as u32;
-    let numbers: Vec<u32> = (0..known)
+    let numbers: Vec<u32> = (0..functions.len() as u32)
         .map(|index| optimiser.optimised(FunctionId(index)))
         .collect();
-    // Functions keep their numbers, and what else was made follows.
-    let mut position = vec![None; optimiser.made.len()];
+    // Functions keep their numbers.
+    let mut position = vec![0; functions.len()];
     for (index, &number) in numbers.iter().enumerate() {
-        position[number as usize] = Some(index as u32);
+        position[number as usize] = index as u32;
     }
-    let mut next = known;
-    for position in &mut position {
-        position.get_or_insert_with(|| {
-            next += 1;
-            next - 1
-        });
-    }
-    let mut ordered: Vec<(u32, Function)> = position
-        .iter()
-        .map(|position| position.expect("every function has a position"))
-        .zip(optimiser.made)
-        .collect();
+    let mut ordered: Vec<(u32, Function)> = position.iter().copied().zip(optimiser.made).collect();
     ordered.sort_by_key(|(position, _)| *position);
     let mut functions: Vec<Function> = ordered.into_iter().map(|(_, function)| function).collect();
     for block in functions
@@ -69,15 +50,12 @@ pub fn optimise(functions: &[Function], constants: &[i32]) -> Vec<Function> {
     {
         for instruction in &mut block.instructions {
             if let Instruction::Call { function, .. } = instruction {
-                function.0 = position[function.0 as usize].expect("every function has a position");
+                function.0 = position[function.0 as usize];
             }
         }
     }
     functions
 }
-
-/// The constant arguments of a call, in order; `None` is not constant.
-type Constants = Vec<Option<i32>>;
 
 /// Optimises functions on demand.
 #[derive(Debug, Default)]
@@ -87,8 +65,8 @@ pub(super) struct Optimiser {
     tuning: Tuning,
     /// The optimised functions; calls in them refer to each other.
     made: Vec<Function>,
-    /// The number of the optimised function, by function and constant arguments.
-    numbers: BTreeMap<(FunctionId, Constants), u32>,
+    /// By function: the number of the optimised one.
+    numbers: BTreeMap<FunctionId, u32>,
 }
 
 impl Optimiser {
@@ -124,52 +102,25 @@ impl Optimiser {
 
     /// The number of a function among those [made](Optimiser::made).
     pub(super) fn optimised(&mut self, function: FunctionId) -> u32 {
-        self.specialise(function, Vec::new())
-    }
-
-    /// Whether a function should be specialised. Without a limit, functions that hand on their
-    /// arguments to each other in several ways would multiply.
-    fn may_specialise(&self, function: FunctionId, arguments: &Constants) -> bool {
-        let general = (function, Constants::new());
-        let variants = self.numbers.range(general..).take(MAX_VARIANTS);
-        let variants = variants.take_while(|((other, _), _)| *other == function);
-        self.tuning.specialising
-            && arguments.iter().any(Option::is_some)
-            && size_of(&self.functions[function.0 as usize]) > MAX_SIZE_TO_LEAVE_GENERAL
-            && (self.numbers.contains_key(&(function, arguments.clone()))
-                || variants.count() < MAX_VARIANTS)
-    }
-
-    /// The number of a function made for constant arguments. It takes all arguments nevertheless.
-    fn specialise(&mut self, function: FunctionId, arguments: Constants) -> u32 {
-        let key = (function, arguments);
-        if let Some(&number) = self.numbers.get(&key) {
+        if let Some(&number) = self.numbers.get(&function) {
             return number;
         }
         let mut made = self.functions[function.0 as usize].clone();
-        for (index, value) in key.1.iter().enumerate() {
-            if let Some(value) = *value {
-                let target = Register(index as u32);
-                made.blocks[0]
-                    .instructions
-                    .insert(0, Instruction::Integer { target, value });
-            }
-        }
         self.improve(&mut made);
         count_rounds(&mut made);
         self.made.push(made);
         let number = self.made.len() as u32 - 1;
-        self.numbers.insert(key, number);
+        self.numbers.insert(function, number);
         number
     }
 
     fn improve(&mut self, function: &mut Function) {
         if size_of(function) > MAX_SIZE_TO_OPTIMISE {
-            self.specialise_calls(function);
+            self.optimise_calls(function);
             return;
         }
         self.tidy(function);
-        self.specialise_calls(function);
+        self.optimise_calls(function);
         let made = &self.made;
         let small = |FunctionId(number): FunctionId| {
             let callee = &made[number as usize];
@@ -184,8 +135,7 @@ impl Optimiser {
         }
     }
 
-    /// Numbers the values and removes what is dead; once more if branches fell away, for then
-    /// blocks can be joined.
+    /// Numbers the values; once more if branches fell away, for then blocks can be joined.
     fn tidy(&self, function: &mut Function) {
         graph::clean(function);
         if self.tuning.value_numbering && numbering::number_values(function, &self.constants) {
@@ -193,55 +143,18 @@ impl Optimiser {
             numbering::number_values(function, &self.constants);
         }
         graph::clean(function);
-        if self.tuning.dead_code {
-            dead::remove_dead_code(function);
-        }
     }
 
-    /// Lets calls refer to optimised functions, made for the arguments that are constants.
-    fn specialise_calls(&mut self, function: &mut Function) {
-        let integers = known_integers(function);
+    /// Lets calls refer to optimised functions.
+    fn optimise_calls(&mut self, function: &mut Function) {
         for block in &mut function.blocks {
             for instruction in &mut block.instructions {
-                if let Instruction::Call {
-                    function,
-                    arguments,
-                    ..
-                } = instruction
-                {
-                    let mut constants: Constants = arguments
-                        .iter()
-                        .map(|register| integers[register.0 as usize])
-                        .collect();
-                    if !self.may_specialise(*function, &constants) {
-                        constants.clear();
-                    }
-                    function.0 = self.specialise(*function, constants);
+                if let Instruction::Call { function, .. } = instruction {
+                    function.0 = self.optimised(*function);
                 }
             }
         }
     }
-}
-
-/// The registers that always hold the same integer.
-fn known_integers(function: &Function) -> Vec<Option<i32>> {
-    let mut writes = vec![0; function.registers.len()];
-    writes[..function.parameters as usize].fill(1);
-    let mut integers = vec![None; function.registers.len()];
-    for instruction in function.instructions() {
-        if let Some(Register(target)) = instruction.target() {
-            writes[target as usize] += 1;
-            if let Instruction::Integer { value, .. } = instruction {
-                integers[target as usize] = Some(*value);
-            }
-        }
-    }
-    for (integer, &writes) in integers.iter_mut().zip(&writes) {
-        if writes != 1 {
-            *integer = None;
-        }
-    }
-    integers
 }
 
 /// How large a function is: its instructions, terminators included.
