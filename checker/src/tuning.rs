@@ -75,7 +75,6 @@ parts! {
     relevance: "Expand only nodes of which some predecessor may still win more.";
     // Games: what is won.
     delayed_zones: "Compute with zones only when the graph has grown by a part of itself.";
-    result_cache: "Keep what nodes win, for nodes that are alike.";
     full_backward: "Explore the whole graph first where all of it is to be computed.";
     exact_first: "Try games that compare two clocks without abstraction first.";
     // Code.

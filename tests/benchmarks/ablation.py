@@ -102,7 +102,6 @@ PARTS = {
     "losing_timed": Part("game", ("game/backward/losing_timed.rs", "game/exploration/schedule.rs")),
     "relevance": Part("game"),
     "delayed_zones": Part("game"),
-    "result_cache": Part("game", ("game/backward/result_cache.rs", "game/backward/known_results.rs")),
     "full_backward": Part("game", ("game/backward/full_backward.rs",)),
     "exact_first": Part("game"),
     "inlining": Part("both", ("exec/optimise/inline.rs",)),

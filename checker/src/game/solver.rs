@@ -51,7 +51,6 @@ use crate::search::limits::Watch;
 
 use super::backward::agenda::Agenda;
 use super::backward::budget::Stops;
-use super::backward::result_cache::ResultCache;
 use super::backward::winning_sets::{Win, WinningSets};
 use super::exploration::{Exploration, Next, Turn};
 use super::forward::graph::Graph;
@@ -77,8 +76,6 @@ pub struct Solver<'g, 's, 'a> {
     pub(in crate::game) agenda: Agenda,
     /// What is explored when.
     pub(in crate::game) exploration: Exploration,
-    /// What was computed before.
-    pub(in crate::game) results: ResultCache,
     pub(in crate::game) stops: Stops,
     /// The bytes of what belongs to the game and is kept elsewhere meanwhile.
     pub(in crate::game) aside_bytes: u64,
@@ -115,7 +112,6 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             won: WinningSets::default(),
             agenda: Agenda::default(),
             exploration: Exploration::default(),
-            results: ResultCache::default(),
             stops: Stops::default(),
             aside_bytes: 0,
             threads: 1,

@@ -31,11 +31,7 @@ impl Solver<'_, '_, '_> {
 
     fn bytes(&self) -> u64 {
         let lists = self.agenda.bytes() + self.exploration.bytes();
-        self.graph.bytes()
-            + self.results.bytes()
-            + self.won.all_bytes()
-            + lists as u64
-            + self.aside_bytes
+        self.graph.bytes() + self.won.all_bytes() + lists as u64 + self.aside_bytes
     }
 
     /// The bytes of a zone.

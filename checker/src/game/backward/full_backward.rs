@@ -146,7 +146,7 @@ impl Solver<'_, '_, '_> {
                 match self.quick(node) {
                     Some(true) => self.gain_everything(node),
                     Some(false) => {}
-                    None => tasks.extend(self.task_of(node)?),
+                    None => tasks.push(self.task_of(node)?),
                 }
             }
             if let Some(reason) = self.compute(tasks, watch) {

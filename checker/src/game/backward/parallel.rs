@@ -38,12 +38,10 @@ const STACK_BYTES: usize = 8 << 20;
 pub(super) struct Task {
     pub(super) node: u32,
     pub(super) situation: Situation,
-    /// The key of the case that it is, if it is one: see [`super::result_cache`].
-    pub(super) key: Option<Box<[u32]>>,
 }
 
 impl Task {
-    /// The bytes that it takes beside the value itself, keys excepted.
+    /// The bytes that it takes beside the value itself.
     fn heap_bytes(&self) -> u64 {
         let Situation { stops, movers, .. } = &self.situation;
         let zones = stops.iter().map(|(_, stop)| stop.heap_bytes());
@@ -182,9 +180,6 @@ impl Solver<'_, '_, '_> {
         let mut done = done.unwrap_or_else(|Cut| cancellation::cut());
         done.sort_unstable_by_key(|one| one.index);
         for (task, one) in tasks.into_iter().zip(done) {
-            if let Some(key) = task.key {
-                self.remember_case(key, &one.gained, &one.defence);
-            }
             self.defend(task.node, &one.defence);
             self.gain_computed(task.node, one.gained);
         }

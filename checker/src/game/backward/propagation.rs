@@ -5,7 +5,6 @@ use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
 
 use super::parallel::Task;
-use super::result_cache::Case;
 use super::winning_sets::{Gained, Win};
 use crate::game::forward::node::Standing;
 use crate::game::solver::Solver;
@@ -34,7 +33,6 @@ impl Solver<'_, '_, '_> {
                 return Ok(Some(reason));
             }
             let tasks = self.next_tasks()?;
-            // Known cases that gained something have left updates.
             if tasks.is_empty() && self.agenda.is_empty() {
                 return Ok(None);
             }
@@ -52,36 +50,21 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Takes some deferred nodes whose winning valuations are to be computed; those of nodes that
-    /// are known cases are recorded.
+    /// Takes some deferred nodes whose winning valuations are to be computed.
     fn next_tasks(&mut self) -> Result<Vec<Task>, Failure> {
         let mut tasks = Vec::new();
         while tasks.len() < MOST_TASKS
             && let Some(node) = self.agenda.next_computed()
         {
-            tasks.extend(self.task_of(node)?);
+            tasks.push(self.task_of(node)?);
         }
         Ok(tasks)
     }
 
-    /// The task to compute what a node wins; if it is a known case, that is recorded, and there is
-    /// none.
-    pub(super) fn task_of(&mut self, node: u32) -> Result<Option<Task>, Failure> {
-        let key = match self.case_of(node)? {
-            Case::Known(gained, defence) => {
-                self.defend(node, &defence);
-                self.gain_computed(node, gained);
-                return Ok(None);
-            }
-            Case::New(key) => Some(key),
-            Case::None => None,
-        };
+    /// The task to compute what a node wins.
+    pub(super) fn task_of(&mut self, node: u32) -> Result<Task, Failure> {
         let situation = self.situation_for_win(node)?;
-        Ok(Some(Task {
-            node,
-            situation,
-            key,
-        }))
+        Ok(Task { node, situation })
     }
 
     /// Records what a node gains that was computed.

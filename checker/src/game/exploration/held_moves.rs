@@ -1,7 +1,5 @@
 //! The moves of the evader that are held back where time passes: see [`super::lazy_safety`].
 
-use crate::zones::federation::block_bytes;
-
 /// Whether the evader uses a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::game) enum Hold {
@@ -80,12 +78,5 @@ impl HeldMoves {
     /// Whether some node may be undefended.
     pub(in crate::game) fn is_undefended(&self) -> bool {
         !self.undefended.is_empty()
-    }
-}
-
-impl Defence {
-    /// The bytes that it takes beside the value itself.
-    pub(in crate::game) fn heap_bytes(&self) -> u64 {
-        block_bytes(size_of_val(&*self.moves)) as u64
     }
 }
