@@ -13,13 +13,10 @@ use crate::exec::EmittedConstraint;
 use crate::ir::Network;
 
 use super::broadcast_filter::{Demand, Scope};
-use super::enabled_edges::Candidate;
+use super::candidate::{Candidate, Choice, Group};
 use super::stepper::Stepper;
 use super::transition::{Label, Moves, Part};
 use crate::network::failure::Failure;
-
-/// The most moves of a state: receivers of a broadcast that have a choice each multiply.
-const MOST_MOVES: usize = 1 << 20;
 
 /// After so many moves it is asked whether there may be more.
 const MANY_MOVES: usize = 1 << 12;
@@ -33,74 +30,6 @@ const MOST_RANKS: u64 = 1 << 62;
 /// As many combinations are put together without looking whether the zone allows them: this is seen
 /// later.
 const FEW_COMBINATIONS: u64 = 2;
-
-/// A receiving process of a broadcast: its candidates, and what it does in the combination at hand.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Group {
-    first: usize,
-    last: usize,
-    /// One past the last pick.
-    end: usize,
-    /// A candidate, or `last` for abstaining.
-    pick: usize,
-    /// How many moves the choices before it stand for, by the branches of their edges.
-    before: u64,
-    /// How many moves the groups after it stand for.
-    after: u64,
-    /// How many ways there are to choose: candidates by the branches of their edges.
-    ways: u64,
-}
-
-/// What a process does in a move that is being put together.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Choice {
-    /// It takes part by this candidate.
-    Takes(u32),
-    /// It abstains: none of these clock-guarded candidates holds.
-    Abstains(u32, u32),
-}
-
-impl Group {
-    /// The place of its first candidate.
-    pub(super) fn first(&self) -> usize {
-        self.first
-    }
-
-    /// How many choices there are.
-    pub(super) fn picks(&self) -> u64 {
-        (self.end - self.first) as u64
-    }
-
-    /// How many moves its choices stand for.
-    pub(super) fn ways(&self) -> u64 {
-        self.ways
-    }
-
-    /// The same of candidates that begin at another place.
-    pub(super) fn starting_at(&self, first: usize) -> Group {
-        Group {
-            first,
-            last: first + (self.last - self.first),
-            end: first + (self.end - self.first),
-            pick: first,
-            ..*self
-        }
-    }
-
-    /// Puts it before groups that stand for so many moves; returns for how many they stand with it.
-    pub(super) fn put_before(&mut self, after: u64) -> u64 {
-        self.after = after;
-        after.saturating_mul(self.ways)
-    }
-
-    fn choice(&self) -> Choice {
-        if self.pick < self.last {
-            Choice::Takes(self.pick as u32)
-        } else {
-            Choice::Abstains(self.first as u32, self.last as u32)
-        }
-    }
-}
 
 impl Stepper<'_> {
     /// Joins the candidate 0 with one enabled receiving edge of every process that has one.
@@ -240,7 +169,7 @@ impl Stepper<'_> {
                 group.pick = group.first;
             } else if !needs_committed || self.has_committed_choice(words) {
                 self.emit(is_possible, out);
-                check_count(out)?;
+                out.check_count()?;
                 cancellation::work(UNITS_FOR_MOVE);
                 if out.len().is_multiple_of(MANY_MOVES) {
                     // The lists are about to grow to more than this, and may double while the old
@@ -354,13 +283,6 @@ impl Stepper<'_> {
         let (first, last) = self.candidates[candidate as usize].constraints;
         &self.constraints[first as usize..last as usize]
     }
-}
-
-pub(super) fn check_count(moves: &Moves) -> Result<(), Failure> {
-    if moves.len() > MOST_MOVES {
-        return Err(Failure::Moves(MOST_MOVES));
-    }
-    Ok(())
 }
 
 /// Goes to the next combination of branches, the last part fastest; false after the last one.

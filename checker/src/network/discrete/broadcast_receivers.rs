@@ -7,35 +7,11 @@
 //! Invariant: guards are evaluated only of processes that may hear somebody, in the order of the
 //! receivers: one that is the only sender is not asked what it hears, since its guard could fail.
 
-use crate::exec::EmittedConstraint;
-
-use super::broadcast::{Choice, Group};
 use super::broadcast_filter::Scope;
-use super::enabled_edges::Candidate;
+use super::candidate::{Candidate, Choice, Group};
 use super::stepper::Stepper;
 use super::transition::Moves;
 use crate::network::failure::Failure;
-
-/// The receivers of the channel that was sent on last.
-#[derive(Debug, Default)]
-pub(super) struct Audience {
-    /// The state, by the stepper's count, and the channel; none if there is no round 0.
-    round: u64,
-    channel: u32,
-    /// The candidates, of which the first is a sender's, with their constraints.
-    candidates: Vec<Candidate>,
-    constraints: Vec<EmittedConstraint>,
-    /// By receiver, in their order.
-    groups: Vec<Group>,
-    /// The sender that was not asked what it hears.
-    left_out: Option<u32>,
-}
-
-impl Audience {
-    fn process_of(&self, group: &Group) -> u32 {
-        self.candidates[group.first()].process
-    }
-}
 
 impl Stepper<'_> {
     /// As [`Stepper::broadcast`] does first, if the receivers were not looked for in this state.

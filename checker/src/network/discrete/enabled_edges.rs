@@ -8,12 +8,12 @@ use crate::cancellation;
 use crate::exec::{Context, EmittedConstraint, Executor, RunTimeError};
 use crate::ir::{ChannelId, FunctionId, Guard, RunTimeErrorKind};
 
-use super::broadcast::{Choice, check_count};
 use super::broadcast_filter::Scope;
+use super::candidate::{Candidate, Choice};
 use super::edge_tables::EdgeEntry;
 use super::selects::select_values;
 use super::stepper::Stepper;
-use super::transition::{Moves, Part};
+use super::transition::Moves;
 use crate::network::failure::Failure;
 
 /// The number of no channel.
@@ -24,28 +24,6 @@ const NO_CHANNEL: u32 = u32::MAX;
 const UNITS_FOR_PROCESS: usize = 8;
 const UNITS_FOR_RECEIVER: usize = 16;
 const UNITS_FOR_MOVE: usize = 256;
-
-/// One enabled edge instance: a process, an edge, its select values and its clock constraints.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
-    pub(super) process: u32,
-    pub(super) edge: u32,
-    pub(super) select: u32,
-    pub(super) is_controllable: bool,
-    pub(super) constraints: (u32, u32),
-}
-
-impl Candidate {
-    /// Its share in a move, by its first branch.
-    pub(super) fn part(&self) -> Part {
-        Part {
-            process: self.process,
-            edge: self.edge,
-            branch: 0,
-            select: self.select,
-        }
-    }
-}
 
 impl<'a> Stepper<'a> {
     /// As [`Stepper::moves`], without remembering, and without combinations that the scope leaves
@@ -75,7 +53,7 @@ impl<'a> Stepper<'a> {
                 let entry = self.tables[process][location].sends[index];
                 self.synchronisations(process as u32, entry, committed && !own, words, scope, out)?;
             }
-            check_count(out)?;
+            out.check_count()?;
         }
         cancellation::work(UNITS_FOR_PROCESS * self.tables.len() + UNITS_FOR_MOVE * out.len());
         Ok(())

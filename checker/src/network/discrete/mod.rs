@@ -4,9 +4,11 @@
 pub(super) mod broadcast;
 pub(super) mod broadcast_filter;
 pub(super) mod broadcast_receivers;
+pub(super) mod candidate;
 pub(super) mod edge_tables;
 pub(super) mod enabled_edges;
 pub(super) mod pairing;
+pub(super) mod partners;
 pub(super) mod select_cache;
 pub mod selects;
 pub mod stepper;

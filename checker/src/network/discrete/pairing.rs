@@ -1,15 +1,11 @@
 //! Enabled instances and synchronisations from remembered sets; see [`super::select_cache`].
 
-use std::sync::Arc;
+use crate::ir::ChannelId;
 
-use rustc_hash::FxHashMap;
-
-use crate::ir::{ChannelId, Network};
-
-use super::broadcast::Choice;
 use super::broadcast_filter::Scope;
+use super::candidate::{Candidate, Choice};
 use super::edge_tables::EdgeEntry;
-use super::enabled_edges::Candidate;
+use super::partners::Pair;
 use super::select_cache::{Instance, Known, Set, SetId};
 use super::selects::select_values;
 use super::stepper::Stepper;
@@ -20,47 +16,6 @@ use crate::network::failure::Failure;
 /// receive on one of its channels if these are not more than so many for each instance, else by
 /// channel.
 const MOST_PARTNERS: usize = 4;
-
-/// A pair that synchronises.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pair<'a> {
-    /// The place of the sender's instance in its set.
-    own: u32,
-    receiver: u32,
-    receive: EdgeEntry<'a>,
-    set: SetId,
-    /// The place of the receiver's instance.
-    other: u32,
-}
-
-/// The processes that may receive on one of the channels of an array, for arrays on which edges
-/// send that have several instances.
-pub(super) type Partners = FxHashMap<(ChannelId, u32), Arc<[u32]>>;
-
-/// Finds the partners by the receivers of each channel.
-pub(super) fn partners(network: &Network, receivers: &[Vec<u32>]) -> Partners {
-    let mut partners = Partners::default();
-    let edges = network.processes.iter().flat_map(|process| &process.edges);
-    for edge in edges {
-        let Some(sync) = edge
-            .sync
-            .filter(|sync| sync.send && !edge.select.is_empty())
-        else {
-            continue;
-        };
-        partners
-            .entry((sync.channel, sync.count))
-            .or_insert_with(|| {
-                let first = sync.channel.0 as usize;
-                let of_channels = &receivers[first..first + sync.count as usize];
-                let mut all: Vec<u32> = of_channels.iter().flatten().copied().collect();
-                all.sort_unstable();
-                all.dedup();
-                all.into()
-            });
-    }
-    partners
-}
 
 impl<'a> Stepper<'a> {
     /// The enabled instances of an edge in the state at hand; `None` if they are not remembered.

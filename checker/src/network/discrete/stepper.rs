@@ -16,12 +16,10 @@ use crate::cancellation;
 use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
 use crate::ir::{ChannelId, Edge, FunctionId, Network, RunTimeErrorKind, Update, Urgency};
 
-use super::broadcast::{Choice, Group};
 use super::broadcast_filter::{Scope, Sieve};
-use super::broadcast_receivers::Audience;
+use super::candidate::{Audience, Candidate, Choice, Group};
 use super::edge_tables::{LocationTable, receivers};
-use super::enabled_edges::Candidate;
-use super::pairing::{Pair, Partners, partners};
+use super::partners::{Pair, Partners, partners};
 use super::select_cache::Instances;
 use super::selects::select_values;
 use super::transition::{MoveRef, Moves, OfferId, Part};

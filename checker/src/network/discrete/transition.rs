@@ -3,7 +3,11 @@
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ChannelId;
+use crate::network::failure::Failure;
 use crate::zones::federation::block_bytes;
+
+/// The most moves of a state: receivers of a broadcast that have a choice each multiply.
+const MOST_MOVES: usize = 1 << 20;
 
 /// The index of remembered moves. Each belongs to one location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -146,6 +150,14 @@ impl Moves {
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.headers.is_empty()
+    }
+
+    /// Fails if there are too many.
+    pub(super) fn check_count(&self) -> Result<(), Failure> {
+        if self.len() > MOST_MOVES {
+            return Err(Failure::Moves(MOST_MOVES));
+        }
+        Ok(())
     }
 
     /// The move with this index.

@@ -1,0 +1,119 @@
+//! What moves are put together from: enabled edge instances, the receivers of a broadcast, and who
+//! takes part.
+
+use crate::exec::EmittedConstraint;
+
+use super::transition::Part;
+
+/// One enabled edge instance: a process, an edge, its select values and its clock constraints.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    pub(super) process: u32,
+    pub(super) edge: u32,
+    pub(super) select: u32,
+    pub(super) is_controllable: bool,
+    pub(super) constraints: (u32, u32),
+}
+
+impl Candidate {
+    /// Its share in a move, by its first branch.
+    pub(super) fn part(&self) -> Part {
+        Part {
+            process: self.process,
+            edge: self.edge,
+            branch: 0,
+            select: self.select,
+        }
+    }
+}
+
+/// A receiving process of a broadcast: its candidates, and what it does in the combination at hand.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Group {
+    pub(super) first: usize,
+    pub(super) last: usize,
+    /// One past the last pick.
+    pub(super) end: usize,
+    /// A candidate, or `last` for abstaining.
+    pub(super) pick: usize,
+    /// How many moves the choices before it stand for, by the branches of their edges.
+    pub(super) before: u64,
+    /// How many moves the groups after it stand for.
+    pub(super) after: u64,
+    /// How many ways there are to choose: candidates by the branches of their edges.
+    pub(super) ways: u64,
+}
+
+/// What a process does in a move that is being put together.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Choice {
+    /// It takes part by this candidate.
+    Takes(u32),
+    /// It abstains: none of these clock-guarded candidates holds.
+    Abstains(u32, u32),
+}
+
+impl Group {
+    /// The place of its first candidate.
+    pub(super) fn first(&self) -> usize {
+        self.first
+    }
+
+    /// How many choices there are.
+    pub(super) fn picks(&self) -> u64 {
+        (self.end - self.first) as u64
+    }
+
+    /// How many moves its choices stand for.
+    pub(super) fn ways(&self) -> u64 {
+        self.ways
+    }
+
+    /// The same of candidates that begin at another place.
+    pub(super) fn starting_at(&self, first: usize) -> Group {
+        Group {
+            first,
+            last: first + (self.last - self.first),
+            end: first + (self.end - self.first),
+            pick: first,
+            ..*self
+        }
+    }
+
+    /// Puts it before groups that stand for so many moves; returns for how many they stand with it.
+    pub(super) fn put_before(&mut self, after: u64) -> u64 {
+        self.after = after;
+        after.saturating_mul(self.ways)
+    }
+
+    /// What it does in the combination at hand.
+    pub(super) fn choice(&self) -> Choice {
+        if self.pick < self.last {
+            Choice::Takes(self.pick as u32)
+        } else {
+            Choice::Abstains(self.first as u32, self.last as u32)
+        }
+    }
+}
+
+/// The receivers of the channel that was sent on last.
+#[derive(Debug, Default)]
+pub(super) struct Audience {
+    /// The state, by the stepper's count, and the channel; none if there is no round 0.
+    pub(super) round: u64,
+    pub(super) channel: u32,
+    /// The candidates, of which the first is a sender's, with their constraints.
+    pub(super) candidates: Vec<Candidate>,
+    pub(super) constraints: Vec<EmittedConstraint>,
+    /// By receiver, in their order.
+    pub(super) groups: Vec<Group>,
+    /// The sender that was not asked what it hears.
+    pub(super) left_out: Option<u32>,
+}
+
+impl Audience {
+    /// The process of a group.
+    pub(super) fn process_of(&self, group: &Group) -> u32 {
+        self.candidates[group.first()].process
+    }
+}
