@@ -63,7 +63,7 @@ def test_no_page_is_left_over() -> None:
 def test_a_page_is_found_by_code_and_name(capsys: pytest.CaptureFixture[str], name: str) -> None:
     assert main(["explain", name]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("error[E0201]: name-unknown\n\nA name is used that nothing declares")
+    assert out.startswith("error[E0201]: name-unknown\n\nThis name is not declared at this place")
     assert "\nWrong:\n\n    int length;\n" in out
     assert "\nRight:\n\n    const int length = 3;\n" in out
     assert "```" not in out
