@@ -2,17 +2,16 @@
 
     python tests/benchmarks/ablation.py [--part NAME] [--member NAME] [--models FOLDER] [--runs 3]
 
-Every member of the benchmark set is asked with all heuristics, and then with each of them switched
-off (``ntagen check --without NAME``). Printed is, for each heuristic, a line for each member: the
-processor time and the explored states without it, as multiples of those with it. Below it stands
-what it gains at most; ``KEEP`` if that is at least 15 % of the time or of the states of one member,
-else ``GO``. A heuristic is asked about the members only that it can matter to: searches, games,
-or all.
+Every member of the benchmark set is asked with all heuristics and with each of them switched off
+(``ntagen check --without NAME``). Printed is, for each heuristic, what it gains at most, with
+``KEEP`` if that is at least 15 % of the time or of the states of one member, else ``GO``; below it
+stand the members for which the time or the states differ. A heuristic is asked about the members
+only that it can matter to: searches, games, or all.
 
 ``--models`` adds ``E<> false`` for each model of a folder, up to 40,000 states. ``--first`` ends
-with a heuristic at the first member that shows that it is worth its lines. Seconds are user seconds
-of a process of its own; where they decide, the median of the runs counts. A verdict that depends on
-a heuristic is an error, and ends the program with 1.
+with a heuristic at the first member that shows that it is worth its lines. Each answer has a
+process of its own. Times are processor times with and without the heuristic in turn; the least of
+the runs counts. A verdict that depends on a heuristic is an error, and ends the program with 1.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ import argparse
 import json
 import os
 import resource
-import statistics
+import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, field, replace
@@ -50,8 +49,11 @@ MOST_STATES = 40_000
 MOST_SECONDS = 10
 """Members that take longer with all heuristics are left out."""
 
-LEAST_SECONDS = 0.15
+LEAST_SECONDS = 0.02
 """Times below are not compared: they are mostly noise."""
+
+UNCERTAIN = 0.05
+"""Times that differ by more than this part of them are measured again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +187,7 @@ def _searches() -> Iterator[Member]:
     yield of("fischer 7, deadlock", models.fischer(7), DEADLOCK)
     yield of("csmacd 7, deadlock", models.csmacd(7), DEADLOCK)
     yield of("train gate 4, deadlock", models.train_gate(4), DEADLOCK)
+    yield of("peterson 4, deadlock", models.peterson(4), DEADLOCK)
     yield of("dining 5, deadlock", models.dining_philosophers(5), DEADLOCK)
     yield of("fischer 6, liveness", models.fischer(6), "P(1).request --> P(1).waiting")
     yield of("train gate 4, liveness", models.train_gate(4), "Train(1).approaching --> Gate.free")
@@ -241,11 +244,11 @@ def _answered(member: Member, without: str, most_seconds: float) -> Measured:
     name = "model.xml" if member.text.lstrip().startswith("<") else "model.xta"
     model = checker.load(member.text, name)
     names = [without] if without else []
-    start = resource.getrusage(resource.RUSAGE_SELF).ru_utime
+    start = time.process_time()
     most = int(start + most_seconds) + 2
     resource.setrlimit(resource.RLIMIT_CPU, (most, most))
     answer = model.check(member.query, without=names, **member.options)
-    seconds = resource.getrusage(resource.RUSAGE_SELF).ru_utime - start
+    seconds = time.process_time() - start
     value = f"{answer.value} {answer.plan_count}"
     return Measured(answer.verdict, value, answer.explored, answer.stored, seconds)
 
@@ -301,10 +304,6 @@ class Bench:
             running.append((question, *self._begin(question)))
         return answers + [self._end(*one) for one in running]
 
-    def median_seconds(self, member: Member, without: str, runs: int) -> float:
-        """The median of several times."""
-        return statistics.median(one.seconds for one in self.ask([(member, without)] * runs))
-
 
 @dataclass(frozen=True, slots=True)
 class Row:
@@ -321,24 +320,28 @@ class Row:
         return max(self.seconds, self.states)
 
 
-def _row(bench: Bench, question: Question, after: Measured, runs: int) -> Row:
-    """Compares a member with and without a heuristic, again where the time decides."""
-    member, part = question
-    before = bench.default[member.name]
+def _row(bench: Bench, member: Member, part: str, runs: int) -> Row:
+    """Compares a member with and without a heuristic, in turn; again if the times may differ."""
+    before, after = bench.ask([(member, ""), (member, part)])
     if after.verdict is None:
         return Row(member, SLOWER, 1.0, True)
     states = max(after.explored / max(before.explored, 1), after.stored / max(before.stored, 1))
     is_known = "unknown" not in (before.verdict, after.verdict)
     is_same = not is_known or (after.verdict, after.value) == (before.verdict, before.value)
-    seconds = _ratio(after.seconds, before.seconds)
-    if states < WORTH and seconds >= WORTH and runs > 1:
-        medians = (bench.median_seconds(member, one, runs) for one in (part, ""))
-        seconds = _ratio(*medians)
-    return Row(member, seconds, states, is_same)
+    times = [(before.seconds, after.seconds)]
+    if abs(_ratio(after.seconds, before.seconds) - 1.0) > UNCERTAIN:
+        answers = bench.ask([(member, ""), (member, part)] * (runs - 1))
+        times += [
+            (one.seconds, other.seconds)
+            for one, other in zip(answers[::2], answers[1::2], strict=True)
+        ]
+    # What else the machine does can only add to a time.
+    least_before, least_after = (min(column) for column in zip(*times, strict=True))
+    return Row(member, _ratio(least_after, least_before), states, is_same)
 
 
 def _ratio(after: float, before: float) -> float:
-    return 1.0 if max(after, before) < LEAST_SECONDS else after / max(before, 0.01)
+    return 1.0 if max(after, before) < LEAST_SECONDS else after / max(before, 0.001)
 
 
 def _lines(part: Part) -> int:
@@ -354,11 +357,9 @@ def _ablate(bench: Bench, name: str, members: list[Member], arguments: argparse.
     part = PARTS[name]
     wanted = [one for one in members if part.kinds in ("both", one.kind)]
     rows: list[Row] = []
-    for start in range(0, len(wanted), 2 * bench.jobs):
-        questions = [(one, name) for one in wanted[start : start + 2 * bench.jobs]]
-        pairs = zip(questions, bench.ask(questions), strict=True)
-        rows += [_row(bench, question, after, arguments.runs) for question, after in pairs]
-        if arguments.first and any(row.gain >= WORTH for row in rows):
+    for member in wanted:
+        rows.append(_row(bench, member, name, arguments.runs))
+        if arguments.first and rows[-1].gain >= WORTH:
             break
     best = max(rows, key=lambda row: row.gain)
     is_worth = best.gain >= WORTH
@@ -384,7 +385,7 @@ def main() -> None:
     parser.add_argument("--part", action="append", choices=sorted(PARTS), help="default all")
     parser.add_argument("--member", action="append", help="members by a part of their names")
     parser.add_argument("--models", type=Path, help="a folder with further models")
-    parser.add_argument("--runs", type=int, default=3, help="the median is of so many runs")
+    parser.add_argument("--runs", type=int, default=3, help="at most so many of each")
     parser.add_argument("--jobs", type=int, default=1, help="processes side by side")
     parser.add_argument("--first", action="store_true", help="end at the first gain")
     parser.add_argument("--all", action="store_true", help="print members without a gain too")
