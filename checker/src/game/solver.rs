@@ -11,8 +11,8 @@
 //!
 //! ```text
 //! good   = goal ∪ ⋃ Pre_c(win)                     what a controllable move reaches
-//! bad    = ⋃ Pre_u(not win) ∪ broken, less goal    what the environment can spoil
-//! forced = stop ∩ ⋃ enabled_u, less bad and less where the controller could move (see Forced)
+//! bad    = ⋃ Pre_u(not win) ∪ broken, without goal what the environment can spoil
+//! forced = stop ∩ ⋃ enabled_u, without bad and without where Forced lets it decline
 //! win    = Pred_t(good ∪ forced, bad)              wait into good without meeting bad
 //! ```
 //!
@@ -20,11 +20,15 @@
 //! environment need not:
 //!
 //! ```text
-//! now    = broken ∪ ⋃ Pre_u(win), less goal        what the environment has at once, in any case
-//! escape = ⋃ Pre_c(not win), less now              where the controller gets away, on any leg
-//! held   = stop ∩ ⋃ enabled_c, less escape and less where the environment must move (see Forced)
-//! win    = Pred_t(now ∪ held, escape ∪ goal)
+//! now    = broken ∪ ⋃ Pre_u(win), without goal     what the environment has at once
+//! escape = ⋃ Pre_c(not win), without now           where the controller gets away
+//! stuck  = stop ∩ ⋃ enabled_c, without escape and without where the environment must move
+//! win    = Pred_t(now ∪ stuck, escape ∪ goal)
 //! ```
+//!
+//! There `stop` are the valuations in which time cannot pass, `enabled_u` and `enabled_c` those in
+//! which a move of the environment or of the controller is possible, and [`Forced`] is the rule that
+//! says when the environment must move.
 //!
 //! A move of the evader into a node that is not explored counts as an escape, so every intermediate
 //! result is sound, and the search ends as soon as the initial valuation is won. Each gain is
@@ -32,15 +36,14 @@
 //! ones makes progress. Where the seeker wins nowhere any more, the evader has only to stay outside
 //! of what is won.
 //!
-//! Forward, the solver dives, and for a verdict explores only as many moves of the evader as it
-//! needs ([`super::exploration`]). From time to time it is looked whether the seeker may still win
-//! at all ([`super::backward::losing_untimed`], and with zones [`super::backward::losing_timed`]),
-//! so that both answers can come early.
+//! Forward, the solver follows random moves as deep as they go, and for a verdict explores only as
+//! many moves of the evader as it needs ([`super::exploration`]). Now and then it computes whether
+//! the seeker can still win at all ([`super::backward::losing_untimed`], and with zones
+//! [`super::backward::losing_timed`]), so that both answers can come early.
 //!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not
-//! decide who wins, all are. What takes zones is put off until the graph has grown by a part of
-//! itself, and goes round in turns: so a node meets what several of its successors have gained at
-//! once.
+//! decide who wins, all are. What takes zones waits until the graph has grown by a quarter, so that a
+//! node sees the gains of several successors at once.
 //!
 //! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms
 //! for the Analysis of Timed Games", CONCUR 2005; the forced moves are those of G. Behrmann et al.,
