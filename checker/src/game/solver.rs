@@ -27,8 +27,8 @@
 //! ```
 //!
 //! There `stop` are the valuations in which time cannot pass, `enabled_u` and `enabled_c` those in
-//! which a move of the environment or of the controller is possible, and [`Forced`] is the rule that
-//! says when the environment must move.
+//! which a move of the environment or of the controller is possible, and [`Forced`] is the rule
+//! that says when the environment must move.
 //!
 //! A move of the evader into a node that is not explored counts as an escape, so every intermediate
 //! result is sound, and the search ends as soon as the initial valuation is won. Each gain is
@@ -42,8 +42,8 @@
 //! [`super::backward::losing_timed`]), so that both answers can come early.
 //!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not
-//! decide who wins, all are. What takes zones waits until the graph has grown by a quarter, so that a
-//! node sees the gains of several successors at once.
+//! decide who wins, all are. What takes zones waits until the graph has grown by a quarter, so that
+//! a node sees the gains of several successors at once.
 //!
 //! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms
 //! for the Analysis of Timed Games", CONCUR 2005; the forced moves are those of G. Behrmann et al.,
