@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use rustc_hash::FxHashMap;
 
 use super::codes;
-use super::left_out::{LeftOut, declared_at};
+use super::left_out::causes::{LeftOut, declared_at};
 use super::lower::{Builder, Images};
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Local, LocalId, Place, Root};

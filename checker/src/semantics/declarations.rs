@@ -3,7 +3,7 @@
 use super::checker::Checker;
 use super::codes;
 use super::initialisers::InitialPart;
-use super::left_out::declared_at;
+use super::left_out::causes::declared_at;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{self, SIZE_LIMIT, Size, Type};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::checker::Checker;
 use super::codes;
-use super::left_out::declared_at;
+use super::left_out::causes::declared_at;
 use super::scalars::is_order_irrelevant;
 use super::scope::{Entity, Scope};
 use super::typed::{

@@ -17,9 +17,9 @@
 //! * Variables are left out as a whole, in all processes, and only if they hold nothing but
 //!   doubles, or clocks.
 
-mod causes;
+pub(super) mod causes;
 
-pub(super) use causes::{Causes, LeftOut, MOST_ROUNDS, declared_at};
+pub(super) use causes::{Causes, LeftOut, MOST_ROUNDS};
 
 use super::checker::Checker;
 use super::codes;
