@@ -37,6 +37,8 @@ thread_local! {
     static LOOK: RefCell<Option<Look>> = const { RefCell::new(None) };
     /// Units of work that were done.
     static DONE: Cell<u64> = const { Cell::new(0) };
+    /// Bytes of the operations that run: see [`hold`].
+    static HELD: Cell<u64> = const { Cell::new(0) };
 }
 
 /// Counts units of work, and looks when they have become many.
@@ -59,10 +61,28 @@ pub fn done() -> u64 {
     DONE.with(Cell::get)
 }
 
-/// Looks before this number of bytes is allocated beside what the account says.
+/// Looks before this number of bytes is allocated beside what the account says and what is held.
 #[cold]
 pub fn ask_for(bytes: usize) {
-    look_and_unwind(bytes as u64);
+    look_and_unwind(bytes as u64 + HELD.get());
+}
+
+/// Bytes that an operation holds until the value is dropped.
+#[must_use]
+#[derive(Debug)]
+pub struct Held(u64);
+
+/// Tells that an operation of this thread holds these bytes while others are allocated: no account
+/// counts the values that an operation computes on the way to its result.
+pub fn hold(bytes: usize) -> Held {
+    HELD.set(HELD.get() + bytes as u64);
+    Held(bytes as u64)
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        HELD.set(HELD.get() - self.0);
+    }
 }
 
 /// Looks whether to end, for code that cannot unwind.
@@ -191,6 +211,22 @@ mod tests {
             ask_for(1001);
         });
         assert_eq!(result, Err(Cut));
+    }
+
+    #[test]
+    fn what_is_held_counts_until_it_is_dropped() {
+        let look: Look = Arc::new(|bytes| bytes > 1000);
+        let result = within(look, || {
+            let held = hold(600);
+            ask_for(400);
+            drop(held);
+            ask_for(1000);
+            let _held = hold(1);
+            ask_for(1000);
+        });
+        assert_eq!(result, Err(Cut));
+        // Unwinding drops it, too.
+        assert_eq!(HELD.get(), 0);
     }
 
     #[test]

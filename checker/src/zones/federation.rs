@@ -144,6 +144,7 @@ impl Federation {
     /// The valuations in both.
     #[must_use]
     pub fn intersection(&self, other: &Federation) -> Federation {
+        let _held = cancellation::hold(self.heap_bytes() + other.heap_bytes());
         let mut result = Federation::empty(self.dimension);
         let mut both = vec![Bound::LE_ZERO; self.size()];
         for zone in other.zones() {
@@ -187,6 +188,7 @@ impl Federation {
             }
             is_kept
         });
+        let _held = cancellation::hold(cut.capacity() * size_of::<Bound>());
         let subtrahend = Subtrahend::new(zone, dimension);
         let size = self.size();
         for minuend in cut.chunks_exact(size) {
@@ -340,6 +342,7 @@ impl Federation {
     /// Removes every zone that a single other one contains. Quadratic in the number of zones.
     fn remove_included(&mut self) {
         let zones = std::mem::take(&mut self.bounds);
+        let _held = cancellation::hold(zones.capacity() * size_of::<Bound>());
         for zone in zones.chunks_exact(self.size()) {
             self.add(zone);
         }
@@ -366,6 +369,7 @@ impl Federation {
     fn join_pairs(&mut self) {
         let size = self.size();
         let zones = std::mem::take(&mut self.bounds);
+        let _held = cancellation::hold(zones.capacity() * size_of::<Bound>());
         let mut entering = vec![Bound::LE_ZERO; size];
         let mut hull = entering.clone();
         for zone in zones.chunks_exact(size) {

@@ -75,3 +75,28 @@ fn operations_look_and_end() {
         assert_eq!(looks, 1, "{name}");
     }
 }
+
+#[test]
+fn operands_count_while_a_large_result_grows() {
+    let dimension = 128;
+    let mut points = Federation::empty(dimension);
+    for place in 0..32 {
+        let mut zone = Zone::universe(dimension);
+        zone.constrain(1, 0, Bound::weak(2 * place).expect("it is small"));
+        zone.constrain(0, 1, Bound::weak(-2 * place).expect("it is small"));
+        points.push(zone.bounds());
+    }
+    let whole = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
+    let most = points.heap_bytes() * 3 / 2;
+    let asked = |operation: &dyn Fn()| {
+        let look = Arc::new(move |bytes| bytes > most as u64);
+        cancellation::within(look, operation)
+    };
+    let copy = || drop(points.intersection(&whole));
+    assert_eq!(asked(&copy), Err(Cut));
+    let alone = || {
+        let mut copy = Federation::empty(dimension);
+        points.zones().for_each(|zone| copy.push(zone));
+    };
+    assert_eq!(asked(&alone), Ok(()));
+}
