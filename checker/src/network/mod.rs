@@ -15,6 +15,7 @@ pub mod failure;
 
 pub mod reduction;
 pub mod symbolic;
+mod trial;
 
 pub use failure::Failure;
 pub use symbolic::constant_effect::FixedMove;

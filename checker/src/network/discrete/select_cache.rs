@@ -10,7 +10,8 @@
 //!   words. Where evaluating fails there is no set, and whoever asks evaluates one instance after
 //!   the other, so that only what is needed can fail.
 //! * Sets stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes
-//!   later is not remembered, nor are edges whose words seldom come again.
+//!   later is not remembered, nor are edges whose words seldom come again. That is judged by how
+//!   often each set was used and not in trials of states, as an edge has few sets or many.
 
 use std::hash::{Hash, Hasher};
 use std::ops::Range;
@@ -28,9 +29,8 @@ use crate::analysis::function_reads::read_words;
 const MOST_BYTES: usize = 16 << 20;
 /// Edges whose functions read more words are not remembered.
 const MOST_WORDS: usize = 16;
-/// After so many new sets an edge is given up unless [`LEAST_USES`] states on average asked for
-/// each.
-const TRIAL: u32 = 256;
+/// An edge with this many sets is given up unless on average [`LEAST_USES`] states asked for each.
+const SETS_TO_JUDGE: u32 = 256;
 const LEAST_USES: u64 = 4;
 
 /// No set; no edge.
@@ -203,7 +203,7 @@ impl Instances {
     ) -> Option<SetId> {
         let memory = &mut self.memories[self.places[process as usize][edge as usize] as usize];
         let number = memory.sets.len() as u32;
-        if number >= TRIAL && memory.uses < u64::from(number) * LEAST_USES
+        if number >= SETS_TO_JUDGE && memory.uses < u64::from(number) * LEAST_USES
             || self.bytes > MOST_BYTES
         {
             memory.is_given_up = true;

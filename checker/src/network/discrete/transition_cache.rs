@@ -23,6 +23,7 @@ use crate::ir::FunctionId;
 use crate::zones::federation::block_bytes;
 
 use super::transition::{Moves, OfferId};
+use crate::network::trial::{Pause, Trial};
 
 /// What is remembered takes at most about so many bytes.
 const MOST_BYTES: usize = 24 << 20;
@@ -34,14 +35,12 @@ const MOST_QUESTIONS: usize = 256;
 /// A question has few answers, mostly no and yes.
 const USUAL_ANSWERS: usize = 2;
 
-/// So many states of a search make a trial of whether remembering pays; one of [`LEAST_FOUND`] must
-/// find its moves.
-const TRIAL: u32 = 1024;
+/// A trial in a search fails unless one state in this many finds its moves: a search may meet most
+/// location vectors a few times only.
 const LEAST_FOUND: u32 = 4;
-/// After a trial that failed so many states do not ask, and four times as many after each further
-/// one.
-const FIRST_PAUSE: u32 = 16 * TRIAL;
-const LONGEST_PAUSE: u32 = 256 * TRIAL;
+/// How many states do not ask after a trial that failed.
+const FIRST_PAUSE: u32 = 16 * Trial::LENGTH;
+const LONGEST_PAUSE: u32 = 256 * Trial::LENGTH;
 
 /// The index of a remembered location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -133,18 +132,7 @@ pub(super) struct Offers {
     moves: Vec<Moves>,
     bytes: usize,
     trial: Trial,
-}
-
-/// Whether remembering pays where nobody knows beforehand: for a search, which may meet most
-/// location vectors a few times only.
-#[derive(Debug, Default)]
-struct Trial {
-    /// How many states asked in this trial, and how many of them found their moves.
-    asked: u32,
-    found: u32,
-    /// How many states will not ask, and how many after the last trial that failed did not.
-    pause: u32,
-    last_pause: u32,
+    pause: Pause,
 }
 
 impl Offers {
@@ -159,32 +147,25 @@ impl Offers {
             moves: Vec::new(),
             bytes: 0,
             trial: Trial::default(),
+            pause: Pause::default(),
         }
     }
 
     /// Whether a state of a search should ask; to be called for each of them.
     pub(super) fn is_worth_asking(&mut self) -> bool {
-        let trial = &mut self.trial;
-        if trial.pause > 0 {
-            trial.pause -= 1;
+        if self.pause.lasts() {
             return false;
         }
-        if trial.asked == TRIAL {
-            let is_worth = trial.found > TRIAL / LEAST_FOUND;
-            (trial.asked, trial.found) = (0, 0);
-            if !is_worth {
-                trial.last_pause = (4 * trial.last_pause).clamp(FIRST_PAUSE, LONGEST_PAUSE);
-                trial.pause = trial.last_pause;
-                return false;
-            }
+        let fails = self.trial.fails(LEAST_FOUND);
+        if fails {
+            self.pause.begin(FIRST_PAUSE, LONGEST_PAUSE);
         }
-        trial.asked += 1;
-        true
+        !fails
     }
 
     /// Says that a state of a search found its moves.
     pub(super) fn note_found(&mut self) {
-        self.trial.found += 1;
+        self.trial.gain();
     }
 
     /// The bytes that are taken, about.

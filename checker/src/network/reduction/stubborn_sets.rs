@@ -25,7 +25,7 @@
 //! it is remembered.
 //!
 //! Cost: for some sets of a state a look-up for each pair of processes; given up where it seldom
-//! helps ([`TRIAL`]).
+//! helps ([`LEAST_SHARE`]).
 
 use std::sync::Arc;
 
@@ -39,13 +39,13 @@ use crate::network::Failure;
 use crate::network::discrete::stepper::Stepper;
 use crate::network::discrete::transition::{MoveRef, Moves, Part};
 use crate::network::symbolic::clock_effect::to_constraint;
+use crate::network::trial::Trial;
 
 /// Sets that are tried in a state, at most.
 const MOST_SETS: u32 = 8;
 
-/// After so many states, and again after as many, a search gives up looking for sets
-const TRIAL: u32 = 1024;
-/// unless one in so many was enough.
+/// A search gives up looking for sets after a trial, unless the set of one state in this many was
+/// enough.
 const LEAST_SHARE: u32 = 16;
 
 /// Which of the moves of a state are taken first, and whether these are enough.
@@ -110,9 +110,7 @@ pub(crate) struct StubbornSets {
     members: Vec<u32>,
     /// By process: whether it is in the best set so far.
     best: Vec<bool>,
-    /// States that were looked at since the last trial ended, and sets that were enough.
-    states: u32,
-    gains: u32,
+    trial: Trial,
     is_given_up: bool,
 }
 
@@ -127,8 +125,7 @@ impl StubbornSets {
             is_member: Vec::new(),
             members: Vec::new(),
             best: Vec::new(),
-            states: 0,
-            gains: 0,
+            trial: Trial::default(),
             is_given_up: false,
         }
     }
@@ -161,11 +158,7 @@ impl StubbornSets {
         if self.possible.len() < 2 {
             return Ok(());
         }
-        self.states += 1;
-        if self.states == TRIAL {
-            self.is_given_up = self.gains < TRIAL / LEAST_SHARE;
-            (self.states, self.gains) = (0, 0);
-        }
+        self.is_given_up = self.trial.fails(LEAST_SHARE);
         let ground = Ground {
             network: stepper.network(),
             watched: &order.watched,
@@ -199,7 +192,9 @@ impl StubbornSets {
 
     /// Counts the state if the moves of its set were enough.
     pub(crate) fn count(&mut self, agenda: &Agenda) {
-        self.gains += u32::from(agenda.are_enough);
+        if agenda.are_enough {
+            self.trial.gain();
+        }
     }
 
     /// Looks for the stubborn set with the fewest possible moves, which is left in `best`; returns

@@ -15,7 +15,8 @@
 //!   before has another age then, and is not looked up any more.
 //!
 //! Cost: a look-up takes two hashes, of the effect and of the pair. Where fewer than half of the
-//! pairs are found it does not pay, and is given up for a while.
+//! pairs are found it does not pay, and is given up for a while. Pairs are weighed, and
+//! all the time: there are no trials of states, because one state may have many pairs.
 
 use hashbrown::HashTable;
 use rustc_hash::FxHashMap;
@@ -25,6 +26,7 @@ use crate::zones::Bound;
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 
 use super::packed_effects::{PackedEffects, fold};
+use crate::network::trial::Pause;
 use crate::network::{FixedMove, OfferId};
 
 /// How much is remembered, and for how long though it does not pay.
@@ -115,6 +117,7 @@ pub(super) struct ZoneMemo {
     /// Moves of offers that were taken; `None` where the effect may depend on variables.
     pub(super) fixed: FxHashMap<(OfferId, u32), Option<FixedEffect>>,
     pub(super) balance: Balance,
+    pause: Pause,
     pub(super) age: u32,
     /// A reduced form with its limits.
     pub(super) scratch: Vec<Bound>,
@@ -139,6 +142,7 @@ impl ZoneMemo {
             outcomes: HashTable::new(),
             fixed: FxHashMap::default(),
             balance: Balance::default(),
+            pause: Pause::default(),
             age: 0,
             scratch: Vec::new(),
         }
@@ -174,8 +178,7 @@ impl ZoneMemo {
 
     /// The number of a zone, unless asking for moves from it does not pay.
     pub(super) fn know(&mut self, zone: &[Bound]) -> Option<KnownZone> {
-        if self.balance.pause > 0 {
-            self.balance.pause -= 1;
+        if self.pause.lasts() {
             return None;
         }
         let pays = self.balance.pays(self.limits.misses);
@@ -183,7 +186,8 @@ impl ZoneMemo {
             self.forget();
         }
         if !pays {
-            self.balance.give_up(self.limits.pause);
+            self.balance = Balance::default();
+            self.pause.begin(self.limits.pause, LONGEST_PAUSE);
             return None;
         }
         let before = self.zones.len();
@@ -220,14 +224,11 @@ impl ZoneMemo {
     }
 }
 
-/// Whether it pays.
+/// Whether it pays: what was found, against what was missed.
 #[derive(Debug, Default)]
 pub(super) struct Balance {
     found: u32,
     missed: u32,
-    /// How many states will not ask, and how many did not the last time.
-    pause: u32,
-    last_pause: u32,
 }
 
 impl Balance {
@@ -237,21 +238,11 @@ impl Balance {
     }
 
     /// Whether it has paid so far, or may still begin to.
-    pub(super) fn pays(&mut self, free_misses: u32) -> bool {
+    fn pays(&mut self, free_misses: u32) -> bool {
         if self.found + self.missed > LONG_AGO {
             (self.found, self.missed) = (self.found / 2, self.missed / 2);
         }
         self.missed <= self.found.saturating_add(free_misses)
-    }
-
-    pub(super) fn give_up(&mut self, first_pause: u32) {
-        let pause = self.last_pause.saturating_mul(4).min(LONGEST_PAUSE);
-        let pause = pause.max(first_pause);
-        *self = Balance {
-            pause,
-            last_pause: pause,
-            ..Balance::default()
-        };
     }
 }
 
