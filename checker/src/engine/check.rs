@@ -5,9 +5,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::answer::{Answer, Verdict};
-use super::evidence::named_strategies::{self, StrategyFile};
+use super::evidence::named_strategies::StrategyFile;
 use super::loaded_model::{Due, LoadedModel, NamedStrategy};
 use super::options::Options;
+use super::query_form::unnamed;
 use super::rejection::Rejection;
 use crate::exec::RunTimeError;
 use crate::game::strategy::Under;
@@ -73,7 +74,7 @@ impl LoadedModel {
         let Some(name) = query.strategy.clone() else {
             return Ok(answer);
         };
-        let text = named_strategies::unnamed(self.sources.text(query.span)).to_owned();
+        let text = unnamed(self.sources.text(query.span)).to_owned();
         // Where the query is not satisfied, the strategy is the environment's.
         let is_won = answer.verdict == Verdict::Satisfied;
         let known = is_won.then(|| answer.evidence.strategy.clone()).flatten();

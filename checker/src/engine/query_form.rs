@@ -1,8 +1,8 @@
-//! What a query asks for, by its text alone, without a model.
+//! What a query asks for, and the parts of its text, by the text alone, without a model.
 
 use crate::diagnostics::SourceMap;
 use crate::syntax;
-use crate::syntax::ast::{Extremum, Name, QueryKind};
+use crate::syntax::ast::{Extremum, Name, Query, QueryKind};
 
 /// What a query asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,11 +17,44 @@ pub struct QueryForm {
     pub is_observed: bool,
 }
 
-/// The form of a query; `None` if the text is no query.
-pub fn query_form(text: &str) -> Option<QueryForm> {
+/// The query that a text is; `None` if it is none.
+fn parsed(text: &str) -> Option<Query> {
     let mut sources = SourceMap::default();
     let span = syntax::add_query_text(text, &mut sources);
-    let query = syntax::parse_query(span, &sources).0?;
+    syntax::parse_query(span, &sources).0
+}
+
+/// The text of a query without the `strategy S =` before it, if it has one.
+pub fn unnamed(text: &str) -> &str {
+    match parsed(text) {
+        Some(query) => &text[query.formula.start as usize..query.span.end as usize],
+        None => text.trim(),
+    }
+}
+
+/// The text of a query without the `under S` after it, if it has that.
+pub fn without_under(text: &str) -> &str {
+    match parsed(text) {
+        Some(query) if query.under.is_some() => &text[..query.formula.end as usize],
+        _ => text,
+    }
+}
+
+/// The texts of the observations of a query, `{o1, o2, …} control: …`.
+pub fn observations(text: &str) -> Vec<String> {
+    let observations = match parsed(text).map(|query| query.kind) {
+        Some(QueryKind::Control(control)) => control.observations.unwrap_or_default(),
+        _ => Vec::new(),
+    };
+    let spans = observations.iter().map(|observation| observation.span);
+    spans
+        .map(|span| text[span.start as usize..span.end as usize].to_owned())
+        .collect()
+}
+
+/// The form of a query; `None` if the text is no query.
+pub fn query_form(text: &str) -> Option<QueryForm> {
+    let query = parsed(text)?;
     let kind = match &query.kind {
         QueryKind::Reachable(_) => "E<>",
         QueryKind::Invariantly(_) => "A[]",
@@ -53,4 +86,37 @@ pub fn query_form(text: &str) -> Option<QueryForm> {
         uses: query.under.as_ref().or(saved).map(text),
         is_observed,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_of_a_query_are_found() {
+        let whole = "strategy S = control: A<> x[a == 1 ? 0 : 1] == 2 under T";
+        assert_eq!(
+            unnamed(whole),
+            "control: A<> x[a == 1 ? 0 : 1] == 2 under T"
+        );
+        assert_eq!(
+            without_under(whole),
+            "strategy S = control: A<> x[a == 1 ? 0 : 1] == 2"
+        );
+        for text in ["control: A<> strategy_1 == under_2", "no query"] {
+            assert_eq!((unnamed(text), without_under(text)), (text, text));
+        }
+    }
+
+    #[test]
+    fn observations_keep_their_brackets() {
+        let query = "{ (a || b) && c, f(1, 2) == x[0],(d)} control: A[] true";
+        assert_eq!(
+            observations(query),
+            ["(a || b) && c", "f(1, 2) == x[0]", "(d)"]
+        );
+        for query in ["{} control: A<> p", "control: A<> forall (i : int[0, 1]) p"] {
+            assert!(observations(query).is_empty());
+        }
+    }
 }

@@ -10,10 +10,10 @@ use super::answer::Answer;
 use super::convert::{FailedError, priority_rule, rejected, rules};
 use super::model::Model;
 use crate::diagnostics::Span;
-use crate::engine::evidence::named_strategies::unnamed;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{strategy_json, text};
 use crate::engine::query::time_clock;
+use crate::engine::query_form::unnamed;
 use crate::engine::session::play::{
     self as engine, Done, Follower, Refused, Unadvised, Wait, player_name,
 };

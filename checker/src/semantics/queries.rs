@@ -186,7 +186,7 @@ impl Checker<'_> {
                 self.check_observable(span);
                 let predicates: Vec<Option<Predicate>> = observations
                     .iter()
-                    .map(|observation| self.observation(observation))
+                    .map(|observation| self.observation(&observation.predicate))
                     .collect();
                 predicates.into_iter().collect::<Option<Vec<_>>>().map(Some)
             }

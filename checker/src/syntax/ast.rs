@@ -569,6 +569,8 @@ pub struct Query {
     pub strategy: Option<Name>,
     /// What is asked.
     pub kind: QueryKind,
+    /// Where what is asked stands.
+    pub formula: Span,
     /// `under name`
     pub under: Option<Name>,
     /// The whole query.
@@ -636,7 +638,16 @@ pub struct Control {
     /// `control_t*(u, g)`: the bounds, each optional; `None` for plain `control`.
     pub time_optimal: Option<(Option<Expr>, Option<Expr>)>,
     /// `{ o1, o2 } control: …`: what the controller sees; `None` for full observation.
-    pub observations: Option<Vec<Expr>>,
+    pub observations: Option<Vec<ObservedPredicate>>,
+}
+
+/// What the controller sees the truth of.
+#[derive(Clone, Debug)]
+pub struct ObservedPredicate {
+    /// The predicate.
+    pub predicate: Expr,
+    /// Where it stands, with the brackets around it.
+    pub span: Span,
 }
 
 /// What the controller is to enforce.

@@ -1,7 +1,9 @@
 //! The query language: path formulas, extrema, games, strategies; statistical and learning queries
 //! by name only.
 
-use super::ast::{Control, Expr, ExprKind, Extremum, Name, Objective, Query, QueryKind};
+use super::ast::{
+    Control, Expr, ExprKind, Extremum, Name, Objective, ObservedPredicate, Query, QueryKind,
+};
 use super::codes;
 use super::expressions::{join_all, level};
 use super::keywords::Dialect;
@@ -52,8 +54,8 @@ impl Parser<'_> {
         let strategy = self.strategy_name();
         let formula = self.here();
         let kind = self.query_kind();
+        let formula = self.since(formula);
         if strategy.is_some() && !yields_strategy(&kind) {
-            let formula = self.since(formula);
             self.report(
                 Diagnostic::new(codes::NOT_A_STRATEGY, formula, "this query gives no strategy").help(
                     "`strategy S =` needs `control: …`, `loadStrategy(…)`, `minE`, `maxE`, `minPr` or `maxPr`",
@@ -70,6 +72,7 @@ impl Parser<'_> {
         Query {
             strategy,
             kind,
+            formula,
             under,
             span: self.since(span),
         }
@@ -257,7 +260,7 @@ impl Parser<'_> {
         let observations = if self.at(TokenKind::RightBrace) {
             Vec::new()
         } else {
-            self.expression_list()
+            self.observations()
         };
         self.closing(TokenKind::RightBrace, "after the observations");
         if self.at(TokenKind::Unknown) {
@@ -274,8 +277,25 @@ impl Parser<'_> {
         self.control(false, Some(observations))
     }
 
+    fn observations(&mut self) -> Vec<ObservedPredicate> {
+        let mut list = Vec::new();
+        loop {
+            let start = self.here();
+            let predicate = self.expression();
+            let span = self.since(start);
+            list.push(ObservedPredicate { predicate, span });
+            if !self.eat(TokenKind::Comma) {
+                return list;
+            }
+        }
+    }
+
     /// `control: objective`
-    fn control(&mut self, cooperative: bool, observations: Option<Vec<Expr>>) -> QueryKind {
+    fn control(
+        &mut self,
+        cooperative: bool,
+        observations: Option<Vec<ObservedPredicate>>,
+    ) -> QueryKind {
         self.eat_word("control");
         self.expect(TokenKind::Colon, "after `control`");
         QueryKind::Control(Control {

@@ -23,16 +23,6 @@ use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
 use crate::search::limits::Counters;
 
-/// The text of a query without the `strategy S =` before it, if it has one.
-pub fn unnamed(query: &str) -> &str {
-    let query = query.trim();
-    let named = query
-        .strip_prefix("strategy")
-        .filter(|rest| rest.starts_with(char::is_whitespace));
-    let parts = named.and_then(|rest| rest.split_once('='));
-    parts.map_or(query, |parts| parts.1.trim())
-}
-
 /// What a query asks to save or load.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StrategyFile<'q> {

@@ -9,8 +9,9 @@ use std::fmt::Write as _;
 use crate::game::partial_observation::{Action, Machine};
 use crate::ir::Network;
 
-use super::machine_json::{action_text, observations};
+use super::machine_json::action_text;
 use super::strategy_c::{array, comment, quoted, starts};
+use crate::engine::query_form::observations;
 
 /// What does not depend on the machine.
 const RUNTIME: &str = "

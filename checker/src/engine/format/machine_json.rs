@@ -20,6 +20,7 @@ use crate::zones::{Federation, Zone};
 use super::json_reader::{At, Difference, MACHINE_FORMAT, Mismatch, compare};
 use super::strategy_json::{self, NetworkReader};
 use super::{json, text};
+use crate::engine::query_form::observations;
 
 /// The version of the format that is written, and the only one that is read.
 pub const VERSION: u64 = 1;
@@ -28,27 +29,6 @@ const SEE_FORMAT: &str = "docs/observations.md describes the format";
 
 const OTHER_MODEL: &str =
     "the machine was made for another model or query, or they have changed: synthesise it again";
-
-/// The texts of the observations of a query, `{o1, o2, …} control: …`.
-pub fn observations(query: &str) -> Vec<String> {
-    let mut texts = vec![String::new()];
-    let mut depth = 0;
-    for sign in query.chars().skip_while(|&sign| sign != '{').skip(1) {
-        match sign {
-            '(' | '[' | '{' => depth += 1,
-            '}' if depth == 0 => break,
-            ')' | ']' | '}' => depth -= 1,
-            _ => {}
-        }
-        if sign == ',' && depth == 0 {
-            texts.push(String::new());
-        } else if let Some(text) = texts.last_mut() {
-            text.push(sign);
-        }
-    }
-    let texts = texts.iter().map(|text| text.trim().to_owned());
-    texts.filter(|text| !text.is_empty()).collect()
-}
 
 /// A machine as JSON.
 pub fn write(network: &Network, machine: &Machine, query: &str) -> Json {

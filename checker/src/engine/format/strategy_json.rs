@@ -25,6 +25,7 @@ use super::json;
 use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT};
 use super::text::{self, ValuePlace};
 use crate::engine::query::time_clock;
+use crate::engine::query_form::without_under;
 
 /// The name of the format.
 pub const FORMAT: &str = "ntagen-strategy";
@@ -119,7 +120,7 @@ fn frame(network: &Network, strategy: &Strategy, query: &str) -> Json {
         file["time_limit"] = json!(limit);
     }
     if strategy.under.is_some() {
-        file["query"] = json!(alone(query));
+        file["query"] = json!(without_under(query));
         file["under"] = Json::Null;
     }
     match &strategy.start {
@@ -139,20 +140,6 @@ fn frame(network: &Network, strategy: &Strategy, query: &str) -> Json {
         }
     }
     file
-}
-
-/// The text of a query without the `under S` after it, if it has that.
-fn alone(query: &str) -> &str {
-    let Some((before, name)) = query.trim_end().rsplit_once(char::is_whitespace) else {
-        return query;
-    };
-    let is_name = name
-        .chars()
-        .all(|one| one == '_' || one.is_ascii_alphanumeric());
-    let asked = before.trim_end().strip_suffix("under");
-    let asked =
-        asked.filter(|asked| is_name && asked.ends_with(|one: char| !one.is_alphanumeric()));
-    asked.map_or(query, str::trim_end)
 }
 
 fn decision(network: &Network, decision: &Decision) -> Json {

@@ -123,8 +123,11 @@ pub(crate) fn shape(expr: &Expr) -> String {
     }
 }
 
-fn shapes(exprs: &[Expr]) -> String {
-    let texts: Vec<String> = exprs.iter().map(|e| format!(" {}", shape(e))).collect();
+fn shapes<'e>(exprs: impl IntoIterator<Item = &'e Expr>) -> String {
+    let texts: Vec<String> = exprs
+        .into_iter()
+        .map(|e| format!(" {}", shape(e)))
+        .collect();
     texts.concat()
 }
 
@@ -182,10 +185,9 @@ fn control_shape(control: &Control) -> String {
         Objective::Buchi(p, q) => format!("A[]({} A<> {})", shape(p), shape(q)),
     };
     let cooperative = if control.cooperative { "E<> " } else { "" };
-    let observed = control
-        .observations
-        .as_ref()
-        .map_or(String::new(), |list| format!("{{{} }} ", shapes(list)));
+    let observed = control.observations.as_ref().map_or(String::new(), |list| {
+        format!("{{{} }} ", shapes(list.iter().map(|one| &one.predicate)))
+    });
     let bounds = control
         .time_optimal
         .as_ref()
