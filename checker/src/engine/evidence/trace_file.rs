@@ -4,6 +4,7 @@
 use serde_json::Value as Json;
 
 use crate::ir::{Network, Objective, Predicate, QueryKind};
+use crate::network::discrete::selects::select_combination;
 use crate::verify::replay::{self, Claim, End, Moment, Run, Shown, Step};
 use crate::verify::{self, Part};
 
@@ -215,6 +216,9 @@ fn run_of(network: &Network, run: &Json) -> Option<Run> {
     })
 }
 
+/// An edge of a run. What else the file shows of it is compared after the replay, where something
+/// wrong is a verdict; in a strategy it is a reason to refuse the file, which
+/// [`crate::engine::format::strategy_json::NetworkReader::part`] does.
 fn part_of(network: &Network, part: &Json) -> Option<Part> {
     let name = part["process"].as_str()?;
     let process = network.processes.iter().position(|one| one.name == name)?;
@@ -222,19 +226,10 @@ fn part_of(network: &Network, part: &Json) -> Option<Part> {
     let (edge, branch) = (number("edge")?, number("branch")?);
     let definition = network.processes[process].edges.get(edge as usize)?;
     definition.branches.get(branch as usize)?;
-    let mut select = 0;
-    for binding in &definition.select {
-        let value = integer(&part["select"][&binding.name])?;
-        if !(binding.low..=binding.high).contains(&value) {
-            return None;
-        }
-        let size = i64::from(binding.high) - i64::from(binding.low) + 1;
-        select = select * size + i64::from(value) - i64::from(binding.low);
-    }
     Some(Part {
         process: process as u32,
         edge,
         branch,
-        select: u32::try_from(select).ok()?,
+        select: select_combination(definition, |name| integer(&part["select"][name]))?,
     })
 }

@@ -16,13 +16,13 @@ use crate::game::strategy::closed_loop::{self, Joined};
 use crate::game::strategy::{Decision, Selection, Start, Strategy, StrategyState, Under, Way};
 use crate::ir::{EdgeId, Network, Shape};
 use crate::network::Part;
-use crate::network::discrete::selects::{select_count, select_values};
+use crate::network::discrete::selects::select_combination;
 use crate::verify::timed::MOST_TICKS_PER_UNIT;
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
 
 use super::json;
-use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT};
+use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT, integer};
 use super::text::{self, ValuePlace};
 use crate::engine::query::time_clock;
 use crate::engine::query_form::without_under;
@@ -606,12 +606,7 @@ impl NetworkReader<'_> {
             return Err(at.wrong(message, OTHER_MODEL));
         }
         let given = at.map("select")?;
-        let mut values = Vec::new();
-        let select = (0..select_count(edge)).find(|&select| {
-            select_values(edge, select, &mut values);
-            let mut bindings = edge.select.iter().zip(&values);
-            bindings.all(|(binding, value)| given.get(&binding.name) == Some(&json!(value)))
-        });
+        let select = select_combination(edge, |name| integer(given.get(name)?));
         let Some(select) = select.filter(|_| given.len() == edge.select.len()) else {
             let message = format!(
                 "edge {edge_index} of process {name} has no select values {}",

@@ -11,6 +11,17 @@ pub fn select_count(edge: &Edge) -> u32 {
         .product()
 }
 
+/// The combination with the values that `value_of` gives for the names of the bindings; `None` if
+/// there is none.
+pub fn select_combination(edge: &Edge, value_of: impl Fn(&str) -> Option<i32>) -> Option<u32> {
+    edge.select.iter().try_fold(0, |combination, select| {
+        let value = value_of(&select.name)?;
+        let is_possible = (select.low..=select.high).contains(&value);
+        let size = (select.high - select.low + 1) as u32;
+        is_possible.then(|| combination * size + (value - select.low) as u32)
+    })
+}
+
 /// The select values of a combination.
 pub fn select_values(edge: &Edge, mut combination: u32, values: &mut Vec<i32>) {
     values.clear();
