@@ -57,25 +57,122 @@ struct Seeking {
 }
 
 impl Chooser for Seeking {
-    fn strategy(&self) -> Strategy {
-        Strategy::empty(self.owner, Selection::First)
+    fn owner(&self) -> Player {
+        self.owner
+    }
+
+    fn selection(&self) -> Selection {
+        Selection::First
     }
 
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
-        choices(solver, node)
+        let mut chosen = Choices::default();
+        if self.is_over(solver, node) {
+            return Ok(chosen);
+        }
+        let Choices {
+            decisions,
+            legs,
+            taken,
+        } = &mut chosen;
+        let moves = moves_of(solver, node)?;
+        for gain in &solver.won.gains[node as usize].clone() {
+            let mut rest = solver.gained_part(node, gain);
+            // Where what is sought is to come again and again, play goes on from there into
+            // anything that is won.
+            let goes_on = solver.sought.targets.is_some();
+            let earlier = |solver: &Solver<'_, '_, '_>, edge: u32| {
+                let target = solver.graph.edges[edge as usize].target;
+                if gain.stamp > 0 {
+                    won_before(solver, target, gain.stamp)
+                } else {
+                    solver.won.win[target as usize].clone()
+                }
+            };
+            if gain.stamp > 0 || goes_on {
+                for edges in own_choices(solver, node) {
+                    let first = solver.graph.edges[edges[0] as usize];
+                    let wins = edges.iter().map(|&edge| earlier(solver, edge));
+                    let wins: Vec<Win> = wins.collect();
+                    let zones = match &wins[..] {
+                        [win] => solver.before(&first, win),
+                        wins => solver.before_all(edges.iter().copied().zip(wins)),
+                    };
+                    let zones = zones.intersection(&rest);
+                    if !zones.is_empty() {
+                        rest.subtract(&zones);
+                        decisions.push(Decision {
+                            zones,
+                            action: Some(named(solver, &moves, &first)),
+                            rank: gain.stamp,
+                        });
+                        taken.extend(edges);
+                    }
+                }
+                if solver.seeker == Player::Environment {
+                    let whole = solver.gained_part(node, gain);
+                    let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
+                        solver.won_by_leg(leg, &earlier(solver, leg))
+                    };
+                    let chosen = (&mut *legs, &mut *taken);
+                    solver.pick_legs(node, (&whole, gain.stamp), &mut picked, chosen)?;
+                }
+            }
+            if !rest.is_empty() {
+                decisions.push(Decision {
+                    zones: rest,
+                    action: None,
+                    rank: gain.stamp,
+                });
+            }
+        }
+        let opponent = solver.graph.edges_of(node).filter(|&edge| {
+            let edge = &solver.graph.edges[edge];
+            !edge.is_leg && !solver.seeker.owns(edge.controllable)
+        });
+        taken.extend(opponent.map(|edge| edge as u32));
+        Ok(chosen)
     }
 
+    /// What the seeker does in the states inside a chain. Each has one move, which is taken where
+    /// the rest of the chain leads into valuations of the end that are won; the smaller their
+    /// stamp, the better. Until then the strategy waits.
     fn inside(
         &self,
         solver: &mut Solver<'_, '_, '_>,
         edge: &Edge,
         source: &[i32],
     ) -> Result<Vec<StrategyState>, Failure> {
-        inside(solver, edge, source)
-    }
-
-    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
-        solver.is_over(self.owner, node)
+        let inside = walk(solver, edge, source)?;
+        let is_own = |inner: &Inner| solver.seeker.owns(inner.controllable);
+        let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
+        for gain in &solver.won.gains[edge.target as usize] {
+            let mut won = solver.gained_part(edge.target, gain);
+            for (inner, decisions) in inside.iter().zip(&mut decisions).rev() {
+                inner.effect.preimage(&mut won);
+                won.constrain_all(&inner.invariant);
+                decisions.push(Decision {
+                    zones: won.clone(),
+                    action: is_own(inner).then(|| inner.parts.clone()),
+                    rank: gain.stamp,
+                });
+                if inner.delays {
+                    won.down(&ClockSet::default());
+                    won.constrain_all(&inner.invariant);
+                    decisions.push(Decision {
+                        zones: won.clone(),
+                        action: None,
+                        rank: gain.stamp,
+                    });
+                }
+            }
+        }
+        let states = inside.into_iter().zip(decisions);
+        let states = states.map(|(inner, mut decisions)| {
+            decisions.retain(|decision| !decision.zones.is_empty());
+            inner.with(decisions)
+        });
+        Ok(states.collect())
     }
 }
 
@@ -103,76 +200,6 @@ fn rank_chains(all: &mut Extracted) {
             decision.rank = rank as u32;
         }
     }
-}
-
-/// What the seeker chooses in a node.
-fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
-    let mut chosen = Choices::default();
-    if solver.is_over(solver.seeker, node) {
-        return Ok(chosen);
-    }
-    let Choices {
-        decisions,
-        legs,
-        taken,
-    } = &mut chosen;
-    let moves = moves_of(solver, node)?;
-    for gain in &solver.won.gains[node as usize].clone() {
-        let mut rest = solver.gained_part(node, gain);
-        // Where what is sought is to come again and again, play goes on from there into anything
-        // that is won.
-        let goes_on = solver.sought.targets.is_some();
-        let earlier = |solver: &Solver<'_, '_, '_>, edge: u32| {
-            let target = solver.graph.edges[edge as usize].target;
-            if gain.stamp > 0 {
-                won_before(solver, target, gain.stamp)
-            } else {
-                solver.won.win[target as usize].clone()
-            }
-        };
-        if gain.stamp > 0 || goes_on {
-            for edges in own_choices(solver, node) {
-                let first = solver.graph.edges[edges[0] as usize];
-                let wins = edges.iter().map(|&edge| earlier(solver, edge));
-                let wins: Vec<Win> = wins.collect();
-                let zones = match &wins[..] {
-                    [win] => solver.before(&first, win),
-                    wins => solver.before_all(edges.iter().copied().zip(wins)),
-                };
-                let zones = zones.intersection(&rest);
-                if !zones.is_empty() {
-                    rest.subtract(&zones);
-                    decisions.push(Decision {
-                        zones,
-                        action: Some(named(solver, &moves, &first)),
-                        rank: gain.stamp,
-                    });
-                    taken.extend(edges);
-                }
-            }
-            if solver.seeker == Player::Environment {
-                let whole = solver.gained_part(node, gain);
-                let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
-                    solver.won_by_leg(leg, &earlier(solver, leg))
-                };
-                let chosen = (&mut *legs, &mut *taken);
-                solver.pick_legs(node, (&whole, gain.stamp), &mut picked, chosen)?;
-            }
-        }
-        if !rest.is_empty() {
-            decisions.push(Decision {
-                zones: rest,
-                action: None,
-                rank: gain.stamp,
-            });
-        }
-    }
-    let opponent = solver.graph.edges_of(node).filter(|&edge| {
-        let edge = &solver.graph.edges[edge];
-        !edge.is_leg && !solver.seeker.owns(edge.controllable)
-    });
-    taken.extend(opponent.map(|edge| edge as u32));
-    Ok(chosen)
 }
 
 /// What the seeker can choose in a node: edges, each alone unless they are the legs of an entry.
@@ -207,44 +234,4 @@ fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
         }
     }
     won.map_or(Win::Nothing, Win::Part)
-}
-
-/// What the seeker does in the states inside a chain. Each has one move, which is taken where the
-/// rest of the chain leads into valuations of the end that are won; the smaller their stamp, the
-/// better. Until then the strategy waits.
-fn inside(
-    solver: &mut Solver<'_, '_, '_>,
-    edge: &Edge,
-    source: &[i32],
-) -> Result<Vec<StrategyState>, Failure> {
-    let inside = walk(solver, edge, source)?;
-    let is_own = |inner: &Inner| solver.seeker.owns(inner.controllable);
-    let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
-    for gain in &solver.won.gains[edge.target as usize] {
-        let mut won = solver.gained_part(edge.target, gain);
-        for (inner, decisions) in inside.iter().zip(&mut decisions).rev() {
-            inner.effect.preimage(&mut won);
-            won.constrain_all(&inner.invariant);
-            decisions.push(Decision {
-                zones: won.clone(),
-                action: is_own(inner).then(|| inner.parts.clone()),
-                rank: gain.stamp,
-            });
-            if inner.delays {
-                won.down(&ClockSet::default());
-                won.constrain_all(&inner.invariant);
-                decisions.push(Decision {
-                    zones: won.clone(),
-                    action: None,
-                    rank: gain.stamp,
-                });
-            }
-        }
-    }
-    let states = inside.into_iter().zip(decisions);
-    let states = states.map(|(inner, mut decisions)| {
-        decisions.retain(|decision| !decision.zones.is_empty());
-        inner.with(decisions)
-    });
-    Ok(states.collect())
 }

@@ -49,87 +49,106 @@ struct Denying<'r> {
 }
 
 impl Chooser for Denying<'_> {
-    fn strategy(&self) -> Strategy {
-        Strategy::empty(Player::Environment, Selection::First)
+    fn owner(&self) -> Player {
+        Player::Environment
+    }
+
+    fn selection(&self) -> Selection {
+        Selection::First
     }
 
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
-        choices(solver, node, self.rounds)
+        let mut chosen = Choices::default();
+        let Choices {
+            decisions,
+            legs,
+            taken,
+        } = &mut chosen;
+        let moves = moves_of(solver, node)?;
+        for (after, before) in (1..self.rounds.len()).zip(self.rounds) {
+            let mut lost = solver.federation_of(node, &before[node as usize]);
+            let left = solver.federation_of(node, &self.rounds[after][node as usize]);
+            lost.subtract(&left);
+            if lost.is_empty() {
+                continue;
+            }
+            let leaving = leave(solver, node, before)?;
+            let leaving = leaving.intersection(&lost);
+            let mut evading = lost.clone();
+            evading.subtract(&leaving);
+            for (part, kept) in [(leaving, before), (evading, &self.rounds[after])] {
+                let mut waiting = part.clone();
+                for index in solver.graph.edges_of(node) {
+                    let edge = solver.graph.edges[index];
+                    if edge.controllable {
+                        continue;
+                    }
+                    let kept = &kept[edge.target as usize];
+                    let acting = solver.missing(&edge, (kept, None));
+                    let acting = acting.intersection(&part);
+                    if !acting.is_empty() {
+                        waiting.subtract(&acting);
+                        let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
+                        push(decisions, (acting, action, after));
+                        taken.push(index as u32);
+                    }
+                }
+                push(decisions, (waiting, None, after));
+                let mut picked = |solver: &Solver<'_, '_, '_>, leg| {
+                    let edge = &solver.graph.edges[leg as usize];
+                    solver.missing(edge, (&kept[edge.target as usize], None))
+                };
+                let chosen = (&mut *legs, &mut *taken);
+                solver.pick_legs(node, (&part, after as u32), &mut picked, chosen)?;
+            }
+            for index in solver.graph.edges_of(node) {
+                let edge = solver.graph.edges[index];
+                if edge.controllable && !edge.is_leg && solver.enabled(&edge).intersects(&lost) {
+                    taken.push(index as u32);
+                }
+            }
+        }
+        taken.sort_unstable();
+        taken.dedup();
+        Ok(chosen)
     }
 
+    /// What the environment does in the states inside a chain, where the goal holds nowhere. Each
+    /// has one move, which the environment takes, if it owns it, where the rest of the chain does
+    /// not lead into what is kept.
     fn inside(
         &self,
         solver: &mut Solver<'_, '_, '_>,
         edge: &Edge,
         source: &[i32],
     ) -> Result<Vec<StrategyState>, Failure> {
-        inside(solver, edge, source, self.rounds)
+        let inside = walk(solver, edge, source)?;
+        let dimension = solver.graph.dimension();
+        let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
+        // What the rounds so far have taken away.
+        let mut taken: Vec<Federation> = vec![Federation::empty(dimension); inside.len()];
+        for (rank, kept) in self.rounds.iter().enumerate().skip(1) {
+            let mut kept = solver.federation_of(edge.target, &kept[edge.target as usize]);
+            for (index, inner) in inside.iter().enumerate().rev() {
+                let (acting, mut lost) = inner.evaded(&mut kept, !inner.controllable);
+                lost.subtract(&taken[index]);
+                taken[index].unite(&lost);
+                let acting = acting.intersection(&lost);
+                lost.subtract(&acting);
+                let action = Some(inner.parts.clone());
+                push(&mut decisions[index], (acting, action, rank));
+                push(&mut decisions[index], (lost, None, rank));
+            }
+        }
+        let states = inside.into_iter().zip(decisions);
+        Ok(states
+            .map(|(inner, decisions)| inner.with(decisions))
+            .collect())
     }
 
     fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
         solver.graph.nodes[node as usize].standing == Standing::Broken
     }
-}
-
-/// What the environment chooses in a node.
-fn choices(
-    solver: &mut Solver<'_, '_, '_>,
-    node: u32,
-    rounds: &[Vec<Win>],
-) -> Result<Choices, Failure> {
-    let mut chosen = Choices::default();
-    let Choices {
-        decisions,
-        legs,
-        taken,
-    } = &mut chosen;
-    let moves = moves_of(solver, node)?;
-    for (after, before) in (1..rounds.len()).zip(rounds) {
-        let mut lost = solver.federation_of(node, &before[node as usize]);
-        let left = solver.federation_of(node, &rounds[after][node as usize]);
-        lost.subtract(&left);
-        if lost.is_empty() {
-            continue;
-        }
-        let leaving = leave(solver, node, before)?;
-        let leaving = leaving.intersection(&lost);
-        let mut evading = lost.clone();
-        evading.subtract(&leaving);
-        for (part, kept) in [(leaving, before), (evading, &rounds[after])] {
-            let mut waiting = part.clone();
-            for index in solver.graph.edges_of(node) {
-                let edge = solver.graph.edges[index];
-                if edge.controllable {
-                    continue;
-                }
-                let kept = &kept[edge.target as usize];
-                let acting = solver.missing(&edge, (kept, None));
-                let acting = acting.intersection(&part);
-                if !acting.is_empty() {
-                    waiting.subtract(&acting);
-                    let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
-                    push(decisions, (acting, action, after));
-                    taken.push(index as u32);
-                }
-            }
-            push(decisions, (waiting, None, after));
-            let mut picked = |solver: &Solver<'_, '_, '_>, leg| {
-                let edge = &solver.graph.edges[leg as usize];
-                solver.missing(edge, (&kept[edge.target as usize], None))
-            };
-            let chosen = (&mut *legs, &mut *taken);
-            solver.pick_legs(node, (&part, after as u32), &mut picked, chosen)?;
-        }
-        for index in solver.graph.edges_of(node) {
-            let edge = solver.graph.edges[index];
-            if edge.controllable && !edge.is_leg && solver.enabled(&edge).intersects(&lost) {
-                taken.push(index as u32);
-            }
-        }
-    }
-    taken.sort_unstable();
-    taken.dedup();
-    Ok(chosen)
 }
 
 fn push(
@@ -143,37 +162,4 @@ fn push(
             ..Decision::new(zones, action)
         });
     }
-}
-
-/// What the environment does in the states inside a chain, where the goal holds nowhere. Each has
-/// one move, which the environment takes, if it owns it, where the rest of the chain does not lead
-/// into what is kept.
-fn inside(
-    solver: &mut Solver<'_, '_, '_>,
-    edge: &Edge,
-    source: &[i32],
-    rounds: &[Vec<Win>],
-) -> Result<Vec<StrategyState>, Failure> {
-    let inside = walk(solver, edge, source)?;
-    let dimension = solver.graph.dimension();
-    let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
-    // What the rounds so far have taken away.
-    let mut taken: Vec<Federation> = vec![Federation::empty(dimension); inside.len()];
-    for (rank, kept) in rounds.iter().enumerate().skip(1) {
-        let mut kept = solver.federation_of(edge.target, &kept[edge.target as usize]);
-        for (index, inner) in inside.iter().enumerate().rev() {
-            let (acting, mut lost) = inner.evaded(&mut kept, !inner.controllable);
-            lost.subtract(&taken[index]);
-            taken[index].unite(&lost);
-            let acting = acting.intersection(&lost);
-            lost.subtract(&acting);
-            let action = Some(inner.parts.clone());
-            push(&mut decisions[index], (acting, action, rank));
-            push(&mut decisions[index], (lost, None, rank));
-        }
-    }
-    let states = inside.into_iter().zip(decisions);
-    Ok(states
-        .map(|(inner, decisions)| inner.with(decisions))
-        .collect())
 }

@@ -5,15 +5,19 @@ use crate::network::{Failure, Moves, Part};
 use crate::search::limits::{StopReason, Watch};
 use crate::zones::Federation;
 
-use super::{Decision, Strategy, StrategyState};
+use super::{Decision, Selection, Strategy, StrategyState};
+use crate::game::Player;
 use crate::game::forward::branch_points::entry_of;
 use crate::game::forward::node::Edge;
 use crate::game::solver::Solver;
 
 /// How the player chooses whose strategy is read.
 pub(super) trait Chooser {
-    /// The strategy without states.
-    fn strategy(&self) -> Strategy;
+    /// The player.
+    fn owner(&self) -> Player;
+
+    /// How a move is selected where the strategy allows several.
+    fn selection(&self) -> Selection;
 
     /// What is chosen in a node.
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure>;
@@ -27,7 +31,9 @@ pub(super) trait Chooser {
     ) -> Result<Vec<StrategyState>, Failure>;
 
     /// Whether play has ended in a node, won, whatever the clocks say.
-    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool;
+    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
+        solver.is_over(self.owner(), node)
+    }
 }
 
 /// What is chosen in a node.
@@ -59,7 +65,7 @@ pub(super) fn extract(
     if let Some(reason) = solver.tell(watch) {
         return Ok(Err(reason));
     }
-    let mut strategy = chooser.strategy();
+    let mut strategy = Strategy::empty(chooser.owner(), chooser.selection());
     let mut steps_to_end = Vec::new();
     let mut bytes = 0;
     let mut seen = vec![false; solver.graph.nodes.len()];

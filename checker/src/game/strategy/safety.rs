@@ -9,7 +9,7 @@ use crate::zones::{Federation, instants, past};
 
 use super::chains::walk;
 use super::extraction::{Choices, Chooser, moves_of, named};
-use super::{Decision, Selection, Strategy, StrategyState};
+use super::{Decision, Selection, StrategyState};
 use crate::game::Player;
 use crate::game::forward::node::{Edge, Standing};
 use crate::game::solver::Solver;
@@ -20,96 +20,108 @@ pub(super) struct Evading {
 }
 
 impl Chooser for Evading {
-    fn strategy(&self) -> Strategy {
-        let selection = match self.owner {
+    fn owner(&self) -> Player {
+        self.owner
+    }
+
+    fn selection(&self) -> Selection {
+        match self.owner {
             Player::Controller => Selection::Any,
             Player::Environment => Selection::First,
-        };
-        Strategy::empty(self.owner, selection)
+        }
     }
 
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
-        choices(solver, node)
+        let mut chosen = Choices::default();
+        let Choices {
+            decisions,
+            legs,
+            taken,
+        } = &mut chosen;
+        let mut free = solver.federation_of(node, &solver.won.lost(node));
+        free.subtract(&ended(solver, node));
+        if free.is_empty() {
+            return Ok(chosen);
+        }
+        let moves = moves_of(solver, node)?;
+        let mut acting = Federation::empty(solver.graph.dimension());
+        for index in solver.graph.edges_of(node) {
+            let edge = solver.graph.edges[index];
+            if edge.is_leg {
+                continue;
+            }
+            if solver.seeker.owns(edge.controllable) {
+                if solver.enabled(&edge).intersects(&free) {
+                    taken.push(index as u32);
+                }
+                continue;
+            }
+            let spoiling = solver.spoiling(&edge);
+            let zones = spoiling.intersection(&free);
+            if !zones.is_empty() {
+                acting.unite(&zones);
+                let action = Some(named(solver, &moves, &edge));
+                decisions.push(Decision::new(zones, action));
+                taken.push(index as u32);
+            }
+        }
+        if solver.seeker == Player::Environment {
+            for entry in solver.graph.branch_points.of(node) {
+                let spoiling = solver.spoiling_all(entry);
+                let zones = spoiling.intersection(&free);
+                if !zones.is_empty() {
+                    acting.unite(&zones);
+                    let first = &solver.graph.edges[entry[0] as usize];
+                    decisions.push(Decision::new(zones, Some(named(solver, &moves, first))));
+                    taken.extend(entry);
+                }
+            }
+        } else {
+            let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
+                solver.spoiling(&solver.graph.edges[leg as usize])
+            };
+            solver.pick_legs(node, (&free, 0), &mut picked, (legs, taken))?;
+        }
+        let mut waiting = match solver.seeker {
+            Player::Controller => {
+                free.subtract(&acting);
+                free
+            }
+            Player::Environment => allowed_waiting(solver, node, (&free, &acting))?,
+        };
+        if !waiting.is_empty() {
+            waiting.reduce();
+            decisions.push(Decision::new(waiting, None));
+        }
+        Ok(chosen)
     }
 
+    /// What the evader does in the states inside a chain, as far as the seeker does not win there.
     fn inside(
         &self,
         solver: &mut Solver<'_, '_, '_>,
         edge: &Edge,
         source: &[i32],
     ) -> Result<Vec<StrategyState>, Failure> {
-        inside(solver, edge, source)
-    }
-
-    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
-        solver.is_over(self.owner, node)
-    }
-}
-
-/// What the evader chooses in a node.
-fn choices(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
-    let mut chosen = Choices::default();
-    let Choices {
-        decisions,
-        legs,
-        taken,
-    } = &mut chosen;
-    let mut free = solver.federation_of(node, &solver.won.lost(node));
-    free.subtract(&ended(solver, node));
-    if free.is_empty() {
-        return Ok(chosen);
-    }
-    let moves = moves_of(solver, node)?;
-    let mut acting = Federation::empty(solver.graph.dimension());
-    for index in solver.graph.edges_of(node) {
-        let edge = solver.graph.edges[index];
-        if edge.is_leg {
-            continue;
-        }
-        if solver.seeker.owns(edge.controllable) {
-            if solver.enabled(&edge).intersects(&free) {
-                taken.push(index as u32);
+        let inside = walk(solver, edge, source)?;
+        let mut won = solver.federation_of(edge.target, &solver.won.win[edge.target as usize]);
+        let mut states = Vec::new();
+        for inner in inside.into_iter().rev() {
+            let (acting, mut waiting) =
+                inner.evaded(&mut won, !solver.seeker.owns(inner.controllable));
+            waiting.subtract(&acting);
+            let mut decisions = Vec::new();
+            if !acting.is_empty() {
+                decisions.push(Decision::new(acting, Some(inner.parts.clone())));
             }
-            continue;
-        }
-        let spoiling = solver.spoiling(&edge);
-        let zones = spoiling.intersection(&free);
-        if !zones.is_empty() {
-            acting.unite(&zones);
-            let action = Some(named(solver, &moves, &edge));
-            decisions.push(Decision::new(zones, action));
-            taken.push(index as u32);
-        }
-    }
-    if solver.seeker == Player::Environment {
-        for entry in solver.graph.branch_points.of(node) {
-            let spoiling = solver.spoiling_all(entry);
-            let zones = spoiling.intersection(&free);
-            if !zones.is_empty() {
-                acting.unite(&zones);
-                let first = &solver.graph.edges[entry[0] as usize];
-                decisions.push(Decision::new(zones, Some(named(solver, &moves, first))));
-                taken.extend(entry);
+            if !waiting.is_empty() {
+                decisions.push(Decision::new(waiting, None));
             }
+            states.push(inner.with(decisions));
         }
-    } else {
-        let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
-            solver.spoiling(&solver.graph.edges[leg as usize])
-        };
-        solver.pick_legs(node, (&free, 0), &mut picked, (legs, taken))?;
+        states.reverse();
+        Ok(states)
     }
-    let mut waiting = match solver.seeker {
-        Player::Controller => {
-            free.subtract(&acting);
-            free
-        }
-        Player::Environment => allowed_waiting(solver, node, (&free, &acting))?,
-    };
-    if !waiting.is_empty() {
-        waiting.reduce();
-        decisions.push(Decision::new(waiting, None));
-    }
-    Ok(chosen)
 }
 
 /// The valuations of a node in which play has ended without the seeker's having won.
@@ -174,29 +186,4 @@ fn allowed_waiting(
     }
     waiting.unite(&at_rest);
     Ok(waiting)
-}
-
-/// What the evader does in the states inside a chain, as far as the seeker does not win there.
-fn inside(
-    solver: &mut Solver<'_, '_, '_>,
-    edge: &Edge,
-    source: &[i32],
-) -> Result<Vec<StrategyState>, Failure> {
-    let inside = walk(solver, edge, source)?;
-    let mut won = solver.federation_of(edge.target, &solver.won.win[edge.target as usize]);
-    let mut states = Vec::new();
-    for inner in inside.into_iter().rev() {
-        let (acting, mut waiting) = inner.evaded(&mut won, !solver.seeker.owns(inner.controllable));
-        waiting.subtract(&acting);
-        let mut decisions = Vec::new();
-        if !acting.is_empty() {
-            decisions.push(Decision::new(acting, Some(inner.parts.clone())));
-        }
-        if !waiting.is_empty() {
-            decisions.push(Decision::new(waiting, None));
-        }
-        states.push(inner.with(decisions));
-    }
-    states.reverse();
-    Ok(states)
 }
