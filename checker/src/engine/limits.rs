@@ -76,18 +76,20 @@ struct Seen {
     stop: Option<StopReason>,
 }
 
-impl SharedLimits {
-    fn look(&self, counters: &Counters) -> Option<StopReason> {
-        self.seen().counters = *counters;
-        self.look_beside(0)
+impl Seen {
+    /// The bytes that were counted last and these beside them, which may be the most so far.
+    fn memory_with(&mut self, bytes: u64) -> u64 {
+        let memory = self.counters.bytes.saturating_add(bytes);
+        self.peak_bytes = self.peak_bytes.max(memory);
+        memory
     }
+}
 
+impl SharedLimits {
     /// Looks, when so many bytes are about to be allocated beside those that were counted last.
     fn look_beside(&self, bytes: u64) -> Option<StopReason> {
         let mut seen = self.seen();
-        let memory = seen.counters.bytes.saturating_add(bytes);
-        seen.peak_bytes = seen.peak_bytes.max(memory);
-        let memory = memory.saturating_add(self.at_hand_bytes);
+        let memory = seen.memory_with(bytes).saturating_add(self.at_hand_bytes);
         let now = Instant::now();
         if self.timeout.is_some_and(|limit| now - self.start >= limit) {
             seen.stop = Some(StopReason::Time);
@@ -213,7 +215,10 @@ pub(super) fn cut_as_interrupted<R>(
 impl Watch for LimitWatch {
     fn look(&mut self, counters: &Counters) -> Option<StopReason> {
         let mut seen = self.shared.seen();
-        seen.peak_bytes = seen.peak_bytes.max(counters.bytes);
+        seen.counters = *counters;
+        let memory = seen
+            .memory_with(0)
+            .saturating_add(self.shared.at_hand_bytes);
         drop(seen);
         if self
             .limits
@@ -225,10 +230,10 @@ impl Watch for LimitWatch {
         if self
             .limits
             .memory_bytes
-            .is_some_and(|limit| counters.bytes.saturating_add(self.shared.at_hand_bytes) >= limit)
+            .is_some_and(|limit| memory >= limit)
         {
             return Some(StopReason::Memory);
         }
-        self.shared.look(counters)
+        self.shared.look_beside(0)
     }
 }
