@@ -70,11 +70,6 @@ impl Chooser for Seeking {
         if self.is_over(solver, node) {
             return Ok(chosen);
         }
-        let Choices {
-            decisions,
-            legs,
-            taken,
-        } = &mut chosen;
         let moves = moves_of(solver, node)?;
         for gain in &solver.won.gains[node as usize].clone() {
             let mut rest = solver.gained_part(node, gain);
@@ -101,12 +96,12 @@ impl Chooser for Seeking {
                     let zones = zones.intersection(&rest);
                     if !zones.is_empty() {
                         rest.subtract(&zones);
-                        decisions.push(Decision {
+                        chosen.decisions.push(Decision {
                             zones,
                             action: Some(named(solver, &moves, &first)),
                             rank: gain.stamp,
                         });
-                        taken.extend(edges);
+                        chosen.taken.extend(edges);
                     }
                 }
                 if solver.seeker == Player::Environment {
@@ -114,12 +109,11 @@ impl Chooser for Seeking {
                     let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
                         solver.won_by_leg(leg, &earlier(solver, leg))
                     };
-                    let chosen = (&mut *legs, &mut *taken);
-                    solver.pick_legs(node, (&whole, gain.stamp), &mut picked, chosen)?;
+                    chosen.pick(gain.stamp, solver.picks(node, &whole, &mut picked)?);
                 }
             }
             if !rest.is_empty() {
-                decisions.push(Decision {
+                chosen.decisions.push(Decision {
                     zones: rest,
                     action: None,
                     rank: gain.stamp,
@@ -130,7 +124,7 @@ impl Chooser for Seeking {
             let edge = &solver.graph.edges[edge];
             !edge.is_leg && !solver.seeker.owns(edge.controllable)
         });
-        taken.extend(opponent.map(|edge| edge as u32));
+        chosen.taken.extend(opponent.map(|edge| edge as u32));
         Ok(chosen)
     }
 

@@ -59,11 +59,6 @@ impl Chooser for Denying<'_> {
 
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
         let mut chosen = Choices::default();
-        let Choices {
-            decisions,
-            legs,
-            taken,
-        } = &mut chosen;
         let moves = moves_of(solver, node)?;
         for (after, before) in (1..self.rounds.len()).zip(self.rounds) {
             let mut lost = solver.federation_of(node, &before[node as usize]);
@@ -89,27 +84,26 @@ impl Chooser for Denying<'_> {
                     if !acting.is_empty() {
                         waiting.subtract(&acting);
                         let action = Some(moves.get(edge.ordinal as usize).parts.to_vec());
-                        push(decisions, (acting, action, after));
-                        taken.push(index as u32);
+                        push(&mut chosen.decisions, after, acting, action);
+                        chosen.taken.push(index as u32);
                     }
                 }
-                push(decisions, (waiting, None, after));
+                push(&mut chosen.decisions, after, waiting, None);
                 let mut picked = |solver: &Solver<'_, '_, '_>, leg| {
                     let edge = &solver.graph.edges[leg as usize];
                     solver.missing(edge, (&kept[edge.target as usize], None))
                 };
-                let chosen = (&mut *legs, &mut *taken);
-                solver.pick_legs(node, (&part, after as u32), &mut picked, chosen)?;
+                chosen.pick(after as u32, solver.picks(node, &part, &mut picked)?);
             }
             for index in solver.graph.edges_of(node) {
                 let edge = solver.graph.edges[index];
                 if edge.controllable && !edge.is_leg && solver.enabled(&edge).intersects(&lost) {
-                    taken.push(index as u32);
+                    chosen.taken.push(index as u32);
                 }
             }
         }
-        taken.sort_unstable();
-        taken.dedup();
+        chosen.taken.sort_unstable();
+        chosen.taken.dedup();
         Ok(chosen)
     }
 
@@ -136,8 +130,8 @@ impl Chooser for Denying<'_> {
                 let acting = acting.intersection(&lost);
                 lost.subtract(&acting);
                 let action = Some(inner.parts.clone());
-                push(&mut decisions[index], (acting, action, rank));
-                push(&mut decisions[index], (lost, None, rank));
+                push(&mut decisions[index], rank, acting, action);
+                push(&mut decisions[index], rank, lost, None);
             }
         }
         let states = inside.into_iter().zip(decisions);
@@ -153,7 +147,9 @@ impl Chooser for Denying<'_> {
 
 fn push(
     decisions: &mut Vec<Decision>,
-    (mut zones, action, rank): (Federation, Option<Vec<Part>>, usize),
+    rank: usize,
+    mut zones: Federation,
+    action: Option<Vec<Part>>,
 ) {
     if !zones.is_empty() {
         zones.reduce();

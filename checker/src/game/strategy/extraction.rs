@@ -46,6 +46,28 @@ pub(super) struct Choices {
     pub(super) taken: Vec<u32>,
 }
 
+impl Choices {
+    /// Adds legs that are picked, all of one rank.
+    pub(super) fn pick(&mut self, rank: u32, picks: Vec<Pick>) {
+        for Pick { leg, zones, parts } in picks {
+            let action = Some(parts);
+            self.legs.push(Decision {
+                rank,
+                ..Decision::new(zones, action)
+            });
+            self.taken.push(leg);
+        }
+    }
+}
+
+/// A leg that the environment picks.
+pub(super) struct Pick {
+    /// Its edge.
+    leg: u32,
+    zones: Federation,
+    parts: Vec<Part>,
+}
+
 /// A strategy, with how many moves lead from each state inside a chain to the end of it.
 pub(super) struct Extracted {
     pub(super) strategy: Strategy,
@@ -131,38 +153,32 @@ pub(super) fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Mov
 }
 
 impl Solver<'_, '_, '_> {
-    /// Adds the legs that the environment picks in some valuations of a node, each where the ones
-    /// before it are not picked; `picked` says where a leg is good for it. Adds their edges to
-    /// those that play may take.
-    pub(super) fn pick_legs(
+    /// The legs that the environment picks in some valuations of a node, each where the ones before
+    /// it are not picked; `good` says where a leg is good for it.
+    pub(super) fn picks(
         &mut self,
         node: u32,
-        (part, rank): (&Federation, u32),
-        picked: &mut dyn FnMut(&Self, u32) -> Federation,
-        (legs, taken): (&mut Vec<Decision>, &mut Vec<u32>),
-    ) -> Result<(), Failure> {
+        part: &Federation,
+        good: &mut dyn FnMut(&Self, u32) -> Federation,
+    ) -> Result<Vec<Pick>, Failure> {
+        let mut picks = Vec::new();
         if self.graph.branch_points.of(node).is_empty() {
-            return Ok(());
+            return Ok(picks);
         }
         let moves = moves_of(self, node)?;
         for entry in self.graph.branch_points.of(node).to_vec() {
             let mut left = part.clone();
             for leg in entry {
-                let zones = picked(self, leg).intersection(&left);
+                let zones = good(self, leg).intersection(&left);
                 if zones.is_empty() {
                     continue;
                 }
                 left.subtract(&zones);
                 let ordinal = self.graph.edges[leg as usize].ordinal;
-                let action = moves.get(ordinal as usize).parts.to_vec();
-                legs.push(Decision {
-                    zones,
-                    action: Some(action),
-                    rank,
-                });
-                taken.push(leg);
+                let parts = moves.get(ordinal as usize).parts.to_vec();
+                picks.push(Pick { leg, zones, parts });
             }
         }
-        Ok(())
+        Ok(picks)
     }
 }

@@ -33,11 +33,6 @@ impl Chooser for Evading {
 
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
         let mut chosen = Choices::default();
-        let Choices {
-            decisions,
-            legs,
-            taken,
-        } = &mut chosen;
         let mut free = solver.federation_of(node, &solver.won.lost(node));
         free.subtract(&ended(solver, node));
         if free.is_empty() {
@@ -52,7 +47,7 @@ impl Chooser for Evading {
             }
             if solver.seeker.owns(edge.controllable) {
                 if solver.enabled(&edge).intersects(&free) {
-                    taken.push(index as u32);
+                    chosen.taken.push(index as u32);
                 }
                 continue;
             }
@@ -61,8 +56,8 @@ impl Chooser for Evading {
             if !zones.is_empty() {
                 acting.unite(&zones);
                 let action = Some(named(solver, &moves, &edge));
-                decisions.push(Decision::new(zones, action));
-                taken.push(index as u32);
+                chosen.decisions.push(Decision::new(zones, action));
+                chosen.taken.push(index as u32);
             }
         }
         if solver.seeker == Player::Environment {
@@ -72,26 +67,28 @@ impl Chooser for Evading {
                 if !zones.is_empty() {
                     acting.unite(&zones);
                     let first = &solver.graph.edges[entry[0] as usize];
-                    decisions.push(Decision::new(zones, Some(named(solver, &moves, first))));
-                    taken.extend(entry);
+                    chosen
+                        .decisions
+                        .push(Decision::new(zones, Some(named(solver, &moves, first))));
+                    chosen.taken.extend(entry);
                 }
             }
         } else {
             let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
                 solver.spoiling(&solver.graph.edges[leg as usize])
             };
-            solver.pick_legs(node, (&free, 0), &mut picked, (legs, taken))?;
+            chosen.pick(0, solver.picks(node, &free, &mut picked)?);
         }
         let mut waiting = match solver.seeker {
             Player::Controller => {
                 free.subtract(&acting);
                 free
             }
-            Player::Environment => allowed_waiting(solver, node, (&free, &acting))?,
+            Player::Environment => allowed_waiting(solver, node, &free, &acting)?,
         };
         if !waiting.is_empty() {
             waiting.reduce();
-            decisions.push(Decision::new(waiting, None));
+            chosen.decisions.push(Decision::new(waiting, None));
         }
         Ok(chosen)
     }
@@ -141,7 +138,8 @@ fn ended(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
 fn allowed_waiting(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
-    (free, acting): (&Federation, &Federation),
+    free: &Federation,
+    acting: &Federation,
 ) -> Result<Federation, Failure> {
     let situation = solver.situation(node)?;
     let standstill = solver.standstill(&situation);
