@@ -12,7 +12,7 @@ use crate::cancellation;
 use crate::exec::EmittedConstraint;
 use crate::ir::Network;
 
-use super::broadcast_filter::{Demand, Scope};
+use super::broadcast_filter::{Demand, Scope, Sending};
 use super::candidate::{Candidate, Choice, Group};
 use super::stepper::Stepper;
 use super::transition::{Label, Moves, Part};
@@ -35,24 +35,22 @@ impl Stepper<'_> {
     /// Joins the candidate 0 with one enabled receiving edge of every process that has one.
     pub(super) fn broadcast(
         &mut self,
-        sender: u32,
+        sender: Sending<'_>,
         channel: u32,
-        needs_committed: bool,
         words: &mut [i32],
-        scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
         // Whoever records wants to see all that is evaluated.
         let is_shared = self.record.is_none() && self.tuning.broadcast_receivers;
         if is_shared && self.has_audience(channel) {
-            return self.broadcast_again(sender, needs_committed, words, scope, out);
+            return self.broadcast_again(sender, words, out);
         }
         let mut groups = std::mem::take(&mut self.groups);
         groups.clear();
-        let mut has_committed = !needs_committed;
+        let mut has_committed = !sender.needs_committed;
         for index in 0..self.receivers[channel as usize].len() {
             let receiver = self.receivers[channel as usize][index];
-            if receiver == sender {
+            if receiver == sender.process {
                 continue;
             }
             let first = self.candidates.len();
@@ -63,10 +61,10 @@ impl Stepper<'_> {
             }
         }
         if is_shared {
-            self.note_audience(sender, channel, &groups);
+            self.note_audience(sender.process, channel, &groups);
         }
         if has_committed {
-            self.combine(&mut groups, needs_committed, words, scope, out)?;
+            self.combine(sender, &mut groups, words, out)?;
         }
         self.groups = groups;
         Ok(())
@@ -95,10 +93,9 @@ impl Stepper<'_> {
     /// the last receiver's change fastest.
     fn combine(
         &mut self,
+        sender: Sending<'_>,
         groups: &mut [Group],
-        needs_committed: bool,
         words: &[i32],
-        scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
         let (mut combinations, mut after) = (1_u64, 1_u64);
@@ -106,11 +103,11 @@ impl Stepper<'_> {
             combinations = combinations.saturating_mul(group.picks());
             after = group.put_before(after);
         }
-        let (rank_after, scope) = self.ranks_and_scope(combinations, after, scope)?;
+        let (rank_after, scope) = self.ranks_and_scope(combinations, after, sender.scope)?;
         self.chosen.clear();
         self.sieve.begin(scope);
         if self.choose(Choice::Takes(0), scope)? {
-            self.combine_from(groups, needs_committed, words, scope, out)?;
+            self.combine_from(Sending { scope, ..sender }, groups, words, out)?;
         }
         self.rank = rank_after;
         Ok(())
@@ -139,12 +136,16 @@ impl Stepper<'_> {
     /// Goes through the choices of the groups, after the sender was chosen.
     pub(super) fn combine_from(
         &mut self,
+        sender: Sending<'_>,
         groups: &mut [Group],
-        needs_committed: bool,
         words: &[i32],
-        scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
+        let Sending {
+            needs_committed,
+            scope,
+            ..
+        } = sender;
         let is_possible = matches!(scope, Scope::Within(_));
         let mut ways = self.ways(Choice::Takes(0));
         // The groups before this one have made their choices.

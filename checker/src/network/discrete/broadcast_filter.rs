@@ -27,6 +27,15 @@ pub(in crate::network) enum Scope<'z> {
     Of(&'z [Part]),
 }
 
+/// A process that sends, and which moves with it are wanted.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sending<'z> {
+    pub(super) process: u32,
+    /// Whether another process must leave a committed location.
+    pub(super) needs_committed: bool,
+    pub(super) scope: Scope<'z>,
+}
+
 /// A choice of a process in a broadcast, with what must hold for it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Demand<'c> {

@@ -7,7 +7,7 @@
 //! Invariant: guards are evaluated only of processes that may hear somebody, in the order of the
 //! receivers: one that is the only sender is not asked what it hears, since its guard could fail.
 
-use super::broadcast_filter::Scope;
+use super::broadcast_filter::Sending;
 use super::candidate::{Candidate, Choice, Group};
 use super::stepper::Stepper;
 use super::transition::Moves;
@@ -34,18 +34,17 @@ impl Stepper<'_> {
     /// As [`Stepper::broadcast`], if [`Stepper::has_audience`].
     pub(super) fn broadcast_again(
         &mut self,
-        sender: u32,
-        needs_committed: bool,
+        sender: Sending<'_>,
         words: &mut [i32],
-        scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
-        self.ask_left_out(sender, words)?;
+        let process = sender.process;
+        self.ask_left_out(process, words)?;
         let audience = &self.audience;
         let others = audience.groups.iter();
-        let mut others = others.filter(|group| audience.process_of(group) != sender);
+        let mut others = others.filter(|group| audience.process_of(group) != process);
         let is_committed = |group| self.is_process_committed(audience.process_of(group), words);
-        if needs_committed && !others.clone().any(is_committed) {
+        if sender.needs_committed && !others.clone().any(is_committed) {
             return Ok(());
         }
         let (mut combinations, mut after) = (1_u64, 1_u64);
@@ -53,12 +52,13 @@ impl Stepper<'_> {
             combinations = combinations.saturating_mul(group.picks());
             after = after.saturating_mul(group.ways());
         }
-        let (rank_after, scope) = self.ranks_and_scope(combinations, after, scope)?;
+        let (rank_after, scope) = self.ranks_and_scope(combinations, after, sender.scope)?;
         self.chosen.clear();
         self.sieve.begin(scope);
         if self.choose(Choice::Takes(0), scope)? {
-            let mut groups = self.hear(sender);
-            let result = self.combine_from(&mut groups, needs_committed, words, scope, out);
+            let mut groups = self.hear(process);
+            let sender = Sending { scope, ..sender };
+            let result = self.combine_from(sender, &mut groups, words, out);
             self.groups = groups;
             result?;
         }

@@ -8,7 +8,7 @@ use crate::cancellation;
 use crate::exec::{Context, EmittedConstraint, Executor, RunTimeError};
 use crate::ir::{ChannelId, FunctionId, Guard, RunTimeErrorKind};
 
-use super::broadcast_filter::Scope;
+use super::broadcast_filter::{Scope, Sending};
 use super::candidate::{Candidate, Choice};
 use super::edge_tables::EdgeEntry;
 use super::selects::select_values;
@@ -49,9 +49,14 @@ impl<'a> Stepper<'a> {
                     self.internal_moves(process as u32, entry, words, out)?;
                 }
             }
+            let sender = Sending {
+                process: process as u32,
+                needs_committed: committed && !own,
+                scope,
+            };
             for index in 0..sends {
                 let entry = self.tables[process][location].sends[index];
-                self.synchronisations(process as u32, entry, committed && !own, words, scope, out)?;
+                self.synchronisations(sender, entry, words, out)?;
             }
             out.check_count()?;
         }
@@ -81,31 +86,21 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// The moves in which `edge` of `process` sends. `needs_committed`: another process must leave
-    /// a committed location.
+    /// The moves in which a process sends by an edge.
     fn synchronisations(
         &mut self,
-        process: u32,
+        sender: Sending<'_>,
         entry: EdgeEntry<'a>,
-        needs_committed: bool,
         words: &mut [i32],
-        scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
         let (executor, definition) = (self.executor, entry.edge);
+        let process = sender.process;
         let Some(sync) = definition.sync else {
             return Ok(());
         };
         if let Some(set) = self.set_of(process, entry, words) {
-            return self.remembered_synchronisations(
-                process,
-                entry,
-                set,
-                needs_committed,
-                words,
-                scope,
-                out,
-            );
+            return self.remembered_synchronisations(sender, entry, set, words, out);
         }
         for select in 0..entry.instances {
             self.candidates.clear();
@@ -121,7 +116,7 @@ impl<'a> Stepper<'a> {
                 None => 0,
             };
             let channel = sync.channel.0 + offset;
-            self.synchronisations_on(process, channel, needs_committed, words, scope, out)?;
+            self.synchronisations_on(sender, channel, words, out)?;
         }
         Ok(())
     }
@@ -129,27 +124,24 @@ impl<'a> Stepper<'a> {
     /// The moves in which the candidate 0 sends on a channel.
     pub(super) fn synchronisations_on(
         &mut self,
-        process: u32,
+        sender: Sending<'_>,
         channel: u32,
-        needs_committed: bool,
         words: &mut [i32],
-        scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
         self.channel = Some(ChannelId(channel));
         if self.network.channels[channel as usize].broadcast {
-            self.broadcast(process, channel, needs_committed, words, scope, out)
+            self.broadcast(sender, channel, words, out)
         } else {
-            Ok(self.handshakes(process, channel, needs_committed, words, out)?)
+            Ok(self.handshakes(sender, channel, words, out)?)
         }
     }
 
     /// Pairs the candidate 0 with every enabled receiver on a binary channel.
     fn handshakes(
         &mut self,
-        sender: u32,
+        sender: Sending<'_>,
         channel: u32,
-        needs_committed: bool,
         words: &mut [i32],
         out: &mut Moves,
     ) -> Result<(), RunTimeError> {
@@ -157,8 +149,8 @@ impl<'a> Stepper<'a> {
         cancellation::work(UNITS_FOR_RECEIVER * receivers);
         for index in 0..receivers {
             let receiver = self.receivers[channel as usize][index];
-            if receiver == sender
-                || (needs_committed && !self.is_process_committed(receiver, words))
+            if receiver == sender.process
+                || (sender.needs_committed && !self.is_process_committed(receiver, words))
             {
                 continue;
             }

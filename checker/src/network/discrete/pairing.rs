@@ -2,7 +2,7 @@
 
 use crate::ir::ChannelId;
 
-use super::broadcast_filter::Scope;
+use super::broadcast_filter::Sending;
 use super::candidate::{Candidate, Choice};
 use super::edge_tables::EdgeEntry;
 use super::partners::Pair;
@@ -120,19 +120,17 @@ impl<'a> Stepper<'a> {
     }
 
     /// The moves in which an edge with this set of enabled instances sends.
-    #[expect(clippy::too_many_arguments, reason = "they are those of the caller")]
     pub(super) fn remembered_synchronisations(
         &mut self,
-        process: u32,
+        sender: Sending<'_>,
         entry: EdgeEntry<'a>,
         set: SetId,
-        needs_committed: bool,
         words: &mut [i32],
-        scope: Scope<'_>,
         out: &mut Moves,
     ) -> Result<(), Failure> {
+        let process = sender.process;
         let count = self.instances.set(set).instances.len();
-        if count > 1 && self.pair(process, entry, set, needs_committed, words) {
+        if count > 1 && self.pair(sender, entry, set, words) {
             self.emit_pairs(process, entry, set, out);
             return Ok(());
         }
@@ -140,7 +138,7 @@ impl<'a> Stepper<'a> {
             let instance = self.instances.set(set).instances[place];
             self.begin(process, entry, set, instance);
             let channel = instance.channel;
-            self.synchronisations_on(process, channel, needs_committed, words, scope, out)?;
+            self.synchronisations_on(sender, channel, words, out)?;
         }
         Ok(())
     }
@@ -156,10 +154,9 @@ impl<'a> Stepper<'a> {
     /// looked for otherwise.
     fn pair(
         &mut self,
-        sender: u32,
+        sender: Sending<'_>,
         entry: EdgeEntry<'a>,
         set: SetId,
-        needs_committed: bool,
         words: &mut [i32],
     ) -> bool {
         let Some(sync) = entry.edge.sync.filter(|_| self.tuning.pairing) else {
@@ -178,8 +175,8 @@ impl<'a> Stepper<'a> {
         }
         self.pairs.clear();
         for &receiver in &*partners {
-            if receiver == sender
-                || (needs_committed && !self.is_process_committed(receiver, words))
+            if receiver == sender.process
+                || (sender.needs_committed && !self.is_process_committed(receiver, words))
             {
                 continue;
             }
