@@ -7,8 +7,8 @@ a new arrow is a decision and belongs into `MAY_IMPORT`, with a reason in the ch
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -125,13 +125,19 @@ def is_module(name: str) -> bool:
     return top == "ntagen" and (path.is_dir() or path.with_suffix(".py").is_file())
 
 
-def trees() -> Iterator[tuple[Path, ast.Module]]:
-    for path in sorted(PACKAGE.rglob("*.py")):
-        if "templates" not in path.relative_to(PACKAGE).parts:
-            yield path, ast.parse(path.read_text("utf-8"), str(path))
+@cache
+def trees() -> list[tuple[Path, ast.Module]]:
+    """The files of the package; they are read once for all tests."""
+    return [
+        (path, ast.parse(path.read_text("utf-8"), str(path)))
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if "templates" not in path.relative_to(PACKAGE).parts
+    ]
 
 
-def imports() -> Iterator[Import]:
+@cache
+def imports() -> list[Import]:
+    found = []
     for path, tree in trees():
         for node in ast.walk(tree):
             match node:
@@ -147,8 +153,8 @@ def imports() -> Iterator[Import]:
                 case _:
                     continue
             place = f"{path.relative_to(PACKAGE)}:{node.lineno}"
-            for module in modules:
-                yield Import(room_of(path), place, module)
+            found += [Import(room_of(path), place, module) for module in modules]
+    return found
 
 
 def test_every_room_is_known() -> None:

@@ -11,8 +11,12 @@ from ntagen.scene import Scene
 from tests.oracles import planner
 
 
+@lru_cache(maxsize=100)
 def oracle_synthesis(scene: Scene) -> Synthesis:
-    """All plans of a scene by brute force; several targets are planned one after the other."""
+    """All plans of a scene by brute force; several targets are planned one after the other.
+
+    The same scenes come in many runs, and in their replays: their plans are computed once.
+    """
     plans = _chained(scene)
     return Synthesis(
         scene=scene,
@@ -23,17 +27,11 @@ def oracle_synthesis(scene: Scene) -> Synthesis:
     )
 
 
-@lru_cache(maxsize=1000)
-def _plans(scene: Scene) -> tuple[planner.Steps, ...]:
-    """The plans to the first target; the same scenes come in many runs, and in their replays."""
-    return tuple(planner.plans(scene))
-
-
 def _chained(scene: Scene) -> list[Plan]:
     """Plans through the targets in order: the best few to the first, each continued to the next."""
     first = [
         Plan.of(Push(value) if kind == "push" else Roll(value) for kind, value in steps)
-        for steps in _plans(scene)
+        for steps in planner.plans(scene)
     ]
     if len(scene.targets) == 1:
         return first

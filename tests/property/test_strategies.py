@@ -65,9 +65,9 @@ def played(strategy: Strategy, chance: random.Random) -> tuple[str | None, bool]
             index, window = chance.choice(choices)
             edges, delay = situation.replies[index].edges, window.chosen(chance)
             play.wait(delay)
-            replies = play.situation().replies
-            met |= play.situation().goal
-            play.reply(next(i for i, one in enumerate(replies) if one.edges == edges), 0)
+            reached = play.situation()
+            met |= reached.goal
+            play.reply(next(i for i, one in enumerate(reached.replies) if one.edges == edges), 0)
         elif situation.allowed and chance.random() < 0.7:
             index = chance.randrange(len(situation.allowed))
             window = chance.choice(situation.allowed[index].windows)
@@ -104,15 +104,20 @@ def check_wins(strategy: Strategy, seed: int) -> None:
             assert winner == strategy.owner
 
 
+@pytest.mark.parametrize(
+    "seeds",
+    [range(1), pytest.param(range(1, 5), marks=pytest.mark.slow)],
+    ids=["few plays", "more plays"],
+)
 @pytest.mark.parametrize(("path", "query"), queries(), ids=lambda one: getattr(one, "stem", one))
-def test_strategies_of_the_corpus_win(path: Path, query: str) -> None:
+def test_strategies_of_the_corpus_win(path: Path, query: str, seeds: range) -> None:
     model = ntagen.load(path)
     try:
         strategy = model.synthesize(query)
     except (InputError, LimitError):
         # Kinds of games that are refused, or have no strategy, have tests of their own.
         pytest.skip("the game gives no strategy")
-    for seed in range(5):
+    for seed in seeds:
         check_wins(strategy, seed)
 
 

@@ -38,15 +38,15 @@ def names(folder: Path) -> list[str]:
 
 
 @contextlib.contextmanager
-def no_room() -> Iterator[None]:
-    """Files cannot grow beyond 100 bytes, as on a full disk.
+def no_room(size: int = 100) -> Iterator[None]:
+    """Files cannot grow beyond this many bytes, as on a full disk.
 
     That holds for what the test runner prints into a file too, so nothing but what is tested
     happens in between.
     """
     old = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100, old[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, old[1]))
     try:
         yield
     finally:
@@ -425,20 +425,20 @@ def test_every_command_keeps_modes_and_links_and_leaves_nothing(
 
 @pytest.mark.parametrize("arguments", WRITERS, ids=" ".join)
 def test_every_command_leaves_the_old_file_on_a_full_disk(
-    tmp_path: Path, arguments: list[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "game.xta").write_text(GAME)
     (tmp_path / "file.nsl").write_text(Path(PAPER).read_text().replace("  ", "   "))
     (tmp_path / "file.png").write_text("old")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-
-    def no_room() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))
-
-    words = [argument.replace("{}", "file") for argument in arguments]
-    run = ntagen(*words, folder=tmp_path, preexec_fn=no_room, stderr=subprocess.PIPE)
-    assert run.returncode == 2
-    assert b"file too large" in run.stderr
+    with no_room(10):
+        code = main([argument.replace("{}", "file") for argument in arguments])
+    assert code == 2
+    assert "file too large" in capsys.readouterr().err
     after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     # The log of a run grows, so that what was written of it stays.
     after.pop("file", None) if arguments[0] == "drive" else None
