@@ -1,25 +1,26 @@
 //! One bound on a difference of two clocks: `< c`, `<= c`, or none.
 //!
-//! Encoding: `2 * c + 1` for `<= c`, `2 * c` for `< c`, `i32::MAX` for none. The order of the
-//! encodings is the order of tightness: `< c` is below `<= c`, both are below every bound with a
-//! greater constant, and all are below infinity.
+//! Encoding: `2 * c + 1` for `<= c`, `2 * c` for `< c`, `i32::MAX` for none. The tighter of two
+//! bounds has the lesser encoding: `< c` is below `<= c`, both are below every bound with a greater
+//! constant, and all are below infinity.
 //!
-//! The sum of two bounds (the bound on `x - z` that follows from those on `x - y` and `y - z`) adds
-//! the constants and is weak only if both are. In the encoding, for a fixed first bound `a`, `a + b
-//! = (a & !1) + (b & (a | !1))`: the rest of a row costs one `and` and one `add` per entry and no
-//! branch.
+//! The bound on `x - z` that follows from those on `x - y` and `y - z` is their sum: it adds the
+//! constants, and is weak only if both bounds are weak. In the encoding, for a fixed first bound
+//! `a`, `a + b = (a & !1) + (b & (a | !1))`. So the rest of a row costs one `and` and one `add` per
+//! entry, and no branch.
 //!
-//! Range: constants of a model lie within ±[`Bound::MAX_VALUE`]. Inside an operation on a zone,
-//! bounds along a path are added. Where single clocks are compared with constants, a path has two
-//! of the zone and two new ones at most; where clocks are compared with each other, it may pass all
-//! clocks. An `i32` has room for that as long as no bound of the zone is beyond
-//! [`Bound::most_in_zone`]. Extrapolated zones are within it; whoever lets bounds grow asks
-//! [`super::dbm::is_in_range`] once per step, and goes on otherwise or stops.
+//! Range: constants of a model lie within ±[`Bound::MAX_VALUE`]. An operation on a zone adds the
+//! bounds along a path. Where single clocks are compared with constants, a path has at most two
+//! bounds of the zone and two new ones. Where clocks are compared with each other, it may visit all
+//! clocks. The sum fits into an `i32` as long as no bound of the zone exceeds
+//! [`Bound::most_in_zone`]. Extrapolated zones keep within it. Code that lets bounds grow without
+//! extrapolation calls [`super::dbm::is_in_range`] once per step, and stops or uses another
+//! abstraction if the answer is no.
 
 use std::fmt;
 use std::ops::Add;
 
-/// A bound on a difference of clocks, `< c`, `<= c` or none; smaller is tighter.
+/// A bound on a difference of clocks: `< c`, `<= c` or none. A smaller bound is tighter.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
 pub struct Bound(pub(super) i32);
@@ -35,8 +36,8 @@ impl Bound {
     pub const MAX_VALUE: i32 = (1 << 27) - 1;
 
     /// The greatest constant, and the negative of the least one, that a zone of this dimension may
-    /// have for no sum to leave the range of the encoding. `has_differences` says whether clocks
-    /// are compared with each other.
+    /// have so that no sum leaves the range of the encoding. `has_differences` says whether the
+    /// model compares clocks with each other.
     pub const fn most_in_zone(dimension: usize, has_differences: bool) -> i32 {
         const MOST: usize = 2 * (Bound::MAX_VALUE as usize + 1);
         let shared = (1 << 30) / (dimension + 1);
@@ -124,8 +125,8 @@ impl Bound {
         }
     }
 
-    /// The sum of two bounds that are infinite or far from the ends of their range: as `+`, and
-    /// without a branch.
+    /// The sum of two bounds without a branch. Each must be infinite or far from the ends of the
+    /// range; then the result is the same as that of `+`.
     #[inline]
     pub(super) const fn plus(self, other: Bound) -> Bound {
         let sum = (self.0 & !1).wrapping_add(other.0 & (self.0 | !1));
@@ -133,7 +134,8 @@ impl Bound {
         Bound(sum & !is_infinite | i32::MAX & is_infinite)
     }
 
-    /// The lesser of two bounds, as `min`; by a mask, for vectors that have no minimum.
+    /// The lesser of two bounds, as `min` gives it. It uses a mask, because some vector units have
+    /// no minimum.
     #[inline]
     pub(super) const fn lesser(self, other: Bound) -> Bound {
         let is_less = -((other.0 < self.0) as i32);
@@ -142,7 +144,8 @@ impl Bound {
 
     /// The lesser of `current` and `via + rest`; `via` must be finite.
     ///
-    /// Both conditions are one mask, since vectors without a select would otherwise blend twice.
+    /// Both conditions make one mask: vector units without a select instruction would otherwise
+    /// blend twice.
     #[inline]
     pub(super) const fn relaxed(current: Bound, via: Bound, rest: Bound) -> Bound {
         let sum = (via.0 & !1).wrapping_add(rest.0 & (via.0 | !1));

@@ -1,7 +1,7 @@
-//! A set of clocks as a bit set: the first 256 in machine words of its own, so that operations on
-//! zones of few clocks need no allocation, those beyond in a list.
+//! A set of clocks as a bit set. The first 256 clocks are stored in the set itself, so operations
+//! on zones of few clocks need no allocation. The other clocks are stored in a list.
 
-/// How many machine words lie in the set itself.
+/// How many machine words the set itself stores.
 const INLINE_WORDS: usize = 4;
 
 /// A set of clock indices.
@@ -40,7 +40,7 @@ impl ClockSet {
         *word |= 1 << (clock % 64);
     }
 
-    /// Takes a clock out.
+    /// Removes a clock.
     pub fn remove(&mut self, clock: usize) {
         let mut words = self.words.iter_mut().chain(&mut self.more);
         if let Some(word) = words.nth(clock / 64) {
@@ -137,8 +137,8 @@ impl<'s> IntoIterator for &'s ClockSet {
 /// The clocks of a set in ascending order.
 #[derive(Clone, Debug)]
 pub struct Clocks<'s> {
-    /// What is left of each inline word, and of the first four after those that are used up; the
-    /// words before `index` are used up.
+    /// The remaining bits of the current four words. The words before `index` are used up; words of
+    /// `more` take their places.
     words: [u64; INLINE_WORDS],
     more: &'s [u64],
     index: usize,
@@ -159,7 +159,7 @@ impl Iterator for Clocks<'_> {
             }
             self.index += 1;
             if self.index >= INLINE_WORDS {
-                // The place of a word that is used up takes one that comes later.
+                // A later word takes the place of the one that is used up.
                 let next = *self.more.get(self.index - INLINE_WORDS)?;
                 self.words[self.index % INLINE_WORDS] = next;
             }

@@ -1,13 +1,13 @@
-//! What moves clocks: delay and its past, reset, assignment, freeing, and the way back of an
-//! update.
+//! Operations that move clocks: delay and its past, reset, assignment, freeing, and the preimage of
+//! an update.
 //!
-//! The contract is that of [`super::dbm`]: closed, consistent, positive zones in and out. Each
-//! function writes the closed result directly; none needs to close again.
+//! The contract is that of [`super::dbm`]: zones are closed, consistent and positive before and
+//! after. Each function writes the closed result directly, so no result needs closing.
 //!
 //! *Stopped* clocks (stopwatches at rate 0) keep their value while the others run. The exact set
-//! after such a delay is in general not a zone; the functions with stopped clocks return the least
-//! zone that contains it, which UPPAAL does as well (its answers become "maybe"). Without stopped
-//! clocks they are exact.
+//! after such a delay is in general not a zone. The functions with stopped clocks return the least
+//! zone that contains it. UPPAAL does the same (its answers become "maybe"). Without stopped clocks
+//! these functions are exact.
 //!
 //! Source: Bengtsson and Yi 2004, section 4.2, algorithms `up`, `down`, `free`, `reset`, `copy`,
 //! `shift`; the stopped variants are derived here.
@@ -24,11 +24,11 @@ use super::dbm::{Constraint, constrain, least_sum, upper_bounds};
 use super::rows::{for_small_dimension, rows, rows_mut, with_row};
 use super::{Bound, ClockSet};
 
-/// So few upper bounds are looked at one after the other for each clock, more as a row of bounds on
-/// all clocks.
+/// Up to this number of upper bounds, each clock looks at them one by one. If there are more, they
+/// are written into a row with one bound for each clock.
 const FEW_BOUNDS: usize = 4;
 
-/// One step of an update of clocks; a list of them is carried out in order.
+/// One step of an update of clocks. The steps of a list are carried out in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Assignment {
     /// `x_clock := value`; the value must be from 0 to [`Bound::MAX_VALUE`].
@@ -63,11 +63,11 @@ pub fn up(zone: &mut [Bound], dimension: usize) {
         .for_each(|bound| *bound = Bound::INFINITY);
 }
 
-/// Lets time pass as long as the constraints hold, all of which the zone must satisfy.
+/// Lets time pass as long as the constraints hold. The zone must satisfy all of them.
 ///
-/// Only upper bounds end a delay, and of the closed future within them only upper bounds are new:
-/// the least that a bound of another clock and the difference to it allow. Differences were
-/// possible before and stay so. Cost: O(n) for each upper bound.
+/// Only upper bounds end a delay, and the closed result differs from the future only in upper
+/// bounds. Each is the least sum of a difference to some clock and the bound of that clock. All
+/// other differences stay as they were. Cost: O(n) for each upper bound.
 pub fn up_within(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) {
     let is_upper = |one: &&Constraint| one.right == 0 && one.left != 0;
     let count = constraints.iter().filter(is_upper).count();
@@ -93,11 +93,12 @@ fn delay_below(zone: &mut [Bound], upper_bounds: &[Bound], dimension: usize) {
     }
 }
 
-/// The least zone around the future of the zone when the clocks of `stopped` do not move.
+/// Replaces the zone by the least zone that contains its future, while the clocks of `stopped` do
+/// not move.
 ///
-/// Differences between two running or two stopped clocks stay, a running clock loses its bound from
-/// above against every stopped one and the reference, and the opposite bounds are reached without
-/// delay. If all clocks are stopped, nothing changes.
+/// Differences between two running clocks, or two stopped ones, stay. A running clock loses its
+/// upper bound against the reference clock and every stopped clock. The opposite bounds stay, since
+/// a delay of 0 reaches them. If all clocks are stopped, nothing changes.
 pub fn up_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
     let running = |clock: &usize| !stopped.contains(*clock);
     for left in (1..dimension).filter(running) {
@@ -112,8 +113,8 @@ pub fn up_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
 
 /// Lets time run backwards: the zone becomes its past, the valuations that reach it by some delay.
 ///
-/// A lower bound of a clock is lost except for what keeps the other clocks from becoming negative
-/// first.
+/// A clock loses its lower bound, except for the part that keeps other clocks from becoming
+/// negative.
 pub fn down(zone: &mut [Bound], dimension: usize) {
     for_small_dimension!(dimension, lower_to_columns(zone));
 }
@@ -131,13 +132,14 @@ fn lower_to_columns(zone: &mut [Bound], dimension: usize) {
     lower_bounds[0] = Bound::LE_ZERO;
 }
 
-/// The least zone around the past of the zone when the clocks of `stopped` do not move.
+/// Replaces the zone by the least zone that contains its past, while the clocks of `stopped` do not
+/// move.
 ///
 /// Only bounds `x_s - x_r` between a stopped clock or the reference `s` and a running clock `r`
-/// change. A delay `d` is limited by every running clock, so it behaves like a clock with `d - x_q
-/// <= 0` for all running `q`: let `delay(y) = min over q of (q, y)` be its closed bounds. The
-/// greatest `x_s - x_r + d` over the zone is a flow from `{s, d}` to `{r, 0}` along closed entries,
-/// hence the lesser of the two pairings `(s, r) + delay(0)` and `(s, 0) + delay(r)`.
+/// change. Every running clock limits a delay `d`, so `d` behaves like a clock with `d - x_q <= 0`
+/// for all running `q`. Let `delay(y) = min over q of (q, y)` be the closed bounds of `d`. The
+/// greatest `x_s - x_r + d` over the zone is a flow from `{s, d}` to `{r, 0}` along closed entries.
+/// So it is the lesser of the two pairings `(s, r) + delay(0)` and `(s, 0) + delay(r)`.
 pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
     if stopped.is_empty() {
         return down(zone, dimension);
@@ -161,7 +163,7 @@ pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
     }
 }
 
-/// Forgets the value of a clock: it becomes anything from 0.
+/// Frees a clock: it may have any value from 0.
 pub fn free_clock(zone: &mut [Bound], dimension: usize, clock: usize) {
     for row in rows_mut(zone, dimension) {
         row[clock] = row[0];
@@ -194,8 +196,8 @@ pub fn reset(zone: &mut [Bound], dimension: usize, clock: usize, value: i32) {
 /// Sets a clock to the value of another (or its own) plus an increment; returns whether something
 /// is left.
 ///
-/// Valuations that would make the clock negative are dropped: a caller to whom that is a mistake
-/// looks at the lower bound of `source` before.
+/// Drops the valuations that would make the clock negative. A caller that treats this as a mistake
+/// must check the lower bound of `source` before.
 pub fn assign_clock(
     zone: &mut [Bound],
     dimension: usize,
@@ -223,8 +225,8 @@ pub fn assign_clock(
     true
 }
 
-/// Adds an increment to a clock; returns whether something is left. Drops valuations as
-/// [`assign_clock`] does.
+/// Adds an increment to a clock; returns whether something is left. Drops the same valuations as
+/// [`assign_clock`].
 pub fn shift(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32) -> bool {
     if !keep_from(zone, dimension, clock, increment) {
         return false;
@@ -263,8 +265,8 @@ pub fn assign(zone: &mut [Bound], dimension: usize, assignments: &[Assignment]) 
     })
 }
 
-/// Replaces the zone by the valuations that satisfy the guard and are carried into the zone by the
-/// assignments; returns whether there are any.
+/// Replaces the zone by its preimage: the valuations that satisfy the guard and that the
+/// assignments map into the zone. Returns whether there are any.
 pub fn preimage(
     zone: &mut [Bound],
     dimension: usize,
@@ -278,8 +280,8 @@ pub fn preimage(
         && super::dbm::constrain_all(zone, dimension, guard)
 }
 
-/// The preimage of one assignment: the values that the clock may have got, then any value that it
-/// had before.
+/// The preimage of one assignment: restricts the clock to the values that it may have got, then
+/// frees it.
 fn unassign(zone: &mut [Bound], dimension: usize, assignment: &Assignment) -> bool {
     let (clock, source, increment) = match *assignment {
         Assignment::Free { clock } => {

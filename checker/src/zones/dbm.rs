@@ -1,8 +1,8 @@
 //! Zones as difference bound matrices on slices.
 //!
-//! A zone of dimension n is a slice of n * n bounds, row by row: entry (i, j) at `i * n + j` bounds
-//! `x_i - x_j`, so row 0 holds the negated lower bounds and column 0 the upper bounds. The terms
-//! used in every contract:
+//! A zone of dimension n is a slice of n * n bounds, row by row. Entry (i, j) at `i * n + j` bounds
+//! `x_i - x_j`, so row 0 holds the negated lower bounds and column 0 holds the upper bounds. All
+//! contracts use these terms:
 //!
 //! * *consistent*: no cycle of bounds sums to less than `<= 0`, so the zone contains a valuation;
 //! * *closed*: no entry is greater than the sum along a path, so every entry is the least upper
@@ -12,14 +12,14 @@
 //!
 //! Every public function takes zones that are closed, consistent and positive, and leaves them so,
 //! unless it says otherwise. A function that may empty a zone returns whether the zone still
-//! contains a valuation; an empty zone must not be used any further except with [`is_empty`].
-//! Indices must be below the dimension, and slices must have the right length: both are contracts,
-//! checked by the bounds of the slices only.
+//! contains a valuation. Nothing but [`is_empty`] may use an empty zone. Indices must be below the
+//! dimension, and slices must have the right length: only the bounds checks of the slices test
+//! these two contracts.
 //!
 //! Source: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4.
 //!
-//! Cost: closing takes n^3 / 4 vector steps, one constraint n^2 / 4, all others at most that; only
-//! [`least_point`] allocates.
+//! Cost: closing takes n^3 / 4 vector steps, one constraint n^2 / 4, and every other operation at
+//! most that.
 
 #![expect(
     clippy::inline_always,
@@ -33,7 +33,7 @@ use crate::cancellation;
 use super::rows::{for_small_dimension, relax_row, rows_mut, with_row};
 use super::{Bound, ClockSet};
 
-/// How two zones of the same dimension lie to each other.
+/// How two zones of the same dimension relate to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Relation {
     /// The same set.
@@ -49,9 +49,9 @@ pub enum Relation {
 /// One bound on one difference: `x_left - x_right` is bounded by `bound`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Constraint {
-    /// The clock that is counted positively.
+    /// The clock with the positive sign.
     pub left: usize,
-    /// The clock that is counted negatively.
+    /// The clock with the negative sign.
     pub right: usize,
     /// The bound on the difference.
     pub bound: Bound,
@@ -87,11 +87,10 @@ pub fn is_empty(zone: &[Bound]) -> bool {
     zone[0] < Bound::LE_ZERO
 }
 
-/// Whether the constant of every bound is at most this great, signs aside; see
+/// Whether the constants of all bounds have an absolute value of at most `most`; see
 /// [`Bound::most_in_zone`].
 ///
-/// Bounds can only become greater than the constants of a model by growing over many steps without
-/// extrapolation.
+/// Bounds exceed the constants of a model only if they grow over many steps without extrapolation.
 pub fn is_in_range(zone: &[Bound], most: i32) -> bool {
     let (least, most) = (-2 * most, 2 * most + 1);
     zone.iter()
@@ -99,9 +98,10 @@ pub fn is_in_range(zone: &[Bound], most: i32) -> bool {
 }
 
 /// Closes any matrix with a diagonal of `<= 0` (Floyd–Warshall); returns whether it is consistent,
-/// else marks it empty.
+/// and marks it as empty otherwise.
 ///
-/// The matrix need not be closed or consistent before. Positive if row 0 was at most `<= 0`.
+/// The matrix need not be closed or consistent before. The result is positive if row 0 was at most
+/// `<= 0`.
 pub fn close(zone: &mut [Bound], dimension: usize) -> bool {
     for_small_dimension!(dimension, close_all(zone))
 }
@@ -111,19 +111,19 @@ fn close_all(zone: &mut [Bound], dimension: usize) -> bool {
     (0..dimension).all(|via| close_through(zone, dimension, via))
 }
 
-/// Closes a matrix that was closed before bounds between the clocks of `touched` were tightened.
+/// Closes a matrix that was closed until bounds between the clocks of `touched` were tightened.
 ///
 /// Both clocks of every tightened entry must be in the set. Returns whether the zone is consistent.
 ///
-/// Sound because in a closed matrix two old entries in a row are never better than one: a path
-/// needs to visit only ends of new entries on its way.
+/// This is sound: in a closed matrix two successive old entries are never better than one, so a
+/// path needs to visit only the ends of new entries.
 pub fn close_touched(zone: &mut [Bound], dimension: usize, touched: &ClockSet) -> bool {
     touched
         .iter()
         .all(|via| close_through(zone, dimension, via))
 }
 
-/// From this dimension on, a pass over a matrix takes long enough to be counted.
+/// From this dimension on, one pass over a matrix counts as work: it takes long enough.
 const LONG_PASS: usize = 64;
 
 /// Counts the work of one pass over a matrix, a vector of bounds at a time.
@@ -134,14 +134,15 @@ fn count_if_long(dimension: usize) {
     }
 }
 
-/// One step of Floyd–Warshall: admits paths through the clock `via`.
+/// One step of Floyd–Warshall: adds paths through the clock `via`.
 #[inline(always)]
 fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
     count_if_long(dimension);
     let (before, rest) = zone.split_at_mut(via * dimension);
     let (source, after) = rest.split_at_mut(dimension);
     let mut is_consistent = true;
-    // The diagonal shows whether a negative cycle closed; the row of `via` itself has not changed.
+    // The diagonal shows whether a negative cycle exists now; the row of `via` itself has not
+    // changed.
     for (clock, target) in rows_mut(before, dimension).enumerate() {
         relax_row(target, target[via], source);
         is_consistent &= target[clock] >= Bound::LE_ZERO;
@@ -159,8 +160,8 @@ fn close_through(zone: &mut [Bound], dimension: usize, via: usize) -> bool {
 /// Intersects the zone with `x_left - x_right` bounded by `bound`; returns whether something is
 /// left.
 ///
-/// Every tightened path uses the new bound once, so one pass over the rows closes the zone again; a
-/// row whose bound against `x_right` does not improve is passed over whole.
+/// Every tightened path uses the new bound once, so one pass over the rows closes the zone again.
+/// The pass skips a row whose bound against `x_right` does not improve.
 pub fn constrain(
     zone: &mut [Bound],
     dimension: usize,
@@ -224,9 +225,9 @@ fn constrain_by(zone: &mut [Bound], dimension: usize, constraint: &Constraint) -
 /// Intersects the zone with all upper bounds among the constraints at once; returns whether
 /// something is left.
 ///
-/// All the new bounds lead to the reference clock, so a path that uses two of them passes it twice
-/// and is no shorter than without what lies between. Each row is closed again by its new upper
-/// bound and the lower bounds.
+/// All the new bounds lead to the reference clock. A path that uses two of them visits this clock
+/// twice, so it is no shorter than the path without the part between. The new upper bound of each
+/// row and the lower bounds therefore close that row again.
 fn constrain_above(zone: &mut [Bound], dimension: usize, constraints: &[Constraint]) -> bool {
     with_row(dimension, |row| {
         let upper_bounds = upper_bounds(constraints, row);
@@ -251,8 +252,8 @@ fn tighten_above(zone: &mut [Bound], upper_bounds: &[Bound], dimension: usize) -
     true
 }
 
-/// Lowers the entries of `bounds`, by clock, to the upper bounds among some constraints; that of
-/// the reference clock stays.
+/// Lowers the entries of `bounds`, by clock, to the upper bounds among the constraints. The entry
+/// of the reference clock stays.
 pub(super) fn upper_bounds<'b>(constraints: &[Constraint], bounds: &'b mut [Bound]) -> &'b [Bound] {
     for constraint in constraints {
         if constraint.right == 0 && constraint.left != 0 {
@@ -263,8 +264,9 @@ pub(super) fn upper_bounds<'b>(constraints: &[Constraint], bounds: &'b mut [Boun
     bounds
 }
 
-/// The least upper bound on the clock of a row that follows from the differences in it to the
-/// clocks with upper bounds, its own among them: its bound against itself is `<= 0`.
+/// The least upper bound on the clock of this row: the least sum of a difference in the row and the
+/// upper bound of the other clock. Its own upper bound is among them, since its bound against
+/// itself is `<= 0`.
 #[inline(always)]
 pub(super) fn least_sum(row: &[Bound], upper_bounds: &[Bound]) -> Bound {
     let length = row.len().min(upper_bounds.len());
@@ -275,7 +277,7 @@ pub(super) fn least_sum(row: &[Bound], upper_bounds: &[Bound]) -> Bound {
         let sums = sums.map(|(difference, bound)| difference.plus(*bound));
         return sums.fold(Bound::INFINITY, Bound::lesser);
     };
-    // The last four may count twice.
+    // Some of the last four may count twice.
     let mut least = four_sums(last, last_bounds);
     let (rows, _) = row.as_chunks::<4>();
     let (bounds, _) = upper_bounds.as_chunks::<4>();
@@ -317,9 +319,10 @@ pub fn intersect(zone: &mut [Bound], other: &[Bound], dimension: usize) -> bool 
     close_touched(zone, dimension, &touched)
 }
 
-/// Whether two zones certainly have no valuation in common: some difference is bounded apart.
+/// Whether two zones certainly have no valuation in common, because their bounds on some difference
+/// exclude each other.
 ///
-/// Cheap and one-sided: disjoint zones can pass.
+/// This test is cheap and one-sided: it may return false for disjoint zones.
 #[inline]
 pub fn are_apart(zone: &[Bound], other: &[Bound], dimension: usize) -> bool {
     (0..dimension).any(|left| {
@@ -379,7 +382,7 @@ pub fn is_equal(zone: &[Bound], other: &[Bound]) -> bool {
         && !differ(rest, other_rest)
 }
 
-/// How the zones lie to each other.
+/// How the two zones relate to each other.
 pub fn relation(zone: &[Bound], other: &[Bound]) -> Relation {
     match (is_subset(zone, other), is_subset(other, zone)) {
         (true, true) => Relation::Equal,
@@ -415,8 +418,8 @@ pub fn clock_bounds(zone: &[Bound], dimension: usize, clock: usize) -> (Bound, B
     (zone[clock], zone[clock * dimension])
 }
 
-/// Whether the delay from some valuation of the zone within it is limited: some clock other than
-/// those stopped has an upper bound.
+/// Whether the delay from each valuation of the zone is limited: some running clock has an upper
+/// bound.
 pub fn is_delay_bounded(zone: &[Bound], dimension: usize, stopped: &ClockSet) -> bool {
     let upper_bounds = zone
         .chunks_exact(dimension)
@@ -428,10 +431,10 @@ pub fn is_delay_bounded(zone: &[Bound], dimension: usize, stopped: &ClockSet) ->
         .any(|(clock, bound)| bound.is_finite() && !stopped.contains(clock))
 }
 
-/// A hash of the zone that depends on nothing but its bounds, so it is the same in every run.
+/// A hash that depends only on the bounds of the zone, so it is the same in every run.
 ///
-/// Two lanes take two bounds each on either side of a multiplication, whose halves are folded into
-/// one word.
+/// Each of two lanes multiplies two bounds with two others, and folds both halves of the product
+/// into one word.
 pub fn hash(zone: &[Bound]) -> u64 {
     const MULTIPLIERS: [u64; 2] = [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03]; // Odd, bits evenly mixed.
     let word = |low: Bound, high: Bound| {
@@ -454,7 +457,7 @@ pub fn hash(zone: &[Bound]) -> u64 {
     folded_product(lanes[0] ^ MULTIPLIERS[1], lanes[1] ^ MULTIPLIERS[0])
 }
 
-/// The two halves of a product on top of each other.
+/// The exclusive or of the two halves of a product.
 fn folded_product(left: u64, right: u64) -> u64 {
     let (low, high) = left.carrying_mul(right, 0);
     low ^ high

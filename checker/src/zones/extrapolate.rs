@@ -1,9 +1,10 @@
 //! Abstractions that make the zone graph finite by forgetting what no guard can tell apart.
 //!
-//! For each clock let L be the greatest constant that its guards and invariants compare from below
-//! (`x > c`, `x >= c`), U from above, M the greater of both; minus infinity where there is none. A
-//! closed zone with entries (i, j) and lower bounds `low(i)` (the negated entry (0, i)) is replaced
-//! by the closure of this matrix, old entries elsewhere:
+//! For each clock let L be the greatest constant in comparisons from below (`x > c`, `x >= c`) in
+//! its guards and invariants, U the greatest one in comparisons from above, and M the greater of
+//! both. Each is minus infinity where there is none. Let a closed zone have the entries (i, j) and
+//! the lower bounds `low(i)` (the negated entry (0, i)). An extrapolation replaces it by the
+//! closure of the following matrix, whose other entries stay as they are:
 //!
 //! * `Extra_M`: infinite if `(i, j) > M(i)`; `< -M(j)` if `-(i, j) > M(j)`;
 //! * `Extra_LU`: infinite if `(i, j) > L(i)`; `< -U(j)` if `-(i, j) > U(j)`;
@@ -13,22 +14,22 @@
 //!   0; `< -U(j)` in row 0 if `low(j) > U(j)`.
 //!
 //! Zones stay positive: row 0 never exceeds `<= 0`. The diagonal stays. All four are sound and
-//! complete for reachability in automata that compare single clocks with constants; the later ones
-//! are coarser. None is sound where guards compare two clocks; [`split_by_differences`] is the
-//! variant for those.
+//! complete for reachability in automata that compare single clocks with constants; `Extra_M` is
+//! the finest and `Extra_LU+` the coarsest. None is sound where guards compare two clocks;
+//! [`split_by_differences`] is the variant for those.
 //!
-//! [`lu_plus`] is coarser still: an entry (i, j) is infinite, for i other than 0, already if
-//! `low(j) + (i, j) > L(i)`, that is, if with the least j there is a clock i above L; and where
-//! `low(j)` is `> U(j)`, strictly, that counts as above U. It forgets all entries on which the
-//! abstraction `aLU` does not depend (see [`super::simulation`]), and so it stays within `aLU`.
+//! [`lu_plus`] is coarser still. For i other than 0, an entry (i, j) is infinite already if
+//! `low(j) + (i, j) > L(i)`, that is, if clock i is above L where j is least. A clock j is above U
+//! already if `low(j)` is the strict bound `> U(j)`. So it forgets all entries on which the
+//! abstraction `aLU` does not depend (see [`super::simulation`]), and stays within `aLU`.
 //!
 //! Source: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower and Upper Bounds in Zone Based
 //! Abstractions of Timed Automata", TACAS 2004, definitions in section 4, closing after `Extra_LU+`
 //! (LU-Canonize) in section 5.
 //!
-//! Where we differ: closing passes over all rows in which nothing was forgotten. The new matrix
-//! lies above the old one, which was closed, so an entry that was kept cannot become tighter. This
-//! holds for all four.
+//! Where we differ: closing skips all rows in which nothing was forgotten. The new matrix lies
+//! above the old one, which was closed, so an entry that was kept cannot become tighter. This holds
+//! for all four.
 //!
 //! Cost: O(n^2) to forget, then n^2 / 4 vector steps for each row that lost something.
 
@@ -47,11 +48,11 @@ use super::{Bound, ClockSet};
 /// The greatest constants that each clock is compared with, prepared for extrapolation.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Ceilings {
-    /// `<= L` of each clock: greater entries of its row are forgotten. Below every bound if there
-    /// is no L.
+    /// `<= L` of each clock: greater entries of its row are forgotten. It is below every bound if
+    /// there is no L.
     rows: Box<[Bound]>,
-    /// `< -U` of each clock: lesser entries of its column are forgotten. Above every bound if there
-    /// is no U.
+    /// `< -U` of each clock: lesser entries of its column are forgotten. It is above every bound if
+    /// there is no U.
     columns: Box<[Bound]>,
 }
 
@@ -63,14 +64,14 @@ impl Clone for Ceilings {
         }
     }
 
-    /// Takes no memory where both are of the same dimension: this happens for every zone.
+    /// Allocates nothing if both have the same dimension: this runs for every zone.
     fn clone_from(&mut self, other: &Ceilings) {
         self.rows.clone_from(&other.rows);
         self.columns.clone_from(&other.columns);
     }
 }
 
-/// What one clock is compared with.
+/// The constants that one clock is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Ceiling {
     clock: usize,
@@ -89,11 +90,11 @@ impl Ceilings {
         ceilings
     }
 
-    /// The ceilings of the clocks 0..n from the greatest constants of comparisons from below and
+    /// The ceilings of the clocks 0..n, given the greatest constants of comparisons from below and
     /// from above.
     ///
     /// `None` stands for a clock without such comparisons. The entries of the reference clock are
-    /// not looked at.
+    /// ignored.
     pub fn lower_upper(lower: &[Option<i32>], upper: &[Option<i32>]) -> Ceilings {
         let mut ceilings = Ceilings::none(lower.len());
         for (clock, (lower, upper)) in lower.iter().zip(upper).enumerate().skip(1) {
@@ -115,10 +116,10 @@ impl Ceilings {
         self.columns[0] = Bound::LT_ZERO;
     }
 
-    /// Takes a comparison of the clock from below, `x > constant` or `x >= constant`, into account.
+    /// Adds a comparison of the clock from below, `x > constant` or `x >= constant`.
     ///
-    /// A negative constant changes nothing, since clocks are not negative; one beyond
-    /// [`Bound::MAX_VALUE`] counts as that.
+    /// A negative constant changes nothing, since clocks are not negative. A constant above
+    /// [`Bound::MAX_VALUE`] counts as that value.
     pub fn admit_lower(&mut self, clock: usize, constant: i32) {
         if constant >= 0 {
             let row = Bound(2 * constant.min(Bound::MAX_VALUE) + 1);
@@ -126,8 +127,8 @@ impl Ceilings {
         }
     }
 
-    /// Takes a comparison of the clock from above, `x < constant` or `x <= constant`, into account;
-    /// as [`Ceilings::admit_lower`].
+    /// Adds a comparison of the clock from above, `x < constant` or `x <= constant`, like
+    /// [`Ceilings::admit_lower`].
     pub fn admit_upper(&mut self, clock: usize, constant: i32) {
         if constant >= 0 {
             let column = Bound(-2 * constant.min(Bound::MAX_VALUE));
@@ -135,12 +136,12 @@ impl Ceilings {
         }
     }
 
-    /// The ceilings where comparisons from below and from above are not told apart.
+    /// The ceilings that do not distinguish comparisons from below and from above.
     pub fn maximal(constants: &[Option<i32>]) -> Ceilings {
         Ceilings::lower_upper(constants, constants)
     }
 
-    /// The ceilings of which each is the greater of both: sound where either was.
+    /// Raises each ceiling to the greater of both: the result is sound wherever one of the two was.
     pub fn raise(&mut self, other: &Ceilings) {
         for (row, other) in self.rows.iter_mut().zip(&other.rows) {
             *row = (*row).max(*other);
@@ -150,7 +151,7 @@ impl Ceilings {
         }
     }
 
-    /// Raises the ceilings of one clock: as [`Ceilings::raise`].
+    /// Raises the ceilings of one clock, like [`Ceilings::raise`].
     #[inline]
     pub fn raise_one(&mut self, ceiling: &Ceiling) {
         let (row, column) = (
@@ -219,21 +220,22 @@ impl Ceilings {
     }
 }
 
-/// The least even bound on `y - x` that lets y be above L where x is least, from `<= L(y)` and the
-/// entry (0, x).
+/// The least even bound on `y - x` with which y is above L where x is least, given `<= L(y)` and
+/// the entry (0, x).
 #[inline]
 pub(super) fn forgotten_from(limit: Bound, lower: Bound) -> Bound {
     Bound((limit.0 + lower.0) & !1)
 }
 
-/// Extrapolates further than `Extra_LU+`, within `aLU`; than `Extra_M+` if the ceilings are
-/// [`Ceilings::maximal`].
+/// Extrapolates further than `Extra_LU+`, but stays within `aLU`. With the ceilings of
+/// [`Ceilings::maximal`] it extrapolates further than `Extra_M+`.
 ///
-/// The forgetting leaves only these ways from one clock to another: through clocks that are neither
-/// certainly above L (their rows are infinite) nor certainly above U (only the reference clock
-/// still bounds them), and through the reference clock. Row 0 is final after forgetting, since the
-/// way over a clock above U was not better before its bound became weaker. So paths need to be
-/// admitted through those clocks and, last, through the reference clock.
+/// After forgetting, a path from one clock to another can only visit two kinds of clocks. The first
+/// kind is neither certainly above L (its row would be infinite) nor certainly above U (only the
+/// reference clock would still bound it). The second is the reference clock. Row 0 is final after
+/// forgetting: a path through a clock above U was not better before the bound of that clock became
+/// weaker. So it is enough to add paths through the clocks of the first kind, and last those
+/// through the reference clock.
 pub fn lu_plus(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     for_small_dimension!(dimension, forget_and_close(zone, ceilings));
 }
@@ -244,8 +246,8 @@ fn forget_and_close(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
     close_again(zone, dimension, &weakened, &between);
 }
 
-/// Closes a matrix in which nothing is left that [`lu_plus`] forgets, given the clocks whose rows
-/// lost a bound, and those that are neither certainly above L nor certainly above U.
+/// Closes a matrix from which [`lu_plus`] has forgotten all that it can. The rows of `weakened`
+/// lost a bound; the clocks of `between` are neither certainly above L nor certainly above U.
 #[inline(always)]
 pub(super) fn close_again(
     zone: &mut [Bound],
@@ -262,8 +264,9 @@ pub(super) fn close_again(
     relax_rows(zone, dimension, weakened, 0);
 }
 
-/// Writes the matrix of `Extra_LU+`, not closed; returns the clocks whose rows lost a bound that
-/// closing may restore, and the clocks that are neither certainly above L nor certainly above U.
+/// Writes the matrix of `Extra_LU+`, not closed. Returns two sets: the clocks whose rows lost a
+/// bound that closing may restore, and the clocks that are neither certainly above L nor certainly
+/// above U.
 #[inline(always)]
 fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (ClockSet, ClockSet) {
     let (lower_bounds, rows) = zone.split_at_mut(dimension);
@@ -274,7 +277,7 @@ fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (Cl
         if ceilings.is_above_lower(clock, lower_bounds[clock]) {
             row.fill(Bound::INFINITY);
         } else {
-            // The diagonal must not count as weakened.
+            // The diagonal must not count as a lost bound.
             row[clock] = Bound::INFINITY;
             if forget_in_row(row, ceilings.rows[clock], lower_bounds, columns) {
                 weakened.insert(clock);
@@ -287,15 +290,15 @@ fn forget_plus(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) -> (Cl
     }
     for (lower, column) in lower_bounds.iter_mut().zip(columns).skip(1) {
         if *lower < *column {
-            // Without U nothing is left of a lower bound but `x >= 0`.
+            // Without U only `x >= 0` remains of a lower bound.
             *lower = (*column).min(Bound::LE_ZERO);
         }
     }
     (weakened, between)
 }
 
-/// Makes the entries of a row infinite that exceed `limit` or whose clock is certainly above its U;
-/// returns whether that weakened one.
+/// Makes those entries of a row infinite that exceed `limit` or whose clock is certainly above its
+/// U; returns whether an entry became weaker.
 #[inline(always)]
 fn forget_in_row(
     row: &mut [Bound],
@@ -315,7 +318,7 @@ fn forget_in_row(
     changes != 0
 }
 
-/// Admits paths through `via` into the given rows.
+/// Adds paths through `via` to the given rows.
 #[inline(always)]
 fn relax_rows(zone: &mut [Bound], dimension: usize, targets: &ClockSet, via: usize) {
     let (before, rest) = zone.split_at_mut(via * dimension);
@@ -330,19 +333,19 @@ fn relax_rows(zone: &mut [Bound], dimension: usize, targets: &ClockSet, via: usi
     }
 }
 
-/// Extrapolates by `Extra_LU`; by `Extra_M` if the ceilings are [`Ceilings::maximal`].
+/// Extrapolates by `Extra_LU`, or by `Extra_M` with the ceilings of [`Ceilings::maximal`].
 pub fn lu(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     let columns = &ceilings.columns[..dimension];
     let mut weakened = ClockSet::EMPTY;
     for (clock, row) in rows_mut(zone, dimension).enumerate() {
         let limit = ceilings.rows[clock];
-        // Without U nothing is left of a lower bound but `x >= 0`.
+        // Without U only `x >= 0` remains of a lower bound.
         let greatest = if clock == 0 {
             Bound::LE_ZERO
         } else {
             Bound::INFINITY
         };
-        // The diagonal must not count as weakened.
+        // The diagonal must not count as a lost bound.
         row[clock] = Bound::INFINITY;
         let mut is_weakened = false;
         for (bound, column) in row.iter_mut().zip(columns) {
@@ -364,12 +367,12 @@ pub fn lu(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     }
 }
 
-/// Adds to `target` the zone cut along the given differences, each part extrapolated by `Extra_M`
-/// and kept on its sides.
+/// Cuts the zone along the given differences, extrapolates each part by `Extra_M` on its side of
+/// every cut, and adds the parts to `target`.
 ///
-/// For automata whose guards or invariants compare two clocks: `differences` are these comparisons.
-/// Every part lies wholly inside or outside each of them and stays there, so the parts can tell
-/// apart what the guards can.
+/// This is for automata whose guards or invariants compare two clocks: `differences` are these
+/// comparisons. Every part lies wholly inside or outside each of them and stays there, so the parts
+/// can distinguish whatever the guards can.
 ///
 /// Source: J. Bengtsson, W. Yi, "On Clock Difference Constraints and Termination in Reachability
 /// Analysis of Timed Automata", ICFEM 2003, section 4. Cost: up to 2^m parts for m differences.

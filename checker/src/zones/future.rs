@@ -1,27 +1,27 @@
-//! Where time can lead from a set without meeting a bad one, and without passing through one that
-//! stops it.
+//! Where time can lead from a set without meeting a bad set, and without passing a set that stops
+//! it.
 //!
-//! A *barrier* is a set in which time cannot pass: it can be entered by waiting, and not be left by
-//! it. For zones G (from where), B (bad, both ends of a delay included) and U (a barrier), with
-//! `Z↑` for the future of Z and `Z⇑` for the valuations that lie a positive delay after one of Z,
-//! the valuations that G reaches are
+//! A *barrier* is a set in which time cannot pass: waiting can enter it, but cannot leave it. Let G
+//! be the zone of the start, B a bad zone (a delay must avoid it at both ends too) and U a barrier.
+//! Let `Z↑` be the future of Z, and `Z⇑` the valuations that lie a positive delay after a valuation
+//! of Z. Then G reaches
 //!
-//! * without meeting B: `(G↑ \ B↑) ∪ ((G ∩ B↑) \ B)↑`: either B was never, or it was before G;
+//! * without meeting B: `(G↑ \ B↑) ∪ ((G ∩ B↑) \ B)↑`: either B never came, or it came before G;
 //! * without passing U: `G ∪ (G↑ \ U⇑) ∪ ((G ∩ U↑) \ U)↑`.
 //!
 //! Read backwards in time, each set cuts off a final part of the interval of delays that lead back
-//! to G, and of finitely many initial parts the shortest is contained in all. So for unions the
-//! result is the union over the zones of G of the intersection over all B and U, as for the safe
-//! predecessors in [`super::past`], whose mirror image this is.
+//! to G. Of finitely many initial parts, the shortest is contained in all. So for unions the result
+//! is the union over the zones of G of the intersection over all B and U. The safe predecessors in
+//! [`super::past`] have the same form; this is their mirror image.
 //!
-//! A part of a barrier may be *open*: where it has no first moment (`x > 1` after `x <= 1`), there
-//! is no valuation at which time could stop at the latest, so time that comes from outside the
-//! barrier runs on inside the part. Where the part has a first moment, and from valuations in it
-//! that time did not lead to, none passes. For a zone P of the part and its lower edge P' (the
-//! valuations from which every short enough delay leads into P), time runs from `F ∩ P'` to the
-//! valuations of P strictly after it, and on as long as it stays in the part.
+//! A part of a barrier may be *open*. If the part has no first moment (`x > 1` after `x <= 1`),
+//! there is no valuation at which time must stop. So time that comes from outside the barrier runs
+//! on inside the part. If the part has a first moment, or time did not lead to a valuation in it,
+//! no time passes there. Let P be a zone of the part and P' its lower edge (the valuations from
+//! which every short enough delay leads into P). Time runs from `F ∩ P'` to the valuations of P
+//! strictly after it, and goes on as long as it stays in the part.
 //!
-//! Invariant: no clock is stopped. Cost: as [`super::past`].
+//! Invariant: no clock is stopped. The cost is that of [`super::past`].
 
 use super::federation::Federation;
 use super::{Bound, ClockSet, Zone, clocks, dbm, instants, past};
@@ -50,8 +50,8 @@ impl Barriers {
     }
 }
 
-/// The valuations that `from` reaches by some delay, where no valuation on the way, both ends
-/// included, is in `bad`, and none but the last is in a barrier, or all that are form an open part
+/// The valuations that `from` reaches by some delay. No valuation on the way, both ends included,
+/// may be in `bad`. Only the last may be in a barrier, unless those in a barrier form an open part
 /// without a first moment.
 #[must_use]
 pub fn successors(from: &Federation, bad: &Federation, barriers: &Barriers) -> Federation {
@@ -67,7 +67,7 @@ pub fn successors(from: &Federation, bad: &Federation, barriers: &Barriers) -> F
     reached
 }
 
-/// As [`successors`], with barriers that have no open part.
+/// Like [`successors`], for barriers without open parts.
 fn up_to(from: &Federation, bad: &Federation, stops: &Federation) -> Federation {
     let dimension = from.dimension();
     let mut result = Federation::empty(dimension);
@@ -87,7 +87,7 @@ fn up_to(from: &Federation, bad: &Federation, stops: &Federation) -> Federation 
     result
 }
 
-/// The valuations that time reaches in the open parts of a barrier from `from`, if it is running
+/// The valuations that time reaches from `from` in the open parts of a barrier, if time is running
 /// there already.
 #[must_use]
 pub fn successors_inside(from: &Federation, bad: &Federation, barriers: &Barriers) -> Federation {
@@ -98,8 +98,8 @@ pub fn successors_inside(from: &Federation, bad: &Federation, barriers: &Barrier
     reached
 }
 
-/// The valuations in an open part of a barrier that time reaches from `waiting`, which lies outside
-/// the barrier.
+/// The valuations in an open part of a barrier that time reaches from `waiting`. The set `waiting`
+/// lies outside the barrier.
 fn running_on(waiting: &Federation, bad: &Federation, part: &Federation) -> Federation {
     let dimension = part.dimension();
     let mut reached = Federation::empty(dimension);
@@ -129,8 +129,8 @@ fn staying_in(from: &Federation, bad: &Federation, part: &Federation) -> Federat
     up_to(from, &left, &Federation::empty(part.dimension()))
 }
 
-/// The valuations that reach `to` by some delay, where none on the way but the last is in a
-/// barrier, or all that are form an open part without a first moment.
+/// The valuations that reach `to` by some delay. Only the last valuation on the way may be in a
+/// barrier, unless those in a barrier form an open part without a first moment.
 #[must_use]
 pub fn predecessors_within(to: &Federation, barriers: &Barriers) -> Federation {
     let mut to = to.clone();
@@ -140,8 +140,8 @@ pub fn predecessors_within(to: &Federation, barriers: &Barriers) -> Federation {
     back_to(&to, &barriers.stops)
 }
 
-/// The valuations outside the barrier from which time runs into its open part at once, and in it to
-/// a valuation of `to`.
+/// The valuations outside the barrier from which time runs at once into its open part, and inside
+/// it to a valuation of `to`.
 fn running_into(to: &Federation, part: &Federation, stops: &Federation) -> Federation {
     let dimension = part.dimension();
     let mut entries = Federation::empty(dimension);
@@ -164,7 +164,7 @@ fn running_into(to: &Federation, part: &Federation, stops: &Federation) -> Feder
     entries
 }
 
-/// As [`predecessors_within`], with barriers that have no open part.
+/// Like [`predecessors_within`], for barriers without open parts.
 fn back_to(to: &Federation, stops: &Federation) -> Federation {
     let dimension = to.dimension();
     let mut result = Federation::empty(dimension);
@@ -239,7 +239,7 @@ fn future_of(zone: &[Bound], dimension: usize) -> Box<[Bound]> {
 /// The valuations that lie a positive delay after one of the zone: its future with all lower bounds
 /// strict.
 ///
-/// Closed, since the sum of a strict bound and another is strict.
+/// The result is closed, since the sum of a strict bound and another is strict.
 fn strictly_after(zone: &[Bound], dimension: usize) -> Box<[Bound]> {
     let mut after = future_of(zone, dimension);
     for bound in &mut after[1..dimension] {
@@ -276,7 +276,7 @@ fn strictly_before(zone: &[Bound], dimension: usize) -> Zone {
     before
 }
 
-/// The bound without its constant; infinity stays.
+/// The strict bound with the same constant; infinity stays.
 fn strict(bound: Bound) -> Bound {
     if bound.is_infinite() {
         bound

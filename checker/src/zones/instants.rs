@@ -1,13 +1,13 @@
-//! The instants just before and just after a set: what a delay of any small length enters, or has
+//! The instants just before and just after a set: what every short enough delay enters, or has just
 //! left.
 //!
 //! `before(Z)` holds the valuations v with `v + d` in Z for all small enough delays d > 0;
-//! `after(Z)` those with `v - d` in Z. Of finitely many zones each contains either all small enough
-//! delays or none, so for a union both are the union of those of its zones. A zone is the
-//! conjunction of the bounds of its closed matrix, and for each bound alone the answer is read off:
-//! the differences of two clocks stay; just before `x < c` and `x <= c` it is `x < c`, just before
-//! `x > c` and `x >= c` it is `x >= c`; just after, the other way round. A stopped clock is as the
-//! reference clock: what runs is compared with it.
+//! `after(Z)` holds those with `v - d` in Z. Each zone contains either all small enough delays or
+//! none. So for a union of finitely many zones both are the union over these zones. A zone is the
+//! conjunction of the bounds of its closed matrix, so each bound is treated alone. The differences
+//! of two clocks stay. Just before `x < c` and `x <= c` the bound is `x < c`; just before `x > c`
+//! and `x >= c` it is `x >= c`. Just after, it is the other way round. A stopped clock counts as
+//! the reference clock: running clocks are compared with it.
 //!
 //! Cost: one closing for each zone.
 
@@ -22,8 +22,8 @@ pub fn before(federation: &Federation, stopped: &ClockSet) -> Federation {
     moved(federation, stopped, (&weak, &strict))
 }
 
-/// The valuations that every small enough delay has just led out of the federation, or on within
-/// it.
+/// The valuations that every small enough delay has just led out of the federation, or further
+/// within it.
 #[must_use]
 pub fn after(federation: &Federation, stopped: &ClockSet) -> Federation {
     moved(federation, stopped, (&strict, &weak))
@@ -45,7 +45,7 @@ fn strict(bound: Bound) -> Bound {
     }
 }
 
-/// The zones with other bounds from below and from above, each closed again.
+/// Replaces the bounds from below and from above in each zone, and closes it again.
 fn moved(
     federation: &Federation,
     stopped: &ClockSet,

@@ -1,17 +1,17 @@
 //! Zones described by their fewest constraints.
 //!
-//! A closed matrix says most things twice. The minimal constraints are those that cannot be left
-//! out; closing them gives the matrix back. There are two sources of redundancy, and both have to
-//! be treated in the right order:
+//! A closed matrix is redundant. The minimal constraints are those that cannot be left out; closing
+//! them gives the matrix back. There are two kinds of redundancy, which must be removed in this
+//! order:
 //!
-//! * clocks at a fixed distance from each other (a cycle of bounds that sums to `<= 0`) fall into
-//!   classes. Each class is described by one cycle through its clocks in ascending order, and by
-//!   its least clock to the outside;
-//! * between these representatives there is no such cycle, so all constraints that are the sum of
+//! * clocks at a fixed distance from each other (a cycle of bounds that sums to `<= 0`) form
+//!   classes. One cycle through the clocks of a class, in ascending order, describes the class. Its
+//!   least clock represents it in all other constraints;
+//! * between these representatives there is no such cycle. So all constraints that are the sum of
 //!   two others can be left out at once, and the result does not depend on the order.
 //!
-//! `x >= 0` holds in every zone; neither it nor what follows from it is said, so nothing is said of
-//! the universe.
+//! `x >= 0` holds in every zone. Neither this nor what follows from it is a constraint, so the
+//! universe has none.
 //!
 //! Source: K. G. Larsen, F. Larsson, P. Pettersson, W. Yi, "Efficient Verification of Real-Time
 //! Systems: Compact Data Structure and State-Space Reduction", RTSS 1997, section 3.
@@ -31,7 +31,7 @@ pub fn for_each_minimal(zone: &[Bound], dimension: usize, visit: impl FnMut(Cons
     });
 }
 
-/// As [`for_each_minimal`], with room for a row.
+/// Does the work of [`for_each_minimal`]; `detours` has room for a row.
 fn visit_minimal(
     zone: &[Bound],
     dimension: usize,
@@ -66,7 +66,7 @@ fn visit_minimal(
     }
 }
 
-/// Writes for every clock the least sum of two bounds from `left` to it over a third
+/// Writes for every clock the least sum of two bounds from `left` to it through a third
 /// representative.
 fn find_detours(
     zone: &[Bound],
@@ -78,7 +78,7 @@ fn find_detours(
     detours.fill(Bound::INFINITY);
     let row = &zone[left * dimension..(left + 1) * dimension];
     for via in representatives.iter().filter(|via| *via != left) {
-        // To `via` itself this would be no detour.
+        // The path to `via` itself would be no detour.
         let kept = detours[via];
         relax_row(
             detours,
@@ -106,7 +106,7 @@ fn representatives(zone: &[Bound], dimension: usize) -> ClockSet {
     (0..dimension).filter(is_least).collect()
 }
 
-/// The clock that follows in the cycle through the class of `clock`; none if it is alone.
+/// The next clock in the cycle through the class of `clock`; none if the class has no other clock.
 fn cycle_successor(zone: &[Bound], dimension: usize, clock: usize) -> Option<usize> {
     let is_tied = |other: &usize| are_tied(zone, dimension, *other, clock);
     (clock + 1..dimension)
@@ -114,11 +114,11 @@ fn cycle_successor(zone: &[Bound], dimension: usize, clock: usize) -> Option<usi
         .or_else(|| (0..clock).find(is_tied))
 }
 
-/// Whether the lower bound of a clock follows from `x >= 0` for itself or for a clock that is tied
+/// Whether the lower bound of a clock follows from `x >= 0`, for itself or for a clock that is tied
 /// to it.
 ///
-/// Clocks tied to the reference clock have the cycle of their class through it, which must stay
-/// whole.
+/// The cycle of the clocks that are tied to the reference clock must stay whole, so they do not
+/// count.
 fn is_implied_by_sign(zone: &[Bound], dimension: usize, clock: usize) -> bool {
     let follows =
         |tied: usize| zone[tied] == Bound::LE_ZERO && zone[tied * dimension + clock] <= zone[clock];

@@ -1,29 +1,29 @@
 //! Sets of clock valuations: bounds, zones as difference bound matrices, federations,
 //! extrapolation.
 //!
-//! This room knows clocks by index and bounds, nothing of automata. Clock 0 is the reference clock,
-//! whose value is always 0; a zone of *dimension* n speaks about the n - 1 clocks 1..n. The modules
-//! stand in reading order:
+//! This room knows clocks by index, and bounds. It knows nothing of automata. Clock 0 is the
+//! reference clock, whose value is always 0; a zone of *dimension* n describes the n - 1 clocks
+//! 1..n. These are the modules in reading order:
 //!
 //! * [`bound`]: one bound `x - y < c` or `x - y <= c` in an `i32`;
 //! * [`clock_set`]: a set of clocks as a bit set;
 //! * `rows`: the innermost loops;
-//! * [`dbm`]: zones on slices, so that callers keep them in arenas; the contract of a zone stands
-//!   at its top;
-//! * [`clocks`]: what moves clocks: delay, reset, assignment, freeing, and the way back of an
-//!   update;
+//! * [`dbm`]: zones on slices, so that callers can keep them in arenas; its module text states the
+//!   contract of a zone;
+//! * [`clocks`]: operations that move clocks: delay, reset, assignment, freeing, and the preimage
+//!   of an update;
 //! * [`zone`]: one zone that owns its matrix;
-//! * [`zone_table`]: zones, each stored once;
-//! * [`minimal`]: the fewest constraints that make a zone;
+//! * [`zone_table`]: a table that stores each zone once;
+//! * [`minimal`]: the least set of constraints that makes a zone;
 //! * [`extrapolate`]: the abstractions that make the zone graph finite;
-//! * [`simulation`]: inclusion up to what comparisons can tell;
+//! * [`simulation`]: inclusion up to what comparisons can distinguish;
 //! * [`federation`]: finite unions of zones, with exact subtraction and inclusion;
 //! * [`past`]: the safe timed predecessors of timed games;
-//! * [`future`]: their mirror image, and delays that something stops;
+//! * [`future`]: their mirror image, and delays that a barrier stops;
 //! * [`instants`]: what lies just before and just after a set.
 //!
 //! Sources: J. Bengtsson, W. Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, for the
-//! operations on zones; the others are named where they are used.
+//! operations on zones. The modules name the other sources.
 
 pub mod bound;
 pub mod clock_set;

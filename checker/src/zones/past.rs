@@ -1,20 +1,21 @@
 //! Safe timed predecessors: from where can time pass into a good set without meeting a bad one?
 //!
 //! `Pred_t(G, B)` holds the valuations that reach G by some delay d >= 0 such that no valuation on
-//! the way is in B, both ends included: where a good and a bad move are possible at the same
-//! instant, the opponent may come first.
+//! the way is in B. The way includes both ends: where a good and a bad move are possible at the
+//! same instant, the opponent may move first.
 //!
 //! For zones G and B, with `Z↓` for the past of Z, `Pred_t(G, B) = (G↓ \ B↓) ∪ ((G ∩ B↓) \ B)↓`:
-//! either B never comes, or G is met before it. For unions it is the union over the zones of G of
-//! the intersection over the zones of B: from one valuation the delays that reach a zone of G form
-//! an interval, each zone of B cuts off a final part of it, and of finitely many initial parts the
-//! shortest is contained in all.
+//! either B never comes, or G comes before it. For unions it is the union over the zones of G of
+//! the intersection over the zones of B. The reason: from one valuation, the delays that reach a
+//! zone of G form an interval, and each zone of B cuts off a final part of it. Of finitely many
+//! initial parts, the shortest is contained in all.
 //!
-//! Where we differ: instead of intersecting unions, which multiplies overlapping zones, we collect
-//! what each zone of B takes away, `(G↓ ∩ B↓) \ ((G ∩ B↓) \ B)↓`, and subtract that from `G↓` once.
+//! Where we differ: intersecting unions would multiply overlapping zones. Instead we collect what
+//! each zone of B takes away, `(G↓ ∩ B↓) \ ((G ∩ B↓) \ B)↓`, and subtract that from `G↓` once.
 //!
-//! With stopped clocks the past of a zone is over-approximated (see [`super::clocks`]), so the
-//! result is an approximation in either direction and a verdict that rests on it is "maybe".
+//! With stopped clocks the past of a zone is over-approximated (see [`super::clocks`]). The result
+//! is then neither an over- nor an under-approximation, and a verdict that depends on it is
+//! "maybe".
 //!
 //! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms
 //! for the Analysis of Timed Games", CONCUR 2005, section 4.
@@ -22,12 +23,13 @@
 use super::federation::Federation;
 use super::{Bound, ClockSet, clocks, dbm};
 
-/// Subtracting a zone can multiply the zones of the rest, reducing costs the square of their
-/// number: from about this many zones on, reducing first was faster on random federations.
+/// From about this number of zones on, it is worth reducing the federation first. Subtracting a
+/// zone can multiply the zones of the rest, but reducing costs the square of their number. On
+/// random federations, reducing first was faster from this number on.
 const WORTH_REDUCING: usize = 16;
 
-/// The safe timed predecessors of `good` with respect to `bad`, with the clocks of `stopped` at
-/// rest.
+/// The safe timed predecessors of `good` with respect to `bad`, where the clocks of `stopped` do
+/// not move.
 #[must_use]
 pub fn predecessors(good: &Federation, bad: &Federation, stopped: &ClockSet) -> Federation {
     let dimension = good.dimension();
@@ -37,7 +39,7 @@ pub fn predecessors(good: &Federation, bad: &Federation, stopped: &ClockSet) -> 
     for good in good.zones().map(with_past) {
         let mut lost = Federation::empty(dimension);
         for bad in &bad {
-            // Where the pasts do not meet, this bad zone forbids nothing.
+            // If the pasts do not meet, this bad zone forbids nothing.
             if !dbm::are_apart(&good.past, &bad.past, dimension) {
                 let lost_to_it = lost_to(&good, bad, dimension, stopped);
                 lost.unite(&lost_to_it);
@@ -67,7 +69,7 @@ impl<'a> WithPast<'a> {
     }
 }
 
-/// The part of the past of `good` that cannot reach it without meeting `bad` first.
+/// The part of the past of `good` that can reach it only by meeting `bad` first.
 fn lost_to(good: &WithPast, bad: &WithPast, dimension: usize, stopped: &ClockSet) -> Federation {
     let mut before_bad = Federation::of_zone(dimension, good.zone);
     before_bad.intersect_zone(&bad.past);

@@ -1,8 +1,8 @@
-//! The innermost loops: rows of a matrix, and the step that all closing consists of.
+//! The innermost loops: the rows of a matrix, and the step from which all closing is made.
 //!
-//! Rows are relaxed as vectors of four entries, the last of which may overlap the one before it.
-//! That is sound because relaxing is idempotent, and it spares short rows a scalar rest. Everything
-//! here is inlined into loops whose bounds are constants for small dimensions.
+//! Rows are relaxed as vectors of four entries. The last vector may overlap the one before it; this
+//! is sound because relaxing is idempotent, and so short rows need no scalar loop at the end.
+//! Everything here is inlined into loops whose bounds are constants for small dimensions.
 
 #![expect(
     clippy::inline_always,
@@ -11,9 +11,10 @@
 
 use super::Bound;
 
-/// Calls a function with the dimension as its last argument, which is a constant where it is small.
+/// Calls a function with the dimension as its last argument. For small dimensions the argument is a
+/// constant.
 ///
-/// Small zones are the common ones, and their rows then unroll into a few vectors.
+/// Most zones are small, and with a constant their rows unroll into a few vectors.
 macro_rules! for_small_dimension {
     ($dimension:expr, $function:ident($($argument:expr),*)) => {
         match $dimension {
@@ -30,8 +31,8 @@ macro_rules! for_small_dimension {
 }
 pub(super) use for_small_dimension;
 
-/// The rows of a matrix: as `chunks_exact_mut`, without its division, which is a good part of an
-/// operation.
+/// The rows of a matrix, like `chunks_exact_mut`, but without its division: that would take a good
+/// part of the time of an operation.
 #[inline(always)]
 pub(super) fn rows_mut(
     matrix: &mut [Bound],
@@ -45,7 +46,7 @@ pub(super) fn rows_mut(
     })
 }
 
-/// The rows of a matrix that is only read; see [`rows_mut`].
+/// The rows of a matrix that is only read, like [`rows_mut`].
 #[inline(always)]
 pub(super) fn rows(matrix: &[Bound], dimension: usize) -> impl Iterator<Item = &[Bound]> {
     let mut rest = matrix;
@@ -56,10 +57,10 @@ pub(super) fn rows(matrix: &[Bound], dimension: usize) -> impl Iterator<Item = &
     })
 }
 
-/// Dimensions up to which a row for a moment needs no allocation.
+/// The greatest dimension for which a temporary row needs no allocation.
 const MOST_ON_STACK: usize = 256;
 
-/// Calls `action` with a row of infinite bounds, which lasts as long as the call.
+/// Calls `action` with a row of infinite bounds that exists during the call.
 #[inline(always)]
 pub(super) fn with_row<R>(dimension: usize, action: impl FnOnce(&mut [Bound]) -> R) -> R {
     if dimension <= MOST_ON_STACK {
@@ -70,8 +71,7 @@ pub(super) fn with_row<R>(dimension: usize, action: impl FnOnce(&mut [Bound]) ->
     }
 }
 
-/// Tightens every entry of `target` to the sum of `via` and the entry of `source`, where that is
-/// less.
+/// Tightens every entry of `target` to the sum of `via` and the entry of `source`, if that is less.
 #[inline(always)]
 pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
     if via.is_infinite() {
@@ -97,8 +97,8 @@ pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
     }
 }
 
-/// The last four entries after relaxing, computed before any other is written so that no load waits
-/// for a store that overlaps it; none if the row is shorter.
+/// The last four entries after relaxing. They are computed before any other entry is written, so
+/// that no load waits for a store that overlaps it. None if the row is shorter.
 #[inline(always)]
 fn last_relaxed(target: &[Bound], via: Bound, source: &[Bound]) -> Option<[Bound; 4]> {
     Some(relaxed_four(

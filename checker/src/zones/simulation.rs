@@ -1,33 +1,34 @@
-//! Inclusion up to what comparisons can tell: the abstraction `aLU`.
+//! Inclusion up to what comparisons can distinguish: the abstraction `aLU`.
 //!
-//! A valuation w *simulates* v if on each clock it agrees with v, or is less but above L, or is
-//! greater where v is above U already: whatever comparisons let v do they let w do. `aLU(Z)` is the
+//! A valuation w *simulates* v if each clock has the same value in w, or is less but above L, or is
+//! greater while v is above U. Then w satisfies every comparison that v satisfies. `aLU(Z)` is the
 //! set of the valuations that some valuation of Z simulates. It is the coarsest abstraction that L
-//! and U allow. It is no zone, but its *demands* determine it:
+//! and U allow. It is not a zone, but the *demands* of Z determine it:
 //!
-//! The zone Z lies within `aLU(Z')` exactly if no entry of Z' is less than its counterpart among
-//! the demands of Z. That of entry (y, x) is the lesser of the entry of Z itself and of the least
-//! even bound from `2 L(y) + (0, x)` on, both encoded; there is none if y has no L, or if x is
-//! certainly above U. This is the theorem on inclusion of the source, read for all entries at once:
-//! an entry of Z' refutes the inclusion exactly if x may be at most U in Z, the entry is less than
-//! that of Z, and its sum with `< -L(y)` is less than (0, x).
+//! The zone Z lies within `aLU(Z')` exactly if no entry of Z' is less than the demand of Z for the
+//! same entry. The demand for entry (y, x) is the lesser of two bounds: the entry of Z itself, and
+//! the least even bound that is at least `2 L(y) + (0, x)`, both encoded. There is no demand if y
+//! has no L, or if x is certainly above U. This is the theorem of the source on inclusion, read for
+//! all entries at once: an entry of Z' refutes the inclusion exactly if x may be at most U in Z,
+//! the entry is less than that of Z, and its sum with `< -L(y)` is less than (0, x).
 //!
-//! From this follows:
+//! It follows that:
 //!
-//! * Z lies within `aLU(Z')` exactly if no demand of Z exceeds that of Z'. For if Z does, the
-//!   entries (0, x) of Z are at most those of Z' where x may be at most U, and so are the bounds
-//!   that are made of them; the other way round, demands are at most entries. So zones have the
-//!   same `aLU` exactly if they have the same demands.
-//! * The zone *reduced* to those of its entries that are demands, infinite elsewhere and without a
-//!   demand for (0, x) if x is certainly above U, has these demands, and is determined by them.
-//!   Unlike demands it does not show L, so that it is the same more often.
-//! * What [`super::extrapolate::lu_plus`] makes of Z has the demands of Z. It is the closure of the
-//!   reduced zone, with `< -U(x)` for the entries (0, x) without a demand.
+//! * Z lies within `aLU(Z')` exactly if no demand of Z exceeds that of Z'. Proof: if Z lies within
+//!   it, the entries (0, x) of Z are at most those of Z' where x may be at most U, and so are the
+//!   bounds that are made of them. Conversely, demands are at most entries. So zones have the same
+//!   `aLU` exactly if they have the same demands.
+//! * The *reduced* zone keeps the entries that are demands. All others are infinite, and there is
+//!   no demand for (0, x) if x is certainly above U. The reduced zone has the demands of Z, and
+//!   they determine it. Demands show L, the reduced zone does not, so reduced zones are equal more
+//!   often.
+//! * The result of [`super::extrapolate::lu_plus`] on Z has the demands of Z. It is the closure of
+//!   the reduced zone, with `< -U(x)` for the entries (0, x) without a demand.
 //!
 //! Source: F. Herbreteau, B. Srivathsan, I. Walukiewicz, "Better abstractions for timed automata",
-//! Information and Computation 251, 2016 (LICS 2012). What follows is derived here.
+//! Information and Computation 251, 2016 (LICS 2012). The consequences are derived here.
 //!
-//! Cost: n^2 / 4 vector steps; for restoring as many as for [`super::extrapolate::lu_plus`].
+//! Cost: n^2 / 4 vector steps; restoring takes as many as [`super::extrapolate::lu_plus`].
 
 #![expect(
     clippy::inline_always,
@@ -38,7 +39,7 @@ use super::extrapolate::{Ceilings, close_again, forgotten_from};
 use super::rows::{for_small_dimension, rows, rows_mut};
 use super::{Bound, ClockSet};
 
-/// No demand: every bound meets it, and what is less.
+/// No demand: every bound meets it. Everything below counts as no demand too.
 pub const NO_DEMAND: Bound = Bound(i32::MIN / 2);
 
 /// Replaces a zone by its reduced form.
@@ -65,8 +66,8 @@ fn leave_demands(zone: &mut [Bound], ceilings: &Ceilings, dimension: usize) {
 }
 
 /// Writes the demands of a reduced zone; `limits` are those of its ceilings. A zone lies within
-/// `aLU` of another exactly if [`super::dbm::is_subset`] holds of its demands and the other,
-/// reduced or not, or the demands of the other.
+/// `aLU` of another exactly if [`super::dbm::is_subset`] holds for its demands and the other zone.
+/// The other zone may be given as it is, reduced, or as its demands.
 pub fn demands(reduced: &[Bound], dimension: usize, limits: &[Bound], target: &mut [Bound]) {
     for_small_dimension!(dimension, write_demands(reduced, limits, target));
 }
@@ -83,7 +84,7 @@ fn write_demands(reduced: &[Bound], limits: &[Bound], target: &mut [Bound], dime
     }
 }
 
-/// Replaces a reduced zone by what [`super::extrapolate::lu_plus`] makes of the zone.
+/// Replaces a reduced zone by the result of [`super::extrapolate::lu_plus`] on the zone.
 pub fn restore(reduced: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     for_small_dimension!(dimension, restore_and_close(reduced, ceilings));
 }

@@ -1,5 +1,5 @@
-//! One zone that owns its matrix: the comfortable face of [`super::dbm`] and [`super::clocks`] for
-//! code that is not in the innermost loop.
+//! One zone that owns its matrix. It is a convenient form of [`super::dbm`] and [`super::clocks`]
+//! for code outside the innermost loops.
 
 use super::clocks::{self, Assignment};
 use super::dbm::{self, Constraint, Relation};
@@ -65,7 +65,7 @@ impl Zone {
         self.bounds[left * self.dimension + right]
     }
 
-    /// What it says of all clocks but the last.
+    /// The projection to all clocks but the last.
     #[must_use]
     pub fn without_last_clock(&self) -> Zone {
         let dimension = self.dimension - 1;
@@ -131,7 +131,7 @@ impl Zone {
         self.is_empty() || !other.is_empty() && dbm::is_subset(&self.bounds, &other.bounds)
     }
 
-    /// How the two zones lie to each other.
+    /// How the two zones relate to each other.
     pub fn relation(&self, other: &Zone) -> Relation {
         match (self.is_subset(other), other.is_subset(self)) {
             (true, true) => Relation::Equal,

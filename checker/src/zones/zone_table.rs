@@ -1,4 +1,4 @@
-//! Zones, each stored once: states share them.
+//! A table that stores each zone once, so that states share it.
 //!
 //! Invariant: two zones get the same [`ZoneId`] exactly if their closed matrices are equal, that
 //! is, if they are the same set.
@@ -18,7 +18,7 @@ pub struct ZoneTable {
     bounds: Vec<Bound>,
     table: HashTable<u32>,
     count: u32,
-    /// How many bounds there were at most before zones were forgotten.
+    /// The greatest number of bounds that were stored before zones were forgotten.
     most_bounds: usize,
 }
 
@@ -28,7 +28,7 @@ impl ZoneTable {
         ZoneTable::of_size(dimension * dimension)
     }
 
-    /// An empty table of zones with what belongs to them, so many bounds together.
+    /// An empty table for zones with data of their own: each entry takes `size` bounds in all.
     pub fn of_size(size: usize) -> ZoneTable {
         ZoneTable {
             size,
@@ -77,7 +77,7 @@ impl ZoneTable {
         self.count = 0;
     }
 
-    /// The bytes that the table takes; room for zones to come takes none before it is written to.
+    /// The bytes that the table takes. Reserved room takes none until it is written to.
     pub fn bytes(&self) -> usize {
         let bounds = self.bounds.len().max(self.most_bounds);
         bounds * size_of::<Bound>() + self.table.allocation_size()

@@ -1,15 +1,15 @@
-//! The play inside one observation: what an action leads to from a knowledge set.
+//! The play inside one observation: the knowledge sets to which an action leads from a given one.
 //!
-//! Symbolic states are explored whose zones are those on entry. From each, time passes as long as
-//! the goal does not hold, up to the first moment at which the observation changes or the action is
-//! possible; then the environment moves, or the action is taken.
+//! The search explores symbolic states; their zones are those on entry. From each state, time
+//! passes until the goal holds, the observation changes, or the action is possible. Then the
+//! environment moves, or the action is taken.
 //!
-//! A cycle of this graph is a run without end only if states are told apart by equality of zones:
-//! an edge to a state with a larger zone can close a cycle that no run takes. So the graph is first
-//! made with inclusion, which is smaller; without a cycle there is none in the other one either.
-//! Source: A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G. Larsen, J. van de Pol, "Multi-core
-//! Emptiness Checking of Timed Büchi Automata Using Inclusion Abstraction", CAV 2013 (what
-//! inclusion does to cycles).
+//! A cycle of this graph is a run without end only if states are compared by equality of zones:
+//! with inclusion, an edge to a state with a larger zone can close a cycle that no run takes. So
+//! the graph is first made with inclusion, which gives a smaller graph. If it has no cycle, the
+//! graph with equality has none either. Source: A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G.
+//! Larsen, J. van de Pol, "Multi-core Emptiness Checking of Timed Büchi Automata Using Inclusion
+//! Abstraction", CAV 2013 (what inclusion does to cycles).
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -30,14 +30,14 @@ use crate::game::Forced;
 pub(super) enum Consequence {
     /// To one of these knowledge sets, or past the goal.
     Next(Vec<Knowledge>),
-    /// The environment can win before the observation changes, or keep it from changing.
+    /// The environment can win before the observation changes, or prevent the change.
     Lost,
     /// A limit came first.
     Stopped(StopReason),
 }
 
-/// What is asked again and again while play inside an observation is explored: the number of states
-/// that it has so far.
+/// Checks the limits while play inside an observation is explored, given the number of states that
+/// it has until now.
 pub(super) type Look<'l> = dyn FnMut(usize, usize) -> Option<StopReason> + 'l;
 
 /// Explores play inside observations.
@@ -49,7 +49,7 @@ pub(super) struct Explorer<'e, 'a, 'q> {
     pub(super) explored: u64,
 }
 
-/// How states are told apart.
+/// How states are compared.
 #[derive(Clone, Copy, PartialEq)]
 enum Sameness {
     /// A state stands for those with the same words and a smaller zone.
@@ -64,15 +64,15 @@ struct Entry {
     zone: Zone,
 }
 
-/// The play so far.
+/// The play until now.
 struct Class<'c> {
     observation: &'c Observation,
     action: Action,
     sameness: Sameness,
     entries: Vec<Entry>,
-    /// By words: the states.
+    /// The states with these words.
     known: FxHashMap<Box<[i32]>, Vec<usize>>,
-    /// By state: those that play goes on in.
+    /// For each state: the states in which play continues.
     edges: Vec<Vec<usize>>,
     exits: BTreeMap<Observation, Knowledge>,
     /// The actions that are possible somewhere.
@@ -81,8 +81,8 @@ struct Class<'c> {
 }
 
 impl Explorer<'_, '_, '_> {
-    /// Where an action leads from a knowledge set. For [`Action::Wait`] the actions that become
-    /// possible on the way are added to `offers`: any other one is the same as waiting.
+    /// The result of an action in a knowledge set. For [`Action::Wait`] the actions that become
+    /// possible meanwhile are added to `offers`: any other action has the same result as waiting.
     pub(super) fn outcome(
         &mut self,
         knowledge: &Knowledge,
@@ -147,7 +147,7 @@ impl Explorer<'_, '_, '_> {
         Ok(Ok(class))
     }
 
-    /// Lets time pass from a state, and moves from where it leads to.
+    /// Lets time pass from a state, and takes the moves that are then possible.
     fn expand(&mut self, class: &mut Class<'_>, index: usize) -> Result<(), Failure> {
         let place = Rc::clone(&class.entries[index].place);
         let from = Federation::of_zone(
@@ -195,7 +195,8 @@ impl Explorer<'_, '_, '_> {
         Ok(())
     }
 
-    /// Where moves with such actions are possible, as far as `from` meets their guards.
+    /// Where moves with such actions are possible. It covers only those moves whose guards `from`
+    /// meets.
     fn enabled(
         &mut self,
         place: &Place,
@@ -213,8 +214,8 @@ impl Explorer<'_, '_, '_> {
         Ok(enabled)
     }
 
-    /// Whether play may be lost by standing still in one of these states: by waiting for ever, or
-    /// where time stops. `own` is where the action is possible.
+    /// Whether play may be lost by staying in one of these states: by waiting for ever, or where
+    /// time stops. `own` is where the action is possible.
     fn may_stay(
         &mut self,
         place: &Place,
@@ -239,7 +240,7 @@ impl Explorer<'_, '_, '_> {
         let others = self.enabled(place, &at_rest, |one| one.is_none())?;
         let forced = self.forced(place, &at_rest, &others)?;
         if !self.question.must_reach {
-            // Play may stop where the controller has no move.
+            // If keeping is enough, play may stop where the controller has no move.
             let controller = self.enabled(place, &at_rest, |one| one.is_some())?;
             at_rest = at_rest.intersection(&controller);
         }
@@ -277,7 +278,7 @@ impl Explorer<'_, '_, '_> {
         Ok(all)
     }
 
-    /// Takes a move from where time has led to.
+    /// Takes a move from the states that time has reached.
     fn take(
         &mut self,
         class: &mut Class<'_>,
@@ -379,7 +380,7 @@ impl Class<'_> {
     }
 }
 
-/// What time reaches before the goal, up to the first moment in one of the states that stop it.
+/// What time reaches before the goal, up to the first moment in one of the states that stop time.
 fn passing(place: &Place, from: &Federation, stops: &Federation) -> Federation {
     if !place.delays || from.dimension() == 1 {
         return from.clone();

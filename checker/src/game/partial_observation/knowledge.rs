@@ -39,13 +39,13 @@ impl Knowledge {
         }
     }
 
-    /// Makes the descriptions of federations short.
+    /// Makes the representation of each federation short.
     pub(super) fn reduce(&mut self) {
         self.states.values_mut().for_each(Federation::reduce);
     }
 
-    /// A hash of what does not depend on how federations are described: of each, the least zone
-    /// that contains it.
+    /// A hash that does not depend on how federations are represented. It uses the least zone that
+    /// contains each federation.
     pub(super) fn hash(&self) -> u64 {
         let mut hasher = rustc_hash::FxHasher::default();
         self.observation.hash(&mut hasher);
@@ -67,7 +67,7 @@ impl Knowledge {
                 .all(|((words, zones), (others, more))| words == others && zones.is_same_set(more))
     }
 
-    /// Whether all states of this set are in another one, in which the same is observed.
+    /// Whether another set with the same observation contains all states of this set.
     pub(super) fn is_subset(&self, other: &Knowledge) -> bool {
         self.states.len() <= other.states.len()
             && self.states.iter().all(|(words, zones)| {
@@ -76,7 +76,8 @@ impl Knowledge {
             })
     }
 
-    /// A bit for each of some classes of discrete states. A set has all bits of its subsets.
+    /// A set of bits: each stands for a class of discrete states. A set has all bits of its
+    /// subsets.
     pub(super) fn signature(&self) -> u64 {
         self.states.keys().fold(0, |bits, words| {
             let mut hasher = rustc_hash::FxHasher::default();
@@ -90,7 +91,7 @@ impl Knowledge {
         self.states.values().map(Federation::zone_count).sum()
     }
 
-    /// The bytes that it takes, about.
+    /// The approximate number of bytes that it takes.
     pub(super) fn bytes(&self) -> usize {
         let mut bytes = self.observation.len();
         for (words, zones) in &self.states {

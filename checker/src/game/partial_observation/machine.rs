@@ -1,4 +1,4 @@
-//! What is asked of a game under partial observation, and what a strategy for it is.
+//! The question that a game under partial observation answers, and the form of its strategies.
 
 use crate::ir::{ChannelId, Predicate};
 use crate::network::MoveRef;
@@ -44,11 +44,11 @@ impl Action {
 /// A game under partial observation.
 #[derive(Clone, Copy, Debug)]
 pub struct Question<'q> {
-    /// What the controller sees.
+    /// The predicates that the controller sees.
     pub observations: &'q [Predicate],
-    /// Where play ends, won; `None`: nowhere.
+    /// Where play ends and is won; with `None` nowhere.
     pub goal: Option<&'q Predicate>,
-    /// What must hold until then; `None`: nothing.
+    /// What must hold until then; with `None` nothing.
     pub keep: Option<&'q Predicate>,
     /// Whether the goal must be reached; otherwise keeping is enough.
     pub must_reach: bool,
@@ -66,10 +66,11 @@ pub struct Machine {
 /// A state of the machine.
 #[derive(Clone, Debug)]
 pub struct MachineState {
-    /// The states from which it goes on so, among them all in which play may be on entry.
+    /// The states in which this state proposes its action, among them all in which play may be on
+    /// entry.
     pub knowledge: Knowledge,
     /// What it proposes.
     pub action: Action,
-    /// By next observation: the state in which play goes on.
+    /// For each next observation: the state in which play continues.
     pub next: Vec<(Observation, usize)>,
 }

@@ -1,8 +1,8 @@
-//! Discrete states with what does not depend on how they are reached: observations, goal, moves,
-//! and where time stops.
+//! Discrete states with everything that does not depend on the path to them: observations, goal,
+//! moves, and where time stops.
 //!
-//! All federations are parts of what the invariants allow. Moves are evaluated when a zone first
-//! meets their guards, so that no update runs that cannot happen.
+//! All federations are parts of what the invariants allow. A move is evaluated when a zone first
+//! meets its guards, so that no update runs that cannot happen.
 
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -21,18 +21,18 @@ pub(super) struct Place {
     pub(super) words: Box<[i32]>,
     /// What the invariants allow.
     pub(super) zone: Zone,
-    /// Whether time may pass as far as locations and urgent channels say.
+    /// Whether locations and urgent channels allow time to pass.
     pub(super) delays: bool,
-    /// By observation: where it is made.
+    /// Each observation, and where it holds.
     pub(super) cells: Vec<(Observation, Federation)>,
     /// Where the goal holds.
     pub(super) goal: Federation,
     /// Where neither the goal holds nor what must be kept.
     pub(super) broken: Federation,
-    /// Where time cannot pass, with the process that stops it (`None`: an urgent channel).
+    /// Where time cannot pass, and the process that stops it (`None`: an urgent channel).
     pub(super) stops: Vec<(Option<u32>, Federation)>,
     moves: Moves,
-    /// By move: the action that allows it; `None` if it is the environment's.
+    /// For each move: the action that allows it; `None` if it is the environment's.
     pub(super) actions: Vec<Option<Action>>,
     taken: Vec<OnceCell<Option<Taken>>>,
 }
@@ -47,7 +47,7 @@ pub(super) struct Taken {
     pub(super) enabled: Federation,
 }
 
-/// The discrete states so far.
+/// The discrete states that are known until now.
 #[derive(Default)]
 pub(super) struct Places {
     known: FxHashMap<Box<[i32]>, Rc<Place>>,
@@ -55,12 +55,12 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// The bytes that they take, about.
+    /// The approximate number of bytes that they take.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// The discrete state with these words, which satisfy the invariants for some clock values.
+    /// The discrete state with these words. They must satisfy the invariants for some clock values.
     pub(super) fn at(
         &mut self,
         symbolic: &mut Symbolic<'_>,
@@ -134,14 +134,14 @@ impl Place {
         })
     }
 
-    /// Where this is observed.
+    /// Where this observation holds.
     pub(super) fn cell(&self, observation: &Observation) -> Option<&Federation> {
         let cell = self.cells.iter().find(|(one, _)| one == observation);
         cell.map(|(_, part)| part)
     }
 
-    /// What a move does if its guards leave something of one of these zones, and it is possible at
-    /// all.
+    /// The effect of a move. None if its guards allow nothing of these zones, or if it is not
+    /// possible for another reason.
     pub(super) fn taken(
         &self,
         symbolic: &mut Symbolic<'_>,
@@ -178,7 +178,7 @@ impl Place {
     }
 }
 
-/// The two parts of a cell in which another predicate holds and does not.
+/// The part of a cell in which another predicate does not hold, and the part in which it holds.
 fn halves(values: &[bool], part: Federation, holds: &Federation) -> [(Vec<bool>, Federation); 2] {
     let inside = part.intersection(holds);
     let mut outside = part;

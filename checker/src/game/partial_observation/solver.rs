@@ -1,19 +1,20 @@
-//! Who wins the game on knowledge sets, on the fly.
+//! An on-the-fly algorithm that finds the winner of the game on knowledge sets.
 //!
-//! From a knowledge set the controller chooses an action, the environment one of the knowledge sets
-//! that this leads to. A set is won with an action all of whose sets are won, and lost if each
-//! action is lost or leads to one that is lost. Both spread backwards as soon as they are known. If
-//! everything that matters is explored, what is still open is lost if the goal must be reached,
-//! since play could go from one observation to the next for ever, and won if it is enough to keep.
+//! From a knowledge set the controller chooses an action, and the environment one of the knowledge
+//! sets to which it leads. A set is won if it has an action all of whose sets are won. It is lost
+//! if each action is lost or leads to a lost set. Both spread backwards as soon as they are known.
+//! When everything that matters is explored, some sets may still be open. They are lost if the goal
+//! must be reached, since play could go from one observation to the next for ever; they are won if
+//! it is enough to keep.
 //!
 //! Sets are explored breadth first, and only where the answer can still depend on them. Equal sets
-//! are one. With what wins from a set the controller wins from its subsets, and if it loses from a
-//! set it loses from what contains it. So
-//! * in place of a set comes one that is won and contains it, or one that is lost and is contained
-//!   in it;
-//! * a set is *covered* while it lies in an open one, if it is enough to keep, or contains an open
-//!   one, if the goal must be reached: as long as the other one is not lost, or not won, neither is
-//!   it, and it is not explored. What covers is not covered itself.
+//! share one node. If the controller wins from a set, it wins from the subsets in the same way; if
+//! it loses from a set, it loses from every set that contains it. So
+//! * a set is replaced by a won set that contains it, or by a lost set that it contains;
+//! * a set is *covered* by an open set, and is not explored. If it is enough to keep, the open set
+//!   must contain it; if the goal must be reached, it must contain the open set. As long as the
+//!   open set is not lost (or not won), neither is the covered set. A set that covers another is
+//!   not covered itself.
 //!
 //! Sources: X. Liu, S. Smolka, "Simple linear-time algorithms for minimal fixed points", ICALP
 //! 1998, in both directions; M. De Wulf, L. Doyen, J.-F. Raskin, "A Lattice Theory for Solving
@@ -32,22 +33,22 @@ use super::knowledge::{Knowledge, Observation};
 use super::machine::{Action, Machine, MachineState, Question};
 use super::place::Places;
 
-/// How often limits are looked at: after so many symbolic states inside an observation, and after
-/// each knowledge set.
+/// The number of symbolic states inside an observation between two checks of the limits. Limits are
+/// also checked after each knowledge set.
 const STATES_BETWEEN_LOOKS: usize = 64;
 
-/// Who wins.
+/// The winner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The controller.
     Won,
     /// The environment.
     Lost,
-    /// A limit came first.
+    /// A limit was reached first.
     Stopped(StopReason),
 }
 
-/// What is known of a knowledge set.
+/// What is known about a knowledge set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Decided {
     Open,
@@ -63,7 +64,7 @@ struct KnowledgeNode {
     is_expanded: bool,
     /// Whether all of its choices are known.
     is_complete: bool,
-    /// Whether it is in the queue.
+    /// Whether it is in the worklist.
     is_waiting: bool,
     /// Its choices, in the order in which the controller prefers them.
     choices: Vec<usize>,
@@ -71,19 +72,19 @@ struct KnowledgeNode {
     won_by: Option<usize>,
     /// The choices that lead to it.
     comes_from: Vec<usize>,
-    /// The node that covers it, or that it was decided with.
+    /// The node that covers it, or that decided it.
     cover: Option<usize>,
     /// The open nodes that it covers.
     covered: Vec<usize>,
 }
 
-/// How a knowledge set relates to those that are there.
+/// How a knowledge set relates to the known ones.
 enum Relation {
-    /// This node has the same set, or one that decides who wins from it.
+    /// This node has the same set, or a set that decides who wins from this one.
     Of(usize),
     /// This node covers it.
     Under(usize),
-    /// It is to be explored.
+    /// The set must be explored.
     New,
 }
 
@@ -92,7 +93,7 @@ struct Choice {
     source: usize,
     action: Action,
     targets: Vec<usize>,
-    /// How many of the targets are not won yet.
+    /// How many targets are not won yet.
     open: usize,
     is_lost: bool,
 }
@@ -102,9 +103,9 @@ pub struct Solver<'e, 'a, 'q> {
     explorer: Explorer<'e, 'a, 'q>,
     nodes: Vec<KnowledgeNode>,
     choices: Vec<Choice>,
-    /// By hash: the nodes.
+    /// The nodes with this hash.
     known: FxHashMap<u64, Vec<usize>>,
-    /// By observation: the nodes.
+    /// The nodes with this observation.
     alike: FxHashMap<Observation, Vec<usize>>,
     waiting: VecDeque<usize>,
     bytes: usize,
@@ -131,8 +132,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// What was done: symbolic states inside observations are explored, zones of knowledge sets
-    /// stored.
+    /// The work until now: symbolic states inside observations are explored, zones of knowledge
+    /// sets are stored.
     pub fn counters(&self) -> Counters {
         Counters {
             explored: self.explorer.explored,
@@ -240,7 +241,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         node
     }
 
-    /// How a set that no node has relates to those of the nodes.
+    /// How a set that no node has relates to the sets of the nodes.
     fn place_of(&self, knowledge: &Knowledge, signature: u64) -> Relation {
         let must_reach = self.explorer.question.must_reach;
         let mut place = Relation::New;
@@ -269,7 +270,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         place
     }
 
-    /// Puts an open node into the queue, or the one that covers it, unless it has been there.
+    /// Puts an open node, or the node that covers it, into the worklist, unless it was there
+    /// before.
     fn wait_for(&mut self, node: usize) {
         let node = self.nodes[node].cover.unwrap_or(node);
         let one = &mut self.nodes[node];
@@ -279,8 +281,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// Whether the answer may depend on an open node: some choice of an open node that is not lost
-    /// leads to it, or to one that it covers.
+    /// Whether the answer may depend on an open node: some choice of an open node is not lost and
+    /// leads to it, or to a node that it covers.
     fn matters(&self, node: usize) -> bool {
         let one = &self.nodes[node];
         if one.is_expanded || one.standing != Decided::Open {
@@ -370,7 +372,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// Spreads that the source of a choice is won.
+    /// Propagates that the source of a choice is won.
     fn win(&mut self, choice: usize) {
         let source = self.choices[choice].source;
         if self.nodes[source].standing == Decided::Open {
@@ -379,7 +381,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// Whether none of the choices of an open node is left.
+    /// Whether an open node has no choice left.
     fn is_hopeless(&self, node: usize) -> bool {
         let node = &self.nodes[node];
         node.is_complete
@@ -390,7 +392,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
                 .all(|&choice| self.choices[choice].is_lost)
     }
 
-    /// Spreads that an open node is won or lost.
+    /// Propagates that an open node is won or lost.
     fn spread(&mut self, node: usize, standing: Decided) {
         let mut decided = vec![(node, standing)];
         while let Some((node, standing)) = decided.pop() {
@@ -430,9 +432,11 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         }
     }
 
-    /// Looks anew for what covers or decides an open node, since what covered it does so no more.
+    /// Searches for another node that covers or decides an open node, because its cover no longer
+    /// covers it.
     fn uncover(&mut self, node: usize) -> Option<(usize, Decided)> {
-        // As long as it has a cover, it covers nothing, itself included.
+        // Since it had a cover, it covers no other node, and `place_of` cannot find the node
+        // itself.
         let one = &self.nodes[node];
         match self.place_of(&one.knowledge, one.signature) {
             Relation::Of(other) => {
@@ -449,7 +453,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         None
     }
 
-    /// The strategy of the controller, who has won.
+    /// The strategy of the controller, who must have won.
     pub fn machine(&self) -> Machine {
         let mut machine = Machine { states: Vec::new() };
         if self.nodes.is_empty() {
@@ -481,7 +485,7 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         machine
     }
 
-    /// The node whose choices the controller follows in one that is not lost.
+    /// The node whose choices the controller follows in a node that is not lost.
     fn played_as(&self, node: usize) -> usize {
         let mut node = node;
         while self.nodes[node].won_by.is_none()
@@ -492,8 +496,8 @@ impl<'e, 'a, 'q> Solver<'e, 'a, 'q> {
         node
     }
 
-    /// The choice of a node that is not lost, and that is played as itself: the one by which it was
-    /// won, else the first that is not lost.
+    /// The choice in a node that is not lost and has choices of its own: the choice that won it, or
+    /// the first one that is not lost.
     fn chosen(&self, node: usize) -> usize {
         let node = &self.nodes[node];
         let is_left = |choice: &&usize| !self.choices[**choice].is_lost;

@@ -1,5 +1,5 @@
-//! Operations on large federations end in the middle when they are told to, and give all unless
-//! they are.
+//! Operations on large federations end in the middle when they are told to, and give their whole
+//! result otherwise.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::cancellation::{self, Cut};
 use crate::zones::{Bound, ClockSet, Federation, Zone, past};
 
-/// What gives a federation.
+/// A function whose result is a federation.
 type Operation = Box<dyn Fn() -> Federation>;
 
 /// The clocks, the reference clock included.
 const DIMENSION: usize = 4;
 
-/// Boxes of one unit, every other one along each clock: none can be joined with another.
+/// Boxes of one unit, every other one along each clock: no two of them can be joined.
 fn boxes(first: i32, along_each: i32) -> Federation {
     let mut federation = Federation::empty(DIMENSION);
     for place in 0..along_each.pow(3) {
@@ -29,8 +29,7 @@ fn boxes(first: i32, along_each: i32) -> Federation {
     federation
 }
 
-/// What an operation gives if it is to end at the look with this number, and how many looks there
-/// were.
+/// The result of an operation that must end at the look with this number, and the number of looks.
 fn ended(at: u32, operation: &Operation) -> (Result<Federation, Cut>, u32) {
     let looks = Arc::new(AtomicU32::new(0));
     let counted = Arc::clone(&looks);

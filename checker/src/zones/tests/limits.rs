@@ -1,9 +1,9 @@
-//! Operations on zones and federations with bounds near the limits of their range, against the same
-//! in 64 bits.
+//! Operations on zones and federations with bounds near the limits of their range, compared with
+//! the same operations in 64 bits.
 //!
 //! The other side is written from the definitions: matrices of bounds with all sums in `i64`,
 //! closed by Floyd and Warshall. Every operation starts from zones within [`Bound::most_in_zone`],
-//! as the engine makes sure of, and may end beyond it; no bound may wrap.
+//! as the engine ensures. Its result may be beyond it, but no bound may wrap.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use crate::zones::clocks::Assignment;
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::{Bound, ClockSet, Federation, Zone, past};
 
-/// A bound: the constant, and whether it is weak; `None` is none. Tighter ones are less.
+/// A bound: the constant, and whether it is weak; `None` means no bound. Tighter bounds are less.
 type Wide = Option<(i64, bool)>;
 
 fn least(one: Wide, other: Wide) -> Wide {
@@ -212,7 +212,7 @@ fn cases() -> impl Strategy<Value = Case> {
     })
 }
 
-/// Valuations on the corners of zones and beside them.
+/// Valuations on the corners of zones and next to them.
 fn points(zones: &[&Matrix]) -> Vec<Vec<i64>> {
     let mut points = Vec::new();
     for zone in zones {

@@ -1,5 +1,5 @@
-//! Properties of the operations on zones and federations, against sets of points, against the same
-//! in 64 bits, and against what they do when nobody stops them.
+//! Properties of the operations on zones and federations. They are compared with sets of points,
+//! with the same operations in 64 bits, and with their own results when nothing stops them.
 
 mod cancellation;
 mod limits;

@@ -1,10 +1,10 @@
-//! Zones and federations against sets of points.
+//! Zones and federations compared with sets of points.
 //!
 //! A zone with integer bounds over n clocks is determined by the points whose coordinates are
-//! multiples of 1 / (n + 1): they meet every order of the fractional parts. Up to two clocks every
-//! such point up to [`LARGEST`] is looked at, beyond that a sample. Whatever an operation promises
-//! about a set is asked point by point, and every zone that comes out must be closed, consistent
-//! and positive, which makes its matrix unique.
+//! multiples of 1 / (n + 1): these points have every order of the fractional parts. For at most two
+//! clocks the tests try every such point up to [`LARGEST`], for more clocks a sample. What an
+//! operation promises about a set is tested point by point. Every zone that it returns must be
+//! closed, consistent and positive, which makes its matrix unique.
 
 use std::collections::BTreeSet;
 
@@ -20,10 +20,10 @@ use crate::zones::{
 
 /// The greatest constant in generated constraints.
 const CONSTANT: i32 = 4;
-/// The greatest coordinate of the points that are looked at.
+/// The greatest coordinate of the points that the tests try.
 const LARGEST: i64 = 6;
-/// The greatest delay or forgotten value that an existence question tries: beyond it nothing new
-/// can happen.
+/// The greatest delay or forgotten value that a test of existence tries. Beyond it nothing new can
+/// happen.
 const HORIZON: i64 = 40;
 /// Points in a sample.
 const SAMPLE: usize = 300;
@@ -100,7 +100,7 @@ fn delays(dimension: usize) -> std::ops::RangeInclusive<i64> {
     0..=HORIZON * denominator(dimension)
 }
 
-/// The point after a clock got a value.
+/// The point after a clock is set to a value.
 fn with(point: &Point, clock: usize, value: i64) -> Point {
     let mut point = point.clone();
     point[clock] = value;
@@ -171,7 +171,7 @@ fn check_zone(zone: &Zone, seed: u64, expected: impl Fn(&Point) -> bool) {
 }
 
 /// Asserts that the zones of the federation are closed and not empty, and that it contains exactly
-/// those points.
+/// the points for which `expected` holds.
 fn check_federation(federation: &Federation, seed: u64, expected: impl Fn(&Point) -> bool) {
     for zone in federation.zones() {
         assert!(!dbm::is_empty(zone), "an empty zone in a federation");
@@ -226,8 +226,8 @@ fn assignments(dimension: usize) -> impl Strategy<Value = Assignment> {
     ]
 }
 
-/// Zones that are not empty: constraints that would empty one are left out; some have let time
-/// pass.
+/// Zones that are not empty: constraints that would empty a zone are left out. In some zones time
+/// has passed.
 fn zones(dimension: usize) -> impl Strategy<Value = Zone> {
     let parts = (
         constraints(dimension, 6),
@@ -302,9 +302,9 @@ fn scaled(zone: &Zone, factor: i32) -> Zone {
     Zone::from_bounds(zone.dimension(), &bounds)
 }
 
-/// Whether some valuation of the zone simulates the point with respect to the constants: on each
-/// clock it agrees, or is less but above L, or is greater where the point is above U already
-/// (Behrmann et al. 2004, definition 3).
+/// Whether some valuation of the zone simulates the point with respect to the constants: each clock
+/// has the same value, or is less but above L, or is greater while the point is above U (Behrmann
+/// et al. 2004, definition 3).
 fn is_simulated(zone: &Zone, point: &Point, lower: &Constants, upper: &Constants) -> bool {
     let unit = i32::try_from(denominator(point.len())).unwrap();
     let mut candidates = scaled(zone, unit);
@@ -326,7 +326,7 @@ fn is_simulated(zone: &Zone, point: &Point, lower: &Constants, upper: &Constants
     })
 }
 
-/// What a matrix becomes when each entry (left, right) with its lower bounds is replaced, closed.
+/// The closure of the matrix after each entry (left, right) is replaced.
 fn replaced(zone: &Zone, replacement: impl Fn(usize, usize) -> Bound) -> Zone {
     let dimension = zone.dimension();
     let mut result = zone.clone();
@@ -383,9 +383,9 @@ fn extrapolated_by_definition(
     })
 }
 
-/// The matrix without the entries that inclusion in `aLU` does not look at, closed: those of a
-/// clock without L, those against a clock above U, and those whose sum with `< -L` is not below the
-/// lower bound of the other clock.
+/// The closure of the matrix without the entries that inclusion in `aLU` ignores: those of a clock
+/// without L, those against a clock above U, and those whose sum with `< -L` is not below the lower
+/// bound of the other clock.
 fn reduced_by_definition(zone: &Zone, lower: &Constants, upper: &Constants) -> Zone {
     replaced(zone, |left, right| {
         let (l, u) = (constant(lower, left), constant(upper, right));
@@ -401,8 +401,8 @@ fn reduced_by_definition(zone: &Zone, lower: &Constants, upper: &Constants) -> Z
     })
 }
 
-/// `aLU` of a zone, exactly: for each way in which clocks can be simulated, the valuations v for
-/// which there is a w in the zone. A zone of both v and w, of which the part of v remains.
+/// The exact `aLU` of a zone: for each way in which clocks can be simulated, the valuations v for
+/// which the zone contains a w. It takes a zone of v and w together, and keeps the part of v.
 fn all_simulated(zone: &Zone, lower: &Constants, upper: &Constants) -> Federation {
     let dimension = zone.dimension();
     let clocks = dimension - 1;
@@ -968,8 +968,8 @@ fn clock_set_lists_its_clocks_in_order() {
 proptest! {
     #![proptest_config(configuration())]
 
-    /// A set of any clocks is what a tree of numbers is; the first 256 and those beyond lie in
-    /// different places.
+    /// A set of clocks behaves like a `BTreeSet` of numbers. The first 256 clocks and those beyond
+    /// are stored in different places.
     #[test]
     fn clock_sets_are_sets_of_numbers(
         left in prop::collection::btree_set(0_usize..1500, 0..40),
