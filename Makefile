@@ -93,7 +93,7 @@ bench: $(INSTALLED) ## Measure the engine: all plans, a thousand syntheses, redu
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
 .PHONY: bench-limits
-bench-limits: $(INSTALLED) ## Measure whether the limits of time and memory hold: 20 models with up to 250 clocks
+bench-limits: $(INSTALLED) ## Measure whether the time and memory limits hold: 20 models with up to 250 clocks
 	$(BIN)/python tests/benchmarks/limits.py
 
 .PHONY: bench-games

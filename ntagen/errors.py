@@ -5,7 +5,7 @@
     NtagenError                exit code 70 unless a subclass says otherwise
     ├── InputError             2: what the user gave is wrong: a file, a model, a query, an option
     │   └── UndecidedError     a strategy has no decision for a state
-    ├── LimitError             3: a limit of time, memory or states was reached before an answer
+    ├── LimitError             3: a limit on time, memory or states was reached before an answer
     ├── ModelError             4: the model ran into a run-time error (range, index, overflow, …)
     └── DeviceError            5: a device or sensor failed or gave a wrong answer
 
@@ -37,7 +37,7 @@ class UndecidedError(InputError, LookupError):
 
 
 class LimitError(NtagenError):
-    """A limit of time, memory or states was reached before there was an answer."""
+    """A limit on time, memory or states was reached before there was an answer."""
 
     exit_code: ClassVar[int] = 3
 

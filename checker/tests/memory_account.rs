@@ -1,8 +1,8 @@
-//! The bytes that a game says it takes are those that it takes, and the limit of memory holds where
+//! The bytes that a game says it takes are those that it takes, and the memory limit holds where
 //! there are many clocks.
 //!
 //! An allocator counts what lives. What it takes is compared with the account of the answer, by
-//! which the limit of memory goes, and with the limit.
+//! which the memory limit goes, and with the limit.
 
 #![expect(unsafe_code, reason = "an allocator is not safe to write")]
 

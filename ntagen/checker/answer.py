@@ -54,7 +54,7 @@ class Answer:
         wrapped: The first place, in the order of the model, where a result of integer arithmetic
             did not fit into 32 bits and wrapped round. `Model.overflow` can make it an error.
         warnings: The warnings about the query, one text each.
-        stop: ``states``, ``memory`` or ``time`` if a limit stopped the search.
+        stop: ``states``, ``memory``, ``time`` or ``clocks`` if a limit stopped the search.
         explored: The number of states whose successors were computed.
         stored: The number of states that are stored at the end; a state that was replaced by one
             with a larger zone does not count.
@@ -95,6 +95,11 @@ class Answer:
         self.has_more_plans = raw.has_more_plans
         self.verified = raw.verified
         self.verification = tuple(raw.verification())
+
+    @property
+    def limit_text(self) -> str:
+        """The limit that stopped the search, in words, for example ``state limit``."""
+        return f"{(self.stop or 'unknown').removesuffix('s')} limit"
 
     @property
     def plans(self) -> tuple[EnginePlan, ...]:

@@ -226,7 +226,7 @@ class Model:
         if answer.verdict == "error":
             raise ModelError(answer.message or "the model has a run-time error")
         if answer.verdict == "unknown":
-            raise LimitError(f"the synthesis was stopped by the limit of {answer.stop}")
+            raise LimitError(f"the synthesis was stopped by the {answer.limit_text}")
         if answer.verdict == "maybe":
             raise LimitError("the engine could not decide who wins, because the model stops clocks")
         strategy = answer.strategy
@@ -347,7 +347,7 @@ class Model:
             )
         if stop in ("memory", "time"):
             raise LimitError(
-                f"the search was stopped by the limit of {stop}; "
+                f"the search was stopped by the {stop} limit; "
                 "raise that limit, or ask for fewer states with `limit`"
             )
         return symbolic_states(found, self._edge_table())

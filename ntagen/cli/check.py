@@ -394,7 +394,7 @@ def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_writte
     facts.append(f"{1000 * answer.seconds:.1f} ms")
     facts.append(f"{answer.peak_bytes / 2**20:.1f} MiB")
     if answer.stop:
-        facts.insert(0, f"stopped by the limit of {answer.stop}")
+        facts.insert(0, f"stopped by the {answer.limit_text}")
     wrapped = []
     if answer.wrapped is not None and answer.verdict != "error":
         where = f"first at {answer.wrapped}"

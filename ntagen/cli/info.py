@@ -194,7 +194,7 @@ def _type(variable: Variable) -> str:
 def _clock_rows(clocks: Sequence[Clock]) -> Iterable[list[str]]:
     for (_, hybrid), group in groupby(clocks, lambda one: (_family(one.name), one.hybrid)):
         names = [clock.name for clock in group]
-        yield [_joined(names), "hybrid: abstracted away" if hybrid else ""]
+        yield [_joined(names), "hybrid: left out" if hybrid else ""]
 
 
 def _channel_rows(channels: Sequence[Channel]) -> Iterable[list[str]]:

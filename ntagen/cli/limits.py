@@ -52,7 +52,7 @@ LIMITS: Final = _limits(lambda text: text)
 
 
 def limit_options(of: str) -> Decorator:
-    """The same options where they are limits of one thing of several; `of` says of which."""
+    """The same options where they limit one of several things; `of` says which one."""
 
     def decorate(command: Callable[..., int | None]) -> Callable[..., int | None]:
         options = _limits(lambda text: f"For {of}: {text[0].lower()}{text[1:]}")

@@ -1,4 +1,4 @@
-"""Whether the limits of time and memory hold where there are many clocks, measured from outside.
+"""Whether the time and memory limits hold where there are many clocks, measured from outside.
 
     python tests/benchmarks/limits.py [--timeout 0.5] [--memory 100] [--only workflow]
 

@@ -193,9 +193,9 @@ pub(crate) const CLOCKS_GREW: &str =
 /// Why a search was stopped.
 pub(crate) fn stop_text(reason: StopReason) -> &'static str {
     match reason {
-        StopReason::States => "the search for it was stopped by the limit of states",
-        StopReason::Memory => "the search for it was stopped by the limit of memory",
-        StopReason::Time => "the search for it was stopped by the limit of time",
+        StopReason::States => "the search for it was stopped by the state limit",
+        StopReason::Memory => "the search for it was stopped by the memory limit",
+        StopReason::Time => "the search for it was stopped by the time limit",
         StopReason::Interrupted => "the search for it was interrupted",
         StopReason::Clocks => CLOCKS_GREW,
     }

@@ -143,7 +143,8 @@ pub struct Edge {
     pub sync: Option<Sync>,
     /// Its update, run before that of the chosen branch.
     pub update: Update,
-    /// The branches: one without a branch point. Each is a separate move of whoever owns the edge.
+    /// The branches; only one without a branch point. Each is a separate move of the owner of the
+    /// edge.
     pub branches: Vec<Branch>,
     /// Whether the controller owns it.
     pub controllable: bool,
@@ -221,7 +222,7 @@ pub struct Clock {
     pub name: String,
     /// The process it is local to.
     pub owner: Option<ProcessId>,
-    /// Hybrid clocks are abstracted away in symbolic and game queries.
+    /// Whether it is a hybrid clock, which symbolic and game queries leave out.
     pub hybrid: bool,
     /// Its place in arrays that are indexed by scalars; the stride counts clocks.
     pub coordinates: Vec<Coordinate>,

@@ -135,7 +135,7 @@ impl Strategy {
         })
     }
 
-    /// The limit of time that it is for; `None` without one.
+    /// The time limit that it is for; `None` without one.
     #[getter]
     fn time_limit(&self) -> Option<i32> {
         self.inner.strategy.time_limit
@@ -307,7 +307,7 @@ impl Play {
         })
     }
 
-    /// Takes steps back until only so many are left.
+    /// Takes back steps until only this number is left.
     fn undo(&mut self, length: usize) {
         self.inner.undo(length);
     }

@@ -310,7 +310,7 @@ fn limit_of_time_is_read_with_care() {
         read(&other).map(|_| ()),
         Err((
             "time_limit".to_owned(),
-            "\"soon\" is no limit of time".to_owned()
+            "\"soon\" is no time limit".to_owned()
         ))
     );
     other["time_limit"] = serde_json::Value::Null;

@@ -47,7 +47,7 @@ fn memory_ends_a_strategy_and_not_the_answer() {
             let answer = check(&text, query, limits);
             assert_eq!(answer.verdict, whole.verdict, "{query}");
             assert!(answer.evidence.strategy.is_none(), "{query}");
-            let reason = "no strategy: the search for it was stopped by the limit of memory";
+            let reason = "no strategy: the search for it was stopped by the memory limit";
             assert_eq!(answer.message.as_deref(), Some(reason), "{query}");
         }
     }

@@ -68,7 +68,7 @@ impl Goal for Wanted {
         Ok(self.locations.iter().all(is_there) && may_be_so_great)
     }
 
-    fn looks_at_zones(&self) -> bool {
+    fn depends_on_zones(&self) -> bool {
         self.clock.is_some()
     }
 }

@@ -349,7 +349,7 @@ pub(crate) fn check_file(
     let Some(strategy) = &answer.evidence.strategy else {
         let is_won = matches!(answer.verdict, Verdict::Satisfied | Verdict::NotSatisfied);
         let message = answer.message.as_deref().unwrap_or_default();
-        let is_stopped = message.contains("stopped by the limit of states");
+        let is_stopped = message.contains("stopped by the state limit");
         prop_assert!(
             !is_won || is_stopped,
             "{}\n{:?}",

@@ -281,7 +281,7 @@ struct Game<'a> {
 }
 
 /// Compares the check of the strategy of a query, as it is and made wrong, with the fixpoint on the
-/// game that fits its limit of time.
+/// game that fits its time limit.
 fn compare_query<'g>(
     model: &mut LoadedModel,
     (query, (rule, forced)): (&QueryText, (Rule, Forced)),
@@ -399,7 +399,7 @@ fn compare(
     Ok(())
 }
 
-/// Limits of time that are compared; more takes too many regions.
+/// Time limits that are compared; more takes too many regions.
 const MOST_TIME: i32 = 4;
 
 fn compare_times(

@@ -61,9 +61,9 @@ def test_both_engines_and_every_limit_give_the_same_first_states() -> None:
 
 def test_other_limits_are_errors() -> None:
     model = checker.load(CHAIN)
-    with pytest.raises(LimitError, match="limit of memory"):
+    with pytest.raises(LimitError, match="memory limit"):
         model.states(memory_bytes=1)
-    with pytest.raises(LimitError, match="limit of time"):
+    with pytest.raises(LimitError, match="time limit"):
         model.states(timeout_s=0)
     with pytest.raises(ValueError, match="negative"):
         model.states(-1)

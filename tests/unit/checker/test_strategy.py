@@ -213,7 +213,7 @@ def test_what_gives_no_strategy_says_so() -> None:
     model = ntagen.load(FEEDER)
     with pytest.raises(ntagen.InputError, match="is not a control query"):
         model.synthesize("A<> M.Full")
-    with pytest.raises(ntagen.NtagenError, match="stopped by the limit of states"):
+    with pytest.raises(ntagen.NtagenError, match="stopped by the state limit"):
         ntagen.load(COUNTER).synthesize("control: A<> n == 30000", states=100)
     with pytest.raises(ntagen.RejectedError):
         model.synthesize("control: A<> M.Nowhere")
@@ -280,9 +280,9 @@ def test_strategies_within_a_time_are_saved_and_played(tmp_path: Path) -> None:
     assert (
         strategy.verify()
         .lines[0]
-        .endswith("it is for another start or limit of time than the query")
+        .endswith("it is for another start or time limit than the query")
     )
-    with pytest.raises(ntagen.InputError, match="for another start or limit of time than"):
+    with pytest.raises(ntagen.InputError, match="for another start or time limit than"):
         strategy.play()
 
 
@@ -479,7 +479,7 @@ def test_a_named_strategy_is_made_when_it_is_first_used(tmp_path: Path) -> None:
     answer = model.check(f"strategy Low = {query}", states=500)
     assert (answer.verdict, answer.strategy) == ("satisfied", None)
     with pytest.raises(
-        ntagen.InputError, match="'Low': the search for it was stopped by the limit of states"
+        ntagen.InputError, match="'Low': the search for it was stopped by the state limit"
     ):
         model.check("sup: level under Low", states=500)
     assert model.check("sup: level under Low").value == 50

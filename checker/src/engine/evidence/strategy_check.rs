@@ -56,7 +56,7 @@ impl<'q> Asked<'q> {
         }
     }
 
-    /// The game that is played within a limit of time, if there is one.
+    /// The game that is played within a time limit, if there is one.
     pub(crate) fn game<'n>(
         &self,
         network: &'n Network,
@@ -77,11 +77,11 @@ pub struct Played<'s> {
     pub start: &'s Start,
     /// What it decides: see [`decisions`].
     pub decisions: &'s [Decisions],
-    /// Who plays by it.
+    /// The player who uses it.
     pub owner: Player,
     /// Which of the decisions that apply counts.
     pub selection: Selection,
-    /// The limit of time that it is for, if it is for one.
+    /// The time limit that it is for, if it is for one.
     pub time_limit: Option<i32>,
     /// The strategy under which the game is played, if it is under one.
     pub under: Option<&'s Under>,
@@ -212,7 +212,7 @@ fn without_priorities(network: &Network) -> Network {
     equal
 }
 
-/// Whether a strategy with this start and limit of time answers the query, if it wins.
+/// Whether a strategy with this start and time limit answers the query, if it wins.
 pub(crate) fn is_for(
     network: &Network,
     asked: Asked<'_>,
@@ -232,7 +232,7 @@ pub(crate) fn is_for(
     Ok(has_start && is_for_time(network, asked, owner, time_limit)?)
 }
 
-/// Whether a strategy that wins with a limit of time answers the query: the controller is to need
+/// Whether a strategy that wins with a time limit answers the query: the controller is to need
 /// no more time than the query leaves it, the environment to hold out for as long.
 fn is_for_time(
     network: &Network,
@@ -377,11 +377,11 @@ pub fn describe(network: &Network, verification: &Verification) -> Vec<String> {
             coverage.regions, coverage.own_moves, coverage.opponent_moves, coverage.goals
         )],
         Ok(strategy::Outcome::GivenUp(GivenUp::TooLarge, coverage)) => vec![format!(
-            "strategy not verified: more than {} regions; the limit of states (--states) sets another bound",
+            "strategy not verified: more than {} regions; the state limit (--states) sets another bound",
             coverage.regions
         )],
         Ok(strategy::Outcome::GivenUp(GivenUp::Ended, coverage)) => vec![format!(
-            "strategy not verified: stopped by the limit of time after {} regions",
+            "strategy not verified: stopped by the time limit after {} regions",
             coverage.regions
         )],
         Ok(strategy::Outcome::Violated(violation, _)) => violation_lines(network, violation),
@@ -401,7 +401,7 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
         Defect::Broken => "what must be kept does not hold here",
         Defect::GoalReached => "the goal of the controller holds here",
         Defect::Stuck => "it waits where time cannot pass and it may not",
-        Defect::OtherGame => "it is for another start or limit of time than the query",
+        Defect::OtherGame => "it is for another start or time limit than the query",
         Defect::ImpossibleWay => "the way to where it begins is not possible",
         Defect::Recurring => "the goal of the controller comes again and again",
         Defect::Endless => "the run goes on for ever without what the strategy is for",

@@ -248,7 +248,7 @@ fn under(network: &Network, whole: &At<'_>) -> Result<Option<Arc<Under>>, Mismat
     let at = whole.field("under")?;
     let (query, strategy) = read_whole(network, &at)?;
     if strategy.owner == Player::Environment || strategy.time_limit.is_some() {
-        let help = "a game is played under a strategy of the controller without a limit of time";
+        let help = "a game is played under a strategy of the controller without a time limit";
         return Err(at.wrong("no game is played under this strategy", help));
     }
     Ok(Some(Arc::new(Under {
@@ -304,11 +304,11 @@ fn start(network: &Network, file: &Json) -> Result<Start, Mismatch> {
     }))
 }
 
-/// A limit of time, which zones can compare a clock with; -1 is one that nobody keeps.
+/// A time limit, which zones can compare a clock with; -1 is one that nobody keeps.
 fn time_limit(at: &At<'_>) -> Result<i32, Mismatch> {
     let limit = at.0.as_i64().and_then(|limit| i32::try_from(limit).ok());
     let limit = limit.filter(|&limit| limit >= -1 && Bound::is_allowed(limit));
-    limit.ok_or_else(|| at.wrong(format!("{} is no limit of time", at.0), SEE_FORMAT))
+    limit.ok_or_else(|| at.wrong(format!("{} is no time limit", at.0), SEE_FORMAT))
 }
 
 /// The words of a state that is given as an object with `locations` and `variables`, as in a

@@ -365,7 +365,7 @@ impl LoadedModel {
             Ok(true) => {}
             Ok(false) => {
                 return Err(rejection(format!(
-                    "error: the strategy is for another start or limit of time than {}",
+                    "error: the strategy is for another start or time limit than {}",
                     text.text
                 )));
             }
@@ -569,8 +569,8 @@ impl Play {
         self.step(network, &now, wait, parts)
     }
 
-    /// The strategy goes on: time passes until it acts, and then it does, by the first leg that is
-    /// possible.
+    /// The strategy continues: time passes until it acts. Then it takes its action by the first leg
+    /// that is possible.
     pub fn follow(&mut self, network: &Network) -> Result<(), Refused> {
         let now = self.now().clone();
         let situation = self.look(network, &now)?;
@@ -601,7 +601,7 @@ impl Play {
         Ok(())
     }
 
-    /// Takes the last steps back until only so many are left.
+    /// Takes back the last steps until only this number is left.
     pub fn undo(&mut self, length: usize) {
         self.steps.truncate(self.start + length);
         self.states.truncate(self.start + length + 1);
