@@ -36,7 +36,7 @@ fn load(py: Python<'_>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Model
     })
 }
 
-/// Of every code: the code, its name, its severity ("error" or "warning"), and its page in
+/// For each code: the code, its name, its severity ("error" or "warning"), and its page in
 /// Markdown.
 #[pyfunction]
 fn explanations() -> Vec<(&'static str, &'static str, &'static str, &'static str)> {

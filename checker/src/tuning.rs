@@ -1,9 +1,9 @@
 //! The heuristics that can be switched off, one row each.
 //!
-//! A heuristic changes how long an answer takes and how many states are looked at, and neither
-//! verdicts nor values. So each of them has a row here, which a user, a test or a benchmark may
-//! switch off (`make ablation` measures what each gains). Whoever has a heuristic asks the value of
-//! its row where it begins; nothing else depends on this table.
+//! A heuristic changes how long an answer takes and how many states are explored, but no verdict
+//! and no value. So each of them has a row here, which a user, a test or a benchmark may switch off
+//! (`make ablation` measures what each gains). The code of a heuristic asks for the value of its
+//! row where it begins; nothing else depends on this table.
 
 use std::fmt;
 

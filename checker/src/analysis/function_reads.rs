@@ -29,7 +29,7 @@ pub(crate) fn read_words(
                         words.extend(touched.into_iter().flatten());
                         is_known
                     }
-                    // Who uses the address is not followed.
+                    // The analysis does not follow where the address is used.
                     Operand::Memory(address, Access::Take) => address.base != Base::State,
                     _ => true,
                 };

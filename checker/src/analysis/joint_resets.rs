@@ -1,4 +1,4 @@
-//! Which clocks a synchronisation certainly resets, whoever the partner is.
+//! Which clocks a synchronisation certainly resets, with any partner.
 //!
 //! An edge that synchronises is taken together with another one: a sender on a channel that is no
 //! broadcast with one receiver, a receiver with the sender. What all edges that can stand on the
@@ -65,7 +65,7 @@ impl Partners {
         }
     }
 
-    /// Whether whoever takes part in the edge's synchronisation resets the clock.
+    /// Whether every process that takes part in the edge's synchronisation resets the clock.
     pub(super) fn reset(&self, edge: &Edge, clock: usize) -> bool {
         let Some(sync) = edge.sync else {
             return false;

@@ -7,9 +7,9 @@
 //! they are in the initial state ([`LiveVariables::forget`]), and finds the states together that
 //! differ in nothing else.
 //!
-//! A variable is written on an edge also where whoever takes part in its synchronisation surely
-//! writes it: the sender before the receivers read, the one receiver after the sender. What a query
-//! reads is live everywhere, and so is what is read around every transition.
+//! An edge also writes a variable if every process that can take part in its synchronisation writes
+//! it: the sender before the receivers read, the one receiver after the sender. What a query reads
+//! is live everywhere, and so is what is read around every transition.
 
 use crate::ir::{Edge, FunctionId, Network, Process, Shape};
 
@@ -49,7 +49,7 @@ impl LiveVariables {
         functions: impl IntoIterator<Item = FunctionId>,
         keeps_scalars: bool,
     ) -> Option<LiveVariables> {
-        let looked_at = looked_at(network, functions, keeps_scalars)?;
+        let looked_at = tracked_words(network, functions, keeps_scalars)?;
         let mut numbers = vec![None; network.layout.words as usize];
         for (number, &word) in looked_at.iter().enumerate() {
             numbers[word as usize] = Some(number as u32);
@@ -61,7 +61,7 @@ impl LiveVariables {
             receivers: vec![WordSet::full(looked_at.len()); network.channels.len()],
             network,
         };
-        analysis.ask_partners();
+        analysis.find_partner_writes();
         let live: Vec<Vec<WordSet>> = network
             .processes
             .iter()
@@ -125,7 +125,7 @@ fn bits_of(live: &WordSet, numbers: &[usize]) -> Vec<u64> {
 
 /// The words that are worth looking at, ascending: they are written, and nothing reads them in
 /// every state.
-fn looked_at(
+fn tracked_words(
     network: &Network,
     functions: impl IntoIterator<Item = FunctionId>,
     keeps_scalars: bool,
@@ -178,7 +178,7 @@ struct LiveSearch<'n> {
 
 impl LiveSearch<'_> {
     /// Finds what those surely write that synchronise on a channel.
-    fn ask_partners(&mut self) {
+    fn find_partner_writes(&mut self) {
         let network = self.network;
         for edge in network.processes.iter().flat_map(|process| &process.edges) {
             let Some(sync) = edge.sync.filter(|_| !edge.guard.never_holds) else {

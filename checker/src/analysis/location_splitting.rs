@@ -8,8 +8,9 @@
 //! read, as long as these are few; where they are not, everything counts as possible.
 //!
 //! Invariants
-//! * Only words that nobody else writes and that are not `meta` are tracked: who takes no part in a
-//!   transition stays in its node, and states with different nodes are different.
+//! * Only words that no other process writes and that are not `meta` are tracked. A process that
+//!   takes no part in a transition stays in its node, and states with different nodes are
+//!   different.
 //! * Every transition of the network in which the process takes an edge leads from a node to
 //!   another one along a [`SplitStep`], and the comparisons in the guards that it evaluates are
 //!   among the [`Node::atoms`].
@@ -103,7 +104,7 @@ impl Writers {
         }
     }
 
-    /// Who writes a word of a variable.
+    /// The processes that write a word of a variable.
     fn of(&self, word: u32, variable: &Variable) -> Writer {
         let of_word = self.of_words.get(&word).copied();
         let of_variable = self.of_variables.get(&variable.offset).copied();
@@ -249,8 +250,8 @@ impl<'a> Splitting<'a> {
         tracked
     }
 
-    /// The values of a word of a variable that is not `meta`, if they are integers, and who writes
-    /// it.
+    /// The values of a word of a variable that is not `meta`, if they are integers, and the
+    /// processes that write it.
     fn range_of(&mut self, word: u32) -> Option<(Ranged, Writer)> {
         let network = self.network;
         let behind = variable_behind(network, word);
@@ -328,8 +329,8 @@ impl<'a> Splitting<'a> {
             atoms: Vec::new(),
         };
         let finished = self.run_all(edge, &[function], &free, here, |run| {
-            // Who evaluates a guard that fails with an error goes no further, but first looks at
-            // what it compared.
+            // A guard that fails with an error ends the evaluation, but what it compared before
+            // counts.
             if run.result != Ok(0) {
                 answer.can_hold |= run.result.is_ok();
                 add_atoms(guard, run.constraints, &mut answer.atoms);

@@ -1,8 +1,9 @@
 //! Whether a predicate can hold where nothing is known of a state but the location of one process.
 //!
-//! Code is run with unknown values: where one decides how it goes on, both ways are looked at. What
-//! frames and references hold counts as unknown. The answer errs towards "it can": a way that ends
-//! in a run-time error, and whatever takes too many steps, counts as holding.
+//! Code is run with unknown values. Where an unknown value decides how the code continues, both
+//! branches are tried. The contents of frames and references count as unknown. The answer errs
+//! towards "it can": a branch that ends in a run-time error counts as holding, and so does one that
+//! takes too many steps.
 
 use crate::exec::arithmetic;
 use crate::ir::{
@@ -40,7 +41,7 @@ struct Call {
     registers: Vec<Option<i32>>,
 }
 
-/// How a way goes on.
+/// How a branch continues.
 enum NextStep {
     /// Here.
     Here,

@@ -194,7 +194,7 @@ impl<'n> Exposures<'n> {
                     None => *reads = WordSet::full(self.count),
                 }
             }
-            // Who uses the address is not followed.
+            // The analysis does not follow where the address is used.
             Operand::Memory(address, Access::Take) if address.base == Base::State => {
                 *reads = WordSet::full(self.count);
             }

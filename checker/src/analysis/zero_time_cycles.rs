@@ -70,7 +70,7 @@ pub(crate) fn recurrent_edges(network: &Network, greatest: &[i32]) -> Vec<Vec<bo
     }
 }
 
-/// By channel: who sends and who receives on it with edges that may recur.
+/// For each channel: the processes that send and receive on it with edges that may recur.
 fn partners(network: &Network, recurrent: &[Vec<bool>]) -> (Vec<Who>, Vec<Who>) {
     let mut senders = vec![Who::Nobody; network.channels.len()];
     let mut receivers = senders.clone();

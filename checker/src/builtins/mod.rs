@@ -1,10 +1,10 @@
 //! The functions that the language defines, in one table: name, types and code of each.
 //!
-//! Everybody who asks reads this table: the parser (which names are taken), the checker (names,
-//! types, folding of constants), the interpreter, the optimiser and compiled code. A function more
-//! is one row in [`MathFunction`]'s table, and its code in `library.rs`. Its types follow from the
-//! kind of its code, and so does what may go wrong: only a code that gives an [`IntegerResult`] can
-//! wrap round or have no result.
+//! The parser (which names are taken), the checker (names, types, folding of constants), the
+//! interpreter, the optimiser and compiled code all read this table. A new function is one row in
+//! the table of [`MathFunction`], and its code in `library.rs`. The kind of its code gives its
+//! types, and what may go wrong: only a code that gives an [`IntegerResult`] can wrap round or have
+//! no result.
 
 mod integer_result;
 mod library;

@@ -94,7 +94,7 @@ pub struct Values {
     pub least: bool,
     /// Whether the greatest values were asked for.
     pub greatest: bool,
-    /// Of each item.
+    /// For each item.
     pub items: Vec<Extremes>,
 }
 
@@ -125,7 +125,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// An answer with nothing beside the verdict and what was done for it.
+    /// An answer that has only the verdict and the counters of the search.
     pub(crate) fn new(verdict: Verdict, counters: Counters) -> Answer {
         Answer {
             verdict,

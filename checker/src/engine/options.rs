@@ -118,7 +118,7 @@ pub struct Options {
     pub runs: bool,
     /// Where the files of `saveStrategy` and `loadStrategy` lie; `None` is the folder of the model.
     pub folder: Option<PathBuf>,
-    /// Below which folders `saveStrategy` may write, beside the current one.
+    /// The folders below which `saveStrategy` may write; it may always write below the current one.
     pub allow_write: Vec<PathBuf>,
     /// Which trace to a state is wanted.
     pub trace: TraceWanted,

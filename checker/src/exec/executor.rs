@@ -3,7 +3,7 @@
 use super::Wraps;
 use crate::ir::{ClockId, FixedConstraint, FunctionId, RunTimeErrorKind, SiteId};
 
-/// What a call reads and writes beside its arguments.
+/// What a call reads and writes in addition to its arguments.
 #[derive(Debug)]
 pub struct Context<'a> {
     /// The words of the state; updates change them in place.

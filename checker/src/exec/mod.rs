@@ -1,8 +1,8 @@
 //! Running code: the interpreter is the reference, compiled code is fast, and both answer to one
 //! trait.
 //!
-//! Neither knows the solver, zones or queries. Clock constraints and assignments that code emits
-//! are collected in the context for whoever called.
+//! Neither knows the solver, zones or queries. The context collects the clock constraints and
+//! assignments that code emits, for the caller.
 
 pub(crate) mod arithmetic;
 

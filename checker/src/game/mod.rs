@@ -14,10 +14,10 @@ pub mod strategy;
 
 use crate::search::limits::StopReason;
 
-/// Who plays.
+/// The players.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Player {
-    /// The one for whom a control query asks.
+    /// The player for whom a control query asks.
     Controller,
     /// Its opponent.
     Environment,
@@ -42,18 +42,19 @@ impl Player {
 /// Whether the priorities of channels and processes count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Priorities {
-    /// TIGA's rule: they do not, neither in games nor under the strategies that come from them.
+    /// TIGA's rule: they do not count, neither in games nor under the strategies that come from
+    /// them.
     #[default]
     Ignored,
-    /// A move is possible only where none of a higher level is, whoever owns either, as in all
-    /// other queries.
+    /// A move is possible only where no move of a higher level is, whoever owns the two moves, as
+    /// in all other queries.
     Kept,
 }
 
-/// What happens at a point where time cannot pass and the environment has a move. Where it need not
-/// move it may decline, and then play stops unless the controller moves: that loses a goal that
-/// must be reached; where something has only to be kept, the controller must take a move if it has
-/// one, and has lost if each of them loses.
+/// What happens at a point where time cannot pass and the environment has a move. If it need not
+/// move, it may decline, and then play stops unless the controller moves. A goal that must be
+/// reached is then lost. If something has only to be kept, the controller must take a move if it
+/// has one, and has lost if each of them loses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Forced {
     /// TIGA's rule: the environment must move if the component whose invariant (or urgent location)
@@ -66,47 +67,47 @@ pub enum Forced {
     Neutral,
 }
 
-/// What the nodes of a game graph are. The answer is the same.
+/// The kind of nodes in a game graph. The answer is the same for all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Nodes {
-    /// Symbolic states first; discrete states if there turn out to be many symbolic ones for each,
-    /// and if that is possible.
+    /// Symbolic states first; then discrete states, if that is possible and there are many symbolic
+    /// states for each discrete one.
     #[default]
     Automatic,
-    /// Symbolic states: what is reached, and no more.
+    /// Symbolic states: only what is reached.
     Symbolic,
     /// Discrete states with all that their invariants allow, where that is possible.
     Discrete,
 }
 
-/// How much is to be computed.
+/// How much must be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Until the verdict is known.
     Verdict,
-    /// Until the verdict is known, and if the seeker loses, until nothing is left out that the
-    /// evader may do.
+    /// Until the verdict is known; if the seeker loses, until everything that the evader may do is
+    /// there.
     Permissive,
     /// The winning valuations of all nodes that can be reached.
     Everything,
 }
 
-/// Who wins a game.
+/// The winner of a game.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solution {
     /// This player wins from the initial valuation.
     Won(Player),
-    /// A limit came first.
+    /// A limit was reached first.
     Stopped(StopReason),
 }
 
-/// What becomes of play in the goal.
+/// Whether play continues in the goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum AfterGoal {
     /// It ends.
     Ends,
-    /// It goes on, and what comes is to be known too.
+    /// Play continues, and the graph must show what follows.
     GoesOn,
-    /// It goes on, and the goal makes no difference to it.
+    /// Play continues, and the goal makes no difference to it.
     IsLikeBefore,
 }

@@ -1,13 +1,13 @@
-//! Attractor games: can one player, the *seeker*, force play into a set, whatever the other one,
+//! Attractor games: can one player, the *seeker*, force play into a set, whatever the other player,
 //! the *evader*, does?
 //!
 //! For reachability the controller seeks the goal. For safety the environment seeks a valuation in
-//! which what must be kept is broken; the controller wins where it does not get there. In both,
-//! play ends in the goal, if there is one.
+//! which what must be kept is broken; the controller wins where the environment cannot get there.
+//! In both games, play ends in the goal, if there is one.
 //!
-//! The algorithm is on the fly and goes forward and backward in turns. Forward, nodes are expanded;
-//! backward, the valuations of a node from which the seeker wins are computed anew when those of a
-//! successor have grown. For the controller as the seeker:
+//! The algorithm is on the fly, and alternates between forward and backward steps. Forward, nodes
+//! are expanded. Backward, the valuations of a node from which the seeker wins are computed again
+//! when those of a successor have grown. For the controller as the seeker:
 //!
 //! ```text
 //! good   = goal ∪ ⋃ Pre_c(win)                     what a controllable move reaches
@@ -16,8 +16,8 @@
 //! win    = Pred_t(good ∪ forced, bad)              wait into good without meeting bad
 //! ```
 //!
-//! For the environment, which is faster, and whose opponent must move where time stops and the
-//! environment need not:
+//! For the environment. It is faster, and its opponent must move where time stops and the
+//! environment need not move:
 //!
 //! ```text
 //! now    = broken ∪ ⋃ Pre_u(win), without goal     what the environment has at once
@@ -26,23 +26,23 @@
 //! win    = Pred_t(now ∪ stuck, escape ∪ goal)
 //! ```
 //!
-//! There `stop` are the valuations in which time cannot pass, `enabled_u` and `enabled_c` those in
+//! Here `stop` are the valuations in which time cannot pass, `enabled_u` and `enabled_c` those in
 //! which a move of the environment or of the controller is possible, and [`Forced`] is the rule
 //! that says when the environment must move.
 //!
-//! A move of the evader into a node that is not explored counts as an escape, so every intermediate
-//! result is sound, and the search ends as soon as the initial valuation is won. Each gain is
-//! recorded with a stamp: a strategy that moves from valuations of one stamp into those of smaller
-//! ones makes progress. Where the seeker wins nowhere any more, the evader has only to stay outside
-//! of what is won.
+//! A move of the evader into an unexplored node counts as an escape, so every intermediate result
+//! is sound, and the search ends as soon as the initial valuation is won. Each gain is recorded
+//! with a stamp: a strategy that moves from valuations of one stamp into those of smaller ones
+//! makes progress. Once the seeker can win nothing more, the evader only has to stay outside of
+//! what is won.
 //!
-//! Forward, the solver follows random moves as deep as they go, and for a verdict explores only as
-//! many moves of the evader as it needs ([`super::exploration`]). Now and then it computes whether
-//! the seeker can still win at all ([`super::backward::losing_untimed`], and with zones
-//! [`super::backward::losing_timed`]), so that both answers can come early.
+//! Forward, the solver follows random moves as deep as they go. For a verdict it explores only as
+//! many moves of the evader as the evader needs ([`super::exploration`]). From time to time it
+//! computes whether the seeker can still win at all ([`super::backward::losing_untimed`], and with
+//! zones [`super::backward::losing_timed`]), so that both answers can come early.
 //!
 //! Nodes that are won or lost as a whole are handled without zones; in models where clocks do not
-//! decide who wins, all are. What takes zones waits until the graph has grown by a quarter, so that
+//! decide the winner, all are. Work on zones waits until the graph has grown by a quarter, so that
 //! a node sees the gains of several successors at once.
 //!
 //! Source: F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient On-the-Fly Algorithms
@@ -59,48 +59,48 @@ use super::exploration::{Exploration, Next, Turn};
 use super::forward::graph::Graph;
 use super::{AfterGoal, Extent, Forced, Player, Solution};
 
-/// Nodes whose winning valuations depend on clocks are computed when the explored states have grown
-/// by this part of them. Each time costs more than looking at words, and the more is known by then,
-/// the fewer are computed twice.
+/// Nodes whose winning valuations depend on clocks are computed when the number of explored states
+/// has grown by this part. Such a computation costs more than one by words, and the more is known,
+/// the fewer nodes are computed twice.
 const BETWEEN_COMPUTATIONS: u64 = 4;
 
 /// A solver with its graph.
 pub struct Solver<'g, 's, 'a> {
     /// The graph.
     pub graph: &'g mut Graph<'s, 'a>,
-    /// Who seeks.
+    /// The player who seeks something.
     pub seeker: Player,
     pub(in crate::game) forced: Forced,
-    /// What is sought.
+    /// The target of the seeker.
     pub(in crate::game) sought: Sought,
-    /// What is won.
+    /// The winning sets.
     pub won: WinningSets,
-    /// What is to be computed again.
+    /// The nodes that must be computed again.
     pub(in crate::game) agenda: Agenda,
-    /// What is explored when.
+    /// Which nodes are explored, and in which order.
     pub(in crate::game) exploration: Exploration,
     pub(in crate::game) stops: Stops,
-    /// The bytes of what belongs to the game and is kept elsewhere meanwhile.
+    /// The bytes of what belongs to the game but is kept elsewhere for a while.
     pub(in crate::game) aside_bytes: u64,
-    /// How many threads compute what nodes win.
+    /// The number of threads that compute what nodes win.
     pub(in crate::game) threads: usize,
     /// The words of some node.
     pub(in crate::game) words: Vec<i32>,
 }
 
-/// What is sought.
+/// The target of the seeker.
 #[derive(Debug)]
 pub(in crate::game) struct Sought {
-    /// By node, if it is not where the goal holds. Play does not end there, and all nodes are
+    /// For each node, if the target is not the goal. Play does not end there, and all nodes are
     /// expanded.
     pub(in crate::game) targets: Option<Vec<Win>>,
     pub(in crate::game) after_goal: AfterGoal,
-    /// Whether it matters what can be reached at all, through whatever has been won or lost.
+    /// Whether the question is what can be reached at all, even after one player has won.
     pub(in crate::game) is_cooperative: bool,
 }
 
 impl<'g, 's, 'a> Solver<'g, 's, 'a> {
-    /// A solver that has looked at the initial node only.
+    /// A solver that has evaluated only the initial node.
     pub fn new(graph: &'g mut Graph<'s, 'a>, seeker: Player, forced: Forced) -> Solver<'g, 's, 'a> {
         let mut solver = Solver {
             words: graph.symbolic.stepper.network().initial.clone(),
@@ -123,7 +123,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         solver
     }
 
-    /// Sets how many threads compute what nodes win.
+    /// Sets the number of threads that compute what nodes win.
     pub fn share_among(&mut self, threads: usize) {
         self.threads = threads;
     }
@@ -153,7 +153,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 Next::Nothing => break,
                 Next::Stopped(reason) => return Ok(Solution::Stopped(reason)),
             }
-            if let Some(reason) = self.look_if_due(watch) {
+            if let Some(reason) = self.check_limits(watch) {
                 return Ok(Solution::Stopped(reason));
             }
         }
@@ -161,13 +161,13 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
     }
 
     fn begin(&mut self, extent: Extent) {
-        self.begin_looks();
+        self.schedule_limit_check();
         self.stops.next_crowd = 1;
         self.exploration.next_may_win = 1;
         self.exploration.reserve.is_kept = extent == Extent::Verdict;
     }
 
-    /// Begins a turn: what takes zones is computed if the graph has grown by a part of itself, or
+    /// Begins a turn. What needs zones is computed if the graph has grown by a part of itself, or
     /// if no node waits.
     fn begin_turn(&mut self) -> Turn {
         let explored = self.graph.explored;
@@ -186,14 +186,14 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    /// Who wins, once nothing is left to do; the strategy of the evader keeps out of what was not
+    /// The winner, once nothing is left to do. The strategy of the evader avoids what was not
     /// explored.
     fn winner(&mut self, extent: Extent) -> Player {
         if self.is_won() {
             return self.seeker;
         }
         if extent == Extent::Verdict {
-            self.keep_out_of_unexpanded();
+            self.avoid_unexpanded();
         }
         self.seeker.opponent()
     }

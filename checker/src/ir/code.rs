@@ -73,11 +73,11 @@ pub struct Function {
 pub struct Block {
     /// What is done, in order.
     pub instructions: Vec<Instruction>,
-    /// Where it goes on.
+    /// The next block.
     pub terminator: Terminator,
 }
 
-/// Where execution goes on.
+/// Where execution continues.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Terminator {
     /// To a block.

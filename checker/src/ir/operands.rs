@@ -1,7 +1,7 @@
 //! The operands of instructions: which registers, words and clocks they read and write.
 //!
-//! One walk over all kinds of instructions tells everybody who asks, for reading and for changing
-//! alike. A new kind of instruction has one row here.
+//! One walk over all kinds of instructions serves every caller, both for reading and for changing.
+//! A new kind of instruction has one row here.
 
 use super::code::{
     Address, Base, BlockId, ClockOperand, Function, Instruction, Register, Terminator,

@@ -1,4 +1,4 @@
-//! Why exploring a model ended without an answer.
+//! The reasons why exploring a model ended without an answer.
 
 use crate::exec::RunTimeError;
 use crate::ir::RunTimeErrorKind;
@@ -10,7 +10,7 @@ pub enum Failure {
     RunTime(RunTimeError),
     /// A clock bound or value is beyond what zones can hold; the number is the value.
     ClockLimit(i32),
-    /// Bounds of clocks grew beyond what zones can hold, where no abstraction keeps them small.
+    /// Bounds of clocks grew beyond what zones can hold, and no abstraction keeps them small.
     ClockRange,
     /// A rate other than 0 and 1 on a clock of the process with this index.
     Rate {
@@ -23,7 +23,7 @@ pub enum Failure {
     Moves(usize),
     /// The initial state breaks an invariant.
     InitialInvariant,
-    /// None of the model: a call of its code, or the enumeration of moves, was ended
+    /// The model did not fail: a call of its code, or the enumeration of moves, was cancelled
     /// ([`crate::cancellation`]).
     Interrupted,
 }

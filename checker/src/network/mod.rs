@@ -1,14 +1,14 @@
-//! The network's semantics: which moves a state has, what they do, and whether time may pass.
+//! The semantics of networks: which moves a state has, what they do, and whether time may pass.
 //!
 //! [`Stepper`] works on the words of a state and collects clock constraints and assignments; it
-//! knows no zones. [`Symbolic`] puts zones on top. Neither knows how states are stored or why they
-//! are wanted.
+//! knows no zones. [`Symbolic`] adds zones. Neither knows how states are stored or why they are
+//! wanted.
 //!
-//! Semantics: UPPAAL's, as the documentation's pages on edges, synchronisation and semantics give
-//! it. In short: guards of all participants hold in the source state; updates run sender first,
-//! then receivers in process order; invariants of the target hold after all updates; a committed
-//! location must take part if there is one; a broadcast takes along every process with an enabled
-//! receiving edge.
+//! The semantics is UPPAAL's, as the documentation's pages on edges, synchronisation and semantics
+//! give it. In short: guards of all participants hold in the source state; updates run sender
+//! first, then receivers in process order; invariants of the target hold after all updates; if a
+//! location is committed, a committed location must take part; every process with an enabled
+//! receiving edge takes part in a broadcast.
 
 pub mod discrete;
 pub mod failure;

@@ -183,8 +183,8 @@ impl ExactWalk {
         })
     }
 
-    /// Waits for so many ticks and takes the choice with this index. The ticks are as long
-    /// afterwards as the state allows.
+    /// Waits for this number of ticks and takes the choice with this index. Afterwards, the length
+    /// of a tick follows from the state.
     fn take(&mut self, index: usize, wait: i64) -> PyResult<()> {
         let next = self.model.get().with(|model| {
             let choices = model.choices(self.timed.ticks_per_unit);

@@ -1,6 +1,6 @@
 //! Limits: a search reports its counters now and then, and is told whether to go on.
 //!
-//! The search itself reads no clock and knows no limit; whoever calls it does.
+//! The search itself reads no clock and knows no limit; its caller does.
 
 /// What a search has done so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,11 +31,11 @@ impl std::ops::Add for Counters {
 /// Why a search stopped before it had an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// The limit of states.
+    /// The state limit.
     States,
-    /// The limit of memory.
+    /// The memory limit.
     Memory,
-    /// The limit of time.
+    /// The time limit.
     Time,
     /// The user interrupted.
     Interrupted,
@@ -52,12 +52,12 @@ pub trait Watch {
 /// States that a search may explore between two looks, of as many at most, at zones of this
 /// dimension: what a state takes grows with the third power of it, and what its successors take
 /// with that, too, where clocks have a process each.
-pub(crate) fn states_between_looks(most: u64, dimension: usize) -> u64 {
+pub(crate) fn states_between_checks(most: u64, dimension: usize) -> u64 {
     (UNITS_BETWEEN_LOOKS / (dimension as u64).pow(3)).clamp(1, most)
 }
 
 /// Moves that a search may take between two looks.
-pub(crate) fn moves_between_looks(most: u64, dimension: usize) -> u64 {
+pub(crate) fn moves_between_checks(most: u64, dimension: usize) -> u64 {
     (UNITS_BETWEEN_LOOKS / (dimension as u64).pow(2)).clamp(1, most)
 }
 

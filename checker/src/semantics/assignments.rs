@@ -76,8 +76,8 @@ impl Checker<'_> {
         Expr::new(Kind::Assign(Box::new(target), Box::new(value)), ty, span)
     }
 
-    /// An assignment to a variable that is left out: it remains where its own value is used, which
-    /// is unknown, and what the value does beside it.
+    /// An assignment to a variable that is left out. It stays where its own value, which is
+    /// unknown, is used, and where the right side has other effects.
     fn assignment_left_out(
         &mut self,
         (target, place): (Expr, &Expr),

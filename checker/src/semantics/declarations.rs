@@ -106,7 +106,7 @@ impl Checker<'_> {
         {
             return Entity::Broken;
         }
-        self.tell_parts_apart(ty, words, span);
+        self.distinguish_parts(ty, words, span);
         if ty.is_register() {
             let value = match ty {
                 Type::Double => {

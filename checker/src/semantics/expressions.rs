@@ -359,7 +359,7 @@ impl Checker<'_> {
     /// Checks that an expression changes nothing.
     pub(super) fn expect_pure(&mut self, expr: &Expr, what: &str) {
         if expr.has_effect() {
-            // What someone meant who writes `x = 1` where a condition is wanted.
+            // What a user means by `x = 1` where a condition is wanted.
             let assigns =
                 expr.any(&|e| matches!(e.kind, Kind::Assign(..) | Kind::AssignClock { .. }));
             let help = if assigns {

@@ -262,9 +262,9 @@ impl Checker<'_> {
         // Without a value, a scalar is the first member; in a list of values, the first comes
         // first.
         if parts.is_empty() {
-            self.tell_scalars_apart(&ty, variable.name.span);
+            self.distinguish_scalars(&ty, variable.name.span);
         } else {
-            self.tell_indices_apart(&ty, variable.name.span);
+            self.distinguish_indices(&ty, variable.name.span);
         }
         let local = self.new_local(ty.clone());
         let root = Root::Local(local);
@@ -382,7 +382,7 @@ impl Checker<'_> {
             && ty.scalar_set().is_some()
             && !is_order_irrelevant(&body, local, &self.locals)
         {
-            self.tell_members_apart(&ty, span);
+            self.distinguish_members(&ty, span);
         }
         Statement::Iterate { local, range, body }
     }

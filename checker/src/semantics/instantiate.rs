@@ -582,7 +582,7 @@ fn is_unsupported(diagnostic: &Diagnostic) -> bool {
     .contains(&diagnostic.code)
 }
 
-/// What it takes to make a process, beside its functions: see [`cancellation::work`].
+/// The work of making a process, without its functions: see [`cancellation::work`].
 const UNITS_FOR_PROCESS: usize = 1 << 14;
 
 /// A variable of a template without instance: its type is known, its place is not.

@@ -52,7 +52,7 @@ impl Checker<'_> {
         self.scopes.pop();
         if quantifier == Quantifier::Sum && checked.ty == Type::Double {
             // The order of additions decides how they are rounded.
-            self.tell_members_apart(&range_type, span);
+            self.distinguish_members(&range_type, span);
         }
         if members_differ || self.must_unroll(&checked) {
             return self.unrolled(quantifier, (name, &range_type, range), body, span);

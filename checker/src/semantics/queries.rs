@@ -1,7 +1,7 @@
 //! Queries: their static rules, and lowering to predicates.
 //!
-//! A predicate is split only as far as clocks and `deadlock` reach; everything below is one
-//! function on the words.
+//! A predicate is split only down to clocks and `deadlock`; everything below is one function on the
+//! words.
 
 use super::checker::Checker;
 use super::codes;

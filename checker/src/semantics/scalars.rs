@@ -21,42 +21,42 @@ use crate::ir::IntegerOperator;
 
 impl Checker<'_> {
     /// Notes that members of the set of a scalar type are told apart; nothing for other types.
-    pub(super) fn tell_members_apart(&mut self, ty: &Type, span: Span) {
+    pub(super) fn distinguish_members(&mut self, ty: &Type, span: Span) {
         if let Some(set) = ty.scalar_set() {
-            self.tell_apart(set, span);
+            self.distinguish_set(set, span);
         }
     }
 
-    fn tell_apart(&mut self, set: u32, span: Span) {
+    fn distinguish_set(&mut self, set: u32, span: Span) {
         let set = &mut self.world.network.scalar_sets[set as usize];
         set.told_apart_by.get_or_insert(span);
     }
 
     /// Notes it of the sets whose members are values of this type.
-    pub(super) fn tell_scalars_apart(&mut self, ty: &Type, span: Span) {
+    pub(super) fn distinguish_scalars(&mut self, ty: &Type, span: Span) {
         match ty {
-            Type::Array(array) => self.tell_scalars_apart(&array.part, span),
+            Type::Array(array) => self.distinguish_scalars(&array.part, span),
             Type::Struct(record) => {
                 for (_, ty) in &record.fields {
-                    self.tell_scalars_apart(ty, span);
+                    self.distinguish_scalars(ty, span);
                 }
             }
-            _ => self.tell_members_apart(ty, span),
+            _ => self.distinguish_members(ty, span),
         }
     }
 
     /// Notes it of the sets that arrays of this type are indexed by.
-    pub(super) fn tell_indices_apart(&mut self, ty: &Type, span: Span) {
+    pub(super) fn distinguish_indices(&mut self, ty: &Type, span: Span) {
         match ty {
             Type::Array(array) => {
                 if let Some(set) = array.index.set {
-                    self.tell_apart(set, span);
+                    self.distinguish_set(set, span);
                 }
-                self.tell_indices_apart(&array.part, span);
+                self.distinguish_indices(&array.part, span);
             }
             Type::Struct(record) => {
                 for (_, ty) in &record.fields {
-                    self.tell_indices_apart(ty, span);
+                    self.distinguish_indices(ty, span);
                 }
             }
             _ => {}
@@ -64,7 +64,7 @@ impl Checker<'_> {
     }
 
     /// Notes it of the sets that index arrays whose parts differ, in a constant of these words.
-    pub(super) fn tell_parts_apart(&mut self, ty: &Type, words: &[i32], span: Span) {
+    pub(super) fn distinguish_parts(&mut self, ty: &Type, words: &[i32], span: Span) {
         match ty {
             Type::Array(array) => {
                 let size = array.part.size().words as usize;
@@ -75,17 +75,17 @@ impl Checker<'_> {
                 if let Some(set) = array.index.set
                     && !are_equal
                 {
-                    self.tell_apart(set, span);
+                    self.distinguish_set(set, span);
                 }
                 for part in words.chunks(size.max(1)) {
-                    self.tell_parts_apart(&array.part, part, span);
+                    self.distinguish_parts(&array.part, part, span);
                 }
             }
             Type::Struct(record) => {
                 let mut rest = words;
                 for (_, ty) in &record.fields {
                     let (part, later) = rest.split_at((ty.size().words as usize).min(rest.len()));
-                    self.tell_parts_apart(ty, part, span);
+                    self.distinguish_parts(ty, part, span);
                     rest = later;
                 }
             }

@@ -392,7 +392,7 @@ impl Checker<'_> {
                 return Vec::new();
             };
             // Each value is a branch of its own, which exchanging members would renumber.
-            self.tell_members_apart(&ty, span);
+            self.distinguish_members(&ty, span);
             ranges.push((name, ty));
         }
         let types: Vec<Type> = ranges.iter().map(|(_, ty)| ty.clone()).collect();

@@ -66,7 +66,7 @@ pub struct QueryText {
     pub span: Span,
     /// The formula as written, blanks collapsed, comments removed.
     pub text: String,
-    /// The comment that stands beside it, if any.
+    /// The comment next to it, if any.
     pub comment: String,
     /// The expected verdict, from `<expect>` or an `EXPECT:` comment.
     pub expect: Option<Expectation>,

@@ -345,7 +345,7 @@ impl Parser<'_> {
         if !self.expect(kind, context) {
             self.skip_to(&[kind, TokenKind::Semicolon]);
             if !self.eat(kind) {
-                self.stay_quiet();
+                self.suppress_reports();
             }
         }
     }

@@ -183,7 +183,7 @@ impl Lexer<'_> {
         );
     }
 
-    /// `\` and a line end: the line goes on.
+    /// `\` and a line end: the line continues.
     fn continuation(&mut self) -> bool {
         let rest = &self.text.as_bytes()[self.position + 1..];
         let blanks = rest

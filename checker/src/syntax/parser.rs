@@ -209,11 +209,11 @@ impl<'a> Parser<'a> {
             }
             self.blamed = Some(self.position);
         }
-        self.report_behind(diagnostic);
+        self.report_earlier(diagnostic);
     }
 
     /// Reports about something that was read before.
-    pub(super) fn report_behind(&mut self, diagnostic: Diagnostic) {
+    pub(super) fn report_earlier(&mut self, diagnostic: Diagnostic) {
         if self.gave_up {
             return;
         }
@@ -237,7 +237,7 @@ impl<'a> Parser<'a> {
 
     /// Reports nothing about the current token: the text was skipped up to here because of an
     /// earlier mistake.
-    pub(super) fn stay_quiet(&mut self) {
+    pub(super) fn suppress_reports(&mut self) {
         self.blamed = Some(self.position);
     }
 
@@ -288,7 +288,7 @@ impl<'a> Parser<'a> {
     fn expected_at(&mut self, span: Span, what: &str) {
         if self.at(TokenKind::Unknown) {
             // The lexer reported the symbol itself.
-            self.stay_quiet();
+            self.suppress_reports();
             return;
         }
         let message = format!("expected {what}, found {}", self.found());

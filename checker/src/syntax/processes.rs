@@ -66,7 +66,7 @@ impl Parser<'_> {
         document.unsupported.append(&mut self.unsupported);
         if !has_system && matches!(part, Part::System | Part::Whole) {
             let end = self.behind_previous();
-            self.report_behind(
+            self.report_earlier(
                 Diagnostic::new(codes::MISSING_SYSTEM, end, "no `system` line")
                     .help("name the processes of the system, for example `system P, Q;`"),
             );
@@ -175,7 +175,7 @@ impl Parser<'_> {
         if self.at(TokenKind::LeftParenthesis) {
             self.arguments();
         }
-        self.report_behind(
+        self.report_earlier(
             Diagnostic::new(
                 codes::INTERFACE_IGNORED,
                 self.since(start),
@@ -283,7 +283,7 @@ impl Parser<'_> {
         self.set_marks(marks, &mut template.locations);
         if template.initial.is_none() {
             let message = format!("process `{}` has no initial location", template.name.text);
-            self.report_behind(
+            self.report_earlier(
                 Diagnostic::new(codes::MISSING_INITIAL_LOCATION, start, message)
                     .help("add `init L;` after the states"),
             );
@@ -427,7 +427,7 @@ impl Parser<'_> {
             }
             let Some(&index) = index.get(&name.text) else {
                 let message = format!("`{}` is not a location of this process", name.text);
-                self.report_behind(Diagnostic::new(codes::UNKNOWN_LOCATION, name.span, message));
+                self.report_earlier(Diagnostic::new(codes::UNKNOWN_LOCATION, name.span, message));
                 continue;
             };
             let location = &mut locations[index];
@@ -438,7 +438,7 @@ impl Parser<'_> {
             if location.urgent && location.committed {
                 let message = format!("location `{}` is both urgent and committed", name.text);
                 let code = codes::URGENT_AND_COMMITTED;
-                self.report_behind(Diagnostic::new(code, name.span, message));
+                self.report_earlier(Diagnostic::new(code, name.span, message));
             }
         }
     }

@@ -1,9 +1,9 @@
 //! `.q` files: one query a line, with comments that may say what is expected.
 //!
-//! A line goes on behind a `\` at its end and inside a block comment. A comment belongs to the
-//! query on its line, else to the next one. `EXPECT:` on a line of its own belongs to the next
-//! query if the file's first one stands before the first query, and to the previous one otherwise,
-//! which is how verifyta reads it.
+//! A line continues after a `\` at its end, and inside a block comment. A comment belongs to the
+//! query on its line, or else to the next one. `EXPECT:` on a line of its own belongs to the next
+//! query if the file's first one stands before the first query, and otherwise to the previous one.
+//! This is how verifyta reads it.
 
 use super::ast::{Expectation, QueryText};
 use super::codes;

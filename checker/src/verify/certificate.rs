@@ -13,10 +13,10 @@
 //! than what is reachable (extrapolation makes them so) does no harm as long as the four points
 //! hold.
 //!
-//! Where a clock stands still beside two that run, what a zone becomes in time is no zone. If the
-//! least zone around it lies in the zones of the same words, all is well; if not, that shows
-//! nothing, and the check has no result. So it has for deadlocks there, unless a move is possible
-//! at once.
+//! Where a clock stands still while two others run, the future of a zone is no zone. If the least
+//! zone around it lies in the zones of the same words, the check succeeds; otherwise that shows
+//! nothing, and the check has no result. The same holds for deadlocks there, unless a move is
+//! possible at once.
 //!
 //! Words are all words, `meta` variables included, whether or not a search takes states that differ
 //! in them alone for the same. So what holds does so whichever of them are kept.
@@ -147,8 +147,8 @@ struct Possible {
     level: (u32, u32),
     target: Vec<i32>,
     assignments: Vec<EmittedAssignment>,
-    /// Where its guards hold, nobody abstains who may not, and the invariants of the target hold
-    /// after it.
+    /// Where its guards hold, every receiver that must take part does, and the invariants of the
+    /// target hold after it.
     enabled: Vec<Zone>,
 }
 
@@ -265,8 +265,8 @@ impl ClosureCheck<'_> {
         Ok(None)
     }
 
-    /// The combinations of edges that are possible somewhere in a zone as far as words and guards
-    /// decide, and where an urgent one stops time.
+    /// The combinations of edges that words and guards make possible somewhere in a zone, and where
+    /// an urgent combination stops time.
     fn combinations(
         &self,
         candidates: &[Vec<Candidate>],
@@ -443,7 +443,7 @@ impl ClosureCheck<'_> {
 struct Looked<'l> {
     words: &'l [i32],
     possible: &'l [Possible],
-    /// What is possible in the zone or after a wait, as far as words and guards decide.
+    /// What words and guards make possible in the zone or after a wait.
     combinations: &'l [Combination],
     /// What can be waited for in the zone, and possibly more.
     around: &'l Zone,
@@ -464,7 +464,7 @@ fn without_all(mut zones: Vec<Zone>, others: &[Zone]) -> Vec<Zone> {
     zones
 }
 
-/// The part of a zone in which the guards hold and nobody abstains who may not.
+/// The part of a zone in which the guards hold, and every receiver that must take part does.
 fn guarded(guard: &[FixedConstraint], excluded: &[Vec<FixedConstraint>], zone: &Zone) -> Vec<Zone> {
     let within = zone.within(guard.iter().map(Comparison::from));
     let mut parts = vec![within];
@@ -476,9 +476,9 @@ fn guarded(guard: &[FixedConstraint], excluded: &[Vec<FixedConstraint>], zone: &
     parts
 }
 
-/// What a zone becomes while time passes, up to the barriers: each stops time, so a wait ends
-/// before it begins or in its first moment, or starts after its end, or runs beside it. Clocks that
-/// stand still are not expected beside barriers.
+/// The future of a zone up to the barriers. Each stops time, so a wait ends before the barrier
+/// begins or in its first moment, starts after its end, or never enters it. Clocks that stand still
+/// must not occur together with barriers.
 fn futures(zone: &Zone, stopped: &[bool], barriers: &[Zone]) -> Vec<Zone> {
     // Where a wait may start, and what holds at its end.
     let mut waits: Vec<(Zone, Vec<Comparison>)> = vec![(zone.clone(), Vec::new())];

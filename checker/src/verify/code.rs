@@ -33,7 +33,7 @@ pub(super) struct Code<'a> {
     emitted: RefCell<(Vec<EmittedConstraint>, Vec<EmittedAssignment>)>,
 }
 
-/// An edge whose guard holds as far as words decide.
+/// An edge whose guard holds, by the words alone.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
     pub(super) part: Part,
@@ -167,8 +167,8 @@ impl<'a> Code<'a> {
         Ok(Some(constraints))
     }
 
-    /// The edges of a process whose guards hold as far as words decide, and whose clock constraints
-    /// are accepted.
+    /// The edges of a process whose guards hold by the words alone, and whose clock constraints are
+    /// accepted.
     pub(super) fn candidates(
         &self,
         process: usize,

@@ -3,7 +3,7 @@
 /// Regions between two questions whether somebody wants the check to end.
 const BETWEEN_QUESTIONS: u64 = 256;
 
-/// A bound on the regions of a check, and who may end it before.
+/// A bound on the regions of a check, and what may end it before.
 pub struct Effort<'a> {
     most: u64,
     ends: Option<&'a mut dyn FnMut() -> bool>,
@@ -39,7 +39,7 @@ impl<'a> Effort<'a> {
     }
 
     /// Counts regions from 0 again.
-    pub(super) fn begin_anew(&mut self) {
+    pub(super) fn restart_count(&mut self) {
         self.next_question = 0;
     }
 

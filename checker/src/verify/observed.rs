@@ -55,8 +55,9 @@ pub struct MachineState {
     pub next: Vec<(Vec<bool>, usize)>,
 }
 
-/// Checks a machine of the controller, who sees `observations`, with this effort: pairs of a state
-/// of it and a region count. The constants of the observations must be among those of the claim.
+/// Checks a machine of the controller, who sees `observations`, with this effort: each pair of a
+/// state of it and a region counts. The constants of the observations must be among those of the
+/// claim.
 pub fn verify(
     network: &Network,
     machine: &[MachineState],

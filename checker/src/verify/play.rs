@@ -79,7 +79,7 @@ pub fn advice(
             let end = if then.is_empty() {
                 stretch.first
             } else {
-                soon(&stretch)
+                first_tick(&stretch)
             };
             waiting.half_ticks = Some(end);
             waiting.then = then;
@@ -92,7 +92,7 @@ pub fn advice(
 
 /// The first moment of a stretch; of one without, the half tick after its beginning, which lies in
 /// each such stretch of the wait however finely it is cut.
-fn soon(stretch: &Stretch) -> i64 {
+fn first_tick(stretch: &Stretch) -> i64 {
     stretch.first + i64::from(stretch.is_open())
 }
 
@@ -317,7 +317,7 @@ impl View<'_> {
         let mut window = Window::of(stretch);
         self.situation.waits.last = window.last;
         self.situation.waits.is_last_open = window.is_last_open;
-        let moment = soon(stretch);
+        let moment = first_tick(stretch);
         self.situation.half_ticks = Some(moment);
         let until_moment = |window: &mut Window| {
             window.last = Some(moment);
@@ -342,7 +342,7 @@ impl View<'_> {
             self.situation.next = match action {
                 None => Next::Fails(Gap::NoDecision),
                 Some(action) => {
-                    let meant = self.rules.meant(action, &possible).into_iter();
+                    let meant = self.rules.moves_of_action(action, &possible).into_iter();
                     let legs: Vec<Vec<Part>> = meant.map(|(one, _)| one.parts.clone()).collect();
                     if legs.is_empty() {
                         Next::Fails(Gap::ImpossibleAction)
@@ -371,7 +371,7 @@ impl View<'_> {
             for (index, action) in actions.iter().enumerate() {
                 let mut before = actions[..index].iter();
                 if before.all(|one| !is_same_entry(one, action)) {
-                    for (one, _) in self.rules.meant(action, &possible) {
+                    for (one, _) in self.rules.moves_of_action(action, &possible) {
                         add(&mut self.situation.allowed, &one.parts, window);
                     }
                 }

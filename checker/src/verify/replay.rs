@@ -5,10 +5,10 @@
 //!   end (they are conjunctions of comparisons, so they hold before), no location is urgent, and no
 //!   synchronisation on an urgent channel becomes enabled before the end of the wait;
 //! * every move is one of the possible moves of the state, of the highest priority;
-//! * it ends as it says: in a loop, if the last state and the one that it leads back to lie in the
-//!   same region ([`super::regions`]; with stopwatches if they have the same values as far as they
-//!   matter), so that the same moves are possible again and again; waiting forever; or without any
-//!   move, now or after any wait.
+//! * it ends as it says: in a loop, if its last state and the state to which it leads back lie in
+//!   the same region ([`super::regions`]; with stopwatches if their relevant values are the same),
+//!   so that the same moves are possible again and again; waiting forever; or without any move, now
+//!   or after any wait.
 //!
 //! What must hold during a wait is looked at at all moments at which something may change
 //! ([`super::moments`]).
@@ -41,7 +41,7 @@ pub enum End {
     /// Its last state is one of the same region as the state with this index (the first is 0), on
     /// entry of both.
     Loop(usize),
-    /// After this number of ticks in its last state, time goes on forever.
+    /// After this number of ticks in its last state, time continues forever.
     Waits(i64),
     /// After this number of ticks in its last state, nothing is possible any more.
     Stuck(i64),
@@ -364,15 +364,15 @@ impl Replay<'_> {
 
     /// Whether no move is possible, now or after any wait.
     fn is_dead(&self, state: &State) -> Result<bool, Error> {
-        Ok(self.waits_in_vain(state, None)?.is_ok())
+        Ok(self.waits_without_moves(state, None)?.is_ok())
     }
 
     fn stuck(&self, state: &State) -> Checked {
-        self.waits_in_vain(state, self.keep)
+        self.waits_without_moves(state, self.keep)
     }
 
     /// Whether, for as long as time may pass, no move is possible and the predicate stays.
-    fn waits_in_vain(&self, state: &State, keep: Option<&Predicate>) -> Checked {
+    fn waits_without_moves(&self, state: &State, keep: Option<&Predicate>) -> Checked {
         let is_stopped = self.semantics.stopped(state)?;
         let unit = self.semantics.ticks_per_unit();
         let moments = self.moments.of(state, &is_stopped, unit, None)?;

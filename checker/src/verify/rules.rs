@@ -1,5 +1,5 @@
-//! What is claimed of a strategy, and the rules of the two sides: who may do what in a state, who
-//! must, and who has won.
+//! What is claimed about a strategy, and the rules of the two sides: who may do what in a state,
+//! who must, and who has won.
 //!
 //! [`super::strategy`] and [`super::observed`] close their loops by them, [`super::play`] lets a
 //! person play by them.
@@ -94,7 +94,7 @@ pub enum Forcing {
     Always,
 }
 
-/// Who plays by the strategy.
+/// The player who uses the strategy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Owner {
     /// The controller.
@@ -118,7 +118,7 @@ pub enum Aim {
 /// by keeping it from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Claim<'a> {
-    /// Who plays by the strategy.
+    /// The player who uses the strategy.
     pub owner: Owner,
     /// Whether every decision that applies is allowed; else the first counts.
     pub is_permissive: bool,
@@ -268,7 +268,7 @@ impl<'a> Rules<'a> {
 
     /// The possible moves that an action of the owner stands for: of the controller's all with the
     /// same edges, since the environment picks the branches.
-    pub(super) fn meant<'m, 'p>(
+    pub(super) fn moves_of_action<'m, 'p>(
         &self,
         action: &[Part],
         possible: &'p [(&'m Move, State)],

@@ -7,12 +7,14 @@
 //! strategy of the controller is right if
 //! * every region that is met before the goal satisfies what must be kept and has a decision;
 //! * every action is one of the moves of the state, is the controller's, and its target satisfies
-//!   the invariants; whichever branches of its edges the environment picks, play goes on right;
+//!   the invariants; whichever branches of its edges the environment picks, play continues
+//!   correctly;
 //! * where it waits and time cannot pass, the environment has a move and must take it (see
 //!   [`Forcing`]); if it has only to keep something, play may also stop there, if the controller
 //!   has no move;
-//! * if it has to reach the goal, no play goes on forever without: the graph up to the goals has
-//!   no cycle, not even a region without end; if the goal is to recur, the same from each goal on.
+//! * if it has to reach the goal, no play continues forever without it: the graph up to the goals
+//!   has no cycle, not even a region without end; if the goal must recur, the same holds from each
+//!   goal on.
 //!
 //! One of the environment, which may say which branches of the controller's edges it picks, is
 //! right if no play meets the goal before what must be kept is broken, every decision is there and
@@ -67,11 +69,11 @@ pub enum Defect {
     /// The strategy waits where time cannot pass, although play may stop there, lost, or it must
     /// move itself.
     Stuck,
-    /// The play goes on forever without what the owner wants.
+    /// Play continues forever without what the owner wants.
     Endless,
     /// The goal comes again and again, against the environment.
     Recurring,
-    /// The strategy is for another start or limit of time than what is asked.
+    /// The strategy is for another start or time limit than what is asked.
     OtherGame,
     /// The way to where it begins is not possible.
     ImpossibleWay,
@@ -178,7 +180,7 @@ pub fn verify(
 /// Where a region stands in the depth-first search.
 #[derive(Clone, Copy, PartialEq)]
 enum Mark {
-    /// On the path at hand.
+    /// On the current path.
     Open,
     /// All plays from it are right.
     Done,
@@ -235,7 +237,7 @@ impl Play<'_> {
             }
         }
         all.reverse();
-        effort.begin_anew();
+        effort.restart_count();
         Ok(Ok(all))
     }
 
@@ -437,7 +439,7 @@ impl Play<'_> {
         let mut successors: Vec<(Step, State)> = Vec::new();
         let mut acts_first = false;
         for action in decisions.iter().filter_map(|one| one.action.as_ref()) {
-            let meant = self.rules.meant(action, &possible);
+            let meant = self.rules.moves_of_action(action, &possible);
             if meant.is_empty() {
                 return Ok(Err(Defect::ImpossibleAction));
             }

@@ -152,7 +152,7 @@ impl Zone {
 
     /// Tightens every bound by the least sum that goes through one bound that was made tighter in a
     /// closed zone.
-    fn close_over(&mut self, one: Comparison) {
+    fn close_with(&mut self, one: Comparison) {
         for left in 0..self.clocks {
             let to = sum(self.get(left, one.left), self.get(one.left, one.right));
             if to == NONE {
@@ -177,7 +177,7 @@ impl Zone {
             }
             if one.limit() < part.get(one.left, one.right) {
                 *part.at(one.left, one.right) = one.limit();
-                part.close_over(one);
+                part.close_with(one);
             }
         }
         part

@@ -278,9 +278,7 @@ def test_strategies_within_a_time_are_saved_and_played(tmp_path: Path) -> None:
     path.write_text(json.dumps(other))
     strategy = ntagen.load_strategy(path, model)
     assert (
-        strategy.verify()
-        .lines[0]
-        .endswith("it is for another start or time limit than the query")
+        strategy.verify().lines[0].endswith("it is for another start or time limit than the query")
     )
     with pytest.raises(ntagen.InputError, match="for another start or time limit than"):
         strategy.play()

@@ -28,7 +28,7 @@ use crate::engine::session::walk::{Point, successors_or_failure};
 /// explored,
 const EFFORT: u64 = 10;
 
-/// and at least among so many.
+/// and at least if there are this many.
 const LEAST_EFFORT: u64 = 10_000;
 
 impl LoadedModel {
@@ -40,7 +40,7 @@ impl LoadedModel {
         let predicates = predicates(&query.kind);
         let (failure, witness) = match answer.evidence.witnesses.pop() {
             Some(witness) => (failure, witness),
-            None => match self.shortest_way(&predicates, &query.kind, options, answer) {
+            None => match self.shortest_error_trace(&predicates, &query.kind, options, answer) {
                 Some((found, trace)) => (found, Witness::new(trace, None, WitnessKind::Failure)),
                 None => return,
             },
@@ -124,7 +124,7 @@ impl LoadedModel {
 
     /// The shortest way to an error that a game can run into, if it is found with a reasonable
     /// effort.
-    fn shortest_way(
+    fn shortest_error_trace(
         &self,
         predicates: &[&Predicate],
         kind: &QueryKind,

@@ -1,11 +1,11 @@
 //! Strategies that have a name: what queries define, save, load, and are asked under.
 //!
 //! A name stays for all later queries of the same loaded model. Its strategy is missing if the
-//! query that defines it did not come out satisfied; to be asked under such a name is an error. Who
-//! wins is often known long before the whole strategy is, so unless it is wanted with the answer,
-//! it is made when it is first used. Files lie relative to the folder that
-//! [`crate::engine::Options`] names, else to the folder of the model; `strategy_place` says which
-//! of them may be written.
+//! query that defines it was not satisfied; a query under such a name gets an error. It is often
+//! known who wins long before the whole strategy is. So a strategy that is not wanted with the
+//! answer is made when it is first used. Relative names of files start at the folder that
+//! [`crate::engine::Options`] names, or else at the folder of the model; `strategy_place` says
+//! which files may be written.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,6 +1,6 @@
-//! What files of evidence show beside what their check goes by: states, labels of edges, zones. All
-//! of it must agree with what was checked, and a name that nothing here knows is refused, so that
-//! nobody reads in a file that holds what is not so.
+//! What files of evidence show in addition to what their check uses: states, labels of edges,
+//! zones. All of it must agree with what was checked. A name that nothing here knows is refused, so
+//! that nobody reads something false in a file.
 
 use serde_json::Value as Json;
 
@@ -54,8 +54,8 @@ pub(super) fn compare_trace(
         let text = "its symbolic states and transitions are not those of its run";
         return Err(Difference::False(text.to_owned()));
     }
-    // Of a run without end zones are those in which something stays, and those of another round;
-    // where zones are split a state has a part that its run need not enter.
+    // In a run without end, a zone holds the valuations in which something stays true, or those of
+    // another round. Where zones are split, a state has a part that its run need not enter.
     let features = &network.features;
     let is_split = features.clock_guarded_urgent
         || features.guarded_receivers

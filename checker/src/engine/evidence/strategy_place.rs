@@ -26,8 +26,7 @@ pub(super) struct Refusal {
     pub help: String,
 }
 
-/// Saves the text of a strategy; `allowed` are the folders below which this may be, beside the
-/// current one.
+/// Saves the text of a strategy. It may lie below the current folder and the `allowed` folders.
 pub(super) fn save(path: &Path, text: &str, allowed: &[PathBuf]) -> Result<(), Refusal> {
     let failed = |error: &io::Error| Refusal {
         message: format!("{} cannot be written: {error}", path.display()),
@@ -103,7 +102,7 @@ fn is_free(place: &Path) -> io::Result<bool> {
         Ok(found) if !found.is_file() => return Ok(false),
         Ok(_) => {}
     }
-    // Who may not write it may still be able to rename another file to it.
+    // A user who may not write the file may still be able to rename another file to it.
     OpenOptions::new().write(true).open(place)?;
     let mut start = Vec::new();
     File::open(place)?
@@ -126,7 +125,7 @@ fn is_strategy(start: &str) -> bool {
         .any(|line| line.starts_with("State: (") || line.starts_with("Strategy to "))
 }
 
-/// Writes a file beside its place under another name, which it then loses.
+/// Writes a file under another name in the same folder, and then renames it to its own name.
 fn write_whole(place: &Path, text: &str) -> io::Result<()> {
     let old = fs::metadata(place).ok();
     let (part, mut file) = new_part(place, old.is_some())?;
@@ -141,8 +140,8 @@ fn write_whole(place: &Path, text: &str) -> io::Result<()> {
     written
 }
 
-/// A new file beside a place. What takes the place of another is nobody else's to read until it has
-/// the other's mode.
+/// A new file in the same folder. Nobody else may read it until it has the mode of the file that it
+/// replaces.
 fn new_part(place: &Path, is_replaced: bool) -> io::Result<(PathBuf, File)> {
     static PARTS: AtomicU64 = AtomicU64::new(0);
     let mut options = OpenOptions::new();

@@ -243,7 +243,7 @@ impl<'t> Lasso<'t> {
         moves
     }
 
-    /// The state on entry of the loop after so many rounds.
+    /// The state on entry of the loop after this number of rounds.
     fn head(&self, rounds: usize) -> usize {
         self.stem.len() + rounds * self.cycle.len()
     }

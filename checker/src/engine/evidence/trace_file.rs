@@ -1,5 +1,5 @@
-//! The check of files with traces: their runs are replayed, and all that they show beside these is
-//! compared with what the replay shows.
+//! The check of files with traces: it replays their runs, and compares everything else that they
+//! show with the replay.
 
 use serde_json::Value as Json;
 
@@ -88,8 +88,8 @@ pub(super) fn check_file(
 /// What of a trace is not checked, or what it shows that is not so.
 type Agreement = Result<Vec<&'static str>, String>;
 
-/// Replays a run that is to show what its file says of the query, and compares it with all that is
-/// shown beside it.
+/// Replays a run that must show what its file says about the query, and compares everything else
+/// that the file shows about it.
 fn replay_of(
     network: &Network,
     query: &QueryKind,

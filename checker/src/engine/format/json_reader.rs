@@ -1,5 +1,5 @@
-//! Reading files of JSON: each part is known with its place, so that a message can say where in the
-//! file something is wrong. What a file shows beside what counts is compared with what is so.
+//! Reading JSON files: each part is known with its place, so that a message can say where in the
+//! file something is wrong. What a file shows for information is compared with the facts.
 
 use serde_json::{Map, Value as Json};
 

@@ -6,8 +6,8 @@
 //!   location has `id`, `name` (empty without one), `kind` ("normal", "urgent", "committed"),
 //!   `initial`, `invariant` and `rate` as text; a branch point has `id`; an edge has `source` and
 //!   `target` (ids), `controllable`, `select`, `guard`, `sync`, `update` and `weight` as text,
-//!   `nails`. All three have where they are drawn, as far as the file says so: `position`, `color`,
-//!   and `labels`, a position by kind of label. Positions are pairs in the editor's units, x to the
+//!   `nails`. All three say where they are drawn, if the file says so: `position`, `color`, and
+//!   `labels`, a position by kind of label. Positions are pairs in the editor's units, x to the
 //!   right and y down.
 //! * `processes` after instantiation: `name`, `template`, `priority`, and how many `locations` and
 //!   `edges` they have; the legs of a branch point are one edge.

@@ -2,11 +2,10 @@
 //! elsewhere.
 //!
 //! The file has two functions: what the strategy does in a state, and whether it allows an action
-//! there (see the comment that it begins with). The rest is tables. A discrete state is packed into
-//! a key of as many bits as the values need that its words take; the keys are sorted, and each has
-//! a row of rules. A rule is a zone and an action. Rows, zones and constraints are there once,
-//! whoever shares them. Where the first rule that applies counts, zones are made larger by what
-//! earlier rules decide.
+//! there (see the comment at its beginning). The rest is tables. A discrete state is packed into a
+//! key, with only as many bits as the values of its words need. The keys are sorted, and each has a
+//! row of rules. A rule is a zone and an action. Equal rows, zones and constraints are stored once.
+//! If the first rule that applies counts, zones are enlarged by what earlier rules decide.
 //!
 //! The same strategy gives the same text.
 

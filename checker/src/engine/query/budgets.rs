@@ -30,8 +30,8 @@ const MOST_BYTES_OF_DISCRETE_STATE: u64 = 64 << 10;
 /// they do not, many more soon.
 const MOST_WORK_ON_DISCRETE_STATE: u64 = 1 << 20;
 
-/// States that are counted beside those that are stored, for the bytes and the work that an average
-/// one may take.
+/// This many states are added to the stored ones, for the bytes and the work that an average state
+/// may take.
 const STATES_OF_GRACE: u64 = 256;
 
 /// To play a game without abstraction.

@@ -22,9 +22,9 @@ use crate::engine::evidence::{strategy_check, timed_run};
 use crate::engine::format::text;
 use crate::engine::limits::stop_text;
 
-/// What is known of a solved game beside its graph.
+/// What is known about a solved game, without its graph.
 pub(super) struct Solved<'s, 'n> {
-    /// Who wins.
+    /// The winner.
     pub(super) winner: Player,
     /// The rounds of a goal that is to recur.
     pub(super) rounds: Option<&'s [Vec<Win>]>,

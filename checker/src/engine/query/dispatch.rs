@@ -59,7 +59,7 @@ fn answer(subject: Subject<'_>, query: &Query) -> Answer {
     let options = subject.options;
     let start = Instant::now();
     let zone_bytes = subject.network.clocks.len().pow(2) * size_of::<Bound>();
-    let at_hand_bytes = (zones_at_hand(&query.kind) * zone_bytes) as u64;
+    let at_hand_bytes = (zones_in_use(&query.kind) * zone_bytes) as u64;
     let mut watch = LimitWatch::with_at_hand(options.limits.clone(), at_hand_bytes);
     let result = watch.bound(|watch| {
         // Where there are thousands of clocks this alone may be too much.
@@ -68,7 +68,7 @@ fn answer(subject: Subject<'_>, query: &Query) -> Answer {
     });
     let mut answer =
         result.unwrap_or_else(|(reason, counters)| Answer::new(Verdict::Unknown(reason), counters));
-    // What is known by then does not matter to a user who interrupts.
+    // A user who interrupts does not need what is known until then.
     if answer.verdict == Verdict::Error(Failure::Interrupted) || watch.is_interrupted() {
         let counters = answer.counters;
         let verdict = Verdict::Unknown(watch.stop());
@@ -87,9 +87,9 @@ fn answer(subject: Subject<'_>, query: &Query) -> Answer {
     answer
 }
 
-/// So many zones stand side by side in one step of the search, beside those of its account, at most
-/// about: where it is a matter of cutting zones by each other, more.
-fn zones_at_hand(kind: &QueryKind) -> usize {
+/// The approximate greatest number of zones that one step of the search has in addition to those of
+/// its account. It is greater where zones are cut by each other.
+fn zones_in_use(kind: &QueryKind) -> usize {
     match kind {
         QueryKind::Reachable(predicate) | QueryKind::Invariantly(predicate)
             if !predicate::has_deadlock(predicate) =>

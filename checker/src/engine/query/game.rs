@@ -38,7 +38,7 @@ use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 /// What is said where plans are wanted of a game for which none are listed.
 const NO_PLANS: &str = "plans are listed for control: A<> and A[ U ] only, and not under a strategy; what to do is in the strategy";
 
-/// Says so if plans are wanted of a game that sees everything and for which none are listed,
+/// Adds a remark if plans are wanted of a game that sees everything but for which none are listed,
 /// whoever wins.
 pub(super) fn note_missing_plans(answer: &mut Answer, query: &QueryKind, is_under: bool) {
     let Some(asked) = Asked::of(query) else {
@@ -127,7 +127,7 @@ impl From<Answer> for AttemptEnd {
 struct Sides<'q> {
     goal: Option<Cow<'q, Predicate>>,
     keep: Option<&'q Predicate>,
-    /// Who wants to get somewhere: to the goal, or out of what is to be kept.
+    /// The player who wants to reach something: the goal, or the outside of what must be kept.
     seeker: Player,
 }
 
@@ -248,7 +248,7 @@ impl<'a> Game<'a> {
         solver.share_among(self.subject.options.thread_count());
         solver.give_up_beyond(attempt.allowance);
         if attempt.nodes == Nodes::Automatic {
-            solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD);
+            solver.set_crowd_limit(STATES_BEFORE_CROWD, CROWD);
         }
         let mut rounds = Vec::new();
         let result = self.solve(&mut solver, sides.seeker, &mut rounds, watch);
@@ -322,7 +322,8 @@ impl<'a> Game<'a> {
         match strategy {
             Ok(Ok(strategy)) => self.add_strategy(answer, strategy, watch),
             Ok(Err(reason)) => answer.remark(format!("no strategy: {reason}")),
-            // Who wins is known, so that an end of the strategy is none of the answer.
+            // The winner is known, so the answer stays even if the search for the strategy ends
+            // early.
             Err(Failure::Interrupted) => {
                 let reason = watch.look(&solver.counters());
                 let reason = stop_text(reason.unwrap_or(StopReason::Interrupted));
@@ -368,7 +369,7 @@ impl<'a> Game<'a> {
         }
     }
 
-    /// Finds out who wins. The rounds of a goal that is to recur are noted if they are needed.
+    /// Finds the winner. The rounds of a goal that must recur are recorded if they are needed.
     fn solve(
         &self,
         solver: &mut Solver<'_, '_, '_>,
@@ -379,7 +380,7 @@ impl<'a> Game<'a> {
         let is_strategy_wanted = self.is_strategy_wanted();
         let is_cooperative = self.asked.is_cooperative;
         if is_cooperative && is_strategy_wanted {
-            solver.graph.leave_out_chains();
+            solver.graph.disable_chains();
         }
         if self.is_recurring() {
             let wanted = is_strategy_wanted.then_some(rounds);

@@ -19,7 +19,7 @@ pub(super) struct Sought<'q> {
     pub(super) target: &'q mut dyn Target,
     /// What holds in them.
     pub(super) predicate: &'q Predicate,
-    /// Comparisons beside those of the predicate that tell them from others.
+    /// Additional comparisons that distinguish them from others; those of the predicate count too.
     pub(super) atoms: Vec<ClockAtom>,
 }
 

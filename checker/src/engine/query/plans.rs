@@ -71,7 +71,7 @@ fn plans(
             }
         }
         let next = cut_as_interrupted(|| match paths.next_path().map(<[u32]>::to_vec) {
-            Some(path) => paths.spell(&path).map(Some),
+            Some(path) => paths.plan_of_path(&path).map(Some),
             None => Ok(None),
         });
         match next {

@@ -335,8 +335,8 @@ impl ClockedGame<'_, '_> {
         })
     }
 
-    /// Solves the game with a limit: as far as it takes to know who wins if the clock starts at 0,
-    /// or in these nodes wholly, with a clock that starts anywhere up to the limit.
+    /// Solves the game with a limit, until it is known who wins: either if the clock starts at 0,
+    /// or in all of these nodes, with a clock that starts anywhere up to the limit.
     fn solve<R>(
         &self,
         limit: i32,
@@ -380,7 +380,7 @@ impl ClockedGame<'_, '_> {
         solver.share_among(options.thread_count());
         match nodes {
             Some(Nodes::Automatic) => {
-                solver.give_up_if_crowded(STATES_BEFORE_CROWD, CROWD_IN_RACES);
+                solver.set_crowd_limit(STATES_BEFORE_CROWD, CROWD_IN_RACES);
             }
             Some(Nodes::Discrete) => solver.give_up_beyond(Some(RACE_IN_DISCRETE_STATES)),
             Some(Nodes::Symbolic) | None => {}

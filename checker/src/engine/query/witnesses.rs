@@ -42,8 +42,8 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         }
     }
 
-    /// The same for what is sure only if a run is replayed, where there is a doubt beside zones
-    /// that are too large.
+    /// The same for a result that is certain only if a run is replayed: there is another doubt, in
+    /// addition to zones that are too large.
     pub(super) fn doubting(self, is_doubtful: bool) -> Witnesses<'w, 'a> {
         Witnesses {
             is_doubtful: self.is_doubtful || is_doubtful,

@@ -211,7 +211,7 @@ impl Compiler {
                 failure = Some(error);
                 id
             });
-            import_far(&mut self.module, callee, native)
+            import_function(&mut self.module, callee, native)
         };
         translate(builder, function, &mut import, config, self.overflow);
         if let Some(error) = failure {
@@ -228,7 +228,7 @@ impl Compiler {
             .map_err(JitError::new)?;
         self.context.func.signature = signature;
         self.context.func.name = ir::UserFuncName::user(0, id.as_u32());
-        let callee = import_far(&mut self.module, function, &mut self.context.func);
+        let callee = import_function(&mut self.module, function, &mut self.context.func);
         let builder = FunctionBuilder::new(&mut self.context.func, &mut self.builder_context);
         translate_entry(builder, callee, parameters, self.module.target_config());
         self.finish(id)?;
@@ -280,7 +280,7 @@ fn declare(
 }
 
 /// Refers to a function that may lie anywhere.
-fn import_far(module: &mut JITModule, id: FuncId, native: &mut ir::Function) -> ir::FuncRef {
+fn import_function(module: &mut JITModule, id: FuncId, native: &mut ir::Function) -> ir::FuncRef {
     let reference = module.declare_func_in_func(id, native);
     native.dfg.ext_funcs[reference].colocated = false;
     reference

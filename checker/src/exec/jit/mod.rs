@@ -196,8 +196,7 @@ impl Jit {
         let heat = heat + effort.instructions;
         entry.heat.store(heat, Ordering::Relaxed);
         if heat > self.hot_instructions {
-            // A function that cannot be compiled goes on being interpreted, which gives the same
-            // results.
+            // A function that cannot be compiled stays interpreted, which gives the same results.
             let _ = self.compile_function(function);
         }
         result

@@ -108,8 +108,7 @@ impl AllNeeds {
     }
 }
 
-/// Whether some block goes on to one that stands before it: the front end writes no such jump but
-/// for loops.
+/// Whether some block jumps to an earlier one: the front end writes such jumps only for loops.
 fn has_loop(function: &Function) -> bool {
     let mut blocks = function.blocks.iter().enumerate();
     blocks.any(|(index, block)| {

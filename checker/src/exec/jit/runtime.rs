@@ -2,8 +2,8 @@
 //! says what went wrong, and the functions that it calls back.
 //!
 //! The status of a call is 64 bits: negative for a run-time error (its kind and site in the lower
-//! bits), else the integer that the function returned, or 0. A double or an address is returned
-//! beside the status.
+//! bits), else the integer that the function returned, or 0. A double or an address is returned as
+//! a second value.
 
 use crate::builtins::IntegerResult;
 use crate::cancellation;
@@ -32,7 +32,7 @@ pub(super) struct NativeContext<'call> {
 }
 
 impl<'call> NativeContext<'call> {
-    /// The context of a call, and the state's words, which go beside it.
+    /// The context of a call. The state's words are passed separately.
     #[inline]
     pub(super) fn new(
         constants: &[i32],

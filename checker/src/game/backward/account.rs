@@ -1,25 +1,26 @@
-//! What a game has taken: the account by which the memory limit goes, and when a solver stops.
+//! The account of what a game has taken. The memory limit uses it, and it says when a solver stops.
 //!
-//! Everything that grows with the game counts: the graph, what nodes win with what is left of them
-//! and what was gained when, the lists of nodes, what was computed before, and what is set aside
-//! meanwhile. Zones at hand in an operation are asked for where they are many
-//! ([`crate::cancellation::ask_for`]). Vectors that only grow count by what is in them: room at
-//! their end takes no memory before it is written to. Hash tables count whole.
+//! Everything that grows with the game counts: the graph, what nodes win, what remains of it, what
+//! was gained when, the lists of nodes, what was computed before, and what is set aside meanwhile.
+//! An operation that holds many zones asks for them ([`crate::cancellation::ask_for`]). Vectors
+//! that only grow count by their length: reserved room takes no memory until it is written to. Hash
+//! tables count with all their room.
 
-use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
+use crate::search::limits::{Counters, StopReason, Watch, states_between_checks};
 use crate::zones::Bound;
 
 use super::budget::Budget;
 use crate::game::solver::Solver;
 
-/// Expanded nodes between two looks at the limits.
+/// Expanded nodes between two checks of the limits.
 pub(super) const LOOK_EVERY: u64 = 64;
 
-/// Bytes of zones that are made between two looks at the limits, at most, one expansion aside.
+/// The greatest number of bytes of zones that are made between two checks of the limits. One
+/// expansion may exceed it.
 const ZONE_BYTES_BETWEEN_LOOKS: u64 = 4 << 20;
 
 impl Solver<'_, '_, '_> {
-    /// What was done so far.
+    /// What was done until now.
     pub fn counters(&self) -> Counters {
         Counters {
             explored: self.graph.explored,
@@ -39,19 +40,19 @@ impl Solver<'_, '_, '_> {
         (self.graph.dimension().pow(2) * size_of::<Bound>()) as u64
     }
 
-    /// Lets the solver give up when it has taken more than this: it stops then for the number of
-    /// states, and [`Solver::has_given_up`] says so.
+    /// Lets the solver give up when it has taken more than this. It stops then as at the state
+    /// limit, and [`Solver::has_given_up`] says so.
     pub fn give_up_beyond(&mut self, budget: Option<Budget>) {
         self.stops.budget = budget;
     }
 
-    /// Tells the watch what was done so far; it may give a reason to stop.
+    /// Tells the watch what was done until now; it may give a reason to stop.
     pub(in crate::game) fn tell(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
         self.graph.counted_zones = self.graph.zones.len();
         watch.look(&self.counters())
     }
 
-    /// Looks whether to go on, between operations.
+    /// Checks between operations whether to continue.
     pub(in crate::game) fn look(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
         let reason = self.tell(watch);
         if reason.is_some() {
@@ -67,7 +68,7 @@ impl Solver<'_, '_, '_> {
         is_beyond.then_some(StopReason::States)
     }
 
-    /// How many units of work may be done with the states that are stored now.
+    /// The units of work that are allowed for the states that are stored now.
     pub(super) fn most_work(&self) -> u64 {
         self.stops.budget.map_or(u64::MAX, |budget| {
             let states = self.graph.nodes.len() as u64 + budget.states_of_grace;
@@ -75,16 +76,16 @@ impl Solver<'_, '_, '_> {
         })
     }
 
-    /// Whether the solver has given up: for having many nodes for each discrete state, or for what
-    /// it has taken.
+    /// Whether the solver has given up: it had many nodes for each discrete state, or took too
+    /// much.
     pub fn has_given_up(&self) -> bool {
         self.stops.has_given_up
     }
 
-    /// Lets the solver give up, when it has explored this many states, if it has at least `crowd`
-    /// nodes for each discrete state. It stops then for their number, and [`Solver::has_given_up`]
+    /// Lets the solver give up after this many explored states, if it has at least `crowd` nodes
+    /// for each discrete state. It stops then as at the state limit, and [`Solver::has_given_up`]
     /// says so.
-    pub fn give_up_if_crowded(&mut self, explored: u64, crowd: usize) {
+    pub fn set_crowd_limit(&mut self, explored: u64, crowd: usize) {
         self.stops.crowded_from = explored;
         self.stops.crowd = crowd;
     }
@@ -94,9 +95,9 @@ impl Solver<'_, '_, '_> {
             && self.graph.nodes.len() >= self.stops.crowd * self.graph.discrete_count()
     }
 
-    /// Gives up if there are many nodes for each discrete state; looks when twice as many states
-    /// are explored as the last time.
-    pub(in crate::game) fn gives_up_in_a_crowd(&mut self) -> bool {
+    /// Gives up if there are many nodes for each discrete state. It checks this each time that the
+    /// number of explored states has doubled.
+    pub(in crate::game) fn check_crowd(&mut self) -> bool {
         let explored = self.graph.explored;
         if explored < self.stops.next_crowd {
             return false;
@@ -107,22 +108,22 @@ impl Solver<'_, '_, '_> {
         is_crowded
     }
 
-    /// Begins to count what is explored until the watch is asked again.
-    pub(in crate::game) fn begin_looks(&mut self) {
-        let look_every = states_between_looks(LOOK_EVERY, self.graph.dimension());
+    /// Starts to count what is explored until the watch is asked again.
+    pub(in crate::game) fn schedule_limit_check(&mut self) {
+        let look_every = states_between_checks(LOOK_EVERY, self.graph.dimension());
         let most_zones = (ZONE_BYTES_BETWEEN_LOOKS / self.zone_bytes()) as usize;
         self.stops.next_look = self.graph.explored + look_every;
         self.stops.zones_at_look = self.graph.zones.len() + most_zones;
     }
 
-    /// Asks the watch if many states were explored, or many zones made, since it was asked last.
-    pub(in crate::game) fn look_if_due(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
+    /// Asks the watch if many states were explored, or many zones made, since the last time.
+    pub(in crate::game) fn check_limits(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
         let is_due = self.graph.explored >= self.stops.next_look
             || self.graph.zones.len() >= self.stops.zones_at_look;
         if !is_due {
             return None;
         }
-        self.begin_looks();
+        self.schedule_limit_check();
         self.look(watch)
     }
 }

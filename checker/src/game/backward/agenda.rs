@@ -1,24 +1,24 @@
-//! What is to be computed again: nodes some of whose successors have gained something.
+//! The nodes that must be computed again, since some of their successors have gained something.
 
 use std::collections::VecDeque;
 
-/// Whether a node is to be updated.
+/// Whether a node must be updated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pending {
     /// No.
     No,
-    /// It waits to be looked at.
+    /// It waits for an update by words.
     Look,
-    /// Words do not decide it; it waits to be computed.
+    /// Words do not decide it; it waits to be computed with zones.
     Computation,
 }
 
-/// The nodes that are to be updated.
+/// The nodes that must be updated.
 #[derive(Debug, Default)]
 pub(in crate::game) struct Agenda {
-    /// Nodes to be looked at again, first those that were put in first.
+    /// The nodes that wait for an update by words, in the order in which they were added.
     pub(super) updates: VecDeque<u32>,
-    /// Nodes whose winning valuations are to be computed with zones; some may be settled meanwhile.
+    /// Nodes whose winning valuations must be computed with zones; some may be decided meanwhile.
     pub(super) deferred: VecDeque<u32>,
     pub(super) pending: Vec<Pending>,
     /// How many states may be explored before the deferred nodes are computed.
@@ -32,7 +32,7 @@ impl Agenda {
             + self.pending.len() * size_of::<Pending>()
     }
 
-    /// Makes room for one more node, which is not to be updated.
+    /// Makes room for one more node, which need not be updated.
     pub(super) fn add_node(&mut self) {
         self.pending.push(Pending::No);
     }
@@ -44,7 +44,7 @@ impl Agenda {
         self.pending.clear();
     }
 
-    /// Lets a node be looked at again.
+    /// Lets a node be updated again.
     pub(in crate::game) fn mark(&mut self, node: u32) {
         let pending = &mut self.pending[node as usize];
         if std::mem::replace(pending, Pending::Look) != Pending::Look {
@@ -58,14 +58,14 @@ impl Agenda {
         self.deferred.push_back(node);
     }
 
-    /// The next node to be looked at.
+    /// The next node that waits for an update by words.
     pub(super) fn next_update(&mut self) -> Option<u32> {
         let node = self.updates.pop_front()?;
         self.pending[node as usize] = Pending::No;
         Some(node)
     }
 
-    /// The next node to be computed with zones.
+    /// The next node that must be computed with zones.
     pub(super) fn next_computed(&mut self) -> Option<u32> {
         while let Some(node) = self.deferred.pop_front() {
             let pending = &mut self.pending[node as usize];
@@ -77,12 +77,12 @@ impl Agenda {
         None
     }
 
-    /// Whether nothing is to be updated.
+    /// Whether no node must be updated.
     pub(super) fn is_empty(&self) -> bool {
         self.updates.is_empty() && self.deferred.is_empty()
     }
 
-    /// The nodes to be looked at, in order; none is any more.
+    /// The nodes that wait for an update by words, in order; afterwards none waits.
     pub(super) fn take_updates(&mut self) -> VecDeque<u32> {
         let nodes = std::mem::take(&mut self.updates);
         for &node in &nodes {

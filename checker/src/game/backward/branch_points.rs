@@ -1,5 +1,6 @@
-//! What is won through branch points ([`crate::game::forward::branch_points`]): the controller gets
-//! into some valuations by an entry where one of its legs is possible and all that are lead there.
+//! What is won through branch points ([`crate::game::forward::branch_points`]). By an entry, the
+//! controller gets into given valuations where at least one leg is possible and all possible legs
+//! lead into them.
 
 use crate::zones::Federation;
 
@@ -39,8 +40,8 @@ impl Solver<'_, '_, '_> {
         away
     }
 
-    /// The valuations from which the environment, which seeks something, gets into some of the
-    /// target of a leg by picking it: nowhere if the controller may wait on the way.
+    /// The valuations from which the environment, as the seeker, gets into some of the target of a
+    /// leg by picking it. There are none if the controller may wait in between.
     pub(in crate::game) fn won_by_leg(&self, leg: u32, hit: &Win) -> Federation {
         let edge = &self.graph.edges[leg as usize];
         if self.graph.programs.waits(edge.program) {
@@ -62,7 +63,7 @@ impl Solver<'_, '_, '_> {
     }
 
     /// Whether the controller, which seeks something, gets into won nodes by an entry from
-    /// everywhere in a node, as far as words decide.
+    /// everywhere in a node. It decides this by words alone.
     pub(in crate::game) fn wins_by_an_entry(&self, node: u32) -> bool {
         let is_won = |leg: &u32| {
             let edge = &self.graph.edges[*leg as usize];

@@ -1,9 +1,9 @@
-//! What a way to play a game may take before it is given up for another one.
+//! What an attempt at a game may take before another one replaces it.
 //!
-//! What is looked at does not depend on the number of threads: work is counted by task, and what
-//! threads have at hand does not count.
+//! Nothing here depends on the number of threads: work is counted by task, and the zones that
+//! threads hold meanwhile do not count.
 
-/// What a way to play may take.
+/// What an attempt may take.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     /// States that are explored.
@@ -12,29 +12,29 @@ pub struct Budget {
     pub bytes_each: u64,
     /// Units of work for a stored state, on average.
     pub work_each: u64,
-    /// States that are counted beside those that are stored.
+    /// The states that are added to the stored ones.
     pub states_of_grace: u64,
 }
 
-/// What can stop a solver before it has an answer, beside what the watch says.
+/// What can stop a solver before it has an answer, in addition to the watch.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::game) struct Stops {
     pub(super) budget: Option<Budget>,
-    /// After how many explored states it is looked whether there are many nodes for each discrete
-    /// state.
+    /// From this number of explored states on, the solver checks whether there are many nodes for
+    /// each discrete state.
     pub(super) crowded_from: u64,
-    /// How many nodes for each discrete state are many.
+    /// The number of nodes for each discrete state that counts as many.
     pub(super) crowd: usize,
-    /// When that is looked at next.
+    /// The number of explored states at the next such check.
     pub(in crate::game) next_crowd: u64,
-    /// Whether the solver has given up: for having many nodes for each discrete state, or for what
-    /// it has taken.
+    /// Whether the solver has given up: it had many nodes for each discrete state, or took too
+    /// much.
     pub(in crate::game) has_given_up: bool,
     /// The units of work that computing what nodes win has taken.
     pub(super) work: u64,
-    /// How many states may be explored,
+    /// The watch is asked again when this many states are explored,
     pub(in crate::game) next_look: u64,
-    /// and how many zones stored, before the watch is asked again.
+    /// or this many zones are stored.
     pub(in crate::game) zones_at_look: usize,
 }
 

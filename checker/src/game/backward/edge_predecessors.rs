@@ -47,9 +47,10 @@ impl Solver<'_, '_, '_> {
     }
 
     /// The valuations from which an edge is possible and does not lead into the given valuations of
-    /// its target, whose others are computed unless they are given too. In a chain somebody may
-    /// still wait or get stuck, so there it is what is not led into them; other edges may be pieces
-    /// of a move, and lead into the rest of their own target.
+    /// its target. The other valuations of the target are computed if `missed` does not give them.
+    /// In a chain a player may still wait or get stuck, so there the result is all that is not led
+    /// into the given valuations. Other edges may be pieces of a move, and lead into the rest of
+    /// their own target.
     pub(in crate::game) fn missing(
         &self,
         edge: &Edge,
@@ -91,7 +92,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// What a gain added to what is won of a node.
+    /// What a gain added to the won part of a node.
     pub(in crate::game) fn gained_part(&self, node: u32, gain: &Gain) -> Federation {
         match &gain.part {
             Some(part) => part.clone(),

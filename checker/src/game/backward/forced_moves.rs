@@ -1,4 +1,4 @@
-//! Where time stops, and who must move there.
+//! Where time stops, and which player must move there.
 
 use crate::network::{Failure, Symbolic};
 use crate::zones::{Bound, Federation};
@@ -8,8 +8,8 @@ use crate::game::solver::Solver;
 use crate::game::{Forced, Player};
 
 impl Solver<'_, '_, '_> {
-    /// The valuations in which time stops, the environment has a move, and must take one; those
-    /// that are bad for the controller are left out.
+    /// The valuations in which time stops, and the environment has a move and must take one. The
+    /// valuations that are bad for the controller are left out.
     pub(super) fn forced_environment(
         &self,
         node: u32,
@@ -108,9 +108,9 @@ impl Solver<'_, '_, '_> {
         Ok(stops)
     }
 
-    /// The controllable edges of a node, each with the processes that take part in its first move;
-    /// none if they do not matter, since the environment has no move there, or must move whatever
-    /// the controller can do.
+    /// The controllable edges of a node, each with the processes that take part in its first move.
+    /// None if they do not matter: the environment has no move there, or must move whatever the
+    /// controller can do.
     pub(super) fn controllable_movers(
         &mut self,
         node: u32,
@@ -139,8 +139,8 @@ impl Solver<'_, '_, '_> {
 }
 
 /// The valuations of a state in which time cannot pass, with the process that stops it (`None`: an
-/// urgent channel without clock guards). `whole` is what counts of the zone of the state, and
-/// `delays` says whether time may pass as far as locations and such channels say.
+/// urgent channel without clock guards). `whole` is the relevant part of the state's zone, and
+/// `delays` says whether locations and such channels allow time to pass.
 pub(in crate::game) fn stops(
     symbolic: &mut Symbolic<'_>,
     words: &mut [i32],

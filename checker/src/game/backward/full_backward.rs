@@ -1,11 +1,11 @@
 //! What all nodes of a graph win, computed in sweeps: the graph is explored first, and then the
-//! nodes are computed from what is sought back to the start.
+//! nodes are computed from the target back to the start.
 //!
-//! A node is on a higher *level* than those that it leads to and that do not lead back to it. The
-//! nodes that wait on the lowest level are computed first, so that each meets all that its
-//! successors win at once, and where no play comes to a node twice, each is computed once. A solver
-//! that goes forward and backward in turns may end before it has seen everything; where everything
-//! is wanted anyway, it computes most nodes several times.
+//! A node is on a higher *level* than those of its successors that do not lead back to it. The
+//! waiting nodes on the lowest level are computed first, so that each sees at once everything that
+//! its successors win. If no play comes to a node twice, each node is computed once. A solver that
+//! alternates between forward and backward steps may end before it has seen everything; if
+//! everything is wanted anyway, it computes most nodes several times.
 //!
 //! Source of the levels: R. Tarjan, "Depth-First Search and Linear Graph Algorithms", SIAM Journal
 //! on Computing, 1972.
@@ -13,7 +13,7 @@
 use std::collections::VecDeque;
 
 use crate::network::Failure;
-use crate::search::limits::{StopReason, Watch, states_between_looks};
+use crate::search::limits::{StopReason, Watch, states_between_checks};
 
 use crate::game::backward::account::LOOK_EVERY;
 use crate::game::backward::propagation::MOST_TASKS;
@@ -23,10 +23,10 @@ use crate::game::forward::node::NONE;
 use crate::game::solver::Solver;
 use crate::game::{Extent, Solution};
 
-/// Batches of nodes between two looks at the limits.
+/// Batches of nodes between two checks of the limits.
 const BATCHES_BETWEEN_LOOKS: u32 = 16;
 
-/// The nodes that are to be computed, by level.
+/// The nodes that must be computed, by level.
 struct Sweep {
     levels: Vec<u32>,
     waiting: Vec<VecDeque<u32>>,
@@ -55,7 +55,7 @@ impl Sweep {
         }
     }
 
-    /// Some nodes of the lowest level on which any wait; none if none wait at all.
+    /// Some nodes of the lowest level on which a node waits; none if no node waits.
     fn next_batch(&mut self) -> Vec<u32> {
         while let Some(waiting) = self.waiting.get_mut(self.lowest) {
             if !waiting.is_empty() {
@@ -94,12 +94,12 @@ impl Solver<'_, '_, '_> {
         }))
     }
 
-    /// Expands all nodes that can be reached, and computes nothing of what they win.
+    /// Expands all nodes that can be reached, without computing what they win.
     pub(in crate::game) fn explore(
         &mut self,
         watch: &mut dyn Watch,
     ) -> Result<Option<StopReason>, Failure> {
-        let look_every = states_between_looks(LOOK_EVERY, self.graph.dimension());
+        let look_every = states_between_checks(LOOK_EVERY, self.graph.dimension());
         let mut next_look = look_every;
         let tuning = self.graph.symbolic.tuning();
         while let Some(node) = self.exploration.waiting.next(&self.graph.nodes, tuning) {
@@ -164,11 +164,12 @@ impl Solver<'_, '_, '_> {
     }
 }
 
-/// The level of each node: 0 if it leads nowhere but back to itself.
+/// The level of each node: 0 if its edges lead only to itself.
 fn levels(graph: &Graph<'_, '_>) -> Vec<u32> {
     let count = graph.nodes.len();
     let mut levels = vec![NONE; count];
-    // The order in which nodes are met, and the first one met that each is known to lead back to.
+    // The order in which nodes are found, and for each node the first one in this order to which it
+    // is known to lead back.
     let mut order = vec![NONE; count];
     let mut first = vec![NONE; count];
     let mut met = 0;

@@ -1,4 +1,4 @@
-//! What a node gains when more of it is won, and what follows for the nodes before it.
+//! What a node gains when more of it is won, and the consequences for its predecessors.
 
 use crate::zones::Federation;
 
@@ -34,7 +34,7 @@ impl Solver<'_, '_, '_> {
         gained
     }
 
-    /// Records what a node gains, whose predecessors are to be updated then.
+    /// Records what a node gains; its predecessors must then be updated.
     pub(super) fn gain(&mut self, node: u32, gained: Gained) {
         match gained {
             Gained::Nothing => {}

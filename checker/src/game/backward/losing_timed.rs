@@ -1,20 +1,22 @@
 //! What the seeker may still win, where clocks decide.
 //!
-//! If all that is not explored counts as won by the seeker, then all that it can win at all is won:
-//! the *prospects*. They are computed from what is won, and where the initial valuation is not
-//! among them the evader has won, whatever waits. Else they show where the evader is threatened,
-//! also many moves before it is too late; so moves that it has held back
-//! ([`crate::game::exploration::lazy_safety`]) are chosen against the attacks of the whole game,
-//! those that aim at somebody who takes part first, and weak moves only where there are no others.
+//! If all that is not explored counts as won by the seeker, the result is an upper bound of what it
+//! can win: the *prospects*. They are computed from what is won. If the initial valuation is not
+//! among them, the evader has won, whatever waits in the worklist. Otherwise they show where the
+//! evader is threatened, even many moves before it is too late. So the moves that the evader has
+//! held back ([`crate::game::exploration::lazy_safety`]) are chosen against the attacks of the
+//! whole game. Moves that aim at an attacker come first, and weak moves are used only where there
+//! are no others.
 //!
-//! Prospects shrink as the graph grows, so each time they are computed anew. That costs as much as
-//! all that was computed before, and is done only if there are several times as many explored
-//! states as before, ever more times, and if some node is undefended; in between the evader uses
-//! weak moves as well. Where the controller seeks a goal they are computed a few times early on.
+//! Prospects shrink as the graph grows, so they are computed again each time. That costs as much as
+//! everything that was computed before. So it is done only if the number of explored states has
+//! grown several times, by a growing factor, and if some node is undefended. In between, the evader
+//! uses weak moves too. If the controller seeks a goal, they are computed a few times at the
+//! beginning.
 //!
 //! Source: the losing states of F. Cassez, A. David, E. Fleury, K. G. Larsen, D. Lime, "Efficient
-//! On-the-Fly Algorithms for the Analysis of Timed Games", CONCUR 2005. There they are kept beside
-//! the winning ones as the graph grows; here they are what lies outside of the prospects.
+//! On-the-Fly Algorithms for the Analysis of Timed Games", CONCUR 2005. There they grow with the
+//! graph, like the winning states; here they are the complement of the prospects.
 
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
@@ -27,24 +29,24 @@ use crate::game::backward::winning_sets::wins_bytes;
 use crate::game::exploration::schedule::LookAhead;
 use crate::game::solver::Solver;
 
-/// Prospects are computed again when this many times as many states are explored as the first time,
+/// Prospects are computed again when the number of explored states is this many times the number at
+/// the first time,
 const FIRST_GROWTH: u64 = 3;
-/// and this many more. Each time that they did not end the game, the next ones wait for twice the
-/// growth.
+/// and this much greater. Each time that they did not end the game, they wait for twice the growth.
 const LEAST_GROWTH: u64 = 16;
 
-/// Where the controller seeks a goal, nothing is held back, and prospects only tell that it has
-/// lost. They are computed each time that this many times as many states are explored,
+/// If the controller seeks a goal, nothing is held back, and prospects only show that it has lost.
+/// They are computed each time that the number of explored states has grown by this factor,
 const GROWTH_OF_A_GOAL: u64 = 6;
-/// up to about this many: losing shows early, or rather late, and beside many states they took a
-/// third of the time that winning takes.
+/// up to about this number. A loss is usually seen early or very late, and with many states the
+/// prospects took a third of the time of the game.
 const MOST_STATES_OF_A_GOAL: u64 = 1 << 13;
 
 /// The prospects of the seeker.
 struct Prospects {
-    /// By node.
+    /// For each node: what the seeker may win.
     win: Vec<Win>,
-    /// By node: who takes part.
+    /// For each node: the processes that take part.
     attackers: Vec<u32>,
 }
 
@@ -53,7 +55,7 @@ impl Solver<'_, '_, '_> {
     ///
     /// # Errors
     /// The model fails in computing what a node wins.
-    pub(in crate::game) fn look_at_all(
+    pub(in crate::game) fn conclude_in_play(
         &mut self,
         watch: &mut dyn Watch,
     ) -> Result<LookAhead, Failure> {
@@ -63,14 +65,14 @@ impl Solver<'_, '_, '_> {
         if self.graph.symbolic.tuning().losing_timed
             && self.graph.explored >= self.exploration.schedule.next
         {
-            return self.look_ahead(watch);
+            return self.compute_prospects(watch);
         }
         self.use_weak_moves();
         Ok(LookAhead::Open)
     }
 
-    /// Whether it is time to compute the prospects although nodes in play wait to be explored.
-    pub(in crate::game) fn is_look_ahead_due(&self) -> bool {
+    /// Whether the prospects should be computed now, although nodes in play wait to be explored.
+    pub(in crate::game) fn are_prospects_due(&self) -> bool {
         let explored = self.graph.explored;
         let is_of_use = self.graph.symbolic.tuning().losing_timed
             && match self.seeker {
@@ -80,12 +82,13 @@ impl Solver<'_, '_, '_> {
         is_of_use && explored >= self.exploration.schedule.next
     }
 
-    /// Computes the prospects, when all else is computed. If there are none, they count as won
-    /// afterwards, so that the strategy of the evader keeps out of all that is not explored.
+    /// Computes the prospects after everything else is computed. If the initial valuation is not
+    /// among them, they count as won afterwards, so that the strategy of the evader avoids all that
+    /// is not explored.
     ///
     /// # Errors
     /// The model fails in computing what a node wins.
-    pub(in crate::game) fn look_ahead(
+    pub(in crate::game) fn compute_prospects(
         &mut self,
         watch: &mut dyn Watch,
     ) -> Result<LookAhead, Failure> {
@@ -104,7 +107,7 @@ impl Solver<'_, '_, '_> {
         let tables = table_bytes::<(u32, Federation)>(rest.capacity()) + size_of_val(&*attackers);
         let aside_bytes = wins_bytes(&win) + (rests + tables) as u64;
         self.aside_bytes += aside_bytes;
-        let reason = self.add_what_may_be_won(watch);
+        let reason = self.add_prospects(watch);
         self.aside_bytes -= aside_bytes;
         let reason = reason?;
         if reason.is_none() && !self.is_won() {
@@ -127,13 +130,10 @@ impl Solver<'_, '_, '_> {
         Ok(self.defend_against(&prospects, &is_in_play, watch))
     }
 
-    /// Adds the prospects to what is won, unless there is a reason to stop before.
-    fn add_what_may_be_won(
-        &mut self,
-        watch: &mut dyn Watch,
-    ) -> Result<Option<StopReason>, Failure> {
+    /// Adds the prospects to what is won, unless a limit ends this before.
+    fn add_prospects(&mut self, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
         let reserve = std::mem::take(&mut self.exploration.reserve);
-        let holds = self.exploration.held.take_holds();
+        let holds = self.exploration.held.take_held_moves();
         self.exploration.schedule.is_running = true;
         for node in 0..self.graph.nodes.len() as u32 {
             if self.is_unexplored(node) {
@@ -142,13 +142,13 @@ impl Solver<'_, '_, '_> {
         }
         let reason = self.propagate(watch);
         self.exploration.schedule.is_running = false;
-        self.exploration.held.put_holds_back(holds);
+        self.exploration.held.restore_held_moves(holds);
         self.exploration.reserve = reserve;
         reason
     }
 
-    /// Lets the evader use a move in every node that is threatened: the strongest there is, none
-    /// that is weak if there are others anywhere.
+    /// Lets the evader use a move in every node that is threatened: the strongest one. Weak moves
+    /// are used only if there are no others in any node.
     fn defend_against(
         &mut self,
         prospects: &Prospects,
@@ -174,7 +174,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// The strongest of the held moves from a node that help against what the seeker may win.
+    /// The strongest held move from a node that helps against what the seeker may win.
     fn best_defence(&self, node: u32, prospects: &Prospects) -> Option<(usize, u32)> {
         let edges = self.graph.edges_of(node);
         let held: Vec<usize> = edges

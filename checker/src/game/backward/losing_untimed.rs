@@ -1,20 +1,21 @@
-//! Where the seeker may still win, by what is explored of the graph.
+//! Where the seeker may still win, as the explored part of the graph shows.
 //!
-//! A node *may be won* if the seeker has won some of it, or if it is not expanded, or if a move of
+//! A node *may be won* if the seeker has won a part of it, if it is not expanded, or if a move of
 //! the seeker leads to a node that may be won. A move of the evader to such a node counts only if
 //! the evader may have to make it:
-//! * if time may stop in the node, since it need not move before,
-//! * if no other move leads the evader from everywhere in the node to one that cannot be won, and
+//! * if time may stop in the node, since before that the evader need not move,
+//! * if no other move of the evader is possible everywhere in the node and leads to a node that
+//!   cannot be won, and
 //! * if the evader is the controller and the environment has to move wherever it can
-//!   ([`Forced::Neutral`]), unless it can everywhere in the node: then the controller may leave it
-//!   to that.
+//!   ([`Forced::Neutral`]). If the environment can move everywhere in the node, the controller may
+//!   leave the move to it.
 //!
 //! The other nodes are lost: the evader stays among them whatever the seeker does. So if the
-//! initial node is one of them, the game is over, however much of the graph waits; and what only
-//! lost nodes lead to need not be explored. Clocks are not looked at, so a node that may be won may
-//! be lost.
+//! initial node is one of them, the game is over, however much of the graph is unexplored. Nodes to
+//! which only lost nodes lead need not be explored. Clocks are ignored, so a node that may be won
+//! may be lost.
 //!
-//! As the graph grows, more nodes are lost, and none ceases to be.
+//! As the graph grows, more nodes are lost, and each lost node stays lost.
 
 use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::{Edge, NONE};
@@ -22,8 +23,8 @@ use crate::game::solver::Solver;
 use crate::game::{Forced, Player};
 
 impl Solver<'_, '_, '_> {
-    /// Finds the nodes anew that may be won, and returns whether the initial one is among them. If
-    /// it is not, they all count as won afterwards, so that the strategy of the evader keeps out of
+    /// Finds again the nodes that may be won, and returns whether the initial one is among them. If
+    /// it is not, all of them count as won afterwards, so that the strategy of the evader avoids
     /// them.
     pub(in crate::game) fn may_seeker_win(&mut self) -> bool {
         let count = self.graph.nodes.len() as u32;
@@ -43,7 +44,7 @@ impl Solver<'_, '_, '_> {
                 } = self.graph.edges[edge as usize];
                 edge = next_in;
                 let is_useful = self.seeker.owns(controllable)
-                    || self.may_stop(source) && !self.gets_away(source, &may_be_won);
+                    || self.may_stop(source) && !self.may_escape(source, &may_be_won);
                 if is_useful
                     && !self.is_decided(source)
                     && !std::mem::replace(&mut may_be_won[source as usize], true)
@@ -67,7 +68,7 @@ impl Solver<'_, '_, '_> {
         is_open
     }
 
-    /// Whether a node might be won when it was last looked at, or was not there yet.
+    /// Whether a node might be won at the last computation, or is newer than it.
     pub(in crate::game) fn may_win(&self, node: u32) -> bool {
         self.exploration
             .may_win
@@ -75,9 +76,9 @@ impl Solver<'_, '_, '_> {
             .is_none_or(|&it| it)
     }
 
-    /// Counts the nodes that were left unexpanded as won, once the evader has won: it has no need
-    /// of them, and nobody knows more.
-    pub(in crate::game) fn keep_out_of_unexpanded(&mut self) {
+    /// Counts the nodes that were left unexpanded as won, once the evader has won. The evader does
+    /// not need them, and their winner is unknown.
+    pub(in crate::game) fn avoid_unexpanded(&mut self) {
         for node in 0..self.won.win.len() {
             if !self.graph.nodes[node].is_expanded && !self.is_decided(node as u32) {
                 self.won.replace_win(node, Win::Everything);
@@ -85,9 +86,9 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Whether the evader has a move from everywhere in a node to one that cannot be won, or may
-    /// leave it to the environment to move.
-    fn gets_away(&self, node: u32, may_be_won: &[bool]) -> bool {
+    /// Whether the evader has a move that is possible everywhere in a node and leads to one that
+    /// cannot be won, or may leave the move to the environment.
+    fn may_escape(&self, node: u32, may_be_won: &[bool]) -> bool {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         edges.any(|edge| {
             let is_own = self.seeker.owns(edge.controllable);
@@ -104,7 +105,7 @@ impl Solver<'_, '_, '_> {
             || self.seeker == Player::Environment && self.is_obliged(node)
     }
 
-    /// Whether time may come to a stop in an expanded node.
+    /// Whether time may stop in an expanded node.
     pub(in crate::game) fn may_stop(&self, node: u32) -> bool {
         !self.graph.nodes[node as usize].delays
             || self.graph.urgent(node).is_some()

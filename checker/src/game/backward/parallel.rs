@@ -1,8 +1,8 @@
-//! Computing what several nodes win, by several threads.
+//! Several threads compute what several nodes win.
 //!
-//! All tasks start from the same winning valuations, and what comes out is recorded in the order of
-//! the tasks when all are done. So the result does not depend on how many threads there are, nor on
-//! how fast they are.
+//! All tasks start from the same winning valuations, and the results are recorded in the order of
+//! the tasks when all are done. So the result depends neither on the number of threads nor on their
+//! speed.
 
 use std::panic;
 use std::sync::Arc;
@@ -21,13 +21,14 @@ use crate::game::backward::winning_sets::Win;
 use crate::game::exploration::held_moves::Defence;
 use crate::game::solver::Solver;
 
-/// How often the limits are looked at while others work.
+/// The time between two checks of the limits while others work.
 const PULSE: Duration = Duration::from_millis(20);
 
-/// Bounds of all the zones that tasks start from, at least, for threads to be worth starting.
+/// The least number of bounds in all zones from which tasks start, for threads to be worth
+/// starting.
 const WORTH_STARTING: usize = 1 << 15;
 
-/// Bytes of what was computed between two questions whether there may be so many.
+/// The computed bytes between two questions whether this much memory is allowed.
 const BETWEEN_QUESTIONS: u64 = 1 << 20;
 
 /// The stack of a thread: as much as that of the first thread of a program.
@@ -41,7 +42,7 @@ pub(super) struct Task {
 }
 
 impl Task {
-    /// The bytes that it takes beside the value itself.
+    /// The bytes that it takes, without the value itself.
     fn heap_bytes(&self) -> u64 {
         let Situation { stops, movers, .. } = &self.situation;
         let zones = stops.iter().map(|(_, stop)| stop.heap_bytes());
@@ -52,7 +53,7 @@ impl Task {
     }
 }
 
-/// What comes of a task.
+/// The result of a task.
 struct Done {
     /// Which task it is.
     index: usize,
@@ -62,34 +63,34 @@ struct Done {
 
 /// What threads tell each other while they work.
 struct Progress {
-    /// The next task that nobody has begun.
+    /// The next task that no thread has begun.
     next: AtomicUsize,
     threads: Vec<ThreadProgress>,
-    /// The bytes of the tasks, and of what is computed and not recorded yet.
+    /// The bytes of the tasks, and of the results that are not recorded yet.
     done_bytes: AtomicU64,
     /// The units of work that were done: see [`cancellation::work`].
     work: AtomicU64,
     /// After this many units the game is given up: see [`super::budget`].
     most_work: u64,
-    /// What is looked at beside.
+    /// The cancellation that the threads check too.
     beside: Option<Look>,
 }
 
 /// What one thread tells the others.
 #[derive(Default)]
 struct ThreadProgress {
-    /// The bytes that it asked for last in its task.
+    /// The bytes for which it asked last in its task.
     asked_bytes: AtomicU64,
-    /// How much work it had done when it told of it last.
+    /// Its work at its last report.
     work_told: AtomicU64,
 }
 
 impl Progress {
-    /// What a thread looks at during its tasks.
+    /// What a thread checks during its tasks.
     fn look_of(self: &Arc<Self>, thread: usize) -> Look {
         let progress = Arc::clone(self);
         Arc::new(move |bytes| {
-            progress.tell_work(thread);
+            progress.report_work(thread);
             let all = if bytes > 0 {
                 let asked = &progress.threads[thread].asked_bytes;
                 asked.store(bytes, Ordering::Relaxed);
@@ -107,7 +108,7 @@ impl Progress {
         self.work.load(Ordering::Relaxed) > self.most_work
     }
 
-    /// The bytes that no account knows yet.
+    /// The bytes that are not in any account yet.
     fn bytes(&self) -> u64 {
         let asked = self.threads.iter().map(|one| &one.asked_bytes);
         let asked = asked
@@ -116,7 +117,7 @@ impl Progress {
         self.done_bytes.load(Ordering::Relaxed) + asked
     }
 
-    /// Begins a task: what was done and asked for before is none of it.
+    /// Begins a task: earlier work and earlier requests for memory do not count for it.
     fn begin(&self, thread: usize) {
         let ThreadProgress {
             asked_bytes,
@@ -126,7 +127,8 @@ impl Progress {
         work_told.store(cancellation::done(), Ordering::Relaxed);
     }
 
-    /// Counts bytes that are kept until all tasks are done; asks where they have become many more.
+    /// Counts bytes that are kept until all tasks are done; asks for memory when they have become
+    /// many more.
     fn keep(&self, bytes: u64) {
         let before = self.done_bytes.load(Ordering::Relaxed);
         if (before + bytes) / BETWEEN_QUESTIONS > before / BETWEEN_QUESTIONS {
@@ -135,8 +137,8 @@ impl Progress {
         self.done_bytes.fetch_add(bytes, Ordering::Relaxed);
     }
 
-    /// Adds what a thread has done since it told last.
-    fn tell_work(&self, thread: usize) {
+    /// Adds the work of a thread since its last report.
+    fn report_work(&self, thread: usize) {
         let done = cancellation::done();
         let told = self.threads[thread].work_told.swap(done, Ordering::Relaxed);
         self.work
@@ -152,8 +154,8 @@ impl Solver<'_, '_, '_> {
         tasks: Vec<Task>,
         watch: &mut dyn Watch,
     ) -> Option<StopReason> {
-        // Whatever is seen before or afterwards, however many threads there are, no thread sees by
-        // chance.
+        // The limits are checked here and afterwards for any number of threads, so that no thread
+        // stops by chance.
         let reason = self.look(watch);
         if reason.is_some() || tasks.is_empty() {
             return reason;
@@ -186,7 +188,7 @@ impl Solver<'_, '_, '_> {
         None
     }
 
-    /// Whether the tasks are so large that starting threads does not matter.
+    /// Whether the tasks are so large that the time to start threads does not matter.
     fn is_worth_sharing(&self, tasks: &[Task]) -> bool {
         if self.threads == 1 || tasks.len() < 2 {
             return false;
@@ -202,7 +204,7 @@ impl Solver<'_, '_, '_> {
         zones.sum::<usize>() * self.graph.dimension().pow(2) >= WORTH_STARTING
     }
 
-    /// Does the tasks with as many threads as tell of their progress; the caller's is the first.
+    /// Does the tasks with one thread for each entry of `progress`; the caller's is the first.
     fn share(&self, tasks: &[Task], progress: &Arc<Progress>) -> Vec<Done> {
         thread::scope(|scope| {
             let (over, is_over) = mpsc::channel::<()>();
@@ -210,18 +212,18 @@ impl Solver<'_, '_, '_> {
                 .filter_map(|index| {
                     let over = over.clone();
                     let work = move || {
-                        // It is told also when the work is cut off.
+                        // The thread reports its end also when its work is cut off.
                         let _over = over;
                         self.work(tasks, progress, index)
                     };
-                    // Who cannot be started is not missed: the others do its tasks.
+                    // A thread that cannot be started is not needed: the others do its tasks.
                     let thread = thread::Builder::new().stack_size(STACK_BYTES);
                     thread.spawn_scoped(scope, work).ok()
                 })
                 .collect();
             drop(over);
             let mut done = self.work(tasks, progress, 0);
-            // The user is asked by this thread only, so that it looks while it waits.
+            // Only this thread can ask the user, so it checks the limits while it waits.
             while is_over.recv_timeout(PULSE) == Err(RecvTimeoutError::Timeout) {
                 cancellation::is_due();
             }
@@ -235,7 +237,7 @@ impl Solver<'_, '_, '_> {
         })
     }
 
-    /// Does tasks that nobody has begun, as one of the threads.
+    /// Does tasks that no thread has begun, as one of the threads.
     fn work(&self, tasks: &[Task], progress: &Arc<Progress>, thread: usize) -> Vec<Done> {
         let mut done = Vec::new();
         let look = progress.look_of(thread);
@@ -248,7 +250,7 @@ impl Solver<'_, '_, '_> {
                 progress.begin(thread);
                 let (won, defence) = self.winnable_against_defence(task.node, &task.situation);
                 let gained = self.gained(task.node, won);
-                progress.tell_work(thread);
+                progress.report_work(thread);
                 progress.keep(gained.heap_bytes());
                 done.push(Done {
                     index,

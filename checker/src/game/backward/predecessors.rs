@@ -1,4 +1,4 @@
-//! What a node wins by what is known of its successors: the formulas at the head of
+//! What a node wins, given what is known about its successors: the formulas at the top of
 //! [`crate::game::solver`].
 
 use crate::network::Failure;
@@ -8,7 +8,7 @@ use crate::game::Player;
 use crate::game::backward::winning_sets::Win;
 use crate::game::solver::Solver;
 
-/// What the formulas for a node need to know of its words.
+/// The facts about a node's words that the formulas need.
 #[derive(Debug)]
 pub(in crate::game) struct Situation {
     /// The clocks that stand still.
@@ -25,8 +25,8 @@ impl Solver<'_, '_, '_> {
         self.situation_with(node, true)
     }
 
-    /// The situation in a node, as far as it matters for what is won there: time that stops does so
-    /// only for who may be forced.
+    /// The situation in a node, reduced to what decides what is won there: stopped time matters
+    /// only for a player who may be forced.
     pub(super) fn situation_for_win(&mut self, node: u32) -> Result<Situation, Failure> {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         let may_be_forced = edges.any(|edge| !self.seeker.owns(edge.controllable));
@@ -51,13 +51,14 @@ impl Solver<'_, '_, '_> {
         Ok(situation)
     }
 
-    /// The valuations of a node in this situation that are won by what is known of its successors.
+    /// The valuations of a node in this situation that are won, given what is known about its
+    /// successors.
     pub(in crate::game) fn winnable(&self, node: u32, situation: &Situation) -> Federation {
         self.winnable_without(node, situation, &[]).0
     }
 
-    /// The valuations of a node that are won if the evader does not use the edges that are held
-    /// back, and those in which it does not matter what it uses.
+    /// The valuations of a node that are won if the evader does not use the held moves, and those
+    /// in which its choice does not matter.
     pub(in crate::game) fn winnable_without(
         &self,
         node: u32,
@@ -78,7 +79,7 @@ impl Solver<'_, '_, '_> {
         (won, decided)
     }
 
-    /// What the controller wins as the seeker, if it is known.
+    /// What the controller wins as the seeker, given what is known.
     fn controllers_gain(&self, node: u32, situation: &Situation) -> Federation {
         let mut good = self.known(node);
         let goal = self.goal(node);
@@ -108,7 +109,8 @@ impl Solver<'_, '_, '_> {
         won
     }
 
-    /// What the environment wins as the seeker, if it is known, and what of it it has at once.
+    /// What the environment wins as the seeker, given what is known, and the part of it that it has
+    /// at once.
     fn environments_gain(
         &self,
         node: u32,
@@ -145,7 +147,7 @@ impl Solver<'_, '_, '_> {
         (won, now)
     }
 
-    /// What was won in a node so far, as far as it is a part of it.
+    /// The part of a node that is won until now.
     fn known(&self, node: u32) -> Federation {
         match &self.won.win[node as usize] {
             Win::Part(part) => part.clone(),
@@ -153,8 +155,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// The valuations of a node that get into `good` without meeting `bad`, by waiting if time may
-    /// pass.
+    /// The valuations of a node that get into `good` without meeting `bad`, by waiting where time
+    /// may pass.
     pub(in crate::game) fn safe_past(
         &self,
         node: u32,

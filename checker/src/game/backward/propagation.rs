@@ -1,5 +1,5 @@
-//! Backwards: nodes are updated until nothing grows, by words where these decide, and else with
-//! zones.
+//! Backward steps: nodes are updated until nothing grows, by words where these are enough, and
+//! otherwise with zones.
 
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
@@ -10,14 +10,14 @@ use crate::game::forward::node::Standing;
 use crate::game::solver::Solver;
 use crate::game::{AfterGoal, Player};
 
-/// Nodes that are computed from the same winning valuations, at most. Some of them may gain more
-/// from each other, and are computed again; among so many that is rare.
+/// At most this many nodes are computed from the same winning valuations. Some of them may gain
+/// more from each other, and are computed again; in batches of this size that is rare.
 pub(super) const MOST_TASKS: usize = 64;
 
-/// Updates by words between two looks at the limits, where no node is expanded.
+/// Updates by words between two checks of the limits, if no node is expanded.
 const UPDATES_BETWEEN_LOOKS: u32 = 1024;
 
-/// Computations with few zones between two looks at the limits.
+/// Computations with few zones between two checks of the limits.
 const COMPUTATIONS_BETWEEN_LOOKS: u32 = 16;
 
 impl Solver<'_, '_, '_> {
@@ -50,7 +50,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Takes some deferred nodes whose winning valuations are to be computed.
+    /// Takes some deferred nodes whose winning valuations must be computed.
     fn next_tasks(&mut self) -> Result<Vec<Task>, Failure> {
         let mut tasks = Vec::new();
         while tasks.len() < MOST_TASKS
@@ -67,7 +67,7 @@ impl Solver<'_, '_, '_> {
         Ok(Task { node, situation })
     }
 
-    /// Records what a node gains that was computed.
+    /// Records the computed gain of a node.
     pub(super) fn gain_computed(&mut self, node: u32, gained: Gained) {
         self.gain(node, gained);
         if !self.exploration.schedule.is_running
@@ -77,7 +77,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Updates nodes until nothing grows as far as words decide, and puts the other nodes off.
+    /// Updates nodes by words alone until nothing grows, and postpones the other nodes.
     pub(in crate::game) fn propagate_words(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
         let mut until_look = UPDATES_BETWEEN_LOOKS;
         while let Some(node) = self.agenda.next_update() {
@@ -150,12 +150,12 @@ impl Solver<'_, '_, '_> {
             let edge = &self.graph.edges[index];
             !matches!(self.won.win[edge.target as usize], Win::Everything)
         };
-        // Who is obliged to move and cannot has lost.
+        // A player that is obliged to move and cannot has lost.
         if self.seeker == Player::Environment && self.is_obliged(node) {
             return None;
         }
-        // Without a winning move and without an evader that could be forced, there is nothing to
-        // gain.
+        // Without a winning move, and without an evader that could be forced, nothing can be
+        // gained.
         if self.graph.edges_of(node).all(wins_nothing) && (!has_evader || is_spoiled) {
             return Some(false);
         }

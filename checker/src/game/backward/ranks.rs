@@ -1,12 +1,12 @@
-//! Stamps by layers: how far valuations are from what is sought.
+//! Stamps by layers: how far valuations are from the target.
 //!
-//! The solver computes nodes in an order that suits it, and the stamps of gains follow that order.
-//! A strategy that is read from them is right, but may go a longer way than it has to, and another
-//! order gives another one. In layers, all nodes gain at once what the layers before give them. So
-//! a stamp is the least number of turns (to wait and then move, or be moved) after which play has
-//! got there, whatever the order of the search was.
+//! The solver computes nodes in a convenient order, and the stamps of gains follow that order. A
+//! strategy that is read from these stamps is correct, but its paths may be longer than necessary,
+//! and they depend on the order. In layers, all nodes gain at once what the earlier layers give
+//! them. So a stamp is the least number of turns (a wait and then a move of either player) after
+//! which play has reached the target, whatever the order of the search was.
 //!
-//! Cost: as much as computing what the explored nodes win.
+//! The cost is that of computing what the explored nodes win.
 
 use crate::cancellation::{self, Cut};
 use crate::network::Failure;
@@ -15,13 +15,13 @@ use crate::search::limits::Watch;
 use crate::game::backward::winning_sets::Win;
 use crate::game::solver::Solver;
 
-/// Computations between two looks at the limits.
+/// Computations between two checks of the limits.
 const BETWEEN_LOOKS: u32 = 64;
 
 impl Solver<'_, '_, '_> {
-    /// Gives the gains of a game that the seeker wins stamps by layers, up to the first in which
-    /// the initial valuation is won. They stay as they are if a limit comes first, and where what
-    /// is sought is to come again and again.
+    /// Gives the gains of a game that the seeker wins stamps by layers, up to the first layer in
+    /// which the initial valuation is won. They stay as they are if a limit comes first, and if the
+    /// target must recur.
     ///
     /// # Errors
     /// The model fails in computing what a node wins.
@@ -32,7 +32,7 @@ impl Solver<'_, '_, '_> {
         let before = std::mem::take(&mut self.won);
         let before_bytes = before.all_bytes();
         self.aside_bytes += before_bytes;
-        self.begin_anew();
+        self.forget_wins();
         let is_layered = match cancellation::unless_cut(|| self.gain_in_layers(watch)) {
             Ok(Err(Failure::Interrupted)) | Err(Cut) => false,
             Ok(result) => result?,
@@ -81,7 +81,7 @@ impl Solver<'_, '_, '_> {
                 }
             }
             for (node, one) in gained {
-                // What is gained in a layer has one stamp.
+                // All gains of a layer have one stamp.
                 self.won.stamp = layer;
                 match one {
                     None => self.gain_everything(node),

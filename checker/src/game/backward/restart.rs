@@ -9,14 +9,14 @@ use crate::game::solver::Solver;
 use crate::game::{AfterGoal, Extent, Player, Solution};
 
 impl Solver<'_, '_, '_> {
-    /// Forgets what was won, and seeks these parts of the nodes, in all of which play goes on.
+    /// Forgets what was won, and seeks these parts of the nodes. Play continues in all of them.
     pub(in crate::game) fn restart(&mut self, targets: Vec<Win>) {
         self.sought.targets = Some(targets);
-        self.begin_anew();
+        self.forget_wins();
     }
 
-    /// Forgets what was won. All nodes are to be updated.
-    pub(super) fn begin_anew(&mut self) {
+    /// Forgets what was won. All nodes must be updated.
+    pub(super) fn forget_wins(&mut self) {
         self.won = WinningSets::default();
         self.exploration.forget_nodes();
         self.agenda.forget_nodes();
@@ -26,33 +26,34 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Computes anew, in an explored graph, from where the environment can break what must be kept,
-    /// whether the goal was met or not. A chain in which the controller waits counts as a way to
-    /// get away, since it chooses how long.
-    pub(in crate::game) fn seek_to_break(
+    /// Computes again, in an explored graph, from where the environment can break what must be
+    /// kept, whether the goal was met or not. A chain in which the controller waits counts as a way
+    /// to escape, since it chooses how long.
+    pub(in crate::game) fn compute_breaking(
         &mut self,
         watch: &mut dyn Watch,
     ) -> Result<Option<StopReason>, Failure> {
         self.seeker = Player::Environment;
         self.sought.after_goal = AfterGoal::IsLikeBefore;
         self.sought.targets = None;
-        self.begin_anew();
+        self.forget_wins();
         let reason = self.sweep(watch)?;
         self.sought.after_goal = AfterGoal::GoesOn;
         Ok(reason)
     }
 
-    /// Lets nodes be expanded in which the goal holds; in a cooperative game also those that are
-    /// broken.
-    pub(in crate::game) fn go_on(&mut self, is_cooperative: bool) {
+    /// Lets the solver also expand nodes in which the goal holds, and in a cooperative game broken
+    /// nodes.
+    pub(in crate::game) fn continue_after_goal(&mut self, is_cooperative: bool) {
         self.sought.after_goal = AfterGoal::GoesOn;
         self.sought.is_cooperative = is_cooperative;
         self.wait_for(0);
     }
 
-    /// Whether both players together can get to where the controller wins; explores everything.
+    /// Whether both players together can get to a state from which the controller wins; explores
+    /// everything.
     pub fn solve_cooperative(&mut self, watch: &mut dyn Watch) -> Result<Solution, Failure> {
-        self.go_on(true);
+        self.continue_after_goal(true);
         if let Solution::Stopped(reason) = self.solve(Extent::Everything, watch)? {
             return Ok(Solution::Stopped(reason));
         }

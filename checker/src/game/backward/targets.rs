@@ -1,4 +1,4 @@
-//! What the seeker wants to get to: the valuations of each node that are won from the start.
+//! The target of the seeker: the valuations of each node that are won from the start.
 
 use crate::zones::Federation;
 
@@ -9,10 +9,10 @@ use crate::game::forward::node::Standing;
 use crate::game::solver::Solver;
 
 impl Solver<'_, '_, '_> {
-    /// Gives nodes that were just made their place: what is sought is won from the start.
+    /// Adds new nodes to the winning sets: their part of the target is won from the start.
     pub(in crate::game) fn adopt_new_nodes(&mut self) {
         for node in self.won.win.len()..self.graph.nodes.len() {
-            let win = self.sought(node as u32);
+            let win = self.target_in(node as u32);
             let rest = match &win {
                 Win::Part(part) => {
                     let mut rest = self.whole(node as u32);
@@ -30,8 +30,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// The valuations of a node that the seeker wants to get to.
-    fn sought(&self, node: u32) -> Win {
+    /// The part of a node that is the target of the seeker.
+    fn target_in(&self, node: u32) -> Win {
         if let Some(targets) = &self.sought.targets {
             return targets[node as usize].clone();
         }
@@ -50,7 +50,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Whether the words decide who has won in a node.
+    /// Whether the words alone decide the winner in a node.
     pub(in crate::game) fn is_decided(&self, node: u32) -> bool {
         match self.graph.nodes[node as usize].standing {
             Standing::Broken | Standing::Dead => true,
@@ -61,7 +61,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Whether play has ended in a node, won by this player, whatever the clocks say.
+    /// Whether play has ended in a node for all clock values, with this winner.
     pub(in crate::game) fn is_over(&self, winner: Player, node: u32) -> bool {
         let (standing, depends_on_time) = match winner {
             Player::Controller => (Standing::Goal, self.graph.latest.is_some()),
@@ -72,7 +72,7 @@ impl Solver<'_, '_, '_> {
             && !depends_on_time
     }
 
-    /// Where the goal holds, or what is sought lies, in a node that is neither a goal nor broken as
+    /// Where the goal holds, or where the target is, in a node that is neither a goal nor broken as
     /// a whole.
     pub(in crate::game) fn goal(&self, node: u32) -> Federation {
         let dimension = self.graph.dimension();
@@ -91,7 +91,7 @@ impl Solver<'_, '_, '_> {
         parts.map_or_else(none, |parts| parts.goal.clone())
     }
 
-    /// As [`Solver::goal`], where what must be kept does not hold, goals excepted.
+    /// Where what must be kept does not hold, without goals; the node is as for [`Solver::goal`].
     pub(in crate::game) fn broken(&self, node: u32) -> Federation {
         let none = || Federation::empty(self.graph.dimension());
         let parts = self.graph.parts(node);

@@ -1,10 +1,10 @@
-//! The winning sets: by node, the valuations from which the seeker wins, the rest of them, and what
-//! was gained when.
+//! The winning sets: for each node, the valuations from which the seeker wins, the rest of its
+//! valuations, and when each part was gained.
 //!
 //! Invariants:
-//! * Only nodes of which a part is won have a rest, and with it they make up the whole node.
-//! * Gains stand by ascending stamp; together they are what is won.
-//! * The valuations that are kept have no room to spare.
+//! * Only nodes of which a part is won have a rest. The part and the rest make up the whole node.
+//! * Gains are in the order of ascending stamps; together they are what is won.
+//! * The stored valuations have no unused room.
 
 use rustc_hash::FxHashMap;
 
@@ -14,7 +14,7 @@ use crate::zones::federation::{block_bytes, table_bytes};
 /// The valuations of a node from which the seeker wins.
 #[derive(Clone, Debug)]
 pub enum Win {
-    /// None, if it is known.
+    /// None, as far as is known.
     Nothing,
     /// All.
     Everything,
@@ -25,9 +25,9 @@ pub enum Win {
 /// What a stamp added to the winning valuations of a node.
 #[derive(Clone, Debug)]
 pub struct Gain {
-    /// Greater stamps came later.
+    /// A greater stamp came later.
     pub stamp: u32,
-    /// What was added; `None` is the whole zone.
+    /// What was added; `None` means the whole zone.
     pub part: Option<Federation>,
 }
 
@@ -36,27 +36,27 @@ pub struct Gain {
 pub(super) enum Gained {
     /// Nothing.
     Nothing,
-    /// All that was not won; this part, unless it is the whole node.
+    /// All that was not won: this part, or the whole node.
     Everything(Option<Federation>),
     /// A part.
     Part {
         /// What is won now.
         won: Federation,
-        /// What of it was not before.
+        /// The part that was not won before.
         part: Federation,
         /// What is not won.
         rest: Federation,
     },
 }
 
-/// What is won of all nodes.
+/// The winning sets of all nodes.
 #[derive(Debug, Default)]
 pub struct WinningSets {
-    /// By node: the valuations from which the seeker wins.
+    /// For each node: the valuations from which the seeker wins.
     pub win: Vec<Win>,
     /// The rest of each node of which a part is won.
     pub(in crate::game) rest: FxHashMap<u32, Federation>,
-    /// By node: the gains, by ascending stamp. What is sought has stamp 0.
+    /// For each node: the gains, by ascending stamp. The target has stamp 0.
     pub gains: Vec<Vec<Gain>>,
     /// The stamp of the last gain.
     pub(in crate::game) stamp: u32,
@@ -65,7 +65,7 @@ pub struct WinningSets {
 }
 
 impl WinningSets {
-    /// Adds a node of which this is won from the start, and the rest of it if that is a part.
+    /// Adds a node, with what is won of it from the start, and the rest of it if that is a part.
     pub(in crate::game) fn add_node(&mut self, win: Win, rest: Option<Federation>) {
         let node = self.win.len() as u32;
         if let Some(mut rest) = rest {
@@ -86,7 +86,7 @@ impl WinningSets {
         self.gains.push(gains);
     }
 
-    /// The bytes of the tables and of all that is in them.
+    /// The bytes of the tables and of everything in them.
     pub(in crate::game) fn all_bytes(&self) -> u64 {
         self.table_bytes() + self.bytes
     }
@@ -115,8 +115,8 @@ impl WinningSets {
         }
     }
 
-    /// Replaces what is left of a node, of which a part is won if there is a rest; gives what it
-    /// was.
+    /// Replaces the rest of a node and returns the old one. A node has a rest if a part of it is
+    /// won.
     pub(in crate::game) fn replace_rest(
         &mut self,
         node: u32,
@@ -145,7 +145,7 @@ impl WinningSets {
     pub(super) fn note_gain(&mut self, node: u32, part: Option<Federation>) {
         self.stamp += 1;
         let gains = &mut self.gains[node as usize];
-        // Most nodes gain once.
+        // Most nodes gain only once.
         if gains.is_empty() {
             gains.reserve_exact(1);
         }
@@ -163,7 +163,7 @@ impl WinningSets {
 }
 
 impl Win {
-    /// The bytes that it takes beside the value itself.
+    /// The bytes that it takes, without the value itself.
     pub(super) fn heap_bytes(&self) -> u64 {
         match self {
             Win::Nothing | Win::Everything => 0,
@@ -173,7 +173,7 @@ impl Win {
 }
 
 impl Gained {
-    /// The bytes that it takes beside the value itself.
+    /// The bytes that it takes, without the value itself.
     pub(super) fn heap_bytes(&self) -> u64 {
         let bytes = match self {
             Gained::Nothing | Gained::Everything(None) => 0,
@@ -185,7 +185,7 @@ impl Gained {
         bytes as u64
     }
 
-    /// Gives up room to spare.
+    /// Frees unused room.
     pub(super) fn shrink(&mut self) {
         match self {
             Gained::Nothing | Gained::Everything(None) => {}
@@ -199,14 +199,14 @@ impl Gained {
     }
 }
 
-/// The bytes that the gains of a node take beside the value itself.
+/// The bytes that the gains of a node take, without the value itself.
 pub(super) fn gains_bytes(gains: &Vec<Gain>) -> u64 {
     let parts = gains.iter().filter_map(|gain| gain.part.as_ref());
     let zones: usize = parts.map(Federation::heap_bytes).sum();
     (block_bytes(gains.capacity() * size_of::<Gain>()) + zones) as u64
 }
 
-/// The bytes that winning valuations by node take.
+/// The bytes that the winning valuations of all nodes take.
 pub(in crate::game) fn wins_bytes(wins: &[Win]) -> u64 {
     size_of_val(wins) as u64 + wins.iter().map(Win::heap_bytes).sum::<u64>()
 }

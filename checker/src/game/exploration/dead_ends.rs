@@ -2,16 +2,16 @@
 //! what to do there too.
 
 use crate::network::Failure;
-use crate::search::limits::{StopReason, Watch, states_between_looks};
+use crate::search::limits::{StopReason, Watch, states_between_checks};
 
 use crate::game::solver::Solver;
 
-/// Expanded nodes between two looks at the limits, at most.
+/// The greatest number of expanded nodes between two checks of the limits.
 const BETWEEN_LOOKS: u64 = 64;
 
 impl Solver<'_, '_, '_> {
-    /// Explores what follows after dead ends if the evader has won: its strategy says what to do
-    /// there too.
+    /// Explores what follows after dead ends if the evader has won, because its strategy says what
+    /// to do there too.
     ///
     /// # Errors
     /// The model fails in a state that follows.
@@ -22,10 +22,10 @@ impl Solver<'_, '_, '_> {
         if self.is_won() {
             return Ok(None);
         }
-        // What follows after a dead end is a dead end, so all of it is made now.
+        // Everything after a dead end is a dead end, so all of it is made now.
         let mut next = self.graph.nodes.len();
-        let look_every = states_between_looks(BETWEEN_LOOKS, self.graph.dimension()) as usize;
-        self.graph.go_on_in_dead_ends()?;
+        let look_every = states_between_checks(BETWEEN_LOOKS, self.graph.dimension()) as usize;
+        self.graph.expand_dead_ends()?;
         self.adopt_new_nodes();
         while let Some(node) = self.graph.nodes.get(next) {
             if !node.is_expanded && !self.is_decided(next as u32) {

@@ -1,4 +1,4 @@
-//! How a node is expanded, and which nodes are to be expanded then.
+//! How a node is expanded, and which nodes must be expanded then.
 
 use crate::network::Failure;
 
@@ -8,7 +8,7 @@ use crate::game::forward::node::{Edge, NONE, Standing};
 use crate::game::solver::Solver;
 
 impl Solver<'_, '_, '_> {
-    /// Expands a node, and lets the nodes wait that this makes.
+    /// Expands a node, and adds the new nodes to the waiting list.
     pub(in crate::game) fn expand(&mut self, node: u32) -> Result<(), Failure> {
         self.graph.expand(node)?;
         self.adopt_new_nodes();
@@ -50,7 +50,7 @@ impl Solver<'_, '_, '_> {
         Ok(())
     }
 
-    /// Lets a node wait for its expansion unless it is decided.
+    /// Adds a node to the waiting list, unless it is decided.
     pub(in crate::game) fn wait_for(&mut self, node: u32) {
         let Some(known) = self.graph.nodes.get(node as usize) else {
             return;
@@ -66,8 +66,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Lets the nodes be expanded soon to which the evader may move from a node of which more may
-    /// be won.
+    /// Moves forward in the list those nodes to which the evader may move from a node of which more
+    /// may be won.
     pub(in crate::game) fn note_spoilers(&mut self, node: u32) {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         if edges.all(|edge| matches!(self.won.win[edge.target as usize], Win::Nothing)) {
@@ -85,8 +85,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Whether the winning valuations of some predecessor that may be won may still grow by those
-    /// of the node.
+    /// Whether the winning valuations of some predecessor may still grow by those of the node.
     pub(in crate::game) fn is_relevant(&self, node: u32) -> bool {
         if node == 0 || !self.graph.symbolic.tuning().relevance {
             return true;
@@ -105,7 +104,7 @@ impl Solver<'_, '_, '_> {
         false
     }
 
-    /// What the parts do when a node was looked at, and is not won as a whole.
+    /// What the parts do when a node was updated and is not won as a whole.
     pub(in crate::game) fn on_update(&mut self, node: u32) {
         if !self.exploration.schedule.is_running {
             self.choose(node);

@@ -14,25 +14,25 @@ pub(in crate::game) enum Hold {
 /// What is held back.
 #[derive(Debug, Default)]
 pub(in crate::game) struct HeldMoves {
-    /// By edge; edges behind the last one are not held.
+    /// For each edge; edges after the last entry are not held.
     pub(super) holds: Vec<Hold>,
-    /// By node: the processes that take part in the moves by which the seeker wins something of it,
-    /// as in [`Edge::movers`].
+    /// For each node: the processes that take part in the moves by which the seeker wins a part of
+    /// it, as in [`Edge::movers`].
     pub(in crate::game) attackers: Vec<u32>,
-    /// The processes that take part in most moves, so that they tell nothing.
+    /// The processes that take part in most moves, so that they give no information.
     pub(super) hubs: u32,
-    /// How many edges there are when hubs are counted anew.
+    /// The number of edges at which hubs are counted again.
     pub(super) next_count: usize,
-    /// Nodes that were undefended when they were computed last, and others.
+    /// Nodes that were undefended at their last computation, and others.
     pub(super) undefended: Vec<u32>,
-    /// Whether weak moves are taken as well.
+    /// Whether weak moves are used too.
     pub(in crate::game) uses_weak: bool,
 }
 
 /// What the evader does against a threat.
 #[derive(Clone, Debug, Default)]
 pub(in crate::game) struct Defence {
-    /// The moves that it is to use, counted from the first edge of the node.
+    /// The moves that it must use, counted from the first edge of the node.
     pub(super) moves: Box<[u32]>,
     /// Whether only weak moves help against the rest.
     pub(super) is_undefended: bool,
@@ -49,29 +49,29 @@ impl HeldMoves {
         self.holds.get(edge) == Some(&Hold::Held)
     }
 
-    /// Forgets all nodes; nothing is held back any more.
+    /// Forgets all nodes; afterwards nothing is held back.
     pub(in crate::game) fn forget_nodes(&mut self) {
         *self = HeldMoves::default();
     }
 
-    /// Holds nothing back any more.
+    /// Lets the evader use all held moves.
     pub(super) fn release(&mut self) {
         self.holds.clear();
         self.undefended.clear();
     }
 
-    /// Makes room for one more node, against which nobody takes part in anything.
+    /// Makes room for one more node that nobody attacks.
     pub(in crate::game) fn add_node(&mut self) {
         self.attackers.push(0);
     }
 
-    /// Takes out what is held back, so that nothing is meanwhile.
-    pub(in crate::game) fn take_holds(&mut self) -> Vec<Hold> {
+    /// Takes out the held moves, so that for a while nothing is held back.
+    pub(in crate::game) fn take_held_moves(&mut self) -> Vec<Hold> {
         std::mem::take(&mut self.holds)
     }
 
     /// Puts back what was taken out.
-    pub(in crate::game) fn put_holds_back(&mut self, holds: Vec<Hold>) {
+    pub(in crate::game) fn restore_held_moves(&mut self, holds: Vec<Hold>) {
         self.holds = holds;
     }
 

@@ -1,24 +1,22 @@
-//! Which moves the evader defends itself with where time passes: as few as it is known
-//! to need.
+//! Which moves the evader uses where time passes: only as many as it is known to need.
 //!
-//! Where time passes, the evader may wait, and as long as the seeker has no way to win it needs no
-//! move, but for one wherever it must move because time stops. So in a safety game for a verdict
-//! its other moves are *held back*, and what they lead to is not explored, until the seeker
-//! *threatens* to win something more: if the evader did not use the held moves, it would win
-//! valuations that it has not won. Then those of them that help are taken, one after the other:
-//! first such in which a process takes part that also takes part in the attack. Moves that share no
-//! process with the attack are *weak*. They rather put things off, and there may be many of them,
-//! so a node against which nothing else helps is left *undefended*, until a look at the whole game
-//! says what to do ([`crate::game::backward::losing_timed`]).
+//! Where time passes, the evader may wait. As long as the seeker cannot win, the evader needs no
+//! move, except where it must move because time stops. So in a safety game for a verdict its other
+//! moves are *held back*, and the states after them are not explored, until the seeker *threatens*
+//! to win something more: if the evader did not use the held moves, the seeker would win valuations
+//! that it has not won. Then the held moves that help are taken, one after the other. Those that
+//! share a process with the attack come first. Moves that share no process with the attack are
+//! *weak*. They mostly delay the attack, and there may be many of them. So a node that only weak
+//! moves can help is left *undefended*, until a look at the whole game decides
+//! ([`crate::game::backward::losing_timed`]).
 //!
-//! A held move counts as an escape for what the seeker wins, and what is won is recorded only where
-//! it does not help. So all that is known stays sound, and when nothing is left to be explored or
-//! computed and no node is undefended, then the seeker wins nothing that is not known: as in
-//! [`super::lazy_zero_time`], what it wins of the nodes in play follows from what it wins of each
-//! other.
+//! A held move counts as an escape for what the seeker wins, and a win is recorded only where the
+//! move does not help. So all results stay sound. When nothing is left to explore or compute and no
+//! node is undefended, the seeker wins nothing else: as in [`super::lazy_zero_time`], what it wins
+//! of the nodes in play follows only from what it wins of each other.
 //!
-//! Where the controller seeks a goal, nothing is held back: there the moves of the environment are
-//! rather the way to it, and whether dives that leave them out find it sooner is a matter of luck.
+//! If the controller seeks a goal, nothing is held back: the moves of the environment often lead to
+//! the goal, and whether dives without them find it sooner is a matter of luck.
 
 use crate::network::Failure;
 use crate::zones::Federation;
@@ -30,11 +28,11 @@ use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::Edge;
 use crate::game::solver::Solver;
 
-/// Hubs are counted anew when the edges have grown by this part of them.
+/// Hubs are counted again when the edges have grown by this part of them.
 const BETWEEN_COUNTS: usize = 4;
 
 impl Solver<'_, '_, '_> {
-    /// Holds the evader's moves from a node back that was just expanded, if it may wait there;
+    /// Holds back the evader's moves from a node that was just expanded, if it may wait there;
     /// returns whether it does.
     ///
     /// # Errors
@@ -68,7 +66,7 @@ impl Solver<'_, '_, '_> {
                 Hold::Held
             });
         }
-        // Where it must move because time stops, it needs one of the moves at once.
+        // If it must move because time stops, it needs one of the moves at once.
         for index in edges {
             let edge = self.graph.edges[index];
             if forced.is_empty() {
@@ -104,7 +102,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Takes weak moves from now on, and lets the nodes be computed that were undefended.
+    /// Uses weak moves from now on, and lets the undefended nodes be computed.
     pub(in crate::game) fn use_weak_moves(&mut self) {
         self.exploration.held.uses_weak = true;
         for node in std::mem::take(&mut self.exploration.held.undefended) {
@@ -112,8 +110,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Takes no weak moves any more, and holds the moves back again that lead to what is not
-    /// explored.
+    /// Stops using weak moves, and holds back again the moves to unexplored nodes.
     pub(in crate::game) fn hold_back_again(&mut self) {
         self.exploration.held.uses_weak = false;
         for index in 0..self.exploration.held.holds.len() {
@@ -125,13 +122,13 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Notes who takes part in what the seeker wins of a node.
+    /// Notes the processes that take part in what the seeker wins in a node.
     pub(in crate::game) fn note_attackers(&mut self, node: u32) {
         self.exploration.held.attackers[node as usize] |=
             self.attack(node, &self.won.win, &self.exploration.held.attackers);
     }
 
-    /// The processes that take part in moves of the seeker that win, or in how it wins after them.
+    /// The processes that take part in winning moves of the seeker, or in its win after them.
     fn attack(&self, node: u32, win: &[Win], attackers: &[u32]) -> u32 {
         let edges = self.graph.edges[self.graph.edges_of(node)].iter();
         let winning = edges.filter(|edge| {
@@ -143,8 +140,8 @@ impl Solver<'_, '_, '_> {
         })
     }
 
-    /// The processes by which moves are told that help against an attack: not those that take part
-    /// in most moves, if there are others.
+    /// The processes by which one can recognise moves that help against an attack: not those that
+    /// take part in most moves, if there are others.
     pub(in crate::game) fn aims(&self, node: u32, win: &[Win], attackers: &[u32]) -> u32 {
         let attack = self.attack(node, win, attackers);
         match attack & !self.exploration.held.hubs {
@@ -153,7 +150,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Counts who takes part in moves, if there are many new ones.
+    /// Counts the processes that take part in moves, if there are many new moves.
     pub(in crate::game) fn count_hubs(&mut self) {
         let count = self.graph.edges.len();
         if !self.exploration.reserve.is_used || count < self.exploration.held.next_count {
@@ -170,8 +167,8 @@ impl Solver<'_, '_, '_> {
         self.exploration.held.hubs = hubs.fold(0, |all, bit| all | 1 << bit);
     }
 
-    /// What a node wins by what is known of its successors, and which moves that the evader holds
-    /// back it is to use against more.
+    /// What a node wins, given what is known about its successors, and the held moves that the
+    /// evader must use against a greater win.
     pub(in crate::game) fn winnable_against_defence(
         &self,
         node: u32,
@@ -211,7 +208,7 @@ impl Solver<'_, '_, '_> {
         (won, defence)
     }
 
-    /// What of these valuations a node has not won; `None` if there are none.
+    /// The part of these valuations that the node has not won; `None` if there is none.
     pub(in crate::game) fn new_part(&self, node: u32, won: &Federation) -> Option<Federation> {
         let part = match &self.won.win[node as usize] {
             Win::Everything => return None,
@@ -221,8 +218,8 @@ impl Solver<'_, '_, '_> {
         (!part.is_empty()).then_some(part)
     }
 
-    /// The first of some held moves that helps somewhere in these valuations and in which most of
-    /// the processes take part; with how many that are.
+    /// The first held move among those that help somewhere in these valuations and share the most
+    /// of the processes, and the number of shared ones.
     pub(in crate::game) fn strongest(
         &self,
         held: &[usize],

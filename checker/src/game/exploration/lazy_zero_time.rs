@@ -1,31 +1,33 @@
-//! Which moves of the evader are explored: as many as it needs, if it is known.
+//! Which moves of the evader are explored where time does not pass: only as many as it is known to
+//! need.
 //!
-//! When only a verdict is wanted, a single way to evade is enough. So where time does not pass, and
-//! the evader has moves that lead on from everywhere, one of these after the other is explored, in
-//! the order of moves: the next one when the seeker has won something of all before. The others are
-//! in *reserve*. Where time passes, moves are held back instead: see [`super::lazy_safety`].
+//! For a verdict, one way to evade is enough. So where time does not pass, and moves of the evader
+//! are possible everywhere, these moves are explored one after the other, in the order of moves:
+//! the next one when the seeker has won a part of all before. The others are in *reserve*. Where
+//! time passes, moves are held back instead: see [`super::lazy_safety`].
 //!
-//! The nodes *in play* are those that play gets to by moves of the seeker, and by those of the
-//! evader that are neither in reserve nor held back; it does not go on where the seeker has won
-//! everything, or cannot win any more ([`crate::game::backward::losing_untimed`]). Only they need
-//! to be explored. If all of them are, and no wins are to be computed any more, but the initial
-//! valuation is not won, then the evader wins. For in the game in which it never moves to what is
-//! in reserve, what the seeker wins of the nodes in play follows from what it wins of each other,
-//! and it wins nothing that is not known; and more moves do the evader no harm.
+//! The nodes *in play* are those that play reaches by moves of the seeker, and by those moves of
+//! the evader that are neither in reserve nor held back. Play does not continue where the seeker
+//! has won everything, or cannot win any more ([`crate::game::backward::losing_untimed`]). Only
+//! nodes in play need to be explored. Suppose that all of them are explored, no more wins must be
+//! computed, and the initial valuation is not won. Then the evader wins. Proof: consider the game
+//! in which it never uses a move in reserve. There, what the seeker wins of the nodes in play
+//! follows from what it wins of each other, and all of that is known. More moves do not harm the
+//! evader.
 
 use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::Edge;
 use crate::game::solver::Solver;
 
-/// At most this many nodes are looked at for each explored state to find those in play; if that is
-/// not enough, reserves do not pay.
+/// To find the nodes in play, at most this many nodes are visited for each explored state. If that
+/// is not enough, reserves do not pay.
 const MOST_LOOKS: u64 = 32;
 
-/// States that are counted beside those that are explored, for that.
+/// The states that are added to the explored ones for that.
 const STATES_OF_GRACE: u64 = 1 << 10;
 
 impl Solver<'_, '_, '_> {
-    /// Whether moves of the evader from a node that was just expanded are kept in reserve.
+    /// Decides whether moves of the evader from a node that was just expanded are kept in reserve.
     pub(super) fn begin_reserve(&mut self, node: u32) -> bool {
         let is_kept = self.graph.symbolic.tuning().lazy_zero_time
             && self.exploration.reserve.is_kept
@@ -39,8 +41,8 @@ impl Solver<'_, '_, '_> {
         is_kept
     }
 
-    /// Lets the node be explored that the evader is to move to from a node with a reserve; all, if
-    /// it wins nowhere for sure.
+    /// Lets that node be explored to which the evader must move from a node with a reserve. If no
+    /// target is certain to help, all are explored.
     pub(in crate::game) fn choose(&mut self, node: u32) {
         if !self.exploration.reserve.sources[node as usize] {
             return;
@@ -55,7 +57,7 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// The node that the evader is to move to from a node in which time does not pass: the first
+    /// The node to which the evader must move from a node in which time does not pass: the first
     /// one of which nothing is won.
     fn chosen(&self, node: u32) -> Option<u32> {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
@@ -77,8 +79,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Lets the unexplored nodes wait that are in play, and no others; returns by node whether it
-    /// is in play.
+    /// Puts the unexplored nodes in play on the waiting list, and no others; returns for each node
+    /// whether it is in play.
     pub(in crate::game) fn wait_for_nodes_in_play(&mut self) -> Vec<bool> {
         let reserve = &mut self.exploration.reserve;
         if reserve.looks > MOST_LOOKS * (self.graph.explored + STATES_OF_GRACE) {
@@ -116,9 +118,9 @@ impl Solver<'_, '_, '_> {
         is_in_play
     }
 
-    /// Counts the nodes out of play as won, once the evader has won: nobody knows who wins there,
-    /// and it has no need of them.
-    pub(in crate::game) fn keep_in_play(&mut self, is_in_play: &[bool]) {
+    /// Counts the nodes out of play as won, once the evader has won. Their winner is unknown, and
+    /// the evader does not need them.
+    pub(in crate::game) fn avoid_out_of_play(&mut self, is_in_play: &[bool]) {
         for (node, is_in_play) in is_in_play.iter().enumerate() {
             if !is_in_play && self.may_win(node as u32) && !self.is_decided(node as u32) {
                 self.won.replace_win(node, Win::Everything);

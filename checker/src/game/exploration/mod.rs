@@ -1,12 +1,12 @@
-//! What is explored when.
+//! Which nodes are explored, and in which order.
 //!
-//! All ways of exploring are sound, since what is not explored counts as an escape of the evader.
-//! The plain way is the list of nodes that wait ([`waiting`]). For a verdict, parts are plugged in
-//! that need less of the graph, and each can be switched off ([`crate::tuning`]): moves of the
-//! evader in reserve where time does not pass ([`lazy_zero_time`]) and held back where it does
-//! ([`lazy_safety`]), and looks at who may still win at all. They are asked at three points: for
-//! the next node ([`next`]), when a node was expanded, and when one has gained something
-//! ([`expanding`]).
+//! All kinds of exploration are sound, since what is not explored counts as an escape of the
+//! evader. The plain kind is the list of waiting nodes ([`waiting`]). For a verdict, other parts
+//! are plugged in that need less of the graph. Each can be switched off ([`crate::tuning`]): moves
+//! of the evader in reserve where time does not pass ([`lazy_zero_time`]), moves held back where it
+//! does ([`lazy_safety`]), and the computation of who may still win at all. They are called at
+//! three points: for the next node ([`next`]), when a node was expanded, and when a node has gained
+//! something ([`expanding`]).
 
 pub(super) mod dead_ends;
 pub(super) mod expanding;
@@ -28,18 +28,18 @@ use waiting::WaitingList;
 /// What is explored, and what is not.
 #[derive(Debug, Default)]
 pub(super) struct Exploration {
-    /// The nodes to be expanded.
+    /// The waiting list.
     pub(super) waiting: WaitingList,
-    /// What the evader may move to and does not need, if it is known.
+    /// The moves of the evader that it is known not to need.
     pub(super) reserve: Reserve,
     /// The moves that the evader holds back.
     pub(super) held: HeldMoves,
-    /// By node, if it was looked at: whether the seeker may still win; see
+    /// For each node that was checked: whether the seeker may still win; see
     /// [`crate::game::backward::losing_untimed`].
     pub(super) may_win: Vec<bool>,
-    /// How many states are explored when that is looked at again.
+    /// The number of explored states at the next such check.
     pub(super) next_may_win: u64,
-    /// When it is computed with zones what the seeker may still win.
+    /// When to compute with zones what the seeker may still win.
     pub(super) schedule: Schedule,
 }
 
@@ -56,7 +56,7 @@ impl Exploration {
         self.held.add_node();
     }
 
-    /// Forgets all nodes, which are to be added again.
+    /// Forgets all nodes; they must be added again.
     pub(super) fn forget_nodes(&mut self) {
         self.waiting.forget_nodes();
         self.reserve.forget_nodes();
@@ -69,18 +69,18 @@ impl Exploration {
 pub(in crate::game) struct Turn {
     /// Whether no node waited when it began.
     pub(in crate::game) is_dry: bool,
-    /// Whether all was computed.
+    /// Whether everything was computed.
     pub(in crate::game) is_computed: bool,
 }
 
 /// What comes next.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::game) enum Next {
-    /// This node is to be expanded.
+    /// This node must be expanded.
     Expand(u32),
-    /// There may be something to be computed first.
+    /// There may be something to compute first.
     Compute,
-    /// Nothing: the seeker wins nothing that is not known.
+    /// Nothing: the seeker wins nothing else.
     Nothing,
     /// A limit came first.
     Stopped(StopReason),

@@ -1,4 +1,4 @@
-//! What comes next: a node to be expanded, or the end.
+//! The next step: a node to expand, or the end.
 
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
@@ -8,11 +8,11 @@ use super::{Next, Turn};
 use crate::game::Extent;
 use crate::game::solver::Solver;
 
-/// It is looked what is still in play when the explored states have grown by this part of them.
+/// The nodes in play are found again when the number of explored states has grown by this part.
 const BETWEEN_PLAYS: u64 = 3;
 
 impl Solver<'_, '_, '_> {
-    /// Says what comes next.
+    /// Decides the next step.
     ///
     /// # Errors
     /// The model fails in computing what a node wins.
@@ -33,7 +33,7 @@ impl Solver<'_, '_, '_> {
         }
         if extent != Extent::Everything {
             let has_reserve = self.exploration.reserve.is_used;
-            if self.gives_up_in_a_crowd() {
+            if self.check_crowd() {
                 return Ok(Next::Stopped(StopReason::States));
             }
             if has_reserve && self.exploration.waiting.len() == 0 {
@@ -53,24 +53,24 @@ impl Solver<'_, '_, '_> {
         })
     }
 
-    /// Computes what the seeker may still win, if it is time to; says what comes next if that ends
+    /// Computes what the seeker may still win, if this is due; returns the next step if that ends
     /// the game.
     fn next_by_prospects(
         &mut self,
         turn: Turn,
         watch: &mut dyn Watch,
     ) -> Result<Option<Next>, Failure> {
-        if !turn.is_computed || !self.is_look_ahead_due() {
+        if !turn.is_computed || !self.are_prospects_due() {
             return Ok(None);
         }
-        Ok(match self.look_ahead(watch)? {
+        Ok(match self.compute_prospects(watch)? {
             LookAhead::Open | LookAhead::Settled => None,
             LookAhead::EvaderWins => Some(Next::Nothing),
             LookAhead::Stopped(reason) => Some(Next::Stopped(reason)),
         })
     }
 
-    /// Whether the seeker may still win for all that the graph shows, if it is time to look at it.
+    /// Whether the seeker may still win, as the graph shows. It is computed only if this is due.
     fn may_win_untimed(&mut self, has_reserve: bool) -> bool {
         let explored = self.graph.explored;
         if explored < self.exploration.next_may_win {
@@ -88,17 +88,17 @@ impl Solver<'_, '_, '_> {
         true
     }
 
-    /// Says what comes next where no node waits, but some moves of the evader are not explored.
+    /// Decides the next step if no node waits, but some moves of the evader are not explored.
     fn next_from_reserve(&mut self, turn: Turn, watch: &mut dyn Watch) -> Result<Next, Failure> {
         let is_in_play = self.wait_for_nodes_in_play();
         if !turn.is_dry || self.exploration.waiting.len() > 0 {
             return Ok(Next::Compute);
         }
-        Ok(match self.look_at_all(watch)? {
+        Ok(match self.conclude_in_play(watch)? {
             LookAhead::Open => Next::Compute,
             LookAhead::EvaderWins => Next::Nothing,
             LookAhead::Settled => {
-                self.keep_in_play(&is_in_play);
+                self.avoid_out_of_play(&is_in_play);
                 Next::Nothing
             }
             LookAhead::Stopped(reason) => Next::Stopped(reason),

@@ -1,16 +1,16 @@
 //! The moves of the evader that are not explored where time does not pass: see
 //! [`super::lazy_zero_time`].
 
-/// The nodes of which some that the evader may move to are kept in reserve.
+/// The nodes from which some moves of the evader are kept in reserve.
 #[derive(Debug, Default)]
 pub(in crate::game) struct Reserve {
     /// Whether anything more is to be kept.
     pub(in crate::game) is_kept: bool,
     /// Whether anything was ever kept.
     pub(in crate::game) is_used: bool,
-    /// By node: whether it leads to something in reserve.
+    /// For each node: whether it leads to something in reserve.
     pub(super) sources: Vec<bool>,
-    /// How many nodes were looked at to find those in play.
+    /// The number of nodes that were visited to find those in play.
     pub(super) looks: u64,
 }
 

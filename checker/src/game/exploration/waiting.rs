@@ -1,39 +1,39 @@
 //! The order in which nodes are expanded: dives.
 //!
-//! A dive follows a random move of each newly made node as far as this goes, in every other dive
-//! one of the seeker where there is one: those of the evader rather lead away from what is sought,
-//! but sometimes they are the way. Dives from everywhere meet wins that lie close together sooner
-//! than dives in the order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial
-//! Search Through Randomization", AAAI 1998). The random numbers are the same in every run.
+//! A dive follows a random move of each new node as long as there is one. Every other dive prefers
+//! moves of the seeker: moves of the evader usually lead away from what is sought, but sometimes
+//! they are the way to it. Random dives find wins that lie close together sooner than dives in the
+//! order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial Search Through
+//! Randomization", AAAI 1998). The random numbers are the same in every run.
 //!
-//! After a dive come first the nodes that the evader may move to from where the seeker has won
-//! something, since the win depends on them; then the next dive starts from one of the nodes that
-//! wait, at random. Now and then it starts from the one that was made first instead, so that a win
-//! near the start is found however far dives go.
+//! After a dive, the first nodes are those to which the evader may move from where the seeker has
+//! won something, since the win depends on them. Then the next dive starts from a random waiting
+//! node. Sometimes it starts from the oldest node instead, so that a win near the start is found
+//! however deep dives are.
 
 use crate::game::forward::node::Node;
 use crate::tuning::Tuning;
 
-/// One in this many starts is from the oldest node.
+/// One in this many dives starts from the oldest node.
 const STARTS_FROM_OLDEST: u32 = 16;
 
 /// The nodes to be expanded.
 #[derive(Debug, Default)]
 pub(in crate::game) struct WaitingList {
-    /// Those to dive into stand last. Some may be expanded meanwhile.
+    /// The nodes for the dive are at the end. Some may be expanded meanwhile.
     pub(super) waiting: Vec<u32>,
-    /// By node.
+    /// For each node: whether it waits.
     pub(super) is_waiting: Vec<bool>,
-    /// Nodes that moves of the evader lead to, and which decide whether more of a node is won;
-    /// those met last stand last.
+    /// Targets of moves of the evader that decide whether more of a node is won; the newest are at
+    /// the end.
     pub(super) spoilers: Vec<u32>,
     /// All nodes before this one were expanded, or do not wait.
     pub(super) oldest: u32,
     pub(super) starts: u32,
     pub(super) random: Random,
-    /// Whether this dive takes moves of the evader as readily as those of the seeker.
+    /// Whether this dive does not prefer moves of the seeker.
     pub(super) is_impartial: bool,
-    /// Whether the last expansion made no node to go on with.
+    /// Whether the last expansion made no node for the dive.
     pub(super) is_over: bool,
 }
 
@@ -59,7 +59,7 @@ impl WaitingList {
         self.is_waiting.clear();
     }
 
-    /// Lets no node wait.
+    /// Removes all nodes.
     pub(super) fn clear(&mut self) {
         for node in self.waiting.drain(..) {
             self.is_waiting[node as usize] = false;
@@ -71,7 +71,7 @@ impl WaitingList {
         self.spoilers.push(node);
     }
 
-    /// The node to be expanded next; some are expanded already.
+    /// The next node to expand; some are expanded already.
     pub(in crate::game) fn next(&mut self, nodes: &[Node], tuning: Tuning) -> Option<u32> {
         let node = if self.is_over && (tuning.dives || tuning.spoilers) {
             self.next_start(nodes, tuning)

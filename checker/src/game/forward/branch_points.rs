@@ -1,12 +1,12 @@
-//! Branch points behind edges of the controller: it chooses the edge, the environment picks the
+//! Branch points after edges of the controller: it chooses the edge, and the environment picks the
 //! leg.
 //!
-//! The *entry* of a move are its edges with their `select` values, without the legs. The controller
-//! gets into some valuations by an entry where one of its legs is possible and all that are lead
-//! there. A strategy of the controller names entries; one of the environment says which leg it
-//! picks.
+//! The *entry* of a move is its edges with their `select` values, without the legs. By an entry,
+//! the controller gets into given valuations where at least one leg is possible and all possible
+//! legs lead into them. A strategy of the controller names entries; a strategy of the environment
+//! says which leg it picks.
 //!
-//! Moves with the same entry follow each other in the order of moves.
+//! Moves with the same entry are successive in the order of moves.
 
 use rustc_hash::FxHashMap;
 
@@ -21,7 +21,7 @@ use super::node::Edge;
 pub(in crate::game) struct BranchPoints {
     /// Whether the network has any.
     is_possible: bool,
-    /// By node: the edges of each.
+    /// For each node: its entries with several legs, and the edges of each.
     entries: FxHashMap<u32, Vec<Vec<u32>>>,
     bytes: usize,
 }
@@ -46,8 +46,7 @@ impl BranchPoints {
         self.bytes + table_bytes::<(u32, Vec<Vec<u32>>)>(self.entries.capacity())
     }
 
-    /// Marks the legs among the edges of a node that was just expanded, which are those from
-    /// `first` on.
+    /// Marks the legs among the edges of a node that was just expanded. Its edges start at `first`.
     pub(super) fn find(&mut self, node: u32, (edges, first): (&mut [Edge], usize), moves: &Moves) {
         if !self.is_possible {
             return;
@@ -90,7 +89,8 @@ impl BranchPoints {
     }
 }
 
-/// The edges of a move by their first legs: how a strategy of the controller names it.
+/// The edges of a move with their first legs: this is the name of the move in a strategy of the
+/// controller.
 pub(in crate::game) fn entry_of(parts: &[Part]) -> Vec<Part> {
     let parts = parts.iter().map(|&part| Part { branch: 0, ..part });
     parts.collect()

@@ -1,14 +1,15 @@
-//! Chains of moves that were followed before, remembered.
+//! A cache of chains of moves that were followed before.
 //!
-//! What a move does to clocks mostly depends on the locations, the zone and the answers of guards,
-//! not on variables. A *trail* is what is known at a point of a chain: the zone there and what the
-//! moves so far do to clocks. Trails make trees; their roots are moves of nodes, by offer and zone.
-//! Following a chain along its trail evaluates guards and runs updates, and handles no zone at all.
+//! The effect of a move on clocks mostly depends on the locations, the zone and the answers of
+//! guards, not on variables. A *trail* holds what is known at a point of a chain: the zone there,
+//! and the effect of the moves until there on clocks. Trails form trees, whose roots are moves of
+//! nodes, by offer and zone. To follow a chain along its trail, the graph evaluates guards and runs
+//! updates, but computes no zones.
 //!
 //! Invariants:
-//! * A trail says what [`super::graph::Graph`] would find by following the chain move by move;
-//!   where that depends on variables, the trail ends and the graph goes on from its end in that
-//!   way.
+//! * A trail gives the same result as [`super::graph::Graph`] when it follows the chain move by
+//!   move. Where the result depends on variables, the trail ends, and the graph continues move by
+//!   move from its end.
 //! * Trails never decide which states there are, only how fast they are found. Their memory is
 //!   bounded.
 
@@ -23,7 +24,7 @@ use crate::zones::{Bound, Zone};
 use super::clock_programs::{ProgramId, ProgramStep, steps_bytes};
 use super::objective::Objective;
 
-/// Trails take at most about this many bytes.
+/// The approximate number of bytes that trails may take.
 pub(super) const MOST_BYTES: usize = 32 << 20;
 
 /// The index of a trail.
@@ -32,11 +33,11 @@ pub(super) type TrailId = u32;
 /// What a move leads to.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Onward {
-    /// Not asked yet.
+    /// Not known yet.
     Unknown,
-    /// Nowhere: the move is not possible, or the chain ends before it.
+    /// To no state: the move is not possible, or the chain ends before it.
     Ends,
-    /// Variables decide: it must be followed move by move.
+    /// It depends on variables: the move must be followed on its own.
     Varies,
     /// To the end of this trail.
     To(TrailId),
@@ -54,40 +55,40 @@ pub(super) struct Trail {
     pub(super) may_delay: bool,
     /// How many moves lead here.
     pub(super) length: u32,
-    /// What they do to clocks.
+    /// The effect of these moves on clocks.
     pub(super) steps: Vec<ProgramStep>,
-    /// Whether every chain that comes here ends.
+    /// Whether every chain ends here.
     pub(super) is_end: bool,
-    /// How it goes on, by offer.
+    /// How the chain continues, for each offer.
     pub(super) onward: Vec<(OfferId, Onward)>,
     pub(super) ending: Option<Ending>,
 }
 
-/// What a chain that ends here makes of clocks.
+/// The result of a chain that ends here, for clocks.
 #[derive(Clone, Debug)]
 pub(super) struct Ending {
     /// The zone, extrapolated.
     pub(super) zone: Zone,
     /// Its id.
     pub(super) id: ZoneId,
-    /// What the edge does to clocks.
+    /// The effect of the edge on clocks.
     pub(super) program: ProgramId,
-    /// The zone of the node that was entered last, and whether the edge leads from every valuation
-    /// into it.
+    /// The zone of the node that was entered last, and whether the edge leads into it from every
+    /// valuation.
     pub(super) totality: Option<(ZoneId, bool)>,
 }
 
 /// The trails of a graph.
 #[derive(Debug, Default)]
 pub(super) struct ChainCache {
-    /// Whether locations and zones decide how time passes, so that there can be trails.
+    /// Whether locations and zones decide how time passes. Otherwise there are no trails.
     pub(super) is_useful: bool,
     /// Whether locations alone decide where the objective holds.
     pub(super) is_objective_fixed: bool,
-    /// By offer and zone of a node: where its moves are in `first`; `None` if the two were met
-    /// once.
+    /// For each offer and zone of a node: where its moves start in `first`; `None` if the two were
+    /// met only once.
     pub(super) roots: FxHashMap<(OfferId, ZoneId), Option<u32>>,
-    /// What the first moves lead to.
+    /// The results of the first moves.
     pub(super) first: Vec<Onward>,
     /// The ends of all trails.
     pub(super) points: Vec<Trail>,
@@ -110,18 +111,18 @@ impl ChainCache {
         }
     }
 
-    /// The bytes that trails take, about.
+    /// The approximate number of bytes that trails take.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// Whether there can be trails.
+    /// Whether trails are possible.
     pub(super) fn is_useful(&self) -> bool {
         self.is_useful
     }
 
-    /// The root of the moves of an offer at a zone; `None` if they were not met before, as most are
-    /// never met again.
+    /// The root of the moves of an offer at a zone. `None` if they were not met before: most are
+    /// met only once.
     pub(super) fn root(&mut self, offer: OfferId, zone: ZoneId, moves: &Moves) -> Option<Root> {
         if self.bytes > MOST_BYTES {
             return self.roots.get(&(offer, zone)).copied().flatten().map(Root);
@@ -147,7 +148,7 @@ impl ChainCache {
 
     pub(super) fn add(&mut self, trail: Trail) -> Onward {
         let dimension = trail.zone.dimension();
-        // The end has its zone too.
+        // The end of the trail has a zone too.
         self.bytes += size_of::<Trail>() + 2 * block_bytes(size_of::<Bound>() * dimension.pow(2));
         self.bytes += steps_bytes(&trail.steps) + trail.last.heap_bytes();
         self.points.push(trail);

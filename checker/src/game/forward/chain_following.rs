@@ -59,7 +59,7 @@ impl Graph<'_, '_> {
                     self.steps.clone_from(&trail.steps);
                     let zone = trail.zone.clone();
                     let reached = (trail.length, trail.may_delay);
-                    self.go_on(origin, target, zone, reached)?;
+                    self.continue_chain(origin, target, zone, reached)?;
                     return Ok(true);
                 }
             }
@@ -68,7 +68,7 @@ impl Graph<'_, '_> {
         Ok(true)
     }
 
-    /// What a move of a node leads to.
+    /// The result of a move of a node.
     fn first_onward(
         &mut self,
         trails: &mut ChainCache,
@@ -93,7 +93,7 @@ impl Graph<'_, '_> {
         self.add_trail(trails, words, last, zone, (steps, 1))
     }
 
-    /// How a chain goes on from the end of a trail, in a state with these words.
+    /// How a chain continues from the end of a trail, in a state with these words.
     fn onward(
         &mut self,
         trails: &mut ChainCache,
@@ -123,7 +123,7 @@ impl Graph<'_, '_> {
         Ok(onward)
     }
 
-    /// As [`Graph::onward`], where it is not known what the offer leads to.
+    /// Like [`Graph::onward`], if the result of the offer is not known.
     fn new_onward(
         &mut self,
         trails: &mut ChainCache,

@@ -1,5 +1,5 @@
-//! What an edge of the game graph does to clocks: the effects of the moves that it stands for, one
-//! after the other. The first move is always there; later ones that change nothing are left out.
+//! The effect of an edge of the game graph on clocks: the effects of its moves, one after the
+//! other. The first move is always part of it; later moves that change nothing are left out.
 //!
 //! Edges with the same effects share one program. Most models have few.
 
@@ -20,7 +20,7 @@ pub struct ProgramId(pub u32);
 pub struct ProgramStep {
     /// Whether time may pass before it.
     pub delays: bool,
-    /// What it does.
+    /// Its effect.
     pub effect: ClockEffect,
 }
 
@@ -31,10 +31,10 @@ pub struct Programs {
     /// The index of the program that was asked for last.
     last: u32,
     index: FxHashMap<Vec<ProgramStep>, u32>,
-    /// By program, source zone and target zone: whether every valuation of the source gets into the
-    /// target.
+    /// For each program, source zone and target zone: whether every valuation of the source gets
+    /// into the target.
     totals: FxHashMap<(ProgramId, ZoneId, ZoneId), bool>,
-    /// What the steps take.
+    /// The bytes of the steps.
     step_bytes: usize,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn steps_bytes(steps: &[ProgramStep]) -> usize {
 impl Programs {
     /// The program with these steps.
     pub fn intern(&mut self, steps: &[ProgramStep]) -> ProgramId {
-        // The last program is the likeliest, and comparing costs less than hashing.
+        // The last program is the most likely one, and comparing costs less than hashing.
         if self
             .steps
             .get(self.last as usize)
@@ -96,7 +96,7 @@ impl Programs {
         for (index, step) in steps.iter().enumerate().rev() {
             step.effect.preimage(federation);
             if step.delays {
-                // Waiting ends where the invariant of the state waited in does.
+                // A wait ends where the invariant of the state ends.
                 federation.constrain_all(&steps[index - 1].effect.invariant);
                 federation.down(&ClockSet::default());
             }

@@ -1,4 +1,4 @@
-//! The one node that all dead ends are: its edges, and how it is taken back.
+//! The one node that stands for all dead ends: its edges, and how to undo it.
 
 use crate::network::Failure;
 use crate::zones::Zone;
@@ -27,8 +27,8 @@ impl Graph<'_, '_> {
         self.link(origin, node, program, (length, false));
     }
 
-    /// Takes back that dead ends are left out: expands the nodes anew that lead to one.
-    pub(in crate::game) fn go_on_in_dead_ends(&mut self) -> Result<(), Failure> {
+    /// Undoes that dead ends are left out: expands again the nodes that lead to one.
+    pub(in crate::game) fn expand_dead_ends(&mut self) -> Result<(), Failure> {
         let DeadEnds { node, .. } = std::mem::take(&mut self.dead_ends);
         let mut edge = node.map_or(NONE, |node| self.nodes[node as usize].first_in);
         let mut last = NONE;
@@ -36,7 +36,7 @@ impl Graph<'_, '_> {
             let Edge {
                 source, next_in, ..
             } = self.edges[edge as usize];
-            // The edges of a node into the same target stand together.
+            // The edges of a node into the same target are successive.
             if source != last {
                 self.expand(source)?;
             }
@@ -44,7 +44,7 @@ impl Graph<'_, '_> {
             edge = next_in;
         }
         if self.nodes[0].standing == Standing::Dead {
-            self.judge_anew(0)?;
+            self.reevaluate(0)?;
             self.expand(0)?;
         }
         Ok(())

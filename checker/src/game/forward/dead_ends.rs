@@ -1,26 +1,27 @@
-//! Dead ends: states from which what is sought cannot come any more, as locations show.
+//! Dead ends: states from which the target cannot be reached any more, as locations show.
 //!
-//! For each process it is known from which of its locations some edges, whatever their guards, lead
-//! to one in which what is sought may be. In a state in which one process is in none of these the
-//! seeker has lost, whoever moves. Nothing of the words but locations is looked at, nor clocks.
+//! For each process, this finds the locations from which some edges, whatever their guards, lead to
+//! a location that may satisfy the target of the seeker. If one process of a state is in no such
+//! location, the seeker has lost, whoever moves. This uses only locations, neither other words nor
+//! clocks.
 
 use crate::analysis::may_hold::Possibility;
 use crate::ir::{LocationId, Network, Process, ProcessId};
 
 use super::objective::Objective;
 
-/// The locations from which nothing sought can come.
+/// The locations from which the target cannot be reached.
 #[derive(Debug, Default)]
 pub(super) struct DeadEnds {
-    /// The processes that have such locations, and by location whether it is one.
+    /// The processes that have such locations; for each location, whether it is one.
     processes: Vec<(usize, Box<[bool]>)>,
-    /// The node that stands for all of them, once there is one.
+    /// The node that stands for all of them, once it exists.
     pub(super) node: Option<u32>,
 }
 
 impl DeadEnds {
-    /// The dead ends of an objective: of the goal if the controller seeks it, else of breaking what
-    /// must be kept.
+    /// The dead ends of an objective. Its target is the goal if the controller seeks it; otherwise
+    /// it is a state in which what must be kept is broken.
     pub(super) fn new(network: &Network, objective: &Objective<'_>) -> DeadEnds {
         let (sought, truth) = match (objective.goal, objective.keep) {
             (Some(goal), _) if objective.must_progress => (goal, true),

@@ -1,4 +1,4 @@
-//! How the edges of a node are made: its moves are taken, each with the moves that follow without a
+//! How the edges of a node are made: takes each of its moves, and after it the moves without a
 //! choice.
 
 use crate::cancellation;
@@ -11,11 +11,11 @@ use super::clock_programs::{ProgramId, ProgramStep};
 use super::graph::Graph;
 use super::node::{Edge, Origin};
 
-/// Bytes of zones that the account need not be told of.
+/// This many bytes of zones need not be in the account.
 const MOST_UNTOLD_BYTES: usize = 4 << 20;
 
 impl Graph<'_, '_> {
-    /// Computes the edges of a node. Nodes that this makes are behind the ones there were.
+    /// Computes the edges of a node. The new nodes come after the old ones.
     pub fn expand(&mut self, node: u32) -> Result<(), Failure> {
         let mut words = std::mem::take(&mut self.words);
         let mut moves = std::mem::take(&mut self.moves);
@@ -62,7 +62,7 @@ impl Graph<'_, '_> {
         Ok(())
     }
 
-    /// Computes the moves of a node; gives the root of their trails, if they were met before.
+    /// Computes the moves of a node; returns the root of their trails, if they were met before.
     fn moves_of(
         &mut self,
         node: u32,
@@ -82,7 +82,8 @@ impl Graph<'_, '_> {
         Ok(None)
     }
 
-    /// Takes a move of a node, and the moves after it as long as there is no choice; adds the edge.
+    /// Takes a move of a node, and then the following moves as long as there is no choice; adds the
+    /// edge.
     fn follow(
         &mut self,
         origin: Origin,
@@ -114,12 +115,12 @@ impl Graph<'_, '_> {
         }
         let mut zone = self.entries.swap_remove(0);
         let may_delay = delay_after(self.symbolic, target, (&self.steps, self.latest), &mut zone)?;
-        self.go_on(origin, target, zone, (1, may_delay))
+        self.continue_chain(origin, target, zone, (1, may_delay))
     }
 
-    /// Goes on with a chain of which `length` moves were taken, and adds its edge. The zone
-    /// contains its future if time may pass.
-    pub(super) fn go_on(
+    /// Continues a chain of which `length` moves were taken, and adds its edge. The zone contains
+    /// its future if time may pass.
+    pub(super) fn continue_chain(
         &mut self,
         origin: Origin,
         target: &mut Vec<i32>,
@@ -138,9 +139,9 @@ impl Graph<'_, '_> {
         self.end(target, zone, origin, length)
     }
 
-    /// Takes the only move of a state inside a chain: leaves its effect in `effect`, the words
-    /// after it in `spare`, and the zone on entry in `zone`. Returns false, with the zone as it
-    /// was, if the chain ends with the state.
+    /// Takes the only move of a state inside a chain. Writes its effect to `effect`, the words
+    /// after it to `spare`, and the zone on entry to `zone`. Returns false, with the zone
+    /// unchanged, if the chain ends at the state.
     fn only_move(
         &mut self,
         words: &mut [i32],
@@ -178,7 +179,8 @@ impl Graph<'_, '_> {
         Ok(true)
     }
 
-    /// Ends an edge whose first move enters in several zones, or none: an edge to each.
+    /// Ends an edge whose first move leads to several zones or to none: adds one edge for each
+    /// zone.
     fn end_in_pieces(&mut self, target: &mut [i32], origin: Origin) -> Result<(), Failure> {
         let mut zones = std::mem::take(&mut self.entries);
         if !zones.is_empty() && self.dead_ends.contain(target) {
@@ -190,7 +192,7 @@ impl Graph<'_, '_> {
             delay_after(self.symbolic, target, (&self.steps, self.latest), zone)?;
         }
         if self.has_discrete_nodes {
-            // All pieces end in the same node, and the steps say from where.
+            // All pieces end in the same node, and the steps say where each comes from.
             zones.truncate(1);
         } else if self.symbolic.splits() {
             self.symbolic.extrapolate_all(target, &mut zones);
@@ -201,7 +203,7 @@ impl Graph<'_, '_> {
         Ok(())
     }
 
-    /// Adds the edge of the steps at hand, which lead to this zone.
+    /// Adds the edge of the current steps, which lead to this zone.
     fn end(
         &mut self,
         target: &mut [i32],
@@ -225,13 +227,13 @@ impl Graph<'_, '_> {
             program: self.programs.intern(&self.steps),
             totality: None,
         };
-        self.ask_for_zones();
+        self.check_zone_memory();
         self.add_edge(target, &mut ending, origin, length)
     }
 
-    /// Asks whether there may be the zones that the account was not told of yet, if they are many:
-    /// one node can have thousands of successors.
-    fn ask_for_zones(&self) {
+    /// Asks for the memory of zones that are not in the account yet, if they are many: one node can
+    /// have thousands of successors.
+    fn check_zone_memory(&self) {
         let count = self.zones.len() - self.counted_zones;
         let bytes = count * self.dimension().pow(2) * size_of::<Bound>();
         if bytes > MOST_UNTOLD_BYTES {
@@ -302,8 +304,8 @@ impl Graph<'_, '_> {
     }
 }
 
-/// Lets time pass in a state that the steps lead to, within its invariant and until it is too late,
-/// if it may; returns whether it may.
+/// Lets time pass in the state that the steps reach, if it may: within its invariant and up to the
+/// deadline. Returns whether it may.
 pub(super) fn delay_after(
     symbolic: &mut Symbolic<'_>,
     words: &mut [i32],
@@ -316,7 +318,7 @@ pub(super) fn delay_after(
     Ok(may_delay)
 }
 
-/// The invariant of the state that the steps lead to: that of the last step, since steps that are
+/// The invariant of the state that the steps reach: that of the last step, since steps that are
 /// left out have none.
 fn invariant_after(steps: &[ProgramStep]) -> &[Constraint] {
     steps.last().map_or(&[][..], |last| &last.effect.invariant)

@@ -1,30 +1,31 @@
-//! The forward part of a game: nodes are symbolic states, edges are moves, and both are made as
-//! they are asked for.
+//! The forward part of a game: nodes are symbolic states, edges are moves, and both are made on
+//! demand.
 //!
 //! Invariants:
 //! * A node's zone contains its own future where time may pass, and satisfies the invariants.
 //! * An edge may stand for a *chain* of moves: a move and the moves that follow without any choice.
-//!   A state belongs to the inside of a chain if it has exactly one move as far as words decide,
-//!   the goal holds nowhere in it and what must be kept everywhere, and time cannot pass in it, or
-//!   (if waiting never helps the controller) the one move is the controller's. Nothing of the
-//!   inside is stored. The winning valuations of the inside follow from those of the end, since
-//!   nobody has a choice.
+//!   A state belongs to the inside of a chain on these conditions: by its words it has exactly one
+//!   move; the goal holds nowhere in it, and what must be kept holds everywhere; and either time
+//!   cannot pass in it, or the one move is the controller's and waiting never helps the controller.
+//!   Nothing of the inside is stored. The winning valuations of the inside follow from those of the
+//!   end, since no player has a choice.
 //! * Where a move of the controller leads to a branch point, its edges are the *legs* of one entry
 //!   ([`super::branch_points`]): the controller chooses among entries only.
 //! * An edge leads to a node whose zone contains the zone that the moves reach.
 //! * In a graph of discrete states ([`Graph::of_discrete_states`]) there is one node for each
-//!   discrete state, whose zone is all that its invariants allow. Who wins from a valuation does
-//!   not depend on how it is reached, so the answer is the same. There may be far fewer nodes, but
-//!   also ones that no run reaches, so a run-time error in such a graph means nothing.
-//! * All states from which what is sought cannot come any more are one node ([`super::dead_ends`]),
-//!   unless the initial one is among them; what follows after them is left out.
+//!   discrete state, whose zone is all that its invariants allow. The winner from a valuation does
+//!   not depend on the path to it, so the answer is the same. There may be far fewer nodes, but
+//!   also nodes that no run reaches, so a run-time error in such a graph means nothing.
+//! * All states from which the target cannot be reached any more are one node
+//!   ([`super::dead_ends`]), unless the initial state is among them; the states after them are left
+//!   out.
 //!
 //! Where synchronisations on urgent channels have clock guards, time does not reach all of a node's
 //! zone: see [`super::urgent_nodes`].
 //!
-//! Extrapolation is Extra-M+ here: backward steps use the constants of guards and goals exactly.
-//! Where two clocks are compared, zones are cut along the comparisons, and a move has an edge for
-//! each piece; there are no chains then.
+//! Extrapolation is Extra-M+ here, because backward steps use the constants of guards and goals
+//! exactly. If the model compares two clocks, zones are cut along the comparisons, and a move has
+//! an edge for each piece; there are no chains then.
 
 use crate::network::{ClockEffect, Failure, Moves, Symbolic};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
@@ -46,11 +47,11 @@ pub struct Graph<'s, 'a> {
     /// The network.
     pub symbolic: &'s mut Symbolic<'a>,
     pub(super) objective: Objective<'s>,
-    /// How late a state may be, if there is a deadline.
+    /// The latest time of a state, if there is a deadline.
     pub(in crate::game) latest: Option<Constraint>,
     pub(super) store: StateStore,
     pub(in crate::game) zones: ZoneTable,
-    /// What edges do to clocks.
+    /// The effects of edges on clocks.
     pub programs: Programs,
     /// The nodes; the first is the initial one.
     pub nodes: Vec<Node>,
@@ -61,7 +62,7 @@ pub struct Graph<'s, 'a> {
     pub(super) urgent: rustc_hash::FxHashMap<u32, Urgent>,
     /// The bytes that the zones of `parts` and `urgent` take.
     pub(super) cut_bytes: usize,
-    /// How many zones there were when the account was told last.
+    /// The number of zones at the last report to the account.
     pub(in crate::game) counted_zones: usize,
     /// How many states were expanded, those inside chains included.
     pub explored: u64,
@@ -72,7 +73,7 @@ pub struct Graph<'s, 'a> {
     pub(super) moves: Moves,
     pub(super) chain_moves: Moves,
     pub(super) steps: Vec<ProgramStep>,
-    /// What the move that was just taken does to clocks.
+    /// The effect on clocks of the last move.
     pub(super) effect: ClockEffect,
     pub(super) entries: Vec<Zone>,
     pub(super) chains_delays: bool,
@@ -81,7 +82,7 @@ pub struct Graph<'s, 'a> {
     /// Whether there is one node for each discrete state.
     pub(super) has_discrete_nodes: bool,
     pub(super) dead_ends: DeadEnds,
-    /// Moves in one chain, at most.
+    /// The greatest number of moves in one chain.
     pub(super) longest_chain: usize,
 }
 
@@ -121,8 +122,9 @@ impl<'s, 'a> Graph<'s, 'a> {
         Ok(graph)
     }
 
-    /// Makes a node of every state, instead of chains; before the first node is expanded.
-    pub fn leave_out_chains(&mut self) {
+    /// Makes a node of every state, instead of chains. It must be called before the first node is
+    /// expanded.
+    pub fn disable_chains(&mut self) {
         self.longest_chain = 1;
         self.trails = ChainCache::new(false, &self.objective);
     }
@@ -176,7 +178,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         })
     }
 
-    /// All that is allowed by an invariant, up to the deadline.
+    /// All that an invariant allows, up to the deadline.
     pub(super) fn anything_within(&self, invariant: &[Constraint]) -> Zone {
         let mut zone = Zone::of_constraints(self.dimension(), invariant);
         zone.constrain_all(self.latest.as_slice());
@@ -253,7 +255,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         first as usize..last as usize
     }
 
-    /// How time is stopped in a node; `None` if nothing does it at some clock values only.
+    /// How time is stopped in a node; `None` if nothing stops it for only some clock values.
     pub fn urgent(&self, node: u32) -> Option<&Urgent> {
         if self.urgent.is_empty() {
             return None;
@@ -269,7 +271,8 @@ impl<'s, 'a> Graph<'s, 'a> {
         }
     }
 
-    /// Whether a node whose zone contains that of a state also reaches whatever the state does.
+    /// Whether a node whose zone contains that of a state also reaches everything that the state
+    /// reaches.
     pub(super) fn covers(&self, node: u32, zone: &Zone, urgent: Option<&Urgent>) -> bool {
         match (self.urgent(node), urgent) {
             (None, _) => true,
@@ -278,7 +281,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         }
     }
 
-    /// The node of a state, whose zone has this id, made if no stored one contains it.
+    /// The node of a state whose zone has this id. It is made if no stored node contains the state.
     pub(super) fn node_of(
         &mut self,
         words: &mut [i32],

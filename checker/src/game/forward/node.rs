@@ -6,7 +6,7 @@ use crate::zones::zone_table::ZoneId;
 
 use super::clock_programs::ProgramId;
 
-/// Moves in one chain, at most; longer ones are cut by a node, so that loops end.
+/// The greatest number of moves in one chain; longer chains are cut by a node, so that loops end.
 pub(super) const LONGEST_CHAIN: usize = 64;
 
 /// No node or edge.
@@ -33,10 +33,10 @@ pub struct Node {
     pub standing: Standing,
 }
 
-/// Whether a node is decided by itself.
+/// Whether the words decide the objective in a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
-    /// Neither the goal holds anywhere nor is anything broken.
+    /// The goal holds nowhere, and nothing is broken.
     Open,
     /// The goal holds in the whole node.
     Goal,
@@ -44,7 +44,7 @@ pub enum Standing {
     Broken,
     /// Both depend on the clocks: see [`Parts`].
     Mixed,
-    /// What is sought cannot come any more: see [`super::dead_ends`].
+    /// The target cannot be reached any more: see [`super::dead_ends`].
     Dead,
 }
 
@@ -57,7 +57,7 @@ pub struct Parts {
     pub broken: Federation,
 }
 
-/// A move, with those that follow without a choice.
+/// A move, with the moves that follow without a choice.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
     /// Where it starts.
@@ -66,12 +66,12 @@ pub struct Edge {
     pub target: u32,
     /// The next edge into the same target.
     pub next_in: u32,
-    /// What it does to clocks.
+    /// Its effect on clocks.
     pub program: ProgramId,
     /// The index of the first move among the moves of the source.
     pub ordinal: u32,
-    /// The processes that take part in the first move, a bit for each; those with the same index
-    /// modulo 32 share one.
+    /// The processes that take part in the first move, one bit for each; processes with the same
+    /// index modulo 32 share one.
     pub movers: u32,
     /// How many moves it stands for.
     pub length: u8,

@@ -1,25 +1,25 @@
-//! What is to be reached and kept, and by when.
+//! What must be reached and kept, and until when.
 //!
-//! Where the goal is to be reached in time, a clock that nothing sets measures the time. What is
-//! later than the deadline is lost for good, so zones end there: no state past it is ever made.
+//! If the goal must be reached in time, a clock that nothing sets measures the time. A state after
+//! the deadline is lost for good, so zones end at the deadline.
 
 use crate::ir::{FunctionId, Predicate};
 use crate::network::Failure;
 use crate::zones::Bound;
 use crate::zones::dbm::Constraint;
 
-/// What is to be reached and kept.
+/// What must be reached and kept.
 #[derive(Clone, Copy, Debug)]
 pub struct Objective<'q> {
-    /// The goal; play ends where it holds. `None`: there is none (safety).
+    /// The goal; play ends where it holds. With `None` there is none (safety).
     pub goal: Option<&'q Predicate>,
-    /// What must hold until then; `None`: nothing.
+    /// What must hold until then; with `None` nothing.
     pub keep: Option<&'q Predicate>,
     /// Whether waiting for ever never helps the controller.
     pub must_progress: bool,
-    /// By when the goal must be reached.
+    /// The deadline of the goal.
     pub deadline: Option<Deadline>,
-    /// Whether what follows after dead ends is left out.
+    /// Whether the states after dead ends are left out.
     pub leaves_dead_ends: bool,
 }
 
@@ -30,16 +30,16 @@ pub struct Deadline {
     pub clock: usize,
     /// The limit.
     pub limit: i32,
-    /// Whether the clock may start at any value up to the limit, so that the valuations of the
-    /// initial node show how much time is needed; else it starts at 0.
+    /// Whether the clock may start at any value up to the limit. Then the valuations of the initial
+    /// node show how much time is needed. Otherwise it starts at 0.
     pub starts_anywhere: bool,
-    /// How much time, at least, is still to be left in a state before the goal; a negative value
-    /// counts as 0.
+    /// The least time that must still remain in a state before the goal; a negative value counts as
+    /// 0.
     pub rest: Option<FunctionId>,
 }
 
 impl Deadline {
-    /// That the clock shows at most this.
+    /// The constraint that the clock shows at most this.
     pub(super) fn until(&self, limit: i32) -> Result<Constraint, Failure> {
         Ok(Constraint {
             left: self.clock,

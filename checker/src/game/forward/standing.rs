@@ -1,4 +1,4 @@
-//! Where the objective holds in a state: whether a node is decided by itself.
+//! Where the objective holds in a state: whether the words decide it in a node.
 
 use crate::network::{Extent, Failure};
 use crate::zones::dbm::{self, Constraint};
@@ -9,8 +9,8 @@ use super::node::{Parts, Standing};
 use super::urgent_nodes::Urgent;
 
 impl Graph<'_, '_> {
-    /// Evaluates the objective in a node anew.
-    pub(super) fn judge_anew(&mut self, node: u32) -> Result<(), Failure> {
+    /// Evaluates the objective in a node again.
+    pub(super) fn reevaluate(&mut self, node: u32) -> Result<(), Failure> {
         let mut words = self.words.clone();
         self.load(node, &mut words);
         let zone = Zone::from_bounds(self.dimension(), self.zone(node));
@@ -68,7 +68,7 @@ impl Graph<'_, '_> {
         }
     }
 
-    /// Where the goal holds, and where what must be kept does.
+    /// Where the goal holds, and where what must be kept holds.
     pub(super) fn extents(
         &mut self,
         words: &mut [i32],
@@ -85,8 +85,8 @@ impl Graph<'_, '_> {
         self.in_time(words, zone, (goal, keep))
     }
 
-    /// Whether play goes on: neither the goal holds anywhere in the state, nor is anything broken,
-    /// nor is it a dead end.
+    /// Whether play continues: the goal holds nowhere in the state, nothing is broken, and it is
+    /// not a dead end.
     pub(super) fn is_open(&mut self, words: &mut [i32], zone: &Zone) -> Result<bool, Failure> {
         if self.dead_ends.contain(words) {
             return Ok(false);
@@ -95,7 +95,8 @@ impl Graph<'_, '_> {
         Ok(matches!(extents, (Extent::Nowhere, Extent::Everywhere)))
     }
 
-    /// The parts of the extents of the goal, and of what must be kept, that are in time.
+    /// The parts of the extents of the goal, and of what must be kept, that lie before the
+    /// deadline.
     pub(super) fn in_time(
         &mut self,
         words: &mut [i32],
@@ -114,7 +115,7 @@ impl Graph<'_, '_> {
         Ok((within(&goal, deadline.until(deadline.limit)?, zone), keep))
     }
 
-    /// Whether time may come to a stop in a node: what the deadline ends goes on.
+    /// Whether time may stop in a node. The end of play at the deadline does not count.
     pub(in crate::game) fn is_delay_bounded(&self, node: u32) -> bool {
         let mut others = ClockSet::default();
         if let Some(deadline) = self.objective.deadline {

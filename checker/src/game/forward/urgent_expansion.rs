@@ -1,4 +1,4 @@
-//! How nodes are made where something stops time at some clock values only
+//! How nodes are made where something stops time for only some clock values
 //! ([`super::urgent_nodes`]).
 
 use crate::network::{Failure, Moves};
@@ -73,7 +73,7 @@ impl Graph<'_, '_> {
         Ok(())
     }
 
-    /// What the zones on entry of a state become when time passes.
+    /// The zones on entry of a state after time has passed.
     fn futures(
         &mut self,
         words: &mut [i32],

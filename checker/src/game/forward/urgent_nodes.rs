@@ -1,22 +1,23 @@
-//! Nodes in which something stops time at some clock values only.
+//! Nodes in which something stops time for only some clock values.
 //!
 //! A synchronisation on an urgent channel with clock guards stops time where it is enabled: see
-//! `network/symbolic/delay.rs`; and a strategy under which the game is played where it lets the
-//! controller not wait: there the controller is *obliged* to move. The zone of such a node contains
-//! its future as if nothing stopped time, so that it is one zone; which part of it is *reached* is
-//! kept beside it, and nothing outside of that part counts. Invariants:
+//! `network/symbolic/delay.rs`. So does a strategy under which the game is played, where it does
+//! not let the controller wait: there the controller is *obliged* to move. The zone of such a node
+//! contains its future as if nothing stopped time, so it is one zone. The part of it that is
+//! *reached* is stored separately, and nothing outside of that part counts. Invariants:
 //! * The reached part contains its own future up to where time stops.
-//! * An edge leads from the reached part of its source, and whatever it leads to is in the reached
-//!   part of a target.
+//! * An edge starts in the reached part of its source, and everything that it leads to is in the
+//!   reached part of a target.
 //!
 //! There are no chains then, and no clocks that stand still.
 //!
-//! Where an urgent synchronisation has no first moment, time stops before it. Where an obligation
-//! has none, the controller moves soon after: time gets to moments as soon as one likes.
+//! If an urgent synchronisation has no first moment, time stops before it. If an obligation has
+//! none, the controller moves soon after it begins: time gets to moments as close to the beginning
+//! as one likes.
 //!
-//! Zones are extrapolated on entry, before time passes: valuations that differ only above all
-//! constants are bisimilar, so each valuation that is added does, also while time passes, what one
-//! does that was there before.
+//! Zones are extrapolated on entry, before time passes. Valuations that differ only above all
+//! constants are bisimilar. So each added valuation behaves like one that was there before, also
+//! while time passes.
 
 use crate::zones::future::{self, Barriers};
 use crate::zones::{ClockSet, Federation, Zone, instants, past};
@@ -28,12 +29,12 @@ pub struct Urgent {
     pub channel: Federation,
     /// Where the controller is obliged to move.
     pub obliged: Federation,
-    /// What time leads to.
+    /// What time reaches.
     pub reached: Federation,
 }
 
 impl Urgent {
-    /// The bytes that it takes beside the value itself.
+    /// The bytes that it takes, without the value itself.
     pub(super) fn heap_bytes(&self) -> usize {
         let parts = [&self.channel, &self.obliged, &self.reached];
         parts.iter().map(|part| part.heap_bytes()).sum()
@@ -46,15 +47,15 @@ impl Urgent {
         stops
     }
 
-    /// All valuations at which time cannot pass for an urgent channel: where it stops time, and
-    /// what is followed by that at once.
+    /// All valuations in which time cannot pass because of an urgent channel: where it stops time,
+    /// and where such a valuation follows at once.
     pub(in crate::game) fn standstill(&self) -> Federation {
         let mut all = instants::before(&self.channel, &ClockSet::EMPTY);
         all.unite(&self.channel);
         all.intersection(&self.reached)
     }
 
-    /// The zones with what time leads to from them.
+    /// The zones, and what time reaches from them.
     pub(in crate::game) fn later(&self, zones: &[Zone]) -> Vec<Zone> {
         let dimension = self.reached.dimension();
         let mut from = Federation::empty(dimension);
@@ -73,10 +74,10 @@ impl Urgent {
             .collect()
     }
 
-    /// The safe timed predecessors of `good` with respect to `bad` where time is stopped on the
-    /// way: a valuation that stops time can be the last one of a delay, and no other. So of those
-    /// in `good` only the first moments are led to, and where an obligation has none, those as soon
-    /// as one likes.
+    /// The safe timed predecessors of `good` with respect to `bad`, where something stops time in
+    /// between. A valuation that stops time can be the last one of a delay, but no earlier one. So
+    /// only the first moments of those in `good` are reached; where an obligation has no first
+    /// moment, moments as early as one likes are.
     pub(in crate::game) fn predecessors(&self, good: &Federation, bad: &Federation) -> Federation {
         let stops = self.stops();
         let mut now = good.clone();

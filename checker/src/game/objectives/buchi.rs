@@ -1,8 +1,9 @@
-//! Games with a goal that is to come again and again: `A[] (p && A<> q)`.
+//! Games with a goal that must recur: `A[] (p && A<> q)`.
 //!
-//! The controller wins a play if p always holds and q holds at some instant from every one on. A
-//! play that ends wins if q holds at its end. What it wins is the greatest X such that from every
-//! valuation in X it can get, within p, into q, and go on from there without leaving X:
+//! The controller wins a play if p always holds, and after every instant there is one at which q
+//! holds. A play that ends is won if q holds at its end. What the controller wins is the greatest X
+//! such that from every valuation in X it can get, within p, into q, and can continue from there
+//! without leaving X:
 //!
 //! ```text
 //! leave  = Pred_t(not X ∪ Pre_u(not X) ∪ held, ⋃ Pre_c(X), less Pre_u(not X))
@@ -12,13 +13,12 @@
 //!          (see [`crate::game::solver`])
 //! ```
 //!
-//! The graph is explored before. X begins with what the controller wins of the game in which it has
-//! to keep p only, and shrinks until it stays; what breaks p would else come off it round by round.
-//! With the goals that are met at the start of each round, the strategy of the last one is a
-//! strategy for the whole: see [`crate::game::strategy::attractor`]. What each round takes away
-//! shows how the environment wins there, if X begins with everything: see
-//! [`crate::game::strategy::co_buchi`]. So it does in a second solution, once it is known that the
-//! environment wins.
+//! The graph is explored before. X begins with what the controller wins of the game in which it
+//! must only keep p, and shrinks until it stays the same; otherwise X would lose what breaks p
+//! round by round. The strategy of the last round, with the goals at its start, is a strategy for
+//! the whole: see [`crate::game::strategy::attractor`]. If X begins with everything, what each
+//! round takes away shows how the environment wins there: see [`crate::game::strategy::co_buchi`].
+//! A second solution does this, once it is known that the environment wins.
 //!
 //! Source: L. de Alfaro, M. Faella, T. Henzinger, R. Majumdar, M. Stoelinga, "The Element of
 //! Surprise in Timed Games", CONCUR 2003 (nested fixpoints over timed predecessors).
@@ -34,24 +34,25 @@ use crate::game::backward::winning_sets::wins_bytes;
 use crate::game::forward::node::Standing;
 use crate::game::solver::Solver;
 
-/// Nodes between two looks at the limits.
+/// Nodes between two checks of the limits.
 const NODES_BETWEEN_LOOKS: u32 = 64;
 
 /// Solves the game of a new solver with the controller as its seeker. The goal of its graph must be
-/// p ∩ q, and p what is kept. On a win, the strategy can be read from it. If the players work
-/// together, it is enough that it can be won from somewhere. `rounds`, if wanted, becomes the sets
-/// X by node, the first one first, unless the controller wins.
+/// p ∩ q, and p what is kept. If the controller wins, the strategy can be read from the solver. If
+/// the players cooperate, it is enough that the controller wins from somewhere. If `rounds` is
+/// wanted and the controller does not win, it becomes the sets X for each node, the first one
+/// first.
 pub fn solve(
     solver: &mut Solver<'_, '_, '_>,
     is_cooperative: bool,
     rounds: Option<&mut Vec<Vec<Win>>>,
     watch: &mut dyn Watch,
 ) -> Result<Solution, Failure> {
-    solver.go_on(is_cooperative);
+    solver.continue_after_goal(is_cooperative);
     if let Some(reason) = solver.explore(watch)? {
         return Ok(Solution::Stopped(reason));
     }
-    if let Some(reason) = solver.seek_to_break(watch)? {
+    if let Some(reason) = solver.compute_breaking(watch)? {
         return Ok(Solution::Stopped(reason));
     }
     let nodes = 0..solver.graph.nodes.len() as u32;
@@ -67,7 +68,7 @@ pub fn solve(
     }
 }
 
-/// Lets X begin with what is kept, and shrink until it stays or it is clear who wins.
+/// Lets X begin with what is kept, and shrink until it stays the same or the winner is known.
 fn shrink(
     solver: &mut Solver<'_, '_, '_>,
     mut kept: Vec<Win>,
@@ -160,7 +161,7 @@ fn is_within(solver: &Solver<'_, '_, '_>, node: u32, (one, other): (&Win, &Win))
     }
 }
 
-/// The part of a node in which the goal holds, and from which the controller can go on without
+/// The part of a node in which the goal holds, and from which the controller can continue without
 /// leaving what is kept.
 fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Win, Failure> {
     let mut goal = match solver.graph.nodes[node as usize].standing {
@@ -181,7 +182,7 @@ fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Wi
     Ok(as_win(goal))
 }
 
-/// The part of a node from which the controller cannot keep play from leaving what is kept.
+/// The part of a node from which the controller cannot prevent play from leaving what is kept.
 pub(in crate::game) fn leave(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,

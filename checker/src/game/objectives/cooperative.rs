@@ -1,8 +1,8 @@
-//! Games in which both players first work together: `E<> control: …`.
+//! Games in which both players cooperate first: `E<> control: …`.
 //!
-//! The graph is explored through everything, whoever has won there, and without chains, so that
-//! every state is a node. If the controller wins from somewhere, its strategy begins there; a
-//! search finds the way. If it wins nowhere, the environment has a strategy from everywhere.
+//! The graph is explored everywhere, even where a player has won, and without chains, so that every
+//! state is a node. If the controller wins from some state, its strategy begins there, and a search
+//! finds the path to it. If it wins nowhere, the environment has a strategy from everywhere.
 
 use crate::network::{Failure, Symbolic};
 use crate::search::StateStore;
@@ -13,11 +13,11 @@ use crate::game::Player;
 use crate::game::backward::winning_sets::Win;
 use crate::game::solver::Solver;
 
-/// Where the controller wins, by words; a search for it ends where it wins somewhere.
+/// Where the controller wins, by words; a search for such a state ends at the first one.
 #[derive(Debug)]
 pub struct Winning {
     store: StateStore,
-    /// By state of the store: the nodes with its words, and what is won of them.
+    /// For each state of the store: the nodes with its words, and what is won of them.
     parts: Vec<Vec<(u32, Federation)>>,
 }
 
@@ -56,7 +56,7 @@ impl Winning {
         }
     }
 
-    /// A zone of what is won of a state.
+    /// A zone of the won part of a state.
     pub fn zone_in(&self, words: &[i32], zone: &Zone) -> Option<Zone> {
         let mut parts = self.parts(words).iter();
         parts.find_map(|(_, won)| {

@@ -1,5 +1,5 @@
-//! The strategy of the player who seeks something and wins: from valuations of stamp k it moves
-//! into valuations of smaller stamps, or waits for them.
+//! The strategy of the seeker if it wins: from valuations of stamp k it moves into valuations of
+//! smaller stamps, or waits for them.
 
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
@@ -33,7 +33,7 @@ pub fn extract(
 /// Reads the strategy of a player who wins from these nodes of a solved game.
 ///
 /// # Errors
-/// As [`extract`].
+/// Works like [`extract`].
 pub fn extract_from(
     solver: &mut Solver<'_, '_, '_>,
     owner: Player,
@@ -73,8 +73,7 @@ impl Chooser for Seeking {
         let moves = moves_of(solver, node)?;
         for gain in &solver.won.gains[node as usize].clone() {
             let mut rest = solver.gained_part(node, gain);
-            // Where what is sought is to come again and again, play goes on from there into
-            // anything that is won.
+            // Where the target must recur, play continues from there into anything that is won.
             let goes_on = solver.sought.targets.is_some();
             let earlier = |solver: &Solver<'_, '_, '_>, edge: u32| {
                 let target = solver.graph.edges[edge as usize].target;
@@ -128,9 +127,9 @@ impl Chooser for Seeking {
         Ok(chosen)
     }
 
-    /// What the seeker does in the states inside a chain. Each has one move, which is taken where
-    /// the rest of the chain leads into valuations of the end that are won; the smaller their
-    /// stamp, the better. Until then the strategy waits.
+    /// What the seeker does in the states inside a chain. Each state has one move, which is taken
+    /// where the rest of the chain leads into won valuations of the end; smaller stamps come first.
+    /// Elsewhere the strategy waits.
     fn inside(
         &self,
         solver: &mut Solver<'_, '_, '_>,
@@ -170,9 +169,9 @@ impl Chooser for Seeking {
     }
 }
 
-/// Ranks states inside chains above the end of their chain, by their steps to it. Their words may
-/// be those of a node as well; at equal ranks the chain could be entered again from where it has
-/// led.
+/// Gives states inside chains ranks above the end of their chain, by their distance from it. A
+/// state inside a chain may have the same words as a node; with equal ranks, play could enter the
+/// chain again from its end.
 fn rank_chains(all: &mut Extracted) {
     let Extracted {
         strategy,
@@ -196,7 +195,7 @@ fn rank_chains(all: &mut Extracted) {
     }
 }
 
-/// What the seeker can choose in a node: edges, each alone unless they are the legs of an entry.
+/// The choices of the seeker in a node: edges, or all legs of an entry.
 fn own_choices(solver: &Solver<'_, '_, '_>, node: u32) -> Vec<Vec<u32>> {
     let edges = solver.graph.edges_of(node).filter(|&edge| {
         let edge = &solver.graph.edges[edge];

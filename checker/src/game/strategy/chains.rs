@@ -21,7 +21,7 @@ pub(super) struct Inner {
 }
 
 impl Inner {
-    /// The state of a strategy that it is, with these decisions.
+    /// The state of a strategy for it, with these decisions.
     pub(super) fn with(self, decisions: Vec<Decision>) -> StrategyState {
         StrategyState {
             words: self.words,
@@ -31,9 +31,9 @@ impl Inner {
         }
     }
 
-    /// Goes back through the state with what the seeker wins after it, which becomes what it wins
-    /// in the state. Gives where its opponent, if it owns the move, can take it and get elsewhere,
-    /// and where the seeker does not win.
+    /// Steps back through the state: what the seeker wins after it becomes what it wins in it. If
+    /// the opponent owns the move, returns where it can take it and escape, and where the seeker
+    /// does not win.
     pub(super) fn evaded(&self, won: &mut Federation, is_own: bool) -> (Federation, Federation) {
         self.effect.preimage(won);
         won.constrain_all(&self.invariant);

@@ -1,10 +1,10 @@
-//! The closed loop: a network one of whose players follows a strategy.
+//! The closed loop: a network in which one player follows a strategy.
 //!
-//! A strategy becomes a [`Restriction`] of the network, so that any search runs over what is left.
-//! In each valuation the decisions that count are allowed: to wait lets time pass, a move is
-//! possible; all other moves of the player are forbidden, and time stops if waiting is not allowed.
-//! Where a strategy has no decision, and where play has ended, it says nothing, and everything is
-//! allowed. So the closed loop holds every run of every player that follows the strategy.
+//! A strategy becomes a [`Restriction`] of the network, so that any search explores only the closed
+//! loop. In each valuation the decisions that count are allowed: a wait lets time pass, and a move
+//! is possible. All other moves of the player are forbidden, and time stops if waiting is not
+//! allowed. Where a strategy has no decision, and where play has ended, everything is allowed. So
+//! the closed loop contains every run of every player that follows the strategy.
 
 use crate::ir::{ClockAtom, ClockId, ClockRange, Network};
 use crate::network::{Allowed, Part, Restriction, is_same_entry};
@@ -20,14 +20,14 @@ use crate::game::Player;
 pub struct ClosedLoop {
     owner: Player,
     store: StateStore,
-    /// By state of the store; `None` where play has ended.
+    /// For each state of the store; `None` where play has ended.
     states: Vec<Option<Allowed>>,
     atoms: Vec<ClockAtom>,
 }
 
 impl ClosedLoop {
-    /// The restriction that a strategy is of its network, which has the clock that measures time if
-    /// the strategy looks at it.
+    /// The restriction of its network for a strategy. The network must have the clock that measures
+    /// time if the strategy uses it.
     pub fn new(network: &Network, strategy: &Strategy) -> ClosedLoop {
         let dimension = network.clocks.len().max(1);
         let mut store = StateStore::new(network);
@@ -69,7 +69,7 @@ impl Restriction for ClosedLoop {
     }
 }
 
-/// What a strategy says of the states with some words.
+/// What a strategy says about the states with some words.
 #[derive(Debug)]
 pub struct Joined<'s> {
     /// The words.
@@ -109,7 +109,7 @@ pub fn joined<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Joined<'s>> 
     joined
 }
 
-/// The parts of the legs in which they are picked: of those with the same entry the first.
+/// For each leg, the part in which it is picked: among those with the same entry, the first counts.
 pub fn picked<'d>(legs: &[&'d Decision], dimension: usize) -> Vec<(&'d [Part], Federation)> {
     let mut picked: Vec<(&[Part], Federation)> = Vec::new();
     for leg in legs {
@@ -170,7 +170,7 @@ fn allowed(
         let Some(parts) = &decision.action else {
             continue;
         };
-        // Moves of the controller are known by their entries, of which there may be two names.
+        // A move of the controller is known by its entry, which may have two names.
         let is_it = |one: &[Part]| match owner {
             Player::Controller => is_same_entry(one, parts),
             Player::Environment => one == parts,
@@ -203,13 +203,13 @@ fn allowed(
     }
 }
 
-/// Whether time may run into the zone without a first moment: it has a strict lower bound.
+/// Whether time may run into the zone without a first moment, because it has a strict lower bound.
 fn has_open_side(zone: &[Bound], dimension: usize) -> bool {
     zone[1..dimension].iter().any(|bound| bound.is_strict())
 }
 
-/// Adds the comparisons that tell the zones from the rest, in both directions. Comparisons of two
-/// clocks that follow from those of each with a constant are left out.
+/// Adds the comparisons that distinguish the zones from the rest, in both directions. Comparisons
+/// of two clocks that follow from those of each with a constant are left out.
 fn collect_atoms(zones: &Federation, atoms: &mut Vec<ClockAtom>) {
     let dimension = zones.dimension();
     for zone in zones.zones() {

@@ -1,19 +1,20 @@
-//! How the environment keeps a goal from coming again and again.
+//! How the environment prevents a goal from recurring.
 //!
-//! Each round of [`crate::game::objectives::buchi`] takes away valuations from which the controller
-//! cannot get to the goal within p and go on from there inside what was kept before. Let X be what
-//! was kept before a round and Y what is kept after it. The valuations of *rank* k are those that
-//! round k took away. The environment plays by the rank:
-//! * Where it can make play leave X, it does: it waits until it has a move that leaves X, and takes
-//!   it. What is outside X has a smaller rank, or p does not hold there.
-//! * Elsewhere in X without Y it evades: it takes moves that stay outside Y wherever there are any,
-//!   and else waits. So play never gets to a goal from which the controller could go on inside X.
+//! Each round of [`crate::game::objectives::buchi`] takes away valuations: from these the
+//! controller cannot get to the goal within p and continue inside what was kept before. Let X be
+//! what was kept before a round and Y what is kept after it. The valuations of *rank* k are those
+//! that round k took away. The environment plays by the rank:
+//! * If it can make play leave X, it does: it waits until it has a move that leaves X, and takes
+//!   it. Valuations outside X have a smaller rank, or p does not hold there.
+//! * Elsewhere in X \ Y it evades: it takes moves that stay outside Y where there are any, and
+//!   otherwise waits. So play never gets to a goal from which the controller could continue inside
+//!   X.
 //!
 //! Where the controller moves to a branch point, it picks a leg that leaves X, or stays outside Y.
 //!
-//! Along a play the rank never grows. A goal that is met is one from which play leaves X, so that
-//! the rank falls: there are no more goals than ranks, and after the last one the goal does not
-//! come again.
+//! During a play the rank never grows. From every goal that is met, play leaves X, so that the rank
+//! falls. So there are at most as many goals as ranks, and after the last one the goal does not
+//! recur.
 
 use crate::network::{Failure, Part};
 use crate::search::limits::{StopReason, Watch};
@@ -108,8 +109,8 @@ impl Chooser for Denying<'_> {
     }
 
     /// What the environment does in the states inside a chain, where the goal holds nowhere. Each
-    /// has one move, which the environment takes, if it owns it, where the rest of the chain does
-    /// not lead into what is kept.
+    /// state has one move. If the environment owns it, it takes the move where the rest of the
+    /// chain does not lead into what is kept.
     fn inside(
         &self,
         solver: &mut Solver<'_, '_, '_>,
@@ -119,7 +120,7 @@ impl Chooser for Denying<'_> {
         let inside = walk(solver, edge, source)?;
         let dimension = solver.graph.dimension();
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
-        // What the rounds so far have taken away.
+        // The parts that the rounds have taken away until now.
         let mut taken: Vec<Federation> = vec![Federation::empty(dimension); inside.len()];
         for (rank, kept) in self.rounds.iter().enumerate().skip(1) {
             let mut kept = solver.federation_of(edge.target, &kept[edge.target as usize]);

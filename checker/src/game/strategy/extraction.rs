@@ -1,4 +1,4 @@
-//! How a strategy is read from a solved game: node by node, as far as play under it gets.
+//! How a strategy is read from a solved game: node by node, wherever play under it leads.
 
 use crate::cancellation;
 use crate::network::{Failure, Moves, Part};
@@ -11,7 +11,7 @@ use crate::game::forward::branch_points::entry_of;
 use crate::game::forward::node::Edge;
 use crate::game::solver::Solver;
 
-/// How the player chooses whose strategy is read.
+/// The choices of the player whose strategy is read.
 pub(super) trait Chooser {
     /// The player.
     fn owner(&self) -> Player;
@@ -30,7 +30,7 @@ pub(super) trait Chooser {
         source: &[i32],
     ) -> Result<Vec<StrategyState>, Failure>;
 
-    /// Whether play has ended in a node, won, whatever the clocks say.
+    /// Whether play has ended in a node and is won, for all clock values.
     fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
         solver.is_over(self.owner(), node)
     }
@@ -68,7 +68,7 @@ pub(super) struct Pick {
     parts: Vec<Part>,
 }
 
-/// A strategy, with how many moves lead from each state inside a chain to the end of it.
+/// A strategy, and for each state inside a chain the number of moves to its end.
 pub(super) struct Extracted {
     pub(super) strategy: Strategy,
     pub(super) steps_to_end: Vec<u32>,
@@ -129,8 +129,8 @@ pub(super) fn extract(
     }))
 }
 
-/// How a strategy names the first move of an edge, of a node with these moves, if the player who
-/// owns the move takes it.
+/// How a strategy names the first move of an edge, for a node with these moves, if the owner of the
+/// move takes it.
 pub(super) fn named(solver: &Solver<'_, '_, '_>, moves: &Moves, edge: &Edge) -> Vec<Part> {
     let parts = moves.get(edge.ordinal as usize).parts;
     if solver.graph.branch_points.is_possible() && edge.controllable {

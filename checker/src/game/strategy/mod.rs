@@ -1,26 +1,26 @@
 //! Strategies: what a player does, state by state.
 //!
-//! A strategy lists, for each discrete state that play under it can reach, decisions. A decision is
-//! a move of its owner, or to wait: let time pass as long as the zones of the decision go, and
-//! leave moving to the opponent. A decision of the controller names the edges that it takes, and
-//! the environment picks the legs of branch points behind them: a strategy of the environment lists
-//! which. States inside chains of forced moves are listed too, so that a strategy can be followed,
-//! and checked, move by move. Where play has ended there is nothing to decide.
+//! A strategy lists decisions for each discrete state that play under it can reach. A decision is a
+//! move of its owner, or a wait: let time pass inside the zones of the decision, and let the
+//! opponent move. A decision of the controller names the edges that it takes, and the environment
+//! picks the legs of the branch points after them; a strategy of the environment lists these legs.
+//! States inside chains of forced moves are listed too, so that a strategy can be followed, and
+//! checked, move by move. Where play has ended there is nothing to decide.
 //!
-//! There are six kinds, by who wins and how:
+//! There are six kinds, which differ in the winner and the way to win:
 //! * The controller of a reachability game, and the environment of a safety game, follow the stamps
-//!   of the gains: from valuations of stamp k they move only into valuations of smaller stamps, or
-//!   wait for them; so they make progress and get there.
-//! * The controller of a game with a goal that is to come again and again does the same, and from
-//!   the goal goes on into anything from which it wins; the ranks count anew from there.
+//!   of the gains. From valuations of stamp k they move only into valuations of smaller stamps, or
+//!   wait for them, so they make progress and reach the target.
+//! * The controller of a game with a goal that must recur does the same. From the goal, it
+//!   continues into anything from which it wins; the ranks start again there.
 //! * The controller of a safety game may do whatever keeps it safe: its strategy allows all such
-//!   moves and all such waiting. It is the most permissive one, with one choice made: where what is
-//!   safe has no last moment, and a move must be made before, it is made in the last stretch of
-//!   time in which it is possible.
-//! * The environment of a game with a goal that is to come again and again keeps it from coming, or
-//!   leads play to where the goal comes less often: see [`super::co_buchi`].
+//!   moves and all such waits. It is the most permissive strategy except for one choice: if the
+//!   safe valuations have no last moment, and a move must be made before their end, it is made in
+//!   the last stretch of time in which it is possible.
+//! * The environment of a game with a goal that must recur prevents it from recurring, or leads
+//!   play to where the goal recurs less often: see [`super::co_buchi`].
 //! * The environment of a reachability game that it wins moves where that leads to what the
-//!   controller does not win, and else waits: it never gets under pressure there.
+//!   controller does not win, and otherwise waits: it is never forced to move there.
 //!
 //! Source: Cassez et al., CONCUR 2005, section 5 (strategies from the order in which winning states
 //! were found).
@@ -46,11 +46,10 @@ use crate::game::Player;
 pub struct Decision {
     /// Where it applies.
     pub zones: Federation,
-    /// The move to take, where its owner is the controller with whichever branches; `None` is to
-    /// wait.
+    /// The move to take; if the controller owns it, with any legs. `None` means a wait.
     pub action: Option<Vec<Part>>,
-    /// The rank of the valuations: all moves lead to smaller ones, also inside chains. 0 is where
-    /// what was sought is reached, and everywhere in a strategy that only has to avoid.
+    /// The rank of the valuations: all moves lead to smaller ones, also inside chains. The target
+    /// has rank 0, and so has everything in a strategy that only has to avoid.
     pub rank: u32,
 }
 
@@ -61,10 +60,10 @@ pub struct StrategyState {
     pub words: Vec<i32>,
     /// The decisions, in order.
     pub decisions: Vec<Decision>,
-    /// If the owner is the environment: the legs that it picks, as moves of the controller. Of
-    /// those with the same entry the first that applies is picked.
+    /// If the owner is the environment: the legs that it picks, as moves of the controller. Among
+    /// those with the same entry, the first that applies is picked.
     pub legs: Vec<Decision>,
-    /// Whether play has ended here, won, whatever the clocks say.
+    /// Whether play has ended here and is won, for all clock values.
     pub is_goal: bool,
 }
 
@@ -96,40 +95,40 @@ pub enum Selection {
 /// A strategy.
 #[derive(Clone, Debug)]
 pub struct Strategy {
-    /// Who plays by it.
+    /// The player who uses it.
     pub owner: Player,
     /// Which of the decisions that apply counts. Decisions of states with the same words are one
     /// list, in the order of ranks.
     pub selection: Selection,
-    /// Within which time the controller reaches the goal, or up to which the environment prevents
-    /// it, if that is limited. Zones have a clock more then: the last one is 0 in the initial state
-    /// and nothing sets it.
+    /// The time within which the controller reaches the goal, or up to which the environment
+    /// prevents it, if there is a limit. Zones have one more clock then: it is the last one, is 0
+    /// in the initial state, and nothing sets it.
     pub time_limit: Option<i32>,
-    /// The strategy of the controller under which the game is played, if it is under one.
+    /// The strategy of the controller under which the game is played, if there is one.
     pub under: Option<Arc<Under>>,
     /// Where play begins.
     pub start: Start,
-    /// The states; if play begins in one, that first.
+    /// The states. If play begins in one state, that is the first.
     pub states: Vec<StrategyState>,
 }
 
-/// What the controller is allowed in a game.
+/// What the controller may do in a game under a strategy.
 #[derive(Clone, Debug)]
 pub struct Under {
     /// The query that the strategy answers.
     pub query: String,
-    /// The strategy: where it says something, the controller makes no other moves and waits only
+    /// The strategy: where it has a decision, the controller makes no other moves and waits only
     /// where it does.
     pub strategy: Arc<Strategy>,
 }
 
-/// Where play by a strategy begins.
+/// Where play under a strategy begins.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Start {
     /// In the initial state.
     #[default]
     Initial,
-    /// Where both players get to together.
+    /// In the state that both players reach together.
     After(Way),
     /// In any state that can be reached.
     Anywhere,
@@ -147,7 +146,7 @@ pub struct Way {
 }
 
 impl Strategy {
-    /// One that says nothing yet.
+    /// A strategy without decisions.
     pub(super) fn empty(owner: Player, selection: Selection) -> Strategy {
         Strategy {
             owner,
@@ -161,7 +160,7 @@ impl Strategy {
 }
 
 impl Decision {
-    /// One of no rank.
+    /// A decision without a rank.
     pub(super) fn new(zones: Federation, action: Option<Vec<Part>>) -> Decision {
         Decision {
             zones,

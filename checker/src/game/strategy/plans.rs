@@ -1,12 +1,11 @@
 //! Plans: all sequences of moves that win, for games in which only the controller has a choice.
 //!
 //! A plan is a path of the game graph from the initial node to a goal on which every move is
-//! winning. Zones are carried along exactly, so a plan is one that can be carried out, and no state
-//! comes twice on it. Plans come in the order of the moves of each state, which does not depend on
-//! the search.
+//! winning. Zones are computed exactly, so a plan can be carried out, and no state occurs twice on
+//! it. Plans come in the order of the moves of each state, which does not depend on the search.
 //!
-//! Cost: proportional to the nodes on winning paths; plans are found one after the other and never
-//! held all at once here.
+//! Cost: proportional to the nodes on winning paths. Plans are found one after the other, and are
+//! never all in memory here.
 
 use crate::cancellation;
 use crate::network::{Failure, Moves, Part};
@@ -37,7 +36,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The bytes that it takes, those of the value itself among them.
+    /// The bytes that it takes, including the value itself.
     pub fn heap_bytes(&self) -> usize {
         let parts = self.steps.iter().map(|step| size_of_val(&*step.parts));
         size_of::<Plan>()
@@ -54,7 +53,7 @@ pub enum NoPlans {
     EnvironmentChooses,
 }
 
-/// What it takes to follow an edge, beside its zones: see [`cancellation::work`].
+/// The work of following an edge, without its zones: see [`cancellation::work`].
 const UNITS_FOR_STEP: usize = 256;
 
 /// A node on the path that is being followed.
@@ -165,7 +164,7 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
     }
 
     /// The transitions of a path, and the words at its end.
-    pub fn spell(&mut self, path: &[u32]) -> Result<Plan, Failure> {
+    pub fn plan_of_path(&mut self, path: &[u32]) -> Result<Plan, Failure> {
         let graph = &mut *self.solver.graph;
         let symbolic = &mut *graph.symbolic;
         let mut words = symbolic.stepper.network().initial.clone();
@@ -189,7 +188,7 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
     }
 }
 
-/// Whether the environment has a move beside another one, or may choose when to move.
+/// Whether the environment has another move besides this one, or may choose when to move.
 fn has_opponent_choice(solver: &Solver<'_, '_, '_>, node: u32) -> bool {
     let range = solver.graph.edges_of(node);
     let count = range.len();

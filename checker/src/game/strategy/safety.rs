@@ -1,8 +1,8 @@
-//! How to stay where the other player, who seeks something, does not win.
+//! How to stay where the other player, the seeker, does not win.
 //!
-//! Outside of what the seeker wins, the evader always has a way to stay outside: a move, or
-//! waiting. The environment moves where it can, since the controller might get away later. The
-//! controller allows everything that stays outside.
+//! Outside of what the seeker wins, the evader always has a way to stay outside: a move, or a wait.
+//! The environment moves where it can, since the controller might escape later. The controller
+//! allows everything that stays outside.
 
 use crate::network::Failure;
 use crate::zones::{Federation, instants, past};
@@ -93,7 +93,7 @@ impl Chooser for Evading {
         Ok(chosen)
     }
 
-    /// What the evader does in the states inside a chain, as far as the seeker does not win there.
+    /// What the evader does in those states inside a chain in which the seeker does not win.
     fn inside(
         &self,
         solver: &mut Solver<'_, '_, '_>,
@@ -121,7 +121,7 @@ impl Chooser for Evading {
     }
 }
 
-/// The valuations of a node in which play has ended without the seeker's having won.
+/// The valuations of a node in which play has ended and the seeker has not won.
 fn ended(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
     match (solver.graph.nodes[node as usize].standing, solver.seeker) {
         (Standing::Goal, Player::Environment) | (Standing::Broken, Player::Controller) => {
@@ -133,7 +133,7 @@ fn ended(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
     }
 }
 
-/// Where the controller may wait and stay safe. `free` is where it is safe and play goes on,
+/// Where the controller may wait and stay safe. `free` is where it is safe and play continues,
 /// `acting` where it has a safe move.
 fn allowed_waiting(
     solver: &mut Solver<'_, '_, '_>,
@@ -153,7 +153,7 @@ fn allowed_waiting(
     let stopped = situation.stopped;
     let before = instants::before(&safe, &stopped);
     let mut waiting = before.intersection(free);
-    // Where time can pass at all, and what it does not pass.
+    // Where time can pass at all, and where it must stop.
     let mut passing = safe.clone();
     let mut impassable = Federation::empty(safe.dimension());
     if let Some(urgent) = solver.graph.urgent(node) {
@@ -163,7 +163,7 @@ fn allowed_waiting(
         passing.subtract(&standstill);
         impassable.unite(&urgent.stops());
     }
-    // What is safe may end in a limit that is not itself safe. Before such an end, the last
+    // The safe valuations may end in a limit that is not itself safe. Before such an end, the last
     // valuations with a move must use it.
     let mut unsafe_ones = solver.whole(node);
     unsafe_ones.subtract(&safe);

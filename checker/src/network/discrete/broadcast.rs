@@ -1,12 +1,12 @@
-//! From the edges that take part to moves: the receivers of a broadcast, combined, and the branches
-//! of edges.
+//! How moves are made of the edges that take part: the combinations of the receivers of a
+//! broadcast, and the branches of edges.
 //!
-//! Invariant: moves come in a fixed order and each has a *rank*, its place among all that could be
-//! put together, counting those that a [`Scope`] leaves out. So the rank of a move of a state is
-//! the same in every scope.
+//! Invariant: moves come in a fixed order, and each has a *rank*: its place among all combinations,
+//! including those that a [`Scope`] leaves out. So the rank of a move of a state is the same in
+//! every scope.
 //!
-//! Cost: without a scope as many steps as there are combinations; within a zone every choice that
-//! is looked at leads to a combination that is possible, or is the last that is looked at.
+//! Cost: without a scope, the number of steps is the number of combinations. Within a zone, each
+//! choice that is tried leads to a possible combination, or is the last one that is tried.
 
 use crate::cancellation;
 use crate::exec::EmittedConstraint;
@@ -18,16 +18,16 @@ use super::stepper::Stepper;
 use super::transition::{Label, Moves, Part};
 use crate::network::failure::Failure;
 
-/// After so many moves it is asked whether there may be more.
+/// After this many moves, the search asks whether more are allowed.
 const MANY_MOVES: usize = 1 << 12;
 
-/// What it takes to put a move together, beside what is done with zones for it.
+/// The work of combining a move, without the work on its zones.
 const UNITS_FOR_MOVE: usize = 256;
 
-/// The greatest rank, of what no scope would come to the end of.
+/// The greatest rank. No scope could reach the end of more combinations.
 const MOST_RANKS: u64 = 1 << 62;
 
-/// As many combinations are put together without looking whether the zone allows them: this is seen
+/// This number of combinations is made without asking whether the zone allows them; this is checked
 /// later.
 const FEW_COMBINATIONS: u64 = 2;
 
@@ -40,7 +40,7 @@ impl Stepper<'_> {
         words: &mut [i32],
         out: &mut Moves,
     ) -> Result<(), Failure> {
-        // Whoever records wants to see all that is evaluated.
+        // A recorder must see everything that is evaluated.
         let is_shared = self.record.is_none() && self.tuning.broadcast_receivers;
         if is_shared && self.has_audience(channel) {
             return self.broadcast_again(sender, words, out);
@@ -73,8 +73,8 @@ impl Stepper<'_> {
     /// The candidates from `first` on, all of one receiving process.
     pub(super) fn group(&self, first: usize) -> Group {
         let last = self.candidates.len();
-        // A receiver whose edges all have clock guards may have none that is open: abstaining comes
-        // after its candidates.
+        // If all edges of a receiver have clock guards, none may be enabled: abstaining comes after
+        // its candidates.
         let guarded = |candidate: &Candidate| candidate.constraints.0 < candidate.constraints.1;
         let may_abstain = self.candidates[first..last].iter().all(guarded);
         let ways = (first..last).map(|candidate| self.ways(Choice::Takes(candidate as u32)));
@@ -89,8 +89,8 @@ impl Stepper<'_> {
         }
     }
 
-    /// Emits every combination of the receivers' alternatives with the sender that is in the scope;
-    /// the last receiver's change fastest.
+    /// Emits the sender with every combination of the receivers' alternatives that is in the scope.
+    /// The choice of the last receiver changes fastest.
     fn combine(
         &mut self,
         sender: Sending<'_>,
@@ -113,8 +113,8 @@ impl Stepper<'_> {
         Ok(())
     }
 
-    /// The rank after all moves of a broadcast whose receivers can be combined in so many ways,
-    /// which stand for so many moves, and the scope in which they are.
+    /// The rank after all moves of a broadcast, and their scope, given the number of combinations
+    /// of its receivers and the number of moves that they stand for.
     pub(super) fn ranks_and_scope<'z>(
         &self,
         combinations: u64,
@@ -133,7 +133,7 @@ impl Stepper<'_> {
         Ok((rank_after, scope))
     }
 
-    /// Goes through the choices of the groups, after the sender was chosen.
+    /// Tries the choices of the groups, after the sender was chosen.
     pub(super) fn combine_from(
         &mut self,
         sender: Sending<'_>,
@@ -173,8 +173,8 @@ impl Stepper<'_> {
                 out.check_count()?;
                 cancellation::work(UNITS_FOR_MOVE);
                 if out.len().is_multiple_of(MANY_MOVES) {
-                    // The lists are about to grow to more than this, and may double while the old
-                    // ones are still there.
+                    // The lists will grow to more than this. They may double while the old ones
+                    // still exist.
                     cancellation::ask_for(3 * out.heap_bytes() + self.moves_beside);
                 }
             } else {
@@ -191,8 +191,8 @@ impl Stepper<'_> {
         }
     }
 
-    /// Adds a choice to the combination; returns false, with nothing added, if the scope has none
-    /// with it.
+    /// Adds a choice to the combination. Returns false, and adds nothing, if the scope has no
+    /// combination with it.
     pub(super) fn choose(&mut self, choice: Choice, scope: Scope<'_>) -> Result<bool, Failure> {
         let (candidates, constraints) = (&self.candidates, &self.constraints);
         let constraints_of = |candidate: &Candidate| {
@@ -219,7 +219,7 @@ impl Stepper<'_> {
         Ok(is_chosen)
     }
 
-    /// How many moves a choice stands for: the branches of its edge.
+    /// The number of moves that a choice stands for: the branches of its edge.
     fn ways(&self, choice: Choice) -> u64 {
         match choice {
             Choice::Takes(index) => {
@@ -286,7 +286,8 @@ impl Stepper<'_> {
     }
 }
 
-/// Goes to the next combination of branches, the last part fastest; false after the last one.
+/// Moves to the next combination of branches, the last part fastest; returns false after the last
+/// one.
 fn next_branches(network: &Network, parts: &mut [Part]) -> bool {
     for part in parts.iter_mut().rev() {
         let edge = &network.processes[part.process as usize].edges[part.edge as usize];

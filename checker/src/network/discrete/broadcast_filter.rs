@@ -1,11 +1,11 @@
-//! Which combinations of broadcast receivers are wanted, decided while they are put together.
+//! Which combinations of broadcast receivers are wanted. This is decided while they are made.
 //!
-//! Where n receivers have clock guards there are up to 2^n combinations of who takes part, and a
-//! zone leaves most of them without a valuation. So a combination is given up with its first choice
-//! that leaves nothing.
+//! Where n receivers have clock guards there are up to 2^n combinations of participants, and a zone
+//! leaves most of them without a valuation. So a combination is given up at its first choice that
+//! leaves nothing.
 //!
-//! Invariant: what a scope leaves out is never possible, or not wanted; what it lets pass may still
-//! turn out to be impossible.
+//! Invariant: what a scope leaves out is impossible or not wanted; what it accepts may still be
+//! impossible.
 
 use crate::exec::EmittedConstraint;
 use crate::zones::dbm::{self, Constraint};
@@ -14,14 +14,14 @@ use crate::zones::{Bound, Federation};
 use crate::network::symbolic::clock_effect::add_constraints;
 use crate::network::{Failure, Part};
 
-/// Which moves are wanted; only combinations of a broadcast are left out.
+/// Which moves are wanted; a scope leaves out only combinations of a broadcast.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::network) enum Scope<'z> {
     /// All.
     Everything,
     /// Those that are possible at some valuation of the zone.
     Within(&'z [Bound]),
-    /// Those that are possible whatever the clocks say.
+    /// Those that are possible for all clock values.
     Unconditional,
     /// Those with these edges.
     Of(&'z [Part]),
@@ -36,12 +36,13 @@ pub(super) struct Sending<'z> {
     pub(super) scope: Scope<'z>,
 }
 
-/// A choice of a process in a broadcast, with what must hold for it.
+/// A choice of a process in a broadcast, and what must hold for it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Demand<'c> {
     /// It takes part by this edge instance, whose guard emitted the constraints.
     Takes(Part, &'c [EmittedConstraint]),
-    /// This process abstains: the conjunction does not hold; asked for each of its candidates.
+    /// This process abstains: the conjunction does not hold. Each of its candidates makes one such
+    /// demand.
     Abstains(u32, &'c [EmittedConstraint]),
 }
 
@@ -49,17 +50,18 @@ pub(super) enum Demand<'c> {
 #[derive(Debug)]
 pub(super) struct Sieve {
     dimension: usize,
-    /// After each choice that took something away the valuations at which all choices are possible,
-    /// for [`Scope::Within`].
+    /// The valuations at which all choices are possible, after each choice that took something
+    /// away; for [`Scope::Within`].
     left: Vec<Federation>,
-    /// By choice, the first of which is none: the one of them that counts after it.
+    /// For each choice: the index of the entry that counts after it. The first index is that of no
+    /// choice.
     places: Vec<usize>,
     constraints: Vec<Constraint>,
     /// Whether clocks have decided anything since this was false.
     pub(super) has_narrowed: bool,
 }
 
-/// What a demand leaves of valuations.
+/// The part of valuations that a demand leaves.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Leaves {
     All,
@@ -89,14 +91,14 @@ impl Sieve {
         }
     }
 
-    /// Makes a choice; returns false, with nothing chosen, if the scope leaves out everything with
+    /// Makes a choice. Returns false, and chooses nothing, if the scope leaves out everything with
     /// it.
     pub(super) fn choose<'c>(
         &mut self,
         scope: Scope<'_>,
         demands: impl IntoIterator<Item = Demand<'c>>,
     ) -> Result<bool, Failure> {
-        // Where nothing is taken away, nothing is copied.
+        // If nothing is taken away, nothing is copied.
         let before = self.places.last().copied().unwrap_or_default();
         let mut place = before;
         for demand in demands {
@@ -141,13 +143,13 @@ impl Sieve {
         Ok(true)
     }
 
-    /// Takes the last choice back.
+    /// Undoes the last choice.
     pub(super) fn take_back(&mut self) {
         self.places.pop();
     }
 
-    /// What a demand leaves of the valuations at hand, as far as that is seen at a glance; reads
-    /// its constraints.
+    /// The part of the current valuations that a demand leaves, where a glance shows it; reads its
+    /// constraints.
     fn leaves(&mut self, place: usize, demand: Demand<'_>) -> Result<Leaves, Failure> {
         let (Demand::Takes(_, emitted) | Demand::Abstains(_, emitted)) = demand;
         self.has_narrowed |= !emitted.is_empty();
@@ -168,8 +170,8 @@ impl Sieve {
         })
     }
 
-    /// Takes away what the demand does not leave, the constraints of which were read; returns
-    /// whether something is left.
+    /// Removes what the demand does not leave, after its constraints were read; returns whether
+    /// something is left.
     fn narrow(&mut self, place: usize, demand: Demand<'_>) -> bool {
         let left = &mut self.left[place];
         match demand {
@@ -186,7 +188,7 @@ impl Sieve {
     }
 }
 
-/// In how much of a zone some constraints hold, as far as each says for itself.
+/// The part of a zone in which some constraints hold, where each constraint alone decides it.
 fn part_within(zone: &[Bound], dimension: usize, constraints: &[Constraint]) -> Leaves {
     let mut part = Leaves::All;
     for one in constraints {

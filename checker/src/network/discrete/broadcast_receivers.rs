@@ -1,11 +1,12 @@
-//! Who hears a broadcast, looked for once for all its senders in a state.
+//! The receivers of a broadcast, found once for all its senders in a state.
 //!
-//! Where every process may send to all others, as many pairs would be looked at in each state as
-//! there are processes squared. The candidates of the receivers do not depend on who sends; the
-//! sender's own are left out of its combinations.
+//! Where every process may send to all others, the number of pairs in each state is the square of
+//! the number of processes. The candidates of the receivers do not depend on the sender; its own
+//! candidates are left out of its combinations.
 //!
-//! Invariant: guards are evaluated only of processes that may hear somebody, in the order of the
-//! receivers: one that is the only sender is not asked what it hears, since its guard could fail.
+//! Invariant: guards are evaluated only for processes that may receive from somebody, in the order
+//! of the receivers. The only sender of a channel is not asked what it receives, since its guard
+//! could fail.
 
 use super::broadcast_filter::Sending;
 use super::candidate::{Candidate, Choice, Group};
@@ -14,7 +15,7 @@ use super::transition::Moves;
 use crate::network::failure::Failure;
 
 impl Stepper<'_> {
-    /// As [`Stepper::broadcast`] does first, if the receivers were not looked for in this state.
+    /// What [`Stepper::broadcast`] does first, if the receivers were not found in this state yet.
     pub(super) fn note_audience(&mut self, sender: u32, channel: u32, groups: &[Group]) {
         self.audience.round = self.round;
         self.audience.channel = channel;
@@ -26,12 +27,12 @@ impl Stepper<'_> {
         self.audience.left_out = may_hear.then_some(sender);
     }
 
-    /// Whether the receivers of the channel were looked for in this state.
+    /// Whether the receivers of the channel were found in this state.
     pub(super) fn has_audience(&self, channel: u32) -> bool {
         self.audience.round == self.round && self.audience.channel == channel
     }
 
-    /// As [`Stepper::broadcast`], if [`Stepper::has_audience`].
+    /// Works like [`Stepper::broadcast`], if [`Stepper::has_audience`].
     pub(super) fn broadcast_again(
         &mut self,
         sender: Sending<'_>,
@@ -56,7 +57,7 @@ impl Stepper<'_> {
         self.chosen.clear();
         self.sieve.begin(scope);
         if self.choose(Choice::Takes(0), scope)? {
-            let mut groups = self.hear(process);
+            let mut groups = self.combine_receivers(process);
             let sender = Sending { scope, ..sender };
             let result = self.combine_from(sender, &mut groups, words, out);
             self.groups = groups;
@@ -66,7 +67,7 @@ impl Stepper<'_> {
         Ok(())
     }
 
-    /// Asks the sender that was left out so far, unless it sends again.
+    /// Adds what the sender that was left out receives, unless it sends again.
     fn ask_left_out(&mut self, sender: u32, words: &mut [i32]) -> Result<(), Failure> {
         let Some(receiver) = self.audience.left_out.filter(|&one| one != sender) else {
             return Ok(());
@@ -104,8 +105,8 @@ impl Stepper<'_> {
         Ok(())
     }
 
-    /// Puts the receivers beside the sender, the candidate 0; returns the groups of all others.
-    fn hear(&mut self, sender: u32) -> Vec<Group> {
+    /// Combines the receivers with the sender, the candidate 0; returns the groups of all others.
+    fn combine_receivers(&mut self, sender: u32) -> Vec<Group> {
         let own = self.candidates[0];
         let (first, last) = own.constraints;
         let audience = &self.audience;

@@ -1,5 +1,4 @@
-//! What moves are put together from: enabled edge instances, the receivers of a broadcast, and who
-//! takes part.
+//! The parts of moves: enabled edge instances, the receivers of a broadcast, and the participants.
 
 use crate::exec::EmittedConstraint;
 
@@ -16,7 +15,7 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Its share in a move, by its first branch.
+    /// Its part in a move, with its first branch.
     pub(super) fn part(&self) -> Part {
         Part {
             process: self.process,
@@ -27,7 +26,7 @@ impl Candidate {
     }
 }
 
-/// A receiving process of a broadcast: its candidates, and what it does in the combination at hand.
+/// A receiving process of a broadcast: its candidates, and what it does in the current combination.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Group {
     pub(super) first: usize,
@@ -36,18 +35,18 @@ pub(super) struct Group {
     pub(super) end: usize,
     /// A candidate, or `last` for abstaining.
     pub(super) pick: usize,
-    /// How many moves the choices before it stand for, by the branches of their edges.
+    /// The number of moves that the choices before it stand for, by the branches of their edges.
     pub(super) before: u64,
-    /// How many moves the groups after it stand for.
+    /// The number of moves that the groups after it stand for.
     pub(super) after: u64,
-    /// How many ways there are to choose: candidates by the branches of their edges.
+    /// The number of ways to choose: candidates and the branches of their edges.
     pub(super) ways: u64,
 }
 
-/// What a process does in a move that is being put together.
+/// What a process does in a move that is being made.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Choice {
-    /// It takes part by this candidate.
+    /// It takes part with this candidate.
     Takes(u32),
     /// It abstains: none of these clock-guarded candidates holds.
     Abstains(u32, u32),
@@ -64,12 +63,12 @@ impl Group {
         (self.end - self.first) as u64
     }
 
-    /// How many moves its choices stand for.
+    /// The number of moves that its choices stand for.
     pub(super) fn ways(&self) -> u64 {
         self.ways
     }
 
-    /// The same of candidates that begin at another place.
+    /// The same group for candidates that begin at another place.
     pub(super) fn starting_at(&self, first: usize) -> Group {
         Group {
             first,
@@ -80,13 +79,14 @@ impl Group {
         }
     }
 
-    /// Puts it before groups that stand for so many moves; returns for how many they stand with it.
+    /// Puts it before groups that stand for this many moves; returns how many moves they stand for
+    /// with it.
     pub(super) fn put_before(&mut self, after: u64) -> u64 {
         self.after = after;
         after.saturating_mul(self.ways)
     }
 
-    /// What it does in the combination at hand.
+    /// What it does in the current combination.
     pub(super) fn choice(&self) -> Choice {
         if self.pick < self.last {
             Choice::Takes(self.pick as u32)
@@ -99,15 +99,15 @@ impl Group {
 /// The receivers of the channel that was sent on last.
 #[derive(Debug, Default)]
 pub(super) struct Audience {
-    /// The state, by the stepper's count, and the channel; none if there is no round 0.
+    /// The state, by the stepper's count, and the channel; round 0 means none.
     pub(super) round: u64,
     pub(super) channel: u32,
-    /// The candidates, of which the first is a sender's, with their constraints.
+    /// The candidates with their constraints; the first candidate is a sender's.
     pub(super) candidates: Vec<Candidate>,
     pub(super) constraints: Vec<EmittedConstraint>,
-    /// By receiver, in their order.
+    /// The groups of the receivers, in their order.
     pub(super) groups: Vec<Group>,
-    /// The sender that was not asked what it hears.
+    /// The sender that was not asked what it receives.
     pub(super) left_out: Option<u32>,
 }
 

@@ -1,10 +1,10 @@
-//! The edges of a network, sorted by what is asked of them in each state.
+//! The edges of a network, sorted by the questions that every state asks.
 
 use crate::ir::{Edge, Guard, Location, Network, Process, Urgency};
 
 use super::selects::select_count;
 
-/// An edge with what is asked of it most.
+/// An edge with the facts that are needed most.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EdgeEntry<'a> {
     pub(super) index: u32,
@@ -13,14 +13,14 @@ pub(super) struct EdgeEntry<'a> {
     pub(super) edge: &'a Edge,
 }
 
-/// The edges that leave a location, sorted by what they wait for.
+/// The edges that leave a location, sorted by the events that they need.
 #[derive(Debug)]
 pub(super) struct LocationTable<'a> {
     pub(super) internal: Vec<EdgeEntry<'a>>,
     pub(super) sends: Vec<EdgeEntry<'a>>,
     pub(super) receives: Vec<EdgeEntry<'a>>,
     pub(super) urgency: Urgency,
-    /// What must hold in it, if anything.
+    /// Its invariant, if there is one.
     pub(super) invariant: Option<&'a Guard>,
 }
 
@@ -56,7 +56,7 @@ impl<'a> LocationTable<'a> {
     }
 }
 
-/// By channel: the processes with an edge that may receive on it, ascending.
+/// For each channel: the processes with an edge that may receive on it, ascending.
 pub(super) fn receivers(network: &Network) -> Vec<Vec<u32>> {
     let mut receivers = vec![Vec::new(); network.channels.len()];
     for (index, process) in network.processes.iter().enumerate() {

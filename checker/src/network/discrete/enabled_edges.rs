@@ -1,8 +1,8 @@
-//! Which edge instances are enabled, and who synchronises with whom.
+//! Which edge instances are enabled, and which of them synchronise with each other.
 //!
 //! Invariants:
-//! * The order of the moves is that of processes, then edges, select values, partners, branches.
-//! * Where the guard of an edge does not hold, its channel is not looked at: it may have none.
+//! * Moves are ordered by process, then edge, select values, partners, branches.
+//! * If the guard of an edge does not hold, its channel is not evaluated: it may have none.
 
 use crate::cancellation;
 use crate::exec::{Context, EmittedConstraint, Executor, RunTimeError};
@@ -16,19 +16,19 @@ use super::stepper::Stepper;
 use super::transition::Moves;
 use crate::network::failure::Failure;
 
-/// The number of no channel.
+/// The number that stands for no channel.
 const NO_CHANNEL: u32 = u32::MAX;
 
-/// What it takes to look at the location of a process, to ask whether one receives, and to put a
-/// move together: see [`cancellation::work`].
+/// The work of looking at the location of a process, of asking whether a process receives, and of
+/// making a move: see [`cancellation::work`].
 const UNITS_FOR_PROCESS: usize = 8;
 const UNITS_FOR_RECEIVER: usize = 16;
 const UNITS_FOR_MOVE: usize = 256;
 
 impl<'a> Stepper<'a> {
-    /// As [`Stepper::moves`], without remembering, and without combinations that the scope leaves
+    /// Like [`Stepper::moves`], without a cache, and without combinations that the scope leaves
     /// out.
-    pub(in crate::network) fn put_together(
+    pub(in crate::network) fn compute_moves(
         &mut self,
         words: &mut [i32],
         scope: Scope<'_>,
@@ -220,8 +220,8 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// What an instance of a receiving edge listens to whose channel cannot be computed: nothing if
-    /// its guard does not hold, for then the channel does not count; else it is an error. The
+    /// The channel of a receiving instance cannot be computed. If its guard does not hold, it
+    /// receives nothing, since then the channel does not count; otherwise this is an error. The
     /// select values are in the buffer.
     fn unheard(
         &mut self,

@@ -1,4 +1,4 @@
-//! Enabled edges, synchronisations and broadcasts of a discrete state, and what taking them does to
+//! Enabled edges, synchronisations and broadcasts of a discrete state, and the effect of moves on
 //! its words.
 
 pub(super) mod broadcast;

@@ -1,4 +1,4 @@
-//! Enabled instances and synchronisations from remembered sets; see [`super::select_cache`].
+//! Enabled instances and synchronisations from cached sets; see [`super::select_cache`].
 
 use crate::ir::ChannelId;
 
@@ -12,20 +12,20 @@ use super::stepper::Stepper;
 use super::transition::{Label, Moves, Part};
 use crate::network::failure::Failure;
 
-/// Partners of a sending edge that has several instances are looked for among all processes that
-/// receive on one of its channels if these are not more than so many for each instance, else by
-/// channel.
+/// The partners of a sending edge with several instances are searched among all processes that
+/// receive on one of its channels, if there are at most this many processes for each instance.
+/// Otherwise they are searched by channel.
 const MOST_PARTNERS: usize = 4;
 
 impl<'a> Stepper<'a> {
-    /// The enabled instances of an edge in the state at hand; `None` if they are not remembered.
+    /// The enabled instances of an edge in the current state; `None` if they are not remembered.
     pub(super) fn set_of(
         &mut self,
         process: u32,
         entry: EdgeEntry<'a>,
         words: &mut [i32],
     ) -> Option<SetId> {
-        // Whoever records wants to see all that is evaluated.
+        // A recorder must see everything that is evaluated.
         if self.record.is_some() || !self.tuning.select_cache {
             return None;
         }
@@ -80,8 +80,8 @@ impl<'a> Stepper<'a> {
         Some(())
     }
 
-    /// Adds the instances of a set to the candidates, if a channel is given those that listen to
-    /// it.
+    /// Adds the instances of a set to the candidates; if a channel is given, only those that listen
+    /// to it.
     pub(super) fn add_candidates(
         &mut self,
         process: u32,
@@ -143,15 +143,15 @@ impl<'a> Stepper<'a> {
         Ok(())
     }
 
-    /// Makes an instance of a sender the candidate 0.
+    /// Makes an instance of a sender candidate 0.
     fn begin(&mut self, process: u32, entry: EdgeEntry<'a>, set: SetId, instance: Instance) {
         self.candidates.clear();
         self.constraints.clear();
         self.add_candidate(process, entry, set, instance);
     }
 
-    /// Finds the pairs in which an edge sends on a binary channel; returns false if they must be
-    /// looked for otherwise.
+    /// Finds the pairs in which an edge sends on a binary channel. Returns false if another search
+    /// must find them.
     fn pair(
         &mut self,
         sender: Sending<'_>,
@@ -205,8 +205,8 @@ impl<'a> Stepper<'a> {
                     });
             }
         }
-        // The order is that of looking for receivers for one instance of the sender after the
-        // other.
+        // The order is the same as if receivers were searched for each instance of the sender in
+        // turn.
         self.pairs.sort_by_key(|pair| pair.own);
         true
     }

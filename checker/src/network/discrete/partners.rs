@@ -1,4 +1,4 @@
-//! Who may synchronise with whom on the channels of an array.
+//! Which processes may synchronise with each other on the channels of an array.
 
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ pub(super) struct Pair<'a> {
     pub(super) other: u32,
 }
 
-/// The processes that may receive on one of the channels of an array, for arrays on which edges
-/// send that have several instances.
+/// The processes that may receive on one of the channels of an array. Only arrays on which edges
+/// with several instances send are here.
 pub(super) type Partners = FxHashMap<(ChannelId, u32), Arc<[u32]>>;
 
 /// Finds the partners by the receivers of each channel.

@@ -1,13 +1,13 @@
-//! The enabled instances of edges with `select`, remembered by the words that decide them.
+//! The enabled instances of edges with `select`, cached by the words that decide them.
 //!
-//! Guards and channel expressions of an edge often read few words, whose values come again and
-//! again: for each combination of values met so far there is a *set* of the edge's enabled
-//! instances, with their channels and clock constraints. Where two processes synchronise, who fits
-//! whom depends on two sets only, and is remembered too.
+//! Guards and channel expressions of an edge often read few words, whose values occur again and
+//! again. For each combination of values there is a *set* of the edge's enabled instances, with
+//! their channels and clock constraints. Where two processes synchronise, the matching pairs depend
+//! on two sets only, and are cached too.
 //!
 //! Invariants:
-//! * A set is what evaluating the edge's functions in the state gives, since these read no other
-//!   words. Where evaluating fails there is no set, and whoever asks evaluates one instance after
+//! * A set is the result of evaluating the edge's functions in the state, since these read no other
+//!   words. If the evaluation fails there is no set. Then the caller evaluates one instance after
 //!   the other, so that only what is needed can fail.
 //! * Sets stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes
 //!   later is not remembered, nor are edges whose words seldom come again. That is judged by how
@@ -25,9 +25,9 @@ use crate::ir::{Edge, Network};
 use super::selects::select_count;
 use crate::analysis::function_reads::read_words;
 
-/// What is remembered takes at most about so many bytes.
+/// The approximate number of bytes that the cache may take.
 const MOST_BYTES: usize = 16 << 20;
-/// Edges whose functions read more words are not remembered.
+/// Edges whose functions read more words are not cached.
 const MOST_WORDS: usize = 16;
 /// An edge with this many sets is given up unless on average [`LEAST_USES`] states asked for each.
 const SETS_TO_JUDGE: u32 = 256;
@@ -54,7 +54,8 @@ pub(super) struct Instance {
 /// The enabled instances of an edge in some states.
 #[derive(Debug, Default)]
 pub(super) struct Set {
-    /// Of a receiving edge by channel, then by select values; else by select values.
+    /// The instances of a receiving edge by channel, then by select values; those of another edge
+    /// by select values.
     pub(super) instances: Vec<Instance>,
     constraints: Vec<EmittedConstraint>,
 }
@@ -89,40 +90,40 @@ impl Set {
     }
 }
 
-/// What is remembered of an edge.
+/// The cache of an edge.
 #[derive(Debug)]
 struct Memory {
     /// The words that decide its instances.
     words: Vec<u32>,
-    /// The values of these words, by number of set of this edge.
+    /// The values of these words, for each set of this edge.
     keys: Vec<i32>,
     sets: Vec<SetId>,
     table: HashTable<u32>,
-    /// The set of the state that was asked for last, by its number.
+    /// The set of the latest state that asked, and the number of that state.
     latest: (u64, SetId),
     uses: u64,
     is_given_up: bool,
 }
 
-/// What is known before asking.
+/// The answer of the cache.
 pub(super) enum Known {
     Set(SetId),
-    /// It is not remembered yet.
+    /// It is not in the cache yet.
     New,
-    /// The edge is not remembered.
+    /// The edge is not cached.
     Never,
 }
 
-/// All that is remembered.
+/// The cache.
 #[derive(Debug)]
 pub(super) struct Instances {
-    /// By process and edge: its memory.
+    /// For each process and edge: its memory.
     places: Vec<Vec<u32>>,
     memories: Vec<Memory>,
     sets: Vec<Set>,
     key: Vec<i32>,
-    /// By two sets, of a sender and of a receiver: where in `matches` the pairs of their instances
-    /// with the same channel lie.
+    /// For a set of a sender and one of a receiver: where `matches` has the pairs of their
+    /// instances with the same channel.
     pairs: HashTable<(SetId, SetId, u32, u32)>,
     matches: Vec<(u32, u32)>,
     bytes: usize,
@@ -160,7 +161,7 @@ impl Instances {
         }
     }
 
-    /// The bytes that are taken, about.
+    /// The approximate number of bytes that it takes.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
@@ -192,8 +193,8 @@ impl Instances {
         Known::Set(memory.latest.1)
     }
 
-    /// Remembers the set of the edge that was asked for last and found new; `None` if there is no
-    /// place for it.
+    /// Caches the set of the edge that was last asked for and was new; `None` if there is no room
+    /// for it.
     pub(super) fn remember(
         &mut self,
         process: u32,
@@ -226,8 +227,8 @@ impl Instances {
         &self.sets[id as usize]
     }
 
-    /// Which instances of a sending and of a receiving edge have the same channel: adds the pairs
-    /// of their places, by that of the sender, then by that of the receiver.
+    /// Adds the pairs of places of a sending and a receiving instance with the same channel, in the
+    /// order of the senders, then of the receivers.
     #[inline]
     pub(super) fn add_matches(
         &mut self,
@@ -267,7 +268,7 @@ impl Instances {
     }
 }
 
-/// The words that decide the instances of an edge; `None` if it is not worth remembering, or they
+/// The words that decide the instances of an edge. `None` if it is not worth caching, or if they
 /// are not known.
 fn deciding_words(network: &Network, edge: &Edge) -> Option<Vec<u32>> {
     let index = edge.sync.and_then(|sync| sync.index);

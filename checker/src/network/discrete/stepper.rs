@@ -1,7 +1,7 @@
 //! Enabled moves of a state and their effect on its words.
 //!
 //! Invariants:
-//! * The words handed in are those of a whole state; queries for moves do not change them.
+//! * The caller passes the words of a whole state; questions about moves do not change them.
 //! * Moves come in a fixed order: by sending process, then edge, select values, partners, branches.
 //!   Nothing depends on hashes.
 //! * Clock guards are not decided here: each move carries the constraints under which it is
@@ -27,14 +27,14 @@ use super::transition_cache::{Next, Offers, Record, VectorId};
 use crate::network::failure::Failure;
 use crate::tuning::Tuning;
 
-/// Computes moves and their effects. Holds the buffers, so one per thread.
+/// Computes moves and their effects. It holds the buffers, so each thread has its own.
 pub struct Stepper<'a> {
     pub(super) network: &'a Network,
-    /// Which heuristics are used, here and by all that works with these moves.
+    /// The heuristics in use, here and in all code that works with these moves.
     pub(crate) tuning: Tuning,
     pub(super) executor: &'a dyn Executor,
     pub(super) tables: Vec<Vec<LocationTable<'a>>>,
-    /// By channel: the processes that may receive on it.
+    /// For each channel: the processes that may receive on it.
     pub(super) receivers: Vec<Vec<u32>>,
     /// Whether any channel is urgent.
     pub(super) has_urgent_channels: bool,
@@ -42,38 +42,38 @@ pub struct Stepper<'a> {
     pub(super) assignments: Vec<EmittedAssignment>,
     pub(super) arguments: Vec<i32>,
     pub(super) candidates: Vec<Candidate>,
-    /// The channel of the moves that are being put together.
+    /// The channel of the moves that are being made.
     pub(super) channel: Option<ChannelId>,
     pub(super) chosen: Vec<Choice>,
-    /// The receiving processes of the broadcast that is being put together.
+    /// The receiving processes of the broadcast that is being made.
     pub(super) groups: Vec<Group>,
     pub(super) parts: Vec<Part>,
     /// The rank of the next move; see [`super::broadcast`].
     pub(super) rank: u64,
     pub(super) sieve: Sieve,
-    /// The receivers of the channel that was sent on last, and the buffer for their constraints.
+    /// The receivers of the channel of the last broadcast, and the buffer for their constraints.
     pub(super) audience: Audience,
     pub(super) heard: Vec<EmittedConstraint>,
-    /// The enabled instances of edges that are remembered.
+    /// The cached enabled instances of edges.
     pub(super) instances: Instances,
     pub(super) partners: Partners,
-    /// The pairs of the sending edge at hand.
+    /// The pairs of the current sending edge.
     pub(super) pairs: Vec<Pair<'a>>,
-    /// The number of the state at hand.
+    /// The number of the current state.
     pub(super) round: u64,
-    /// The bytes of moves that whoever asks for more has at hand.
+    /// The bytes of moves that the caller holds while it asks for more.
     pub(crate) moves_beside: usize,
-    /// Moves that were put together before.
+    /// Moves that were made before.
     pub(super) offers: Offers,
-    /// What is evaluated while moves are put together to be remembered.
+    /// What is evaluated while moves are made for the cache.
     pub(super) record: Option<Record>,
 }
 
-/// What is remembered of the moves of a state.
+/// What the cache knows about the moves of a state.
 enum Found {
     Offer(OfferId),
     Nothing,
-    /// A question failed, and so the moves cannot be remembered beside those of the tree.
+    /// A question failed, so the moves cannot be cached with those of the tree.
     Failure,
 }
 
@@ -121,7 +121,7 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// One for another thread.
+    /// A stepper for another thread.
     #[must_use]
     pub fn another(&self) -> Stepper<'a> {
         Stepper::tuned(self.network, self.executor, self.tuning)
@@ -148,8 +148,8 @@ impl<'a> Stepper<'a> {
             .any(|(tables, &location)| tables[location as usize].urgency != Urgency::Normal)
     }
 
-    /// Whether time may pass as far as locations and urgent channels say. `moves` are the moves of
-    /// the state.
+    /// Whether locations and urgent channels allow time to pass. `moves` are the moves of the
+    /// state.
     ///
     /// Synchronisations on urgent channels whose guards have clocks do not count here: see
     /// [`crate::network::Symbolic::barriers`].
@@ -169,8 +169,8 @@ impl<'a> Stepper<'a> {
             .is_some_and(|channel| self.network.channels[channel.0 as usize].urgent)
     }
 
-    /// The level of a move: that of its channel, then the greatest of its processes; greater is
-    /// more urgent.
+    /// The level of a move: that of its channel, then the greatest of its processes. A greater
+    /// level has priority.
     pub fn level(&self, one: MoveRef<'_>) -> (u32, u32) {
         let default = self.network.features.default_priority;
         let priority = |channel: ChannelId| self.network.channels[channel.0 as usize].priority;
@@ -185,7 +185,7 @@ impl<'a> Stepper<'a> {
         &self.network.processes[part.process as usize].edges[part.edge as usize]
     }
 
-    /// All moves of the state, as far as the words decide, into `out`.
+    /// Writes all moves of the state that the words allow into `out`.
     pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         if let Some(vector) = self.vector(words)
             && let Some(offer) = self.offer(vector, words)?
@@ -193,11 +193,10 @@ impl<'a> Stepper<'a> {
             out.copy_from(self.offers.moves(offer));
             return Ok(());
         }
-        self.put_together(words, Scope::Everything, out)
+        self.compute_moves(words, Scope::Everything, out)
     }
 
-    /// The location vector of the state, if it is known; it is after the first time that it was
-    /// asked for.
+    /// The location vector of the state, if it is known; it is known after the first question.
     pub fn vector(&mut self, words: &[i32]) -> Option<VectorId> {
         if !self.tuning.transition_cache {
             return None;
@@ -205,8 +204,8 @@ impl<'a> Stepper<'a> {
         self.offers.vector(words)
     }
 
-    /// As [`Stepper::moves`], without combinations that the scope leaves out: for a search, which
-    /// cannot know whether remembering pays.
+    /// Like [`Stepper::moves`], without combinations that the scope leaves out. It is for a search,
+    /// which cannot know whether the cache pays.
     pub(in crate::network) fn moves_in(
         &mut self,
         words: &mut [i32],
@@ -229,11 +228,11 @@ impl<'a> Stepper<'a> {
                 Found::Nothing | Found::Failure => {}
             }
         }
-        self.put_together(words, scope, out)
+        self.compute_moves(words, scope, out)
     }
 
-    /// The moves of a state with this location vector, if they depend on locations and answers of
-    /// guards alone and there is place to remember them.
+    /// The moves of a state with this location vector, if they depend only on locations and answers
+    /// of guards, and the cache has room for them.
     pub fn offer(
         &mut self,
         vector: VectorId,
@@ -248,7 +247,7 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// The moves of a state with this location vector, if they are remembered.
+    /// The moves of a state with this location vector, if they are in the cache.
     fn known_offer(&mut self, vector: VectorId, words: &mut [i32]) -> Result<Found, Failure> {
         let Some(mut way) = self.offers.start(vector) else {
             return Ok(Found::Nothing);
@@ -267,7 +266,8 @@ impl<'a> Stepper<'a> {
                         Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
                             return Err(error.into());
                         }
-                        // Whether it counts shows where the moves are put together.
+                        // The moves are then made without the cache, which shows whether the
+                        // failure counts.
                         Err(_) => return Ok(Found::Failure),
                     }
                 }
@@ -276,8 +276,8 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// Puts the moves of a state with this location vector together and remembers them if they do
-    /// not depend on the scope.
+    /// Makes the moves of a state with this location vector, and caches them if they do not depend
+    /// on the scope.
     fn remember(
         &mut self,
         vector: VectorId,
@@ -287,10 +287,9 @@ impl<'a> Stepper<'a> {
     ) -> Result<Option<OfferId>, Failure> {
         self.sieve.has_narrowed = false;
         self.record = Some(Record::default());
-        // Where it is cut off, what was recorded so far must not be taken for that of another
-        // state.
-        let put_together = || self.put_together(words, scope, out);
-        let result = cancellation::unless_cut(put_together).unwrap_or(Err(Failure::Interrupted));
+        // If this is cancelled, the record must not be taken for that of another state.
+        let compute_moves = || self.compute_moves(words, scope, out);
+        let result = cancellation::unless_cut(compute_moves).unwrap_or(Err(Failure::Interrupted));
         let mut record = self.record.take().unwrap_or_default();
         result?;
         if self.sieve.has_narrowed {
@@ -304,13 +303,13 @@ impl<'a> Stepper<'a> {
         self.offers.moves(offer)
     }
 
-    /// The bytes that remembered moves take, about.
+    /// The approximate number of bytes of the caches.
     pub fn bytes(&self) -> usize {
         self.offers.bytes() + self.instances.bytes()
     }
 
-    /// Takes the move: changes locations and variables. The clock assignments, in order, are in the
-    /// result.
+    /// Takes the move: changes locations and variables. The result has the clock assignments, in
+    /// order.
     pub fn fire(
         &mut self,
         parts: &[Part],

@@ -1,19 +1,18 @@
-//! Moves: one composed transition each, kept in flat buffers that are used again from state to
-//! state.
+//! Moves, each a composed transition, in flat buffers that are reused for the next state.
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ChannelId;
 use crate::network::failure::Failure;
 use crate::zones::federation::block_bytes;
 
-/// The most moves of a state: receivers of a broadcast that have a choice each multiply.
+/// The greatest number of moves of a state: the choices of the receivers of a broadcast multiply.
 const MOST_MOVES: usize = 1 << 20;
 
-/// The index of remembered moves. Each belongs to one location vector.
+/// The index of cached moves. Each belongs to one location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct OfferId(pub(super) u32);
 
-/// One process's share in a move.
+/// The part of one process in a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Part {
     /// Index of the process.
@@ -27,7 +26,7 @@ pub struct Part {
     pub select: u32,
 }
 
-/// Whether two moves take the same edges with the same `select` values, whatever the branches.
+/// Whether two moves take the same edges with the same `select` values, with any branches.
 pub fn is_same_entry(one: &[Part], other: &[Part]) -> bool {
     let key = |part: &Part| (part.process, part.edge, part.select);
     one.len() == other.len() && one.iter().map(key).eq(other.iter().map(key))
@@ -42,7 +41,7 @@ struct Header {
     label: Label,
 }
 
-/// What is said of a move beside its parts and constraints.
+/// The facts about a move that are not its parts and constraints.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::network) struct Label {
     /// The channel of the synchronisation.
@@ -51,8 +50,8 @@ pub(in crate::network) struct Label {
     pub(super) controllable: bool,
     /// See [`MoveRef::rank`].
     pub(super) rank: u64,
-    /// Whether it is known that its guards leave something of the zone that the moves are asked
-    /// for.
+    /// Whether it is known that its guards leave something of the zone for which the moves were
+    /// computed.
     pub(in crate::network) is_possible: bool,
 }
 
@@ -75,7 +74,7 @@ pub struct Moves {
     /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast
     /// receivers that abstain.
     excluded: Vec<(u32, u32)>,
-    /// The offer that they are, if they are remembered.
+    /// The offer, if the moves are cached.
     pub(super) offer: Option<OfferId>,
 }
 
@@ -90,11 +89,11 @@ pub struct MoveRef<'a> {
     pub channel: Option<ChannelId>,
     /// Whether the controller owns the move: all participating edges are controllable.
     pub controllable: bool,
-    /// The place of the move among all that the locations and variables of the state allow,
-    /// whatever the zone.
+    /// The place of the move among all that the locations and variables of the state allow, for any
+    /// zone.
     pub rank: u64,
     pub(in crate::network) label: Label,
-    /// Of remembered moves: the offer and the place in it.
+    /// For cached moves: the offer and the place in it.
     pub(in crate::network) offered: Option<(OfferId, u32)>,
     moves: &'a Moves,
     excluded: (u32, u32),
@@ -125,7 +124,7 @@ impl Moves {
         self.offer = None;
     }
 
-    /// The bytes that the moves take beside the value itself.
+    /// The bytes that the moves take, without the value itself.
     pub(crate) fn heap_bytes(&self) -> usize {
         block_bytes(size_of_val(&*self.headers))
             + block_bytes(size_of_val(&*self.parts))

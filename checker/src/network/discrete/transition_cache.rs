@@ -25,7 +25,7 @@ use crate::zones::federation::block_bytes;
 use super::transition::{Moves, OfferId};
 use crate::network::trial::{Pause, Trial};
 
-/// What is remembered takes at most about so many bytes.
+/// The approximate number of bytes that the cache may take.
 const MOST_BYTES: usize = 24 << 20;
 /// A location vector with more offers is unsuited: its guards seldom answer the same.
 const MOST_OFFERS: u32 = 64;
@@ -67,7 +67,7 @@ enum Point {
 enum Knowledge {
     /// It was met once.
     Met,
-    /// It has a tree with so many offers.
+    /// It has a tree with this many offers.
     Tree(Point, u32),
     Unsuited,
 }
@@ -136,7 +136,7 @@ pub(super) struct Offers {
 }
 
 impl Offers {
-    /// Nothing, for a network of so many processes.
+    /// An empty cache, for a network of this many processes.
     pub(super) fn new(processes: usize) -> Offers {
         Offers {
             processes,

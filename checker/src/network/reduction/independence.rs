@@ -1,29 +1,28 @@
-//! Which processes may get in each other's way in a state in which time stands still, learnt when
-//! it is asked for.
+//! Which processes may be in conflict while time stands still. This is computed on demand.
 //!
-//! A *situation* of a process is its location, and whether the edges that may sleep do; situations
-//! alone decide.
+//! A *situation* of a process is its location, and whether its sleeping edges still sleep; the
+//! analysis depends on situations only.
 
 use crate::ir::{LocationId, Network};
 use crate::zones::{Zone, dbm};
 
 use crate::analysis::dependence::{Footprint, Footprints, Ground, Sleeper, Start, Still};
 
-/// A situation: twice the number of the location among all, and one more if edges sleep.
+/// A situation: twice the number of the location among all, plus one if edges sleep.
 pub(super) type Situation = u32;
 
-/// What is known of the processes of a network.
+/// What is known about the processes of a network.
 #[derive(Debug)]
 pub(super) struct Interference {
     footprints: Footprints,
-    /// By process: the number of its first location among all.
+    /// For each process: the number of its first location among all.
     first: Vec<u32>,
-    /// By location: its process.
+    /// For each location: its process.
     owners: Vec<u32>,
     tables: Tables,
 }
 
-/// What is known of each of the ways in which time stands still.
+/// What is known for each of the reasons why time stands still.
 #[derive(Debug)]
 struct Tables {
     urgent: Table,
@@ -39,16 +38,16 @@ impl Tables {
     }
 }
 
-/// What is known of one of the ways in which time stands still.
+/// What is known for one of the reasons why time stands still.
 #[derive(Debug, Default)]
 struct Table {
-    /// By location: what keeps edges that the process may come to asleep.
+    /// For each location: what keeps those edges asleep that the process may reach.
     sleepers: Vec<Option<Vec<Sleeper>>>,
-    /// By situation: the footprints now and in the future.
+    /// For each situation: the footprints now and in the future.
     now: Vec<Option<Box<Footprint>>>,
     future: Vec<Option<Box<Footprint>>>,
-    /// By situation of one process, then of another: whether what the other may do gets in the way
-    /// of what the one can do now.
+    /// For two situations of different processes: whether what the second process may do is in
+    /// conflict with what the first can do now.
     meets: Vec<Vec<Option<bool>>>,
 }
 
@@ -81,7 +80,7 @@ impl Interference {
         }
     }
 
-    /// By process: the situations of a state with these words and this zone.
+    /// For each process: its situation in a state with these words and this zone.
     pub(super) fn situations(
         &mut self,
         ground: Ground<'_>,
@@ -110,8 +109,8 @@ impl Interference {
             .unwrap_or_default()
     }
 
-    /// Whether what a process in the situation `other` may do may get in the way of what one in the
-    /// situation `member` can do now.
+    /// Whether what a process in the situation `other` may do is in conflict with what a process in
+    /// the situation `member` can do now.
     #[inline]
     pub(super) fn meets(
         &mut self,

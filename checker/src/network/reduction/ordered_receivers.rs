@@ -1,6 +1,7 @@
 //! Whether the receivers of a broadcast run updates whose order matters.
 //!
-//! They run in the order of processes, which exchanging members of a scalar set would change.
+//! They run in the order of processes, and an exchange of members of a scalar set would change this
+//! order.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -11,8 +12,8 @@ use crate::ir::{AssignedValue, ClockRange, Edge, Network, Process, Update};
 /// Receivers whose updates read more words count as reading all.
 const MOST_READ_WORDS: usize = 1 << 16;
 
-/// Whether two processes that exchanging members of a set reorders may receive the same broadcast,
-/// with updates whose order matters.
+/// Whether two processes may receive the same broadcast, run updates whose order matters, and
+/// change their order when members of a set are exchanged.
 pub(super) fn has_ordered_receivers(network: &Network, set: u32) -> bool {
     let mut groups: HashMap<u32, Vec<&Process>> = HashMap::new();
     for process in &network.processes {
@@ -54,7 +55,7 @@ struct Touched {
     /// The words that are read, if they are known.
     reads: Option<Vec<u32>>,
     writes: Vec<Range<u32>>,
-    /// The clocks that are set, to what constant if it is always the same.
+    /// The clocks that are set, and to which constant, if it is always the same.
     sets: Vec<(ClockRange, Option<i32>)>,
     /// The clocks that are copied.
     copies: Vec<ClockRange>,

@@ -1,4 +1,4 @@
-//! What is known of a network before a search that uses partial-order reduction; see
+//! Facts about a network that a search with partial-order reduction needs; see
 //! [`super::stubborn_sets`].
 
 use std::sync::Arc;
@@ -11,23 +11,23 @@ use crate::tuning::Tuning;
 
 use super::time_stoppers::Holders;
 
-/// Networks with more locations are not reduced: what is remembered grows with the square.
+/// Networks with more locations are not reduced: the tables grow with the square of this number.
 const MOST_LOCATIONS: usize = 2048;
 
-/// What a search may reduce by, shared by its threads.
+/// What a search needs for the reduction; its threads share it.
 #[derive(Debug)]
 pub struct PartialOrder {
     pub(super) watched: Watched,
-    /// By clock: the greatest value that it is set to.
+    /// For each clock: the greatest value that it is set to.
     pub(super) greatest: Vec<i32>,
-    /// By process and edge: whether it may be taken again and again while time stands still.
+    /// For each process and edge: whether it may be taken again and again while time stands still.
     pub(super) recurrent: Vec<Vec<bool>>,
     pub(super) holders: Holders,
 }
 
 impl PartialOrder {
-    /// What a search for a state with the predicate may reduce by; `None` if nothing can be gained,
-    /// or that is not known to be sound.
+    /// What a search for a state with the predicate needs for the reduction. `None` if nothing can
+    /// be gained, or if the reduction is not known to be sound.
     pub fn new(network: &Network, goal: &Predicate, tuning: Tuning) -> Option<Arc<PartialOrder>> {
         let locations: usize = network
             .processes

@@ -1,12 +1,11 @@
-//! What changes places with what when two members of a scalar set are exchanged.
+//! What changes places when two members of a scalar set are exchanged.
 //!
-//! A set is left out if the model tells its members apart
-//! ([`crate::ir::ScalarSet::told_apart_by`]), if words that nothing writes do, or if the receivers
-//! of a broadcast run updates whose order matters: they run in the order of processes, which
-//! exchanging members would change.
+//! A set is left out in three cases: the model distinguishes its members
+//! ([`crate::ir::ScalarSet::told_apart_by`]); words that nothing writes distinguish them; or the
+//! receivers of a broadcast run updates whose order matters. These run in the order of processes,
+//! which exchanging members would change.
 //!
-//! Invariant: every exchange is an involution, and it only moves words of the same range to each
-//! other.
+//! Invariant: every exchange is its own inverse, and it exchanges only words of the same range.
 
 use std::sync::Arc;
 
@@ -16,11 +15,11 @@ use crate::ir::{Coordinate, Network, Shape};
 use super::ordered_receivers::has_ordered_receivers;
 use super::symmetry::{Exchange, Members, Swap, Symmetry};
 
-/// The most members of a set that is reduced: all pairs of them are tried.
+/// The greatest number of members of a set that is reduced: all pairs of them are tried.
 const MOST_MEMBERS: u32 = 64;
 
 impl Symmetry {
-    /// The exchanges of members that leave the behaviour of a network as it is; `None` if there are
+    /// The exchanges of members that do not change the behaviour of a network; `None` if there are
     /// none.
     pub fn of_network(network: &Network) -> Option<Arc<Symmetry>> {
         let places = Places::new(network);
@@ -38,7 +37,7 @@ impl Symmetry {
         (!symmetry.sets.is_empty()).then(|| Arc::new(symmetry))
     }
 
-    /// By scalar set: why it is not reduced, if it is not.
+    /// For each scalar set: why it is not reduced, if it is not.
     pub fn obstacles(network: &Network) -> Vec<Option<Obstacle>> {
         let places = Places::new(network);
         let none = Symmetry {
@@ -51,7 +50,7 @@ impl Symmetry {
             .collect()
     }
 
-    /// The exchanges of the members of a set, which would come after those that are there.
+    /// The exchanges of the members of a set; they come after the existing ones.
     fn exchanges_of(
         &self,
         places: &Places<'_>,
@@ -98,7 +97,7 @@ impl Symmetry {
 /// Why members of a scalar set are not exchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Obstacle {
-    /// This tells them apart.
+    /// This distinguishes them.
     ToldApart(Span),
     /// There is only one.
     OneMember,
@@ -112,7 +111,7 @@ pub enum Obstacle {
     Unused,
 }
 
-/// Two members of a scalar set that change places, the smaller one first.
+/// Two members of a scalar set that are exchanged, the smaller one first.
 #[derive(Clone, Copy, Debug)]
 struct MemberPair {
     set: u32,
@@ -121,7 +120,7 @@ struct MemberPair {
 }
 
 impl MemberPair {
-    /// Where something with these coordinates is moved to.
+    /// The place to which something with these coordinates moves.
     fn moved(self, place: u32, coordinates: &[Coordinate]) -> u32 {
         let MemberPair { set, first, second } = self;
         let own = coordinates.iter().filter(|one| one.set == set);
@@ -133,23 +132,23 @@ impl MemberPair {
     }
 }
 
-/// A word as exchanges see it.
+/// A word as an exchange sees it.
 #[derive(Clone, Debug)]
 struct Word {
-    /// Its process, if it is local to one, with the number of the word among those of the process.
+    /// Its process, if it is local to one, and its number among the words of the process.
     local: Option<(usize, usize)>,
     coordinates: Vec<Coordinate>,
     /// The set whose members are its values.
     values: Option<u32>,
 }
 
-/// The words and clocks of a network by where they belong.
+/// The words and clocks of a network by their process.
 struct Places<'n> {
     network: &'n Network,
     words: Vec<Word>,
-    /// By process: its words, then its clocks, in order.
+    /// For each process: its words and its clocks, in order.
     of_process: Vec<(Vec<u32>, Vec<u32>)>,
-    /// By clock: its number among those of its process.
+    /// For each clock: its number among those of its process.
     numbers: Vec<usize>,
     written: Vec<bool>,
 }
@@ -196,8 +195,8 @@ impl<'n> Places<'n> {
         }
     }
 
-    /// The exchange of two members, of the set with this number among those that are reduced;
-    /// `None` if it is none of the network.
+    /// The exchange of two members; their set has this number among those that are reduced. `None`
+    /// if the network does not allow it.
     fn swap(&self, number: usize, pair: MemberPair) -> Option<Swap> {
         let mut swap = Swap {
             set: number,
@@ -232,8 +231,7 @@ impl<'n> Places<'n> {
         Some(swap)
     }
 
-    /// Whether a word may get another value: something writes it, or it would get the value that it
-    /// has.
+    /// Whether a word may get another value: something writes it, or the new value is the same.
     fn is_movable(&self, exchange: Exchange, pair: MemberPair) -> bool {
         let (word, source) = (exchange.word as usize, exchange.source as usize);
         let initial = &self.network.initial;

@@ -76,7 +76,7 @@ impl Agenda {
         }
     }
 
-    /// How many of so many moves are to be taken.
+    /// How many of the possible moves must be taken.
     #[inline]
     pub(crate) fn end(&self, moves: usize) -> usize {
         if self.are_enough { self.first } else { moves }
@@ -99,14 +99,15 @@ impl Agenda {
 pub(crate) struct StubbornSets {
     order: Arc<PartialOrder>,
     interference: Interference,
-    /// By process: its situation in the state at hand, and whether it keeps time from passing.
+    /// For each process: its situation in the current state, and whether it keeps time from
+    /// passing.
     situations: Vec<Situation>,
     holds: Vec<bool>,
     /// The moves that each clock constraint for itself leaves possible.
     possible: Vec<u32>,
-    /// By process: whether it is in the set at hand.
+    /// For each process: whether it is in the current set.
     is_member: Vec<bool>,
-    /// The processes of the set at hand.
+    /// The processes of the current set.
     members: Vec<u32>,
     /// By process: whether it is in the best set so far.
     best: Vec<bool>,
@@ -247,7 +248,7 @@ impl StubbornSets {
         }
     }
 
-    /// How many possible moves the set at hand has; `None` if they cannot be enough.
+    /// The number of possible moves in the current set; `None` if they cannot be enough.
     fn moves_of_set(&mut self, ground: Ground<'_>, moves: &Moves, zone: &Zone) -> Option<usize> {
         let mut count = 0;
         let mut has_sure_one = false;

@@ -1,39 +1,39 @@
-//! Symmetry reduction: of states that differ only in which member of a scalar set is which, a
-//! search needs to see one.
+//! Symmetry reduction: among states that differ only by an exchange of members of a scalar set, a
+//! search needs to see only one.
 //!
-//! Exchanging two members of a scalar set everywhere (in values, in arrays indexed by the set,
-//! among processes of which there is one for each member, and in their clocks) turns runs into
-//! runs, and does not change whether a predicate holds: neither the language of models nor that of
-//! queries can name a member. So a search may replace every state by another one of its orbit; if
-//! the start is s and p a permutation, all that is reachable from p(s) is p of what is reachable
-//! from s, and so the initial state need not look the same from all members. What *can* tell
-//! members apart is found when the model is loaded ([`crate::ir::ScalarSet`]) or here
-//! (`network/reduction/scalar_swaps.rs`), and sets of such members are left as they are.
+//! Exchange two members of a scalar set everywhere: in values, in arrays that the set indexes,
+//! among processes of which there is one for each member, and in their clocks. This turns runs into
+//! runs, and does not change whether a predicate holds: neither models nor queries can name a
+//! member. So a search may replace every state by another state of its orbit. If s is the start and
+//! p a permutation, everything that is reachable from p(s) is p applied to what is reachable from
+//! s. So the initial state need not treat all members in the same way. Members *can* be
+//! distinguished in some models; this is found when the model is loaded ([`crate::ir::ScalarSet`])
+//! or here (`network/reduction/scalar_swaps.rs`), and such sets are not reduced.
 //!
-//! [`Symmetry::normalise`] exchanges members as long as that makes the state less in a total order:
-//! the words one after the other, then the bounds of each clock against 0, then those of
-//! differences. So the result is the least state among all that differ from it by one exchange;
-//! orbits may keep several such. Every exchange is an element of the group, so that this costs
-//! states and never soundness.
+//! [`Symmetry::normalise`] exchanges members as long as that makes the state smaller in a total
+//! order: the words one after the other, then the bounds of each clock against 0, then those of
+//! differences. The result is the least among all states that differ from it by one exchange. An
+//! orbit may have several such states. Every exchange is an element of the group, so this can only
+//! cost more states; it is always sound.
 //!
 //! Source: M. Hendriks, G. Behrmann, K. G. Larsen, P. Niebert, F. Vaandrager, "Adding Symmetry
 //! Reduction to UPPAAL", FORMATS 2003 (state swaps and their soundness). There, the order of resets
 //! decides between clocks; here, the order of bounds.
 //!
-//! Cost: for each pair of members that words tell apart a few comparisons; for others up to four
-//! rows of the zone.
+//! Cost: a few comparisons for each pair of members that words distinguish, and up to four rows of
+//! the zone for every other pair.
 
 use crate::ir::Network;
 use crate::zones::Bound;
 
 use crate::network::{MoveRef, Moves, Part};
 
-/// The exchanges of members that leave the behaviour of a network as it is.
+/// The exchanges of members that do not change the behaviour of a network.
 #[derive(Debug)]
 pub struct Symmetry {
-    /// By set: its members.
+    /// The members of each set.
     pub(super) sets: Vec<Members>,
-    /// The exchanges of two members, for each set those of the first member first.
+    /// The exchanges of two members: for each set, those of the first member come first.
     pub(super) swaps: Vec<Swap>,
     pub(super) dimension: usize,
 }
@@ -45,9 +45,9 @@ pub(super) struct Members {
     pub(super) set: u32,
     /// How many there are.
     pub(super) count: u32,
-    /// Where the images of its members stand in a [`Permutation`].
+    /// Where a [`Permutation`] has the images of its members.
     pub(super) first: usize,
-    /// Where its exchanges stand.
+    /// Where its exchanges begin.
     pub(super) first_swap: usize,
 }
 
@@ -58,17 +58,17 @@ pub(super) struct Swap {
     pub(super) set: usize,
     /// The two members, the lesser first.
     pub(super) members: (i32, i32),
-    /// What becomes of the words that change, in ascending order.
+    /// The words that change, in ascending order.
     pub(super) words: Vec<Exchange>,
     /// How many of them belong to the identity of a state.
     pub(super) identity_words: usize,
-    /// By clock: the one that it changes places with.
+    /// For each clock: the clock with which it changes places.
     pub(super) clocks: Vec<u32>,
-    /// The pairs of clocks that change places, the lesser first, in ascending order.
+    /// The pairs of clocks that change places, the smaller one first, in ascending order.
     pub(super) clock_pairs: Vec<(u32, u32)>,
 }
 
-/// Where a word comes from when two members are exchanged.
+/// Where a word comes from in an exchange of two members.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Exchange {
     pub(super) word: u32,
@@ -108,10 +108,10 @@ impl Swap {
         }
     }
 
-    /// Whether the exchange makes a state less.
+    /// Whether the exchange makes a state smaller.
     fn improves(&self, words: &[i32], zone: &[Bound], dimension: usize) -> bool {
         for &exchange in &self.words[..self.identity_words] {
-            // The greater of two words that change places differs only if the lesser does.
+            // The greater of two words that change places differs only if the smaller does.
             if exchange.source >= exchange.word {
                 let (new, old) = (self.value(exchange, words), words[exchange.word as usize]);
                 if new != old {
@@ -195,16 +195,17 @@ impl Swap {
 }
 
 impl Symmetry {
-    /// The permutation that leaves every member where it is.
+    /// The permutation that changes no member.
     pub fn identity(&self) -> Permutation {
         self.sets.iter().flat_map(|set| 0..set.count).collect()
     }
 
-    /// Replaces a state by one that differs only in which member is which, mostly the same for all
-    /// such states. Adds the numbers of the exchanges that led there to `exchanges`.
+    /// Replaces a state by one that differs only by exchanges of members; for most such states the
+    /// result is the same. Adds the numbers of these exchanges to `exchanges`.
     pub fn normalise(&self, words: &mut [i32], zone: &mut [Bound], exchanges: &mut Vec<u32>) {
         let mut tried = 0;
-        // Round and round until no exchange has made the state less since it was last tried.
+        // All exchanges are tried in turn until none has made the state smaller since its last
+        // trial.
         for (number, swap) in (0..).zip(&self.swaps).cycle() {
             if tried == self.swaps.len() {
                 break;
@@ -219,7 +220,7 @@ impl Symmetry {
         }
     }
 
-    /// Exchanges the members of an exchange, given by its number, in what a permutation leads to.
+    /// Applies the exchange with this number to the images of a permutation.
     pub fn exchange(&self, number: usize, permutation: &mut Permutation) {
         let swap = &self.swaps[number];
         let set = self.sets[swap.set];
@@ -247,8 +248,7 @@ impl Symmetry {
         }
     }
 
-    /// The move among `moves`, those of a state, that becomes `image` when the members are
-    /// permuted.
+    /// The move among `moves`, those of a state, that becomes `image` under the permutation.
     pub fn find_original(
         &self,
         permutation: &Permutation,
@@ -302,7 +302,7 @@ impl Symmetry {
 }
 
 impl Members {
-    /// The exchange of two members, the lesser first.
+    /// The exchange of two members, the smaller one first.
     fn swap(self, first: u32, second: u32) -> usize {
         let before = first * (2 * self.count - first - 1) / 2;
         self.first_swap + (before + second - first - 1) as usize

@@ -1,14 +1,13 @@
-//! Who keeps time from passing in a state: which processes, as long as they do not move, leave it
-//! no way.
+//! Which processes keep time from passing in a state for as long as they do not move.
 //!
-//! * Who stays in an urgent location, or in a committed one.
-//! * Who stays in a location whose invariant bounds a clock from above, where all valuations have
+//! * A process in an urgent location, or in a committed one.
+//! * A process in a location whose invariant bounds a clock from above, where all valuations have
 //!   reached the bound.
-//! * Who takes part in a synchronisation on an urgent channel that is possible whatever the clocks
-//!   say.
+//! * A process that takes part in a synchronisation on an urgent channel which is possible for all
+//!   clock values.
 //!
-//! The last two can also end because of others: who writes what the invariant, or the guards of the
-//! synchronisation, read. Those are the ones that get in the way of the holder (see
+//! The last two can also end because of other processes: those that write what the invariant, or
+//! the guards of the synchronisation, read. These processes are in conflict with the holder (see
 //! [`crate::analysis::dependence`]).
 //!
 //! Where the rate of a clock may be 0, bounds of invariants do not count.
@@ -23,7 +22,7 @@ use crate::network::discrete::stepper::Stepper;
 use crate::network::discrete::transition::{MoveRef, Moves};
 use crate::network::symbolic::clock_effect::to_constraint;
 
-/// A weak upper bound of some of consecutive clocks, at least `low`.
+/// A weak upper bound on some of several successive clocks, at least `low`.
 #[derive(Clone, Copy, Debug)]
 struct Limit {
     first: usize,
@@ -31,7 +30,7 @@ struct Limit {
     low: i32,
 }
 
-/// Why processes may keep time from passing, by process and location.
+/// Why processes may keep time from passing, for each process and location.
 #[derive(Debug)]
 pub(super) struct Holders {
     urgencies: Vec<Vec<Urgency>>,
@@ -70,7 +69,7 @@ impl Holders {
         }
     }
 
-    /// Whether something but a committed location may keep time from passing.
+    /// Whether anything other than a committed location may keep time from passing.
     pub(super) fn are_possible(&self) -> bool {
         self.has_urgent_channels
             || self
@@ -85,9 +84,9 @@ impl Holders {
                 .any(|one| *one == Urgency::Urgent)
     }
 
-    /// Notes by process whether it keeps time from passing in a state with these words, zone and
-    /// moves; returns why it stands still. If some location is committed, only who stays in one
-    /// counts.
+    /// Notes for each process whether it keeps time from passing in a state with these words, zone
+    /// and moves; returns why time stops. If some location is committed, only processes in
+    /// committed locations count.
     pub(super) fn find(
         &self,
         stepper: &mut Stepper<'_>,
@@ -154,7 +153,7 @@ fn limits(location: &Location) -> Vec<Limit> {
 }
 
 impl Limit {
-    /// Whether all valuations of the zone have come to a value that the bound may have.
+    /// Whether all valuations of the zone have reached a value that the bound may have.
     fn may_be_reached(self, zone: &Zone) -> bool {
         let mut clocks = self.first..self.first + self.count;
         clocks.any(|clock| clock != 0 && is_at_least(zone, clock, self.low))
@@ -165,7 +164,7 @@ fn is_at_least(zone: &Zone, clock: usize, value: i32) -> bool {
     Bound::weak(value).is_some_and(|value| zone.bound(0, clock) + value <= Bound::LE_ZERO)
 }
 
-/// Whether all valuations of the zone have come to an upper bound that the invariant of a process
+/// Whether all valuations of the zone have reached an upper bound that the invariant of a process
 /// has now.
 fn has_reached_limit(
     stepper: &mut Stepper<'_>,

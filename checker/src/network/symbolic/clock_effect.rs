@@ -1,5 +1,5 @@
-//! What moves do to clocks, and how the constraints and assignments that code emits become those of
-//! zones.
+//! The effect of moves on clocks: how the constraints and assignments that code emits become those
+//! of zones.
 
 use crate::exec::{EmittedAssignment, EmittedConstraint};
 use crate::ir::ClockId;
@@ -9,7 +9,7 @@ use crate::zones::dbm::Constraint;
 use crate::zones::federation::block_bytes;
 use crate::zones::{Bound, Federation, Zone, minimal};
 
-/// What a move does to clocks, from the source's zone to the zone on entry.
+/// The effect of a move on clocks, from the source's zone to the zone on entry.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ClockEffect {
     /// The guard.
@@ -23,7 +23,7 @@ pub struct ClockEffect {
 }
 
 impl ClockEffect {
-    /// The bytes that it takes beside the value itself.
+    /// The bytes that it takes, without the value itself.
     pub fn heap_bytes(&self) -> usize {
         let excluded = self.excluded.iter();
         block_bytes(size_of_val(&*self.guard))
@@ -43,8 +43,8 @@ impl ClockEffect {
             && self.invariant.is_empty()
     }
 
-    /// Whether the move is possible at all valuations of a zone; of one that copies clocks that is
-    /// not known.
+    /// Whether the move is possible at all valuations of a zone; false if it copies clocks, since
+    /// then this is not known.
     pub fn keeps_all_of(&self, zone: &Zone) -> bool {
         let dimension = zone.dimension();
         let mut after = zone.clone();
@@ -59,8 +59,9 @@ impl ClockEffect {
             && self.invariant.iter().all(|one| holds(&after, one))
     }
 
-    /// The zones on entry of the target: the source's zone within the guard, after the assignments,
-    /// within the invariant. More than one only if some clock-guarded receiver abstains.
+    /// The zones on entry of the target: those valuations of the source's zone that satisfy the
+    /// guard, after the assignments, within the invariant. There is more than one zone only if some
+    /// clock-guarded receiver abstains.
     pub fn entry_zones(&self, zone: &[Bound], dimension: usize, out: &mut Vec<Zone>) {
         out.clear();
         let mut within = Zone::from_bounds(dimension, zone);
@@ -79,16 +80,16 @@ impl ClockEffect {
         }
     }
 
-    /// Carries a zone of the source over to the target, if no receiver abstains; returns whether
-    /// something is left.
+    /// Replaces a zone of the source by the zone of the target, if no receiver abstains; returns
+    /// whether something is left.
     pub fn enter(&self, zone: &mut Zone) -> bool {
         zone.constrain_all(&self.guard)
             && zone.assign(&self.assignments)
             && zone.constrain_all(&self.invariant)
     }
 
-    /// The valuations from which the move leads into the federation, as far as guard and
-    /// assignments say.
+    /// The valuations from which the guard and the assignments of the move lead into the
+    /// federation.
     pub fn preimage(&self, federation: &mut Federation) {
         if self.is_trivial() {
             return;
@@ -104,8 +105,8 @@ impl ClockEffect {
         enabled.constrain_all(&self.invariant);
         enabled.preimage(&self.guard, &self.assignments);
         enabled.intersect_zone(zone);
-        // What must not hold is cut out last: outside of the zone it would make zones without
-        // number.
+        // What must not hold is cut out last: outside of the zone it would make a great number of
+        // zones.
         self.subtract_excluded(&mut enabled);
         enabled
     }

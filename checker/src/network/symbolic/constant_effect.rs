@@ -1,8 +1,9 @@
-//! Moves whose effect on clocks and locations does not depend on variables, worked out once.
+//! Moves whose effect on clocks and locations does not depend on variables; the effect is computed
+//! once.
 //!
-//! Invariant: taking a [`FixedMove`] runs the functions that taking the move runs, in the same
-//! order, and gives the same words; what it does to clocks is [`FixedMove::effect`] in every state
-//! of its location vector.
+//! Invariant: to take a [`FixedMove`] runs the same functions as to take the move, in the same
+//! order, and gives the same words. Its effect on clocks is [`FixedMove::effect`] in every state of
+//! its location vector.
 
 use crate::exec::{EmittedConstraint, RunTimeError};
 use crate::ir::{FunctionId, Update};
@@ -14,26 +15,26 @@ use crate::zones::clocks::Assignment;
 use crate::zones::dbm::Constraint;
 use crate::zones::federation::block_bytes;
 
-/// A move that is worked out.
+/// A move with a computed effect.
 #[derive(Clone, Debug)]
 pub struct FixedMove {
     /// The functions that change variables, with their arguments.
     calls: Vec<(FunctionId, Vec<i32>)>,
     /// The processes that move, each with the location that it enters.
     targets: Vec<(u32, i32)>,
-    /// What the move does to clocks.
+    /// The effect of the move on clocks.
     pub effect: ClockEffect,
 }
 
 impl FixedMove {
-    /// The bytes that it takes beside the value itself, arguments of functions excepted.
+    /// The bytes that it takes, without the value itself and the arguments of functions.
     pub fn heap_bytes(&self) -> usize {
         block_bytes(size_of_val(&*self.calls))
             + block_bytes(size_of_val(&*self.targets))
             + self.effect.heap_bytes()
     }
 
-    /// Enters the locations of the target, and leaves variables as they are.
+    /// Enters the locations of the target, and does not change variables.
     pub fn enter_locations(&self, words: &mut [i32]) {
         for &(process, location) in &self.targets {
             words[process as usize] = location;
@@ -60,7 +61,7 @@ impl FixedMove {
 }
 
 impl Stepper<'_> {
-    /// Takes a move that is worked out: changes locations and variables.
+    /// Takes a move with a computed effect: changes locations and variables.
     pub fn take(&mut self, one: &FixedMove, words: &mut [i32]) -> Result<(), RunTimeError> {
         for (function, arguments) in &one.calls {
             self.run(*function, arguments, words)?;
@@ -69,8 +70,8 @@ impl Stepper<'_> {
         Ok(())
     }
 
-    /// Works out a move of a state with these words; `None` if its effect on clocks, or whether it
-    /// is possible, may depend on variables.
+    /// Computes the effect of a move in a state with these words. `None` if the effect on clocks,
+    /// or whether the move is possible, may depend on variables.
     pub fn fix(&self, one: MoveRef<'_>, words: &[i32]) -> Option<FixedMove> {
         let network = self.network();
         let mut fixed = FixedMove {

@@ -1,15 +1,15 @@
 //! Deadlocks: the valuations of a state from which no move is possible, now or after any delay.
 //!
-//! Most states have a move that every valuation of the zone can wait for. Whether a move is one,
-//! its guard tells without an operation on zones ([`hold_sometime`]): a valuation v can wait until
-//! lower bounds `x >= l` and upper bounds `y <= u` hold, those of the invariant among these,
-//! exactly if `y - x <= u - l` holds of v for all pairs of them, and `y <= u` for the upper bounds
-//! of the guard. That is Fourier and Motzkin's elimination of the delay; the bound of a closed zone
-//! on `y - x` is what decides it for all its valuations.
+//! Most states have a move for which every valuation of the zone can wait. The guard of a move
+//! shows this without an operation on zones ([`hold_sometime`]). A valuation v can wait until lower
+//! bounds `x >= l` and upper bounds `y <= u` hold (including those of the invariant) exactly on two
+//! conditions: `y - x <= u - l` holds for v and all pairs of them, and `y <= u` holds for the upper
+//! bounds of the guard. This is Fourier and Motzkin's elimination of the delay. The bound of a
+//! closed zone on `y - x` decides it for all its valuations.
 //!
-//! Only where no move is within reach of the whole zone, the valuations before each move are made,
-//! and whether they cover the zone is decided part by part ([`Federation::includes_zone`]), so that
-//! no list of what is left grows. What is left is only computed where it is asked for.
+//! Only if no move can be reached from the whole zone, the valuations before each move are
+//! computed. Whether they cover the zone is decided part by part ([`Federation::includes_zone`]),
+//! so that no list of remaining zones grows. The rest is computed only if it is wanted.
 
 use crate::zones::clocks::Assignment;
 use crate::zones::dbm::Constraint;
@@ -74,7 +74,7 @@ impl Symbolic<'_> {
     ) -> Result<Alive, Failure> {
         let may_delay = self.may_delay(words)?;
         let stopped = self.stopped(words)?;
-        // Beside barriers the zone may be one of several pieces of what time reaches.
+        // If there are barriers, the zone may be one of several pieces of what time reaches.
         let future = self.future_beside_barriers(may_delay, words, own)?;
         let zone = future.as_ref().map_or(own, Zone::bounds);
         let barriers = if may_delay {
@@ -85,7 +85,7 @@ impl Symbolic<'_> {
         self.moves_within(words, zone, &mut buffers.moves)?;
         let is_witness_of_use = self.tuning().deadlock_witness;
         if is_witness_of_use && barriers.is_empty() && stopped.is_empty() {
-            // Moves without guards are the likeliest to be within reach.
+            // Moves without guards can be reached most often.
             for is_first in [true, false] {
                 if self.is_one_within_reach(words, zone, may_delay, is_first, buffers)? {
                     return Ok(Alive::Everywhere);
@@ -125,8 +125,8 @@ impl Symbolic<'_> {
         Ok(Alive::Within(alive))
     }
 
-    /// Whether one of the moves without guards, or of the others, is surely possible, now or later,
-    /// from all of the zone.
+    /// Whether one of the moves without guards, or of the others, is certainly possible, now or
+    /// later, from all of the zone.
     fn is_one_within_reach(
         &mut self,
         words: &mut [i32],
@@ -173,8 +173,8 @@ impl Symbolic<'_> {
         Ok(false)
     }
 
-    /// All that time reaches from the zone within the invariants if barriers may have cut it;
-    /// `None` if the zone is that.
+    /// Everything that time reaches from the zone within the invariants, if barriers may have cut
+    /// it; `None` if this is the zone.
     fn future_beside_barriers(
         &mut self,
         may_delay: bool,
@@ -200,7 +200,7 @@ fn hold_now(needs: &[Constraint], zone: &[Bound], dimension: usize) -> bool {
 }
 
 /// Whether every valuation of a closed zone can wait, within the invariant, until it meets the
-/// needs. The invariant only counts where there are lower bounds among them.
+/// needs. The invariant only counts if the needs have lower bounds.
 fn hold_sometime(
     needs: &[Constraint],
     zone: &[Bound],
@@ -221,8 +221,8 @@ fn is_lower(constraint: &Constraint) -> bool {
     constraint.left == 0
 }
 
-/// Replaces `needs` by what must hold of a valuation for the move to be possible; returns false if
-/// that is not known, or never holds.
+/// Replaces `needs` by the condition on a valuation for the move to be possible. Returns false if
+/// it is not known or never holds.
 fn add_needs(effect: &ClockEffect, needs: &mut Vec<Constraint>) -> bool {
     if !effect.excluded.is_empty() {
         return false;
@@ -233,7 +233,7 @@ fn add_needs(effect: &ClockEffect, needs: &mut Vec<Constraint>) -> bool {
     if !effect.assignments.iter().all(is_value) {
         return false;
     }
-    // What a clock has after the assignments, of which the last one counts.
+    // The value of a clock after the assignments; the last assignment counts.
     let after = |clock: usize| {
         let mut last_first = effect.assignments.iter().rev();
         last_first.find_map(|one| match *one {

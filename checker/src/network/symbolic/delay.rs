@@ -1,12 +1,12 @@
-//! How time passes where more than invariants decide: barriers, and delays of several zones at
-//! once.
+//! How time passes where invariants alone do not decide it: barriers, and delays of several zones
+//! at once.
 //!
-//! A *barrier* is where a synchronisation on an urgent channel is enabled and its guards have
-//! clocks: time runs up to it and not on. If it lies everywhere or nowhere, whatever the clocks
-//! say, [`Symbolic::may_delay`] knows it; else the future of a zone within its barriers is a
+//! A *barrier* is the set in which a synchronisation on an urgent channel with clock guards is
+//! enabled: time runs up to it and stops. If it contains all valuations or none,
+//! [`Symbolic::may_delay`] knows it. Otherwise the future of a zone within its barriers is a
 //! federation ([`crate::zones::future`]). A guard with a strict lower bound has no first moment:
-//! time stops before it, and the synchronisation never happens, as the definition of urgency has
-//! it. A restriction ([`super::restriction`]) has its barriers too: where it does not allow
+//! time stops before it, and the synchronisation never happens; this follows from the definition of
+//! urgency. A restriction ([`super::restriction`]) has barriers too, where it does not allow
 //! waiting.
 
 use crate::zones::dbm::{self, Constraint};
@@ -75,7 +75,7 @@ impl Symbolic<'_> {
         let mut moves = std::mem::take(&mut self.inner_moves);
         let result = self
             .stepper
-            .put_together(words, Scope::Within(zone), &mut moves);
+            .compute_moves(words, Scope::Within(zone), &mut moves);
         if result.is_ok() {
             for one in moves.iter().filter(|one| self.stepper.is_urgent_move(*one)) {
                 urgent.unite(&guarded_part(one, zone, self.dimension())?);
@@ -123,7 +123,7 @@ impl Symbolic<'_> {
         Ok(())
     }
 
-    /// What `entry` reaches in `whole`, its future within the invariant, without passing a barrier.
+    /// What `entry` reaches without passing a barrier, in `whole`, its future within the invariant.
     pub fn within(&self, entry: &Zone, whole: &Zone, barriers: &Barriers) -> Federation {
         let from = Federation::of_zone(self.dimension(), entry.bounds());
         let nothing = Federation::empty(self.dimension());
@@ -132,8 +132,8 @@ impl Symbolic<'_> {
         reached
     }
 
-    /// All moves of a state, as far as the words decide, with those that priorities or a
-    /// restriction forbid cut down to what is left of them.
+    /// All moves that the words of a state allow. A move that priorities or a restriction forbid in
+    /// part is cut down to the rest.
     ///
     /// A move is forbidden where one of a higher level is possible, its target's invariants
     /// included. Levels are those of channels first, then the greatest of the participating
@@ -142,7 +142,7 @@ impl Symbolic<'_> {
         self.moves_in(words, Scope::Everything, out)
     }
 
-    /// As [`Symbolic::moves`], without some of those that no valuation of the zone allows.
+    /// Like [`Symbolic::moves`]; it may leave out moves that no valuation of the zone allows.
     pub fn moves_within(
         &mut self,
         words: &mut [i32],
@@ -152,7 +152,7 @@ impl Symbolic<'_> {
         self.moves_in(words, Scope::Within(zone), out)
     }
 
-    /// As [`Symbolic::moves`], without some of those that have other parts.
+    /// Like [`Symbolic::moves`]; it may leave out moves that have other parts.
     pub fn moves_of(
         &mut self,
         words: &mut [i32],
@@ -175,7 +175,7 @@ impl Symbolic<'_> {
         out: &mut Moves,
     ) -> Result<(), Failure> {
         match scope {
-            Scope::Of(_) => self.stepper.put_together(words, scope, out)?,
+            Scope::Of(_) => self.stepper.compute_moves(words, scope, out)?,
             _ => self.stepper.moves_in(words, scope, out)?,
         }
         self.apply_priorities(words, out)?;
@@ -185,7 +185,7 @@ impl Symbolic<'_> {
         Ok(())
     }
 
-    /// As [`Symbolic::moves`], for whoever asks for the moves of the same state again.
+    /// Like [`Symbolic::moves`], for a caller that asks for the moves of the same state again.
     pub fn remembered_moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         self.stepper.moves(words, out)?;
         self.apply_priorities(words, out)?;
@@ -236,8 +236,8 @@ impl Symbolic<'_> {
         Ok(())
     }
 
-    /// Whether the guards of a move leave anything of the zone that the moves were asked for. Asked
-    /// before a move is taken, so that no update runs that cannot happen.
+    /// Whether the guards of a move leave anything of the zone for which the moves were computed.
+    /// This is checked before a move is taken, so that no update runs that cannot happen.
     pub fn is_enabled(&self, one: MoveRef<'_>, zone: &[Bound]) -> Result<bool, Failure> {
         if one.is_unconditional() || one.label.is_possible {
             return Ok(true);

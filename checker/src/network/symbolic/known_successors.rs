@@ -1,4 +1,4 @@
-//! Successors by what is remembered of zones: see [`super::successor_cache`].
+//! Successors from the cache of zones: see [`super::successor_cache`].
 
 use crate::cancellation;
 use crate::network::{Failure, MoveRef, Symbolic};
@@ -11,15 +11,14 @@ use super::packed_effects::{ASSIGNMENTS, GUARD, INVARIANT};
 use super::successor_cache::{FixedEffect, KeptZone, KnownZone, MemoLimits, NOTHING, ZoneOutcome};
 
 impl<'a> Symbolic<'a> {
-    /// The same, with other limits to what is remembered of zones.
+    /// The same, with other limits of the cache.
     #[must_use]
     pub fn remembering(mut self, limits: MemoLimits) -> Symbolic<'a> {
         self.memo.limits = limits;
         self
     }
 
-    /// Says whether zones are needed as they are entered, before extrapolation. They are unless
-    /// this was said.
+    /// Says whether zones on entry, before extrapolation, are needed. By default they are.
     pub fn need_entered(&mut self, needs: bool) {
         if self.memo.needs_entered != needs {
             self.memo.forget();
@@ -27,8 +26,8 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// The number of the zone of a state that is explored; `None` where looking up moves by it is
-    /// impossible or does not pay.
+    /// The number of the zone of a state that is explored; `None` if its moves cannot be looked up,
+    /// or if that does not pay.
     pub fn know(&mut self, zone: &[Bound]) -> Option<KnownZone> {
         let is_used = self.tuning().successor_cache && self.memo.is_possible;
         if !is_used || self.has_barriers() || self.splits() {
@@ -42,9 +41,9 @@ impl<'a> Symbolic<'a> {
         known.age == self.memo.age
     }
 
-    /// As [`Symbolic::take`], [`Symbolic::forget`] and [`Symbolic::pass_time`], for a move from a
-    /// zone that is known and that each of its guards leaves something of; `zone`, of the same
-    /// dimension, is overwritten. `None` if the move is not possible.
+    /// Does the work of [`Symbolic::take`], [`Symbolic::forget`] and [`Symbolic::pass_time`], for a
+    /// move from a known zone of which each of its guards leaves something. It overwrites `zone`,
+    /// which has the same dimension. `None` if the move is not possible.
     pub fn enter_known(
         &mut self,
         one: MoveRef<'_>,
@@ -89,7 +88,7 @@ impl<'a> Symbolic<'a> {
         self.forget(words);
         let may_delay = match self.may_delay(words) {
             Ok(may_delay) => may_delay,
-            // Where nothing of the zone is left nobody asks whether time may pass.
+            // If nothing of the zone is left, it does not matter whether time may pass.
             Err(failure) => {
                 let is_left = self.apply_effect(source, zone)?;
                 return if is_left { Err(failure) } else { Ok(None) };
@@ -105,7 +104,7 @@ impl<'a> Symbolic<'a> {
             return Ok(self.memo.result(outcome, zone));
         }
         let (entered, kept) = if self.compute(words, source, may_delay, zone)? {
-            // A single state may have successors without end.
+            // A single state may have any number of successors.
             if self.memo.used_bytes() > self.memo.limits.bytes {
                 self.memo.forget();
             }
@@ -125,8 +124,8 @@ impl<'a> Symbolic<'a> {
         Ok(self.memo.result(outcome, zone))
     }
 
-    /// Remembers the effect of a move of an offer, which led to these words, unless it may depend
-    /// on variables.
+    /// Caches the effect of a move of an offer, which led to these words, unless it may depend on
+    /// variables.
     fn fix_effect(&mut self, one: MoveRef<'_>, words: &[i32], effect: u32) {
         let Some(offered) = one.offered else { return };
         if self.memo.fixed.contains_key(&offered) {
@@ -139,7 +138,7 @@ impl<'a> Symbolic<'a> {
         self.memo.fixed.insert(offered, fixed);
     }
 
-    /// Applies the effect at hand to a zone.
+    /// Applies the current effect to a zone.
     fn apply_effect(&mut self, source: &[Bound], zone: &mut [Bound]) -> Result<bool, Failure> {
         let dimension = self.dimension;
         let effects = &self.memo.effects;
@@ -158,7 +157,7 @@ impl<'a> Symbolic<'a> {
             && dbm::constrain_all(zone, dimension, &self.invariant))
     }
 
-    /// Applies the effect at hand to a zone and lets time pass if it may.
+    /// Applies the current effect to a zone, and lets time pass if it may.
     fn compute(
         &mut self,
         words: &[i32],
@@ -175,7 +174,7 @@ impl<'a> Symbolic<'a> {
         result.map(|()| true)
     }
 
-    /// The numbers of a zone that was entered and of what is kept of it.
+    /// The numbers of a zone that was entered and of its stored form.
     fn intern(&mut self, words: &[i32], zone: &[Bound]) -> (ZoneId, ZoneId) {
         let mut kept = std::mem::take(&mut self.memo.scratch);
         kept.clear();
@@ -197,14 +196,14 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// Whether the reduced forms of zones are kept (see [`Symbolic::to_stored`]): not where states
-    /// are exchanged before.
+    /// Whether the reduced forms of zones are stored (see [`Symbolic::to_stored`]). They are not if
+    /// states are exchanged before.
     pub fn keeps_reduced(&self) -> bool {
         self.stores_reduced() && self.symmetry().is_none()
     }
 
-    /// What is kept of a zone that the last move entered: the reduced form and the limits of its
-    /// ceilings, or the extrapolated zone and no limits.
+    /// The stored form of a zone that the last move entered: the reduced form and the limits of its
+    /// ceilings, or the extrapolated zone without limits.
     pub fn kept(&self, kept: KeptZone) -> (&[Bound], &[Bound]) {
         if self.keeps_reduced() {
             self.memo
@@ -216,13 +215,13 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// The number of the extrapolated zone that is kept; `None` if it is a reduced form.
+    /// The number of the extrapolated zone that is stored; `None` if the stored form is reduced.
     pub fn known_kept(&self, KeptZone { zone, age }: KeptZone) -> Option<KnownZone> {
         (!self.keeps_reduced()).then_some(KnownZone { zone, age })
     }
 
-    /// Whether locations and the answers of guards decide which moves there are, and locations
-    /// alone how time passes.
+    /// Whether locations and the answers of guards decide the moves, and locations alone decide how
+    /// time passes.
     pub fn is_fixed(&self) -> bool {
         if self.has_priorities || self.restriction.is_some() {
             return false;

@@ -1,13 +1,13 @@
-//! What moves do to clocks, packed into words, each once.
+//! The effects of moves on clocks, packed into words; each is stored once.
 
 use hashbrown::HashTable;
 
 use crate::exec::{EmittedAssignment, EmittedConstraint};
 use crate::ir::ClockId;
 
-/// Effects, each once, as the words that say all that the result depends on: how many there are up
-/// to the end of the guard, of the assignments and of the invariant; these; whether time may pass;
-/// and what clocks are compared with from there on.
+/// Effects; each is stored once, as words that determine the result. The first words say how many
+/// words there are up to the end of the guard, of the assignments and of the invariant. Then come
+/// these parts, whether time may pass, and the constants with which clocks are compared afterwards.
 #[derive(Debug, Default)]
 pub(super) struct PackedEffects {
     /// The words of all effects, one after the other.
@@ -15,11 +15,11 @@ pub(super) struct PackedEffects {
     /// Where the words of each effect end.
     pub(super) ends: Vec<u32>,
     pub(super) table: HashTable<u32>,
-    /// The words of the effect at hand.
+    /// The words of the current effect.
     pub(super) key: Vec<u32>,
 }
 
-/// The words at the front of an effect, which say where its parts end.
+/// The indices of the first words of an effect, which say where its parts end.
 pub(super) const GUARD: usize = 0;
 pub(super) const ASSIGNMENTS: usize = 1;
 pub(super) const INVARIANT: usize = 2;
@@ -89,7 +89,7 @@ impl PackedEffects {
         pairs.iter().copied().map(to_constraint).collect()
     }
 
-    /// The number of the effect at hand.
+    /// The number of the current effect.
     pub(super) fn intern(&mut self) -> u32 {
         let PackedEffects {
             words,
@@ -119,7 +119,7 @@ impl PackedEffects {
     }
 }
 
-/// The bits that a clock takes in a word of an effect: the limit of clocks is far below.
+/// The bits of a clock in a word of an effect; the greatest number of clocks is far below.
 const CLOCK_BITS: u32 = 15;
 /// The greatest clock that fits.
 pub(super) const MOST_CLOCKS: u32 = (1 << CLOCK_BITS) - 1;

@@ -1,18 +1,17 @@
-//! What one player allows itself: moves are left out and delays cut short before any search sees
-//! them.
+//! The choices of one player: moves are left out and delays cut short before any search sees them.
 //!
 //! Under a restriction the moves of its owner are possible only where it allows them, and time
-//! passes only where it allows waiting. All other moves stay as they are. Where waiting ends
-//! without a first moment (wait while `x <= 1`, act when `x > 1`), time runs on inside the
-//! valuations of one decision to act: the restriction leaves open which of its moments is taken.
+//! passes only where it allows waiting. All other moves stay the same. If waiting ends without a
+//! first moment (wait while `x <= 1`, act when `x > 1`), time continues inside the valuations of
+//! one decision to act: the restriction does not say at which of its moments the player acts.
 //!
-//! The controller chooses edges, and the environment picks the legs of branch points. So what is
-//! said of a move of the controller counts for all legs of its edges, and a restriction of the
-//! environment may say which leg of a move of the controller is picked.
+//! The controller chooses edges, and the environment picks the legs of branch points. So a rule for
+//! a move of the controller counts for all legs of its edges, and a restriction of the environment
+//! may say which leg of a move of the controller is picked.
 //!
-//! What priorities leave of the moves is restricted further: a move that the restriction forbids
-//! still goes before those of lower levels. Whether priorities count is said elsewhere
-//! ([`crate::network::Symbolic::without_priorities`]).
+//! The restriction applies to the moves that priorities leave: a move that it forbids still has
+//! priority over moves of lower levels. [`crate::network::Symbolic::without_priorities`] says
+//! whether priorities count.
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ClockAtom;
@@ -27,29 +26,28 @@ use crate::network::{MoveRef, Moves, Part, is_same_entry};
 pub struct Allowed {
     /// Where time must not pass.
     pub barriers: Barriers,
-    /// By move: where it is forbidden.
+    /// For each move: where it is forbidden.
     pub forbidden: Vec<(Vec<Part>, Federation)>,
     /// Where every move that is not listed is forbidden.
     pub others: Federation,
-    /// By move of the other player: where it is the one that is picked of those that take the same
-    /// edges.
+    /// For each move of the other player: where it is picked among those with the same edges.
     pub legs: Vec<(Vec<Part>, Federation)>,
 }
 
 /// Restricts one player. Threads share it.
 pub trait Restriction: Sync {
-    /// What is allowed in a state with these words; `None` is everything.
+    /// What is allowed in a state with these words; `None` means everything.
     fn allowed(&self, words: &[i32]) -> Option<&Allowed>;
 
     /// Whether the player owns a move that is, or is not, controllable.
     fn owns(&self, controllable: bool) -> bool;
 
-    /// The comparisons with which the restriction tells clock values apart.
+    /// The comparisons by which the restriction distinguishes clock values.
     fn atoms(&self) -> &[ClockAtom];
 }
 
 impl Allowed {
-    /// Where a move of the player is forbidden; one of the controller's is known by its entry.
+    /// Where a move of the player is forbidden; a move of the controller is known by its entry.
     fn forbidden(&self, one: &MoveRef<'_>) -> &Federation {
         let is_it = |parts: &[Part]| {
             parts == one.parts || one.controllable && is_same_entry(parts, one.parts)
@@ -58,7 +56,7 @@ impl Allowed {
         listed.map_or(&self.others, |listed| &listed.1)
     }
 
-    /// Where another leg is picked than that of a move of the other player.
+    /// Where another leg is picked, and not the leg of this move of the other player.
     fn picked_otherwise(&self, one: &MoveRef<'_>) -> impl Iterator<Item = &Federation> {
         let others = self
             .legs
@@ -68,7 +66,7 @@ impl Allowed {
     }
 }
 
-/// Cuts the moves of a state down to what is allowed.
+/// Restricts the moves of a state to what is allowed.
 pub(super) fn apply(restriction: &dyn Restriction, words: &[i32], moves: &mut Moves) {
     let Some(allowed) = restriction.allowed(words) else {
         return;
@@ -85,7 +83,7 @@ pub(super) fn apply(restriction: &dyn Restriction, words: &[i32], moves: &mut Mo
             let others = allowed.picked_otherwise(&one);
             others.flat_map(conjunctions).collect()
         };
-        // A conjunction of nothing holds always.
+        // An empty conjunction always holds.
         if !forbidden.iter().any(Vec::is_empty) {
             let excluded = one.excluded().chain(forbidden.iter().map(Vec::as_slice));
             rest.push(

@@ -32,11 +32,12 @@ use crate::network::{FixedMove, OfferId};
 /// How much is remembered, and for how long though it does not pay.
 #[derive(Clone, Copy, Debug)]
 pub struct MemoLimits {
-    /// When so many bytes are taken, about, everything is forgotten.
+    /// When the cache takes about this many bytes, everything is forgotten.
     pub bytes: usize,
     /// So many more pairs may be missed than found before it is given up.
     pub misses: u32,
-    /// When it was given up so many states do not ask, and four times as many each further time.
+    /// When the cache was given up, this many states do not use it; each further time four times as
+    /// many.
     pub pause: u32,
 }
 
@@ -54,9 +55,9 @@ impl Default for MemoLimits {
 /// Where not as many zones fit nothing is remembered: a state and its successors would not be there
 /// together.
 const FEWEST_ZONES: usize = 16;
-/// At most so many states do not ask.
+/// The greatest number of states that do not use the cache.
 const LONGEST_PAUSE: u32 = 1 << 22;
-/// After so many pairs what was found and missed before counts half.
+/// After this many pairs, earlier hits and misses count half.
 const LONG_AGO: u32 = 1 << 17;
 /// What a move of an offer takes, about.
 const FIXED_BYTES: usize = 256;

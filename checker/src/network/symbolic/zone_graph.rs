@@ -3,9 +3,9 @@
 //! Invariants:
 //! * The zone of a state is closed, not empty, satisfies all invariants and, where time may pass,
 //!   contains its own future within them.
-//! * Successors are exact; extrapolation is a step of its own ([`Symbolic::extrapolate`]).
-//! * A clock bound or value that zones cannot hold ends in [`Failure::ClockLimit`], never in a
-//!   wrong zone.
+//! * Successors are exact; extrapolation is a separate step ([`Symbolic::extrapolate`]).
+//! * A clock bound or value that zones cannot hold gives [`Failure::ClockLimit`], never a wrong
+//!   zone.
 //!
 //! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 4.
 
@@ -29,10 +29,10 @@ use crate::network::discrete::broadcast_filter::Scope;
 use crate::network::{Failure, MoveRef, Moves, Part, PartialOrder, Restriction, Stepper, Symmetry};
 use crate::tuning::Tuning;
 
-/// What it takes to take a move, beside its zones: see [`cancellation::work`].
+/// The work of taking a move, without its zones: see [`cancellation::work`].
 const UNITS_FOR_MOVE: usize = 512;
 
-/// Zones on top of the moves of a network. One per thread.
+/// Adds zones to the moves of a network. Each thread has its own.
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
 pub struct Symbolic<'a> {
     /// Moves and their effects on words.
@@ -40,8 +40,9 @@ pub struct Symbolic<'a> {
     pub(super) dimension: usize,
     pub(super) bounds: ClockBounds,
     has_rates: bool,
-    /// How great bounds may become, if it is to be looked at: where they are not extrapolated, or
-    /// constants are so large that they get there in the few steps between two extrapolations.
+    /// The greatest bound that is allowed, if it must be checked: if zones are not extrapolated, or
+    /// if constants are so large that bounds may exceed it in the few steps between two
+    /// extrapolations.
     range: Option<i32>,
     has_urgent_channels: bool,
     pub(super) has_guarded_urgency: bool,
@@ -59,7 +60,7 @@ pub struct Symbolic<'a> {
     pub(super) invariant: Vec<Constraint>,
 }
 
-/// Buffers for looks at deadlocks, which are used again.
+/// Buffers for finding deadlocks, which are reused.
 #[derive(Debug, Default)]
 pub(super) struct DeadlockBuffers {
     pub(super) moves: Moves,
@@ -69,13 +70,13 @@ pub(super) struct DeadlockBuffers {
     pub(super) invariant: Vec<Constraint>,
 }
 
-/// Constants up to this cannot make bounds too great between two extrapolations, of which there are
-/// fewer than a hundred steps.
+/// Constants up to this value cannot make bounds too great between two extrapolations, which are
+/// fewer than a hundred steps apart.
 const CALM_CONSTANT: i32 = 1 << 20;
 
 impl<'a> Symbolic<'a> {
-    /// Zones for the network of `stepper`; `bounds` are the constants that extrapolation must keep
-    /// apart.
+    /// Zones for the network of `stepper`; extrapolation must distinguish the constants in
+    /// `bounds`.
     pub fn new(stepper: Stepper<'a>, bounds: ClockBounds) -> Symbolic<'a> {
         let network = stepper.network();
         let dimension = network.clocks.len().max(1);
@@ -121,12 +122,12 @@ impl<'a> Symbolic<'a> {
         .remembering(self.memo.limits)
     }
 
-    /// Which heuristics are used.
+    /// The heuristics in use.
     pub fn tuning(&self) -> Tuning {
         self.stepper.tuning
     }
 
-    /// Takes over what is known of the zones that another thread has made.
+    /// Takes over what is known about the zones that another thread has made.
     pub fn join(&mut self, other: &Symbolic<'_>) {
         self.is_approximate |= other.is_approximate;
     }
@@ -145,44 +146,44 @@ impl<'a> Symbolic<'a> {
         self
     }
 
-    /// Whether the network has priorities that do not count here.
+    /// Whether the network has priorities that are ignored here.
     pub fn ignores_priorities(&self) -> bool {
         self.stepper.network().features.priorities && !self.has_priorities
     }
 
-    /// The same, of states that may be exchanged for others by this symmetry; a search need only
-    /// see one of each orbit.
+    /// The same for states that this symmetry may exchange; a search needs to see only one state of
+    /// each orbit.
     #[must_use]
     pub fn reduced_by(mut self, symmetry: Option<Arc<Symmetry>>) -> Symbolic<'a> {
         self.symmetry = symmetry;
         self
     }
 
-    /// What states may be exchanged by.
+    /// The symmetry by which states may be exchanged.
     pub fn symmetry(&self) -> Option<&Arc<Symmetry>> {
         self.symmetry.as_ref()
     }
 
-    /// The same, where a search need not take independent moves in every order.
+    /// The same for a search that need not take independent moves in every order.
     #[must_use]
     pub fn ordered_by(mut self, order: Option<Arc<PartialOrder>>) -> Symbolic<'a> {
         self.order = order;
         self
     }
 
-    /// What decides which orders of independent moves a search need not take.
+    /// The facts that say which orders of independent moves a search can leave out.
     pub fn order(&self) -> Option<&Arc<PartialOrder>> {
         self.order.as_ref()
     }
 
-    /// The same, of states in which variables that are not live have no value.
+    /// The same for states in which variables that are not live have no value.
     #[must_use]
     pub fn forgetting(mut self, live: Option<Arc<LiveVariables>>) -> Symbolic<'a> {
         self.live = live;
         self
     }
 
-    /// Sets the variables of a state that are not live to their initial values, if they may be.
+    /// Sets the variables of a state that are not live to their initial values, if this is allowed.
     pub fn forget(&self, words: &mut [i32]) {
         if let Some(live) = &self.live {
             live.forget(words);
@@ -194,7 +195,7 @@ impl<'a> Symbolic<'a> {
         self.restriction.is_some()
     }
 
-    /// The bytes that remembered moves and zones take, about.
+    /// The approximate number of bytes of the caches.
     pub fn bytes(&self) -> usize {
         self.stepper.bytes() + self.memo.bytes()
     }
@@ -209,8 +210,8 @@ impl<'a> Symbolic<'a> {
         self.bounds.greatest()
     }
 
-    /// Whether some zone so far may contain more than what is reachable: delays of at least two
-    /// running clocks beside stopped ones have no exact zone.
+    /// Whether some zone until now may contain more than what is reachable. If at least two clocks
+    /// run while another is stopped, delays have no exact zone.
     pub fn is_approximate(&self) -> bool {
         self.is_approximate
     }
@@ -235,7 +236,7 @@ impl<'a> Symbolic<'a> {
         Ok((words, zone, invariant))
     }
 
-    /// The initial words and values of clocks, whether they meet the invariants or not.
+    /// The initial words and values of clocks, even if they do not satisfy the invariants.
     pub fn origin(&self) -> Result<(Vec<i32>, Zone), Failure> {
         let network = self.stepper.network();
         let mut zone = Zone::zero(self.dimension);
@@ -248,8 +249,8 @@ impl<'a> Symbolic<'a> {
         Ok((network.initial.clone(), zone))
     }
 
-    /// Takes a move on `words`, and gives its effect on clocks; `None` if the target's invariants
-    /// or the guards forbid it whatever the clocks say.
+    /// Takes a move on `words`, and returns its effect on clocks; `None` if the invariants of the
+    /// target or the guards forbid it for all clock values.
     pub fn fire(
         &mut self,
         one: MoveRef<'_>,
@@ -259,15 +260,15 @@ impl<'a> Symbolic<'a> {
         Ok(self.fire_into(one, words, &mut effect)?.then_some(effect))
     }
 
-    /// As [`Symbolic::fire`], with the effect in a value that is used again; returns whether the
-    /// move is possible.
+    /// Like [`Symbolic::fire`], but writes the effect to a value that is reused; returns whether
+    /// the move is possible.
     pub fn fire_into(
         &mut self,
         one: MoveRef<'_>,
         words: &mut [i32],
         effect: &mut ClockEffect,
     ) -> Result<bool, Failure> {
-        // The zones that are made of what is said here are to come.
+        // Other code will make zones from this effect.
         cancellation::work(UNITS_FOR_MOVE + self.dimension * self.dimension);
         effect.excluded.clear();
         effect.assignments.clear();
@@ -317,7 +318,8 @@ impl<'a> Symbolic<'a> {
     }
 
     /// Takes a move on words and zone at once; returns whether it is possible. If it is not,
-    /// neither means anything, and no update has run unless the guards leave something of the zone.
+    /// neither is valid afterwards, and an update has run only if the guards leave something of the
+    /// zone.
     pub fn take(
         &mut self,
         one: MoveRef<'_>,
@@ -356,7 +358,7 @@ impl<'a> Symbolic<'a> {
         result
     }
 
-    /// Whether each constraint of the guards, for itself, leaves something of the zone.
+    /// Whether each constraint of the guards alone leaves something of the zone.
     pub fn may_satisfy(&self, one: MoveRef<'_>, zone: &[Bound]) -> Result<bool, Failure> {
         for emitted in one.constraints {
             if !dbm::satisfies(zone, self.dimension, &to_constraint(emitted)?) {
@@ -385,16 +387,17 @@ impl<'a> Symbolic<'a> {
         let mut moves = std::mem::take(&mut self.inner_moves);
         let result = self
             .stepper
-            .put_together(words, Scope::Unconditional, &mut moves)
+            .compute_moves(words, Scope::Unconditional, &mut moves)
             .map(|()| self.stepper.may_delay(words, &moves));
         self.inner_moves = moves;
         result
     }
 
-    /// The same; `moves` are those of the state as [`Symbolic::remembered_moves`] gives them.
+    /// The same; `moves` are those of the state as [`Symbolic::remembered_moves`] returns them.
     pub fn may_delay_with(&mut self, words: &mut [i32], moves: &Moves) -> Result<bool, Failure> {
         if (self.has_priorities || self.restriction.is_some()) && self.has_urgent_channels {
-            // Neither lets time pass where a synchronisation that it forbids is urgent.
+            // Neither priorities nor a restriction let time pass where they forbid an urgent
+            // synchronisation.
             return self.may_delay(words);
         }
         Ok(self.stepper.may_delay(words, moves))
@@ -420,15 +423,15 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// Whether bounds of a zone have grown so much that it is better extrapolated before more
-    /// steps. Zones of calm models are not looked at.
+    /// Whether bounds of a zone have grown so much that it should be extrapolated before more
+    /// steps. Zones of calm models are not checked.
     pub fn is_almost_out_of_range(&self, zone: &[Bound]) -> bool {
         self.range
             .is_some_and(|most| !dbm::is_in_range(zone, most / 2))
     }
 
-    /// Whether bounds of a zone that was never extrapolated on a long way have grown so much that
-    /// it is to be now.
+    /// Whether bounds of a zone that was not extrapolated on a long path have grown so much that it
+    /// must be extrapolated now.
     pub fn has_grown(&self, zone: &[Bound]) -> bool {
         let most = Bound::most_in_zone(self.dimension, self.bounds.has_differences());
         !dbm::is_in_range(zone, most / 2)
@@ -481,8 +484,8 @@ impl<'a> Symbolic<'a> {
         Ok(stopped)
     }
 
-    /// Forgets differences between clock values that no guard or invariant from here on can tell
-    /// apart.
+    /// Forgets differences between clock values that no guard or invariant can distinguish from
+    /// here on.
     pub fn extrapolate(&mut self, words: &[i32], zone: &mut [Bound]) {
         if self.dimension > 1 {
             self.bounds
@@ -490,21 +493,21 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// The same, but zones are compared by inclusion, also where simulation would pay.
+    /// The same, but zones are compared by inclusion, even where simulation would pay.
     #[must_use]
     pub fn comparing_as_sets(mut self) -> Symbolic<'a> {
         self.bounds.compare_as_sets();
         self
     }
 
-    /// Whether [`Symbolic::to_stored`] makes anything else of extrapolated zones.
+    /// Whether [`Symbolic::to_stored`] changes extrapolated zones.
     pub fn stores_reduced(&self) -> bool {
         self.dimension > 1 && self.tuning().simulation && self.bounds.compares_by_simulation()
     }
 
     /// Replaces the zone of a state, extrapolated or not, by its reduced form (see [`simulation`]),
-    /// and gives the limits of its ceilings. Leaves it as it is, without limits, where zones are
-    /// compared as sets; then it must have been extrapolated.
+    /// and returns the limits of its ceilings. If zones are compared as sets, it does not change
+    /// the zone, which must have been extrapolated, and returns no limits.
     pub fn to_stored(&mut self, words: &[i32], zone: &mut [Bound]) -> &[Bound] {
         if !self.stores_reduced() {
             return &[];
@@ -514,7 +517,7 @@ impl<'a> Symbolic<'a> {
         self.ceilings.limits()
     }
 
-    /// Replaces what [`Symbolic::to_stored`] has made of a zone by the extrapolated zone.
+    /// Replaces the result of [`Symbolic::to_stored`] by the extrapolated zone.
     pub fn from_stored(&mut self, words: &[i32], stored: &mut [Bound]) {
         if self.stores_reduced() {
             self.bounds.ceilings_into(words, &mut self.ceilings);
@@ -550,8 +553,8 @@ impl<'a> Symbolic<'a> {
         }
     }
 
-    /// The stop points that the invariant of each process makes: its weak upper bounds, with the
-    /// process.
+    /// The points at which invariants stop time: the weak upper bounds of each process's invariant,
+    /// with the process.
     pub fn upper_bounds(&mut self, words: &mut [i32]) -> Result<Vec<(u32, Constraint)>, Failure> {
         let mut bounds = Vec::new();
         for process in 0..self.stepper.network().processes.len() {

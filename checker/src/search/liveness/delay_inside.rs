@@ -1,9 +1,9 @@
 //! How a run stays inside a predicate in one state.
 //!
-//! Where the predicate holds in a part of a zone only, that part is cut out exactly
-//! ([`crate::zones::future`]), so that a delay never crosses its outside. With stopped clocks it
-//! may, and beside two clocks that run a wait from which something is possible later may count as
-//! being stuck: every doubt is taken for a run, so that there being none is certain.
+//! Where the predicate holds only in a part of a zone, that part is cut out exactly
+//! ([`crate::zones::future`]), so that a delay never crosses its outside. With stopped clocks a
+//! delay may cross it. If two other clocks run, a wait that makes something possible later may also
+//! count as being stuck. Every doubt counts as a run, so the answer that there is none is certain.
 
 use crate::ir::Predicate;
 use crate::network::{Extent, Failure, Moves, Symbolic};
@@ -113,9 +113,10 @@ struct Passage {
     whole: Zone,
     /// The part of it in which the predicate does not hold.
     outside: Federation,
-    /// Where what time leads to is looked for: the same, or where a clock stands still beside two
-    /// that run all that the invariants allow; and its part in which the predicate does not hold. A
-    /// set of which no comparison cuts corners has an exact past there.
+    /// The set in which the result of a delay is searched, and its part in which the predicate does
+    /// not hold. The set is the same one; but if a clock stands still while two others run, it is
+    /// all that the invariants allow. A set whose comparisons never concern such clocks has an
+    /// exact past there.
     frame: Zone,
     left: Federation,
     /// The part of it in which an urgent synchronisation or a restriction stops time.
@@ -138,7 +139,7 @@ impl Passage {
         let dimension = whole.dimension();
         let stopped = symbolic.stopped(words)?;
         let (mut frame, mut left) = (whole.clone(), outside.clone());
-        if has_crooked_pasts(&stopped, dimension) {
+        if has_inexact_pasts(&stopped, dimension) {
             frame = Zone::universe(dimension);
             frame.constrain_all(&symbolic.invariant(words)?.unwrap_or_default());
             let inside = symbolic.extent(keep, words, frame.bounds())?;
@@ -166,7 +167,7 @@ impl Passage {
     fn past(&self, part: &Federation) -> Federation {
         let dimension = part.dimension();
         let mut past = part.clone();
-        if !self.counts_doubts || !has_crooked_pasts(&self.stopped, dimension) {
+        if !self.counts_doubts || !has_inexact_pasts(&self.stopped, dimension) {
             past.down(&self.stopped);
             return past;
         }
@@ -201,7 +202,7 @@ impl Passage {
     /// Whether the state is treated as if more runs stayed in it than do.
     fn is_coarse(&self) -> bool {
         let is_crossed = !self.stopped.is_empty() && !self.outside.is_empty();
-        self.may_delay && (is_crossed || has_crooked_pasts(&self.stopped, self.whole.dimension()))
+        self.may_delay && (is_crossed || has_inexact_pasts(&self.stopped, self.whole.dimension()))
     }
 
     /// Why a run may end in the part that is reached, and from which valuations of it.
@@ -272,8 +273,8 @@ impl Passage {
     }
 }
 
-/// Whether the past of a zone need not be a zone: a clock stands still beside two that run.
-fn has_crooked_pasts(stopped: &ClockSet, dimension: usize) -> bool {
+/// Whether the past of a zone may be no zone: a clock stands still while two others run.
+fn has_inexact_pasts(stopped: &ClockSet, dimension: usize) -> bool {
     !stopped.is_empty() && dimension - 1 > stopped.len() + 1
 }
 

@@ -30,7 +30,7 @@ use crate::zones::zone_table::{ZoneId, ZoneTable};
 
 use super::delay_inside::{Entry, Inside};
 use super::ending::RunEnding;
-use crate::search::limits::{Counters, Watch, states_between_looks};
+use crate::search::limits::{Counters, Watch, states_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
@@ -66,10 +66,10 @@ struct Frame {
     zone: Zone,
     moves: Moves,
     next_move: usize,
-    /// The target of the move at hand, and its nodes that are still to be visited.
+    /// The target of the current move, and its nodes that are still to be visited.
     target: Vec<i32>,
     pending: Vec<Zone>,
-    /// The move at hand.
+    /// The current move.
     parts: Vec<Part>,
 }
 
@@ -98,7 +98,7 @@ impl<'p> Liveness<'p> {
             heads: Vec::new(),
             frames: Vec::new(),
             explored: 0,
-            next_look: states_between_looks(LOOK_EVERY, symbolic.dimension()),
+            next_look: states_between_checks(LOOK_EVERY, symbolic.dimension()),
             is_coarse: false,
         }
     }
@@ -183,7 +183,7 @@ impl<'p> Liveness<'p> {
                 }
                 if self.explored >= self.next_look {
                     let dimension = symbolic.dimension();
-                    self.next_look = self.explored + states_between_looks(LOOK_EVERY, dimension);
+                    self.next_look = self.explored + states_between_checks(LOOK_EVERY, dimension);
                     if let Some(reason) = watch.look(&(self.counters() + before)) {
                         return Ok(Outcome::Stopped(reason));
                     }
@@ -291,7 +291,7 @@ impl<'p> Liveness<'p> {
         Ok(None)
     }
 
-    /// Whether no run starts in the zone, as far as is known.
+    /// Whether it is known that no run starts in the zone.
     fn is_left(&mut self, words: &[i32], zone: &Zone) -> bool {
         let (discrete, is_new) = self.store.intern(words);
         if is_new {

@@ -12,7 +12,7 @@ pub enum RunEnding {
 }
 
 impl RunEnding {
-    /// The same for a trace with so many more states before it.
+    /// The same for a trace with this many more states before it.
     #[must_use]
     pub fn moved(self, before: usize) -> RunEnding {
         match self {

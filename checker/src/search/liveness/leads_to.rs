@@ -23,7 +23,7 @@ pub struct Unanswered<'p> {
     is_doubtful: bool,
     /// The run that never meets q, from the state that was found.
     pub run: Option<EndlessRun>,
-    /// The way from the state at hand to a failure below it.
+    /// The path from the current state to a failure below it.
     pub failed: Option<Trace>,
 }
 
@@ -63,7 +63,7 @@ impl Goal for Unanswered<'_> {
         let extent = symbolic.extent(self.open, words, zone.bounds())?;
         for part in extent.to_federation(zone.bounds(), dimension).zones() {
             let zone_on_entry = Zone::from_bounds(dimension, part);
-            // Of a valuation in an open part the zone does not say whether time runs in it.
+            // For a valuation in an open part, the zone does not say whether time runs in it.
             let is_open = !symbolic.barriers(words, part)?.open.is_empty();
             for is_running in [false, true].into_iter().take(1 + usize::from(is_open)) {
                 let entry = Entry {

@@ -6,10 +6,11 @@
 //! node to one with the same words, and can be taken again and again: after some rounds the zone
 //! contains that of a round before. What counts is the moves up to there, those of the loop once.
 //!
-//! Nodes are made in the order of their distance from the start, so that the first end is the
-//! nearest. Coming back to the words of a node on the way gives a first loop; then the nearest loop
-//! is looked for from each node in turn, as far as it may beat what was found. Of several ways of
-//! the same length from one node to another, the first is taken for all.
+//! Nodes are made in the order of their distance from the start, so the first end is the nearest.
+//! Where a path returns to the words of one of its nodes, it gives a first loop. Then the search
+//! looks for the nearest loop from each node in turn, as long as it may be better than what was
+//! found. Among several paths of the same length from one node to another, the first one stands for
+//! all.
 //!
 //! Cost: as breadth-first search with equal zones for the same; for loops in the worst case its
 //! square.
@@ -25,7 +26,7 @@ use crate::zones::{Bound, Zone};
 use super::delay_inside::{Entry, Inside};
 use super::emptiness::{EndlessRun, push_state};
 use super::ending::RunEnding;
-use crate::search::limits::{Counters, StopReason, Watch, states_between_looks};
+use crate::search::limits::{Counters, StopReason, Watch, states_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
@@ -148,7 +149,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
 
     fn look(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
         self.steps += 1;
-        let look_every = states_between_looks(LOOK_EVERY, self.symbolic.dimension());
+        let look_every = states_between_checks(LOOK_EVERY, self.symbolic.dimension());
         if self.steps.is_multiple_of(look_every) {
             watch.look(&self.counters())
         } else {
@@ -156,7 +157,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         }
     }
 
-    /// Whether a run with so many moves would be the best so far.
+    /// Whether a run with this many moves would be the best until now.
     fn may_beat(&self, moves: u32) -> bool {
         self.found
             .as_ref()
@@ -218,13 +219,13 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         self.symbolic
             .let_time_pass(words, invariant, &mut entries)?;
         for entry in entries {
-            self.go_on(&from, words, &entry, invariant)?;
+            self.extend_run(&from, words, &entry, invariant)?;
         }
         Ok(())
     }
 
     /// Adds the nodes of the way to the run for a zone, and those of the runs that open in it.
-    fn go_on(
+    fn extend_run(
         &mut self,
         from: &Origin,
         words: &mut [i32],
@@ -369,7 +370,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         Ok(())
     }
 
-    /// Looks for the shortest loop from a node, as far as it may beat what was found.
+    /// Looks for the shortest loop from a node, as long as it may be better than what was found.
     fn close(&mut self, head: usize, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
         // By node: from where it was come to first, and by which of its moves.
         let mut came: HashMap<usize, (usize, usize)> = HashMap::new();
@@ -470,7 +471,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         for from in chain.into_iter().rev() {
             match from {
                 Origin::Start => {}
-                // What follows is the same state, as far as the run begins in it.
+                // The rest is the same state, if the run begins in it.
                 Origin::Opening(_) => *opening = trace.states.len(),
                 Origin::Move(node, parts) => {
                     self.push_node(*node, trace);

@@ -25,7 +25,7 @@ use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::{Bound, Zone, dbm};
 
 use crate::search::limits::{
-    Counters, StopReason, Watch, moves_between_looks, states_between_looks,
+    Counters, StopReason, Watch, moves_between_checks, states_between_checks,
 };
 use crate::search::outcome::Step;
 use crate::search::outcome::{Outcome, Trace};
@@ -147,7 +147,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
         self.symbolic
             .let_time_pass(&mut words, &invariant, &mut zones)?;
         self.enter(&mut words, &mut zones, NONE, 0)?;
-        let look_every = states_between_looks(LOOK_EVERY, self.symbolic.dimension());
+        let look_every = states_between_checks(LOOK_EVERY, self.symbolic.dimension());
         let mut next_look = look_every;
         while let Some(Reverse((cost, is_goal, node))) = self.waiting.pop() {
             if is_goal {
@@ -169,7 +169,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
     /// Comes to the successors of a node; a limit may come first.
     fn explore(&mut self, node: u32, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
         let dimension = self.symbolic.dimension();
-        let nodes_between = moves_between_looks(LOOK_EVERY, dimension) as usize;
+        let nodes_between = moves_between_checks(LOOK_EVERY, dimension) as usize;
         let mut nodes_at_look = self.nodes.len() + nodes_between;
         self.explored += 1;
         let network = self.symbolic.stepper.network();

@@ -1,11 +1,11 @@
 //! `sup`, `inf` and `bounds`: the least and greatest values of integers and clocks over the
 //! reachable states of a predicate.
 //!
-//! Integers are read off every state. A clock is read off the zones, which extrapolation must leave
-//! exact where it matters: up to a *ceiling* the search keeps what comparisons of the clock could
-//! tell, from below for a supremum and from above for an infimum. A result within the ceiling is
-//! exact, since its being reached and not exceeded are such comparisons; otherwise the ceiling
-//! grows twofold and the search begins anew.
+//! Integers are read from every state. A clock is read from the zones, which extrapolation must
+//! leave exact where it matters. Up to a *ceiling*, the search keeps what comparisons of the clock
+//! could distinguish: from below for a supremum, and from above for an infimum. A result within the
+//! ceiling is exact, since such comparisons say whether it is reached and exceeded. Otherwise the
+//! ceiling doubles, and the search starts again.
 //!
 //! A supremum beyond the ceiling may be infinite. It is if time can pass without limit on the way
 //! to the state, or if the way holds a *pump*: two states of it with the same words, such that the
@@ -59,7 +59,7 @@ pub struct Question<'q> {
     pub least: bool,
     /// Whether the greatest value is wanted.
     pub greatest: bool,
-    /// Comparisons that decide what happens, beside those of the network.
+    /// Comparisons that decide what happens, in addition to those of the network.
     pub further: &'q [ClockAtom],
 }
 
@@ -489,7 +489,7 @@ impl Pump<'_> {
         let mut since_start = unmoved.clone();
         // The state when it had these words last, and the origins of clocks since then.
         let (mut before, mut since) = (zone.clone(), unmoved.clone());
-        // For each pump that was found, which clocks are moved by it in the state at hand.
+        // For each pump that was found: the clocks that it moves in the current state.
         let mut pumped: Vec<Vec<bool>> = Vec::new();
         let mut words = first_words.clone();
         for parts in &trace.moves[start..] {
@@ -594,7 +594,7 @@ fn take(
     let mut zones = Vec::new();
     effect.entry_zones(zone.bounds(), symbolic.dimension(), &mut zones);
     symbolic.let_time_pass(words, &effect.invariant, &mut zones)?;
-    // Of several zones one is followed: what it shows is shown.
+    // Among several zones, the search follows one; the trace shows that one.
     let next = zones.into_iter().next();
     Ok(next.map(|zone| (zone, effect.assignments)))
 }

@@ -44,7 +44,7 @@ pub(super) trait Sink {
     fn stored(&self) -> usize;
 }
 
-/// What exploration needs beside its own buffers.
+/// What exploration needs in addition to its own buffers.
 pub(super) struct Scene<'x, 'a, S> {
     pub(super) symbolic: &'x mut Symbolic<'a>,
     pub(super) goal: &'x mut dyn Goal,
@@ -112,9 +112,9 @@ pub(super) struct Explorer {
     recent: RecentStates,
     keeps_recent: bool,
     frames: Vec<Frame>,
-    /// The frame at hand.
+    /// The current frame.
     depth: usize,
-    /// The moves from the stored state to the state at hand.
+    /// The moves from the stored state to the current state.
     way: Vec<Step>,
     entries: Vec<Zone>,
     /// What is stored of a zone that is still needed.
@@ -125,7 +125,7 @@ pub(super) struct Explorer {
     has_committed: bool,
     /// Finds moves that are enough.
     stubborn: Option<StubbornSets>,
-    /// Whether the move at hand is possible in the whole zone and leads to states that are still to
+    /// Whether the current move is possible in the whole zone and leads to states that are still to
     /// be explored.
     leads_on: bool,
     explored: u64,
@@ -135,7 +135,7 @@ pub(super) struct Explorer {
 
 impl Explorer {
     pub(super) fn new(symbolic: &mut Symbolic<'_>, goal: &dyn Goal) -> Explorer {
-        symbolic.need_entered(goal.looks_at_zones());
+        symbolic.need_entered(goal.depends_on_zones());
         let network = symbolic.stepper.network();
         let order = symbolic.order().cloned();
         Explorer {
@@ -163,7 +163,7 @@ impl Explorer {
         self.explored
     }
 
-    /// The bytes that remembered states and the states at hand take.
+    /// The bytes that remembered states and the current states take.
     pub(super) fn bytes(&self) -> usize {
         let frames = self.frames.iter().map(Frame::bytes);
         let entries = self.entries.iter().map(|zone| size_of_val(zone.bounds()));
@@ -171,7 +171,7 @@ impl Explorer {
         self.recent.bytes() + frames.chain(entries).sum::<usize>() + stored
     }
 
-    /// The moves from the stored state to the state at hand.
+    /// The moves from the stored state to the current state.
     pub(super) fn way(&self) -> &[Step] {
         &self.way
     }
@@ -196,7 +196,7 @@ impl Explorer {
         open(symbolic, &mut self.stubborn, frame)
     }
 
-    /// Explores what has begun, until so many moves are used up.
+    /// Continues the exploration that has begun, until this many moves are used up.
     pub(super) fn explore<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
@@ -253,7 +253,7 @@ impl Explorer {
         Ok(Visit::Paused)
     }
 
-    /// Leaves the moves that do not belong to the stubborn set, if the move at hand makes that
+    /// Leaves out the moves that do not belong to the stubborn set, if the current move makes that
     /// enough.
     fn close(&mut self, frame: &mut Frame) {
         if self.leads_on {

@@ -16,14 +16,14 @@ pub struct Visited<'v, 'a> {
     pub zone: &'v Zone,
     /// What the search has done so far.
     pub counters: Counters,
-    /// Who is asked whether to go on, should looking at the state take long.
+    /// Says whether to continue, if looking at the state takes long.
     pub watch: &'v mut dyn Watch,
 }
 
 /// What a look at a state comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
-    /// The search goes on.
+    /// The search continues.
     Continue,
     /// This is what was looked for.
     Found,
@@ -55,7 +55,7 @@ pub trait Goal {
     ) -> Result<bool, Failure>;
 
     /// Whether it depends on zones what looking comes to; else the goal may be shown any zone.
-    fn looks_at_zones(&self) -> bool {
+    fn depends_on_zones(&self) -> bool {
         true
     }
 
@@ -98,7 +98,7 @@ impl Goal for &Predicate {
         symbolic.holds_somewhere(self, words, zone.bounds())
     }
 
-    fn looks_at_zones(&self) -> bool {
+    fn depends_on_zones(&self) -> bool {
         !self.is_of_words()
     }
 }

@@ -36,7 +36,7 @@ use super::report::Report;
 use super::retrace;
 use super::shard::{Mail, Shard};
 use super::tree::{self, Origin, Tree};
-use crate::search::limits::{Counters, Unlimited, Watch, moves_between_looks};
+use crate::search::limits::{Counters, Unlimited, Watch, moves_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 
 /// Moves of a worker between two looks at the time.
@@ -44,14 +44,14 @@ const PULSE_MOVES: u64 = 1 << 10;
 /// How often the time is looked at while others work.
 const PULSE: Duration = Duration::from_millis(20);
 
-/// Moves of a worker in a round: at first so many, and
+/// The moves of a worker in a round: at first this many, and
 const FEWEST_MOVES: u64 = 1 << 10;
-/// at most so many.
+/// at most this many.
 const MOST_MOVES: u64 = 1 << 15;
-/// The zones of the states that a worker comes to in a round have so many bounds at most.
+/// The greatest number of bounds in the zones of the states that a worker reaches in a round.
 const MOST_BOUNDS: u64 = 1 << 22;
-/// A worker that has collected so many bytes for others ends its round: what they then look through
-/// should still be in a cache.
+/// A worker that has collected this many bytes for others ends its round, so that these bytes are
+/// still in a cache when the others read them.
 const MOST_MAIL_BYTES: usize = 1 << 18;
 
 /// States of a round for each worker from which on threads are worth waking.
@@ -60,8 +60,8 @@ const WORTH_WAKING: usize = 48;
 /// The stack of a thread: as much as that of the first thread of a program.
 const STACK_BYTES: usize = 8 << 20;
 
-/// Searches for a state that `goal` finds, breadth first, with so many threads, of which the
-/// caller's is one.
+/// Searches for a state that `goal` finds, breadth first, with this many threads; the caller's
+/// thread is one of them.
 ///
 /// # Panics
 /// If there are no threads or more than [`tree::MOST_SHARDS`], or if a worker does.
@@ -184,7 +184,7 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         mut moves: u64,
         is_cut: &mut dyn FnMut() -> bool,
     ) -> Result<Option<Ending>, Failure> {
-        let pulse_moves = moves_between_looks(PULSE_MOVES, self.symbolic.dimension());
+        let pulse_moves = moves_between_checks(PULSE_MOVES, self.symbolic.dimension());
         let mut until_pulse = pulse_moves;
         while moves > 0 && self.shard.sent_bytes < MOST_MAIL_BYTES {
             if until_pulse == 0 {
@@ -394,7 +394,7 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
     }
 }
 
-/// The threads beside the caller's. Each is started when it is first needed, and ends with this
+/// The threads other than the caller's. Each is started when it is first needed, and ends with this
 /// value.
 struct Crew<'t, 'e, 's, 'a, G> {
     scope: &'t Scope<'t, 'e>,

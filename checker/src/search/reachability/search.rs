@@ -21,7 +21,7 @@ use super::parallel;
 use super::report::{Manner, Order, Report};
 use super::retrace;
 use super::tree::{self, Origin, Tree};
-use crate::search::limits::{Counters, Watch, moves_between_looks, states_between_looks};
+use crate::search::limits::{Counters, Watch, moves_between_checks, states_between_checks};
 use crate::search::outcome::{Outcome, Step, Trace};
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::Stored;
@@ -153,9 +153,9 @@ impl<'s, 'a> Search<'s, 'a> {
             Look::Stopped(reason) => return Ok(Outcome::Stopped(reason)),
         }
         let dimension = self.symbolic.dimension();
-        let look_every = states_between_looks(LOOK_EVERY, dimension);
+        let look_every = states_between_checks(LOOK_EVERY, dimension);
         let mut next_look = look_every;
-        let mut moves = moves_between_looks(LOOK_EVERY_MOVES, dimension);
+        let mut moves = moves_between_checks(LOOK_EVERY_MOVES, dimension);
         while let Some(stored) = self.next_waiting() {
             if self.store.tree.passed.is_covered(stored) {
                 continue;
@@ -233,7 +233,7 @@ impl<'s, 'a> Search<'s, 'a> {
             };
             match self.explorer.explore(&mut scene, moves)? {
                 Visit::Paused => {
-                    *moves = moves_between_looks(LOOK_EVERY_MOVES, self.symbolic.dimension());
+                    *moves = moves_between_checks(LOOK_EVERY_MOVES, self.symbolic.dimension());
                     let counters = self.counters();
                     if let Some(reason) = self.watch.look(&counters) {
                         return Ok(Visit::Stopped(reason));
@@ -244,8 +244,8 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    /// The way to the state at hand: the parents of the current node, then the moves below it. The
-    /// states are computed anew; what fails on the way is left out.
+    /// The path to the current state: the parents of the current node, then the moves below it. The
+    /// states are computed again; those that fail are left out.
     fn trace(&mut self, is_found: bool) -> Trace {
         let Store { tree, current, .. } = &self.store;
         let steps = tree::way(&[tree], *current, self.explorer.way());

@@ -47,7 +47,7 @@ impl Mail {
         self.heads.len()
     }
 
-    /// Whether there are states that belong to the level at hand.
+    /// Whether there are states that belong to the current level.
     pub(super) fn has_choices(&self) -> bool {
         self.has_choices
     }
@@ -77,7 +77,7 @@ pub(super) struct Shard {
     /// The state that is being explored, one of this shard.
     pub(super) current: Origin,
     index: usize,
-    /// The states that wait in the level at hand.
+    /// The states that wait in the current level.
     now: VecDeque<Stored>,
     /// Those of the next level.
     next: VecDeque<Stored>,
@@ -106,7 +106,7 @@ impl Shard {
         self.sent_bytes = 0;
     }
 
-    /// Takes the next state of the level at hand, which is to be explored.
+    /// Takes the next state of the current level, which will be explored.
     pub(super) fn take(&mut self) -> Option<Stored> {
         while let Some(stored) = self.now.pop_front() {
             if !self.tree.passed.is_covered(stored) {
@@ -120,12 +120,12 @@ impl Shard {
         None
     }
 
-    /// How many states wait in the level at hand, and how many in the next.
+    /// The number of states that wait in the current level, and in the next.
     pub(super) fn waiting(&self) -> (usize, usize) {
         (self.now.len(), self.next.len())
     }
 
-    /// Begins the next level; nothing waits in the level at hand.
+    /// Begins the next level; nothing waits in the current level.
     pub(super) fn advance(&mut self) {
         std::mem::swap(&mut self.now, &mut self.next);
     }

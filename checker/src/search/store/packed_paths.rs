@@ -35,7 +35,7 @@ mod tests {
     use super::{pack, unpack_reversed};
 
     #[test]
-    fn steps_come_back() {
+    fn steps_are_packed_and_unpacked() {
         let steps = [7, 1 << 31, (1 << 62) - 1, 3, 1 << 40, 0, (1 << 31) - 1];
         let (mut words, mut back) = (Vec::new(), vec![9]);
         pack(&steps, &mut words);

@@ -3,7 +3,7 @@
 //!
 //! The hash of an entry decides to which of the pieces it belongs, each of which is a table that
 //! grows for itself. So what a search takes while a table grows is hardly more than what it takes
-//! afterwards, which is what the limit of memory is about.
+//! afterwards, which is what the memory limit is about.
 //!
 //! Invariant: `bytes` is what the pieces have allocated.
 //!

@@ -10,8 +10,8 @@ const NARROW: i32 = 255;
 /// counts for each number of a signature, whichever way they are shared out.
 const FEW_CLOCKS: usize = 6;
 
-/// How many bounds lie side by side before the numbers of a signature begin anew with the first
-/// one, and whether bounds have weights.
+/// The number of successive bounds after which the numbers of a signature start again with the
+/// first one, and whether bounds have weights.
 ///
 /// Where a clock was reset a little later, the bounds of its column are greater and those of its
 /// row smaller, or the other way round. So a number is the sum of columns: those of one clock show
@@ -34,7 +34,7 @@ fn period(dimension: usize) -> Period {
 /// How bounds are shared out among the numbers of a signature.
 #[derive(Clone, Copy, Debug)]
 struct Period {
-    /// How many bounds lie side by side before the numbers begin anew with the first one.
+    /// The number of successive bounds after which the numbers start again with the first one.
     length: usize,
     /// Whether bounds have weights.
     is_weighted: bool,
@@ -90,8 +90,8 @@ fn narrow_sums(matrix: &[i16], greatest: i16, period: Period) -> [i32; 8] {
     sums.map(i32::from)
 }
 
-/// The entries of a matrix packed into bytes, or its demands if there are limits, as far as
-/// [`narrow_sums`] tells them apart.
+/// The entries of a matrix packed into bytes, or its demands if there are limits; only as exact as
+/// [`narrow_sums`] needs.
 pub(super) fn widen_narrow(matrix: &[u8], limits: &[Bound], dimension: usize, target: &mut [i16]) {
     const NONE: i16 = -1 << 14;
     for (entry, byte) in target.iter_mut().zip(matrix) {
@@ -117,7 +117,7 @@ pub(super) fn widen_narrow(matrix: &[u8], limits: &[Bound], dimension: usize, ta
 /// How the signatures of zones of one dimension are made.
 #[derive(Debug)]
 pub(super) struct Signatures {
-    /// How many bounds lie side by side before the numbers begin anew with the first one, and
+    /// The number of successive bounds after which the numbers start again with the first one, and
     /// whether bounds have weights.
     period: Period,
     /// The greatest encoded bound that signatures tell from greater ones.
@@ -137,7 +137,7 @@ impl Signatures {
             let place = entry % period.length;
             weights[place % 8] += weight(place / 8, period.is_weighted);
         }
-        // So that sums of so many bounds fit into a word.
+        // Sums of this many bounds must fit into a word.
         let greatest = (2 * greatest.clamp(0, Bound::MAX_VALUE) + 1).min((1 << 29) / weights[0]);
         let most = i64::from(weights[0]) * i64::from(2 * greatest + 1);
         Signatures {

@@ -23,7 +23,7 @@ pub(super) struct Entry {
     pub(super) node: u32,
 }
 
-/// A list: so many entries from `first` on, in a place for as many as the next power of two; or
+/// A list: this many entries from `first` on, in a place whose length is the next power of two; or
 /// [`SPLIT`], and the number of the split.
 #[derive(Clone, Copy, Debug)]
 struct List {
@@ -34,7 +34,7 @@ struct List {
 /// The length of a list that is split.
 const SPLIT: u32 = u32::MAX;
 
-/// A list is split when it has come to so many entries, or to twice as many in vain.
+/// A list is split when it has this many entries, or twice as many after a split in vain.
 const LONG: u32 = 128;
 
 const EMPTY: List = List { first: 0, len: 0 };

@@ -83,7 +83,7 @@ impl Solver {
         Ok(true)
     }
 
-    /// Whether the times at hand satisfy all.
+    /// Whether the current times satisfy all.
     pub(super) fn are_met(&self, limits: &[Limit]) -> Result<bool, TooHard> {
         for limit in limits {
             let is_met = match (self, limit) {
@@ -98,8 +98,8 @@ impl Solver {
         Ok(true)
     }
 
-    /// The times of the events in ticks, and how many make a unit. They satisfy what was required,
-    /// and of the alternatives those that the times at hand do.
+    /// The times of the events in ticks, and the number of ticks in a unit. They satisfy the
+    /// requirements, and those alternatives that the current times satisfy.
     pub(super) fn in_ticks(
         &self,
         alternatives: &[Alternatives],

@@ -1,13 +1,13 @@
 //! When the moves of a symbolic run can happen: exact times for a given sequence of moves.
 //!
-//! Along a known sequence of moves a clock's value is the time since the move that set it last,
-//! plus what it was set to. So guards, invariants and predicates become bounds on differences of
-//! the times of events (moves, and moments that are looked at), and the earliest times that satisfy
-//! them are longest paths. Two things have alternatives: where something must not hold at a moment
-//! (a receiver that abstains, a move of higher priority), one of its comparisons must fail; and
-//! where a wait must not pass through a zone, it must end before the zone begins, start after it
-//! has ended, or run beside it. They are tried one after the other, and only where the earliest
-//! times violate them.
+//! Along a known sequence of moves, a clock's value is the time since the move that set it last,
+//! plus the value that it got. So guards, invariants and predicates become bounds on differences of
+//! the times of events (moves, and moments that are checked), and the earliest times that satisfy
+//! them are longest paths. Two kinds of constraints have alternatives. If something must not hold
+//! at a moment (a receiver that abstains, a move of higher priority), one of its comparisons must
+//! fail. If a wait must not pass through a zone, it must end before the zone begins, start after
+//! the zone has ended, or never enter it for the whole wait. The alternatives are tried one after
+//! the other, and only where the earliest times violate them.
 //!
 //! A strict bound is a weak one with an infinitesimal distance: times are pairs of an integer and a
 //! count of infinitesimals. In the end the infinitesimal becomes `1 / (n + 1)`, where n is the
@@ -158,9 +158,9 @@ struct Plan<'s, 'a> {
     ran: Vec<Vec<usize>>,
     /// Whether a clock stands still in some wait.
     meets_stopped: bool,
-    /// The event at which the state at hand was entered or last looked at.
+    /// The event at which the current state was entered or last checked.
     now: usize,
-    /// What must stay in the state at hand.
+    /// What must stay true in the current state.
     keep: Option<Predicate>,
     solver: Solver,
     alternatives: Vec<Alternatives>,
@@ -238,7 +238,7 @@ impl<'s, 'a> Plan<'s, 'a> {
         Ok(())
     }
 
-    /// The values of the clocks on entry of the state at hand.
+    /// The values of the clocks on entry of the current state.
     fn values(&self) -> Vec<Value> {
         let values = self.set.iter().zip(&self.ran);
         values.map(|(set, ran)| (set.1, ran.clone())).collect()
@@ -274,7 +274,7 @@ impl<'s, 'a> Plan<'s, 'a> {
         }
     }
 
-    /// From this event in the state at hand on the predicate stays.
+    /// From this event in the current state on, the predicate stays true.
     fn stay_from(&mut self, event: usize, keep: &Predicate) -> Result<(), Unscheduled> {
         self.look = event;
         self.keep = Some(keep.clone());
@@ -308,7 +308,7 @@ impl<'s, 'a> Plan<'s, 'a> {
         self.require_part(self.end, &part)
     }
 
-    /// All clock values that the invariants of the state at hand allow.
+    /// All clock values that the invariants of the current state allow.
     fn whole(&mut self) -> Result<Zone, Unscheduled> {
         let mut whole = Zone::universe(self.symbolic.dimension());
         let invariant = self.symbolic.invariant(&mut self.words)?;
@@ -326,7 +326,7 @@ impl<'s, 'a> Plan<'s, 'a> {
         Ok(extent.to_federation(whole.bounds(), whole.dimension()))
     }
 
-    /// A new event, reached by waiting in the state at hand.
+    /// A new event, reached by waiting in the current state.
     fn wait(&mut self) -> Result<usize, Unscheduled> {
         let (start, end) = (self.now, self.solver.add_event());
         self.require(Distance {

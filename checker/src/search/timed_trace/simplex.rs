@@ -1,9 +1,9 @@
 //! Durations of waits under linear bounds, exactly: for runs in which clocks stand still at times.
 //!
-//! A clock's value is the sum of the durations of the waits in which it ran since it was set, so
-//! that bounds on clocks are linear in durations, with coefficients -1, 0 and 1. Numbers are
-//! fractions beside a multiple of an infinitesimal, which makes strict bounds weak ones; in the end
-//! the infinitesimal becomes small enough for all of them.
+//! A clock's value is the sum of the durations of the waits in which it ran since it was set. So
+//! bounds on clocks are linear in durations, with coefficients -1, 0 and 1. A number is a fraction
+//! plus a multiple of an infinitesimal, which makes strict bounds weak ones. In the end the
+//! infinitesimal becomes small enough for all of them.
 //!
 //! Invariants:
 //! * Every row is a basic variable as a sum of multiples of the others, which are not basic and at
@@ -196,7 +196,7 @@ impl Durations {
         self.repair().map(|_| ())
     }
 
-    /// Whether the durations at hand satisfy a bound.
+    /// Whether the current durations satisfy a bound.
     pub(super) fn is_met(&self, bound: &LinearBound) -> Result<bool, TooHard> {
         Ok(!self.left_side(bound)?.is_less(amount(bound.least))?)
     }
@@ -333,8 +333,8 @@ impl Durations {
         Ok(())
     }
 
-    /// The durations as whole numbers of ticks, and how many ticks make a unit. They satisfy what
-    /// was required, and of the other bounds those that the durations at hand do.
+    /// The durations as whole numbers of ticks, and the number of ticks in a unit. They satisfy the
+    /// requirements, and those other bounds that the current durations satisfy.
     pub(super) fn in_ticks(&self, others: &[LinearBound]) -> Result<(Vec<i64>, i64), TooHard> {
         let epsilon = self.epsilon(others)?;
         let mut durations = Vec::new();

@@ -52,7 +52,7 @@ impl Translator<'_> {
         let site = self.integer(site as i32);
         let code = runtime::more_rounds as *const () as usize;
         let status = self.call_back(code, Some(I64), &[self.context, site]);
-        self.hand_on_failure(status);
+        self.propagate_failure(status);
         let offset = offset_of!(NativeContext<'static>, rounds_left) as i32;
         let flags = MemFlagsData::trusted();
         let left = self.builder.ins().load(I64, flags, self.context, offset);
@@ -93,7 +93,7 @@ impl Translator<'_> {
     }
 
     /// Returns the status if it is an error.
-    pub(super) fn hand_on_failure(&mut self, status: Value) {
+    pub(super) fn propagate_failure(&mut self, status: Value) {
         let cold = *self.failed_call.get_or_insert_with(|| {
             let block = self.builder.create_block();
             self.builder.append_block_param(block, I64);
@@ -154,8 +154,7 @@ impl Translator<'_> {
         block
     }
 
-    /// Handles a result of integer arithmetic that does not fit: notes it and goes
-    /// on, or fails.
+    /// Handles a result of integer arithmetic that does not fit: notes it and continues, or fails.
     pub(super) fn overflow_if(&mut self, condition: Value, site: SiteId) {
         if self.overflow == Overflow::Error {
             self.fail_if(condition, RunTimeErrorKind::Overflow, site);

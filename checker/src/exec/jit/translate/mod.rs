@@ -3,7 +3,7 @@
 //! Invariants
 //! * A compiled function takes the [`runtime::NativeContext`], the state's words, its frame, and
 //!   its own arguments in native types; it returns the status (see [`super::runtime`]) and, for a
-//!   double or an address, the value beside it.
+//!   double or an address, also the value.
 //! * A check that fails jumps to a cold block that returns the status of its kind and site; nothing
 //!   is trapped by signals.
 //! * An address is a pointer. The frame of a callee begins where the frame of its caller ends.
@@ -161,10 +161,10 @@ struct Translator<'a> {
     frame: Value,
     /// The cold blocks that return an error, by status.
     failures: Vec<(i64, NativeBlock)>,
-    /// The cold blocks that note that a result wrapped round: the site, the block, and where it
-    /// goes on.
+    /// The cold blocks that note that a result wrapped round: the site, the block, and the block
+    /// that follows.
     wraps: Vec<(SiteId, NativeBlock, NativeBlock)>,
-    /// The cold block that hands on the error of a callee.
+    /// The cold block that passes on the error of a callee.
     failed_call: Option<NativeBlock>,
     /// The signatures of called-back functions, by types.
     signatures: Vec<(Vec<Type>, Option<Type>, SigRef)>,
@@ -299,7 +299,7 @@ impl Translator<'_> {
         }
         let call = self.builder.ins().call(callee, &values);
         let results = self.builder.inst_results(call).to_vec();
-        self.hand_on_failure(results[0]);
+        self.propagate_failure(results[0]);
         if let Some(target) = target {
             let value = match results.get(1) {
                 Some(&value) => value,
@@ -346,7 +346,7 @@ impl Translator<'_> {
         }
     }
 
-    /// Returns a status, with any value beside it.
+    /// Returns a status, and the value if there is one.
     fn return_status(&mut self, status: Value) {
         let value = match self.function.result {
             None | Some(RegisterType::Integer) => None,

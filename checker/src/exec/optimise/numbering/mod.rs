@@ -9,10 +9,10 @@
 //!   known of them holds wherever their definition dominates.
 //! * What is known of memory is forgotten in blocks with several predecessors, at calls, and at
 //!   writes that may concern it.
-//! * No instruction moves in front of another one, and an instruction that can fail goes only if it
-//!   cannot: the first error of a run stays the first. Checking the same values again cannot fail,
-//!   for the call has ended if it did. What may wrap round is computed at every place where it
-//!   stands, since it is noted there.
+//! * No instruction moves in front of another one, and an instruction that can fail is removed only
+//!   if it cannot fail here: the first error of a run stays the first. A second check of the same
+//!   values cannot fail, since the first would have ended the call. An operation that may wrap
+//!   round is computed at each of its places, since each is noted.
 //!
 //! Method: dominator-based value numbering after Briggs, Cooper and Simpson, "Value Numbering"
 //! (1997). Cost: linear in the code but for copying what is known at branches, which is given up in
@@ -86,7 +86,7 @@ struct KnownFacts {
 
 impl KnownFacts {
     /// What remains behind a join of several ways.
-    fn behind_join(mut self) -> KnownFacts {
+    fn after_join(mut self) -> KnownFacts {
         self.current.clear();
         self.memory
             .retain(|address, _| address.base == Base::Constants);
@@ -151,7 +151,7 @@ impl Numbering<'_> {
                 continue;
             }
             self.known = if is_join[block] {
-                known.behind_join()
+                known.after_join()
             } else {
                 known
             };
