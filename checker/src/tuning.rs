@@ -78,7 +78,6 @@ parts! {
     full_backward: "Explore the whole graph first where all of it is to be computed.";
     exact_first: "Try games that compare two clocks without abstraction first.";
     // Code.
-    inlining: "Put the code of small functions where they are called.";
     unrolling: "Write out loops of few rounds.";
     value_numbering: "Compute equal values once.";
     interpret_first: "Compile functions only once they have run for a while.";

@@ -110,7 +110,6 @@ PARTS = {
     "delayed_zones": Part("game"),
     "full_backward": Part("game", ("game/backward/full_backward.rs",)),
     "exact_first": Part("game"),
-    "inlining": Part("both", ("exec/optimise/inline.rs",)),
     "unrolling": Part("both", ("exec/optimise/unroll.rs",)),
     "value_numbering": Part("both", ("exec/optimise/numbering",)),
     "interpret_first": Part("both", ("exec/jit/needs.rs",)),
@@ -184,6 +183,8 @@ def _searches() -> Iterator[Member]:
     yield of("lamps 5", models.lamps(5))
     yield of("relays 4", models.relays(4))
     yield of("sorters 2", models.sorters(2))
+    yield of("resets 6", models.resets(6, 9))
+    yield of("menu 20", models.menu(20), "E<> Cook1.done")
     yield of("fischer 7, deadlock", models.fischer(7), DEADLOCK)
     yield of("csmacd 7, deadlock", models.csmacd(7), DEADLOCK)
     yield of("train gate 4, deadlock", models.train_gate(4), DEADLOCK)
@@ -227,7 +228,10 @@ def _games() -> Iterator[Member]:
     yield family("patrol", HOME, 60)
     text = _game("trains", bridge, 4)
     yield of("trains 4, strategy", text, bridge, strategy=True)
+    yield of("store, safety", models.store(), "control: A[] stock >= 0 && stock <= 40")
+    yield of("duel", models.duel(), "control: A<> life[1] == 0")
     # Two clocks are compared.
+    yield of("ring 4, differences", models.ring(4, 4), "control: A[] hits < 2")
     clocks = text.replace("clock x;", "clock x, y;").replace("x = 0; }}", "x = 0; }}")
     apart = clocks.replace("guard x >= 10;", "guard x >= 10 && y - x >= 0;")
     yield of("trains 3, differences", apart.replace("N = 4", "N = 3"), bridge)

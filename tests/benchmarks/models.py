@@ -540,3 +540,104 @@ process Person(const int[0, N - 1] pid) {{
 }}
 system Person;
 """
+
+
+def resets(clocks: int, latest: int) -> str:
+    """Clocks that are set back from time to time: all zones belong to one discrete state."""
+    return f"""
+process Timer(const int[0, {clocks} - 1] pid) {{
+    clock x;
+    state runs {{ x <= {latest} + pid }};
+    init runs;
+    trans runs -> runs {{ guard x >= 1 + pid % 3; assign x = 0; }};
+}}
+system Timer;
+"""
+
+
+def menu(dishes: int) -> str:
+    """Cooks with functions of their own, most of which hardly run before the first dish is done."""
+    cooks = "".join(
+        f"""
+process Cook{cook}() {{
+    clock x;
+    int[0, 100] used;
+    bool may() {{
+        int total = {cook};
+        for (k : int[0, 4]) total = (total * 7 + k + shared) % 97;
+        return total != {cook % 90};
+    }}
+    void take() {{ used = (used * 3 + {cook}) % 101; shared = (shared + used) % 50; }}
+    state idle, cooks, done;
+    init idle;
+    trans idle -> cooks {{ guard x >= {cook % 7} && may(); assign take(), x = 0; }},
+        cooks -> done {{ guard may() && turn == {cook}; assign turn = {cook + 1}, take(); }};
+}}"""
+        for cook in range(dishes)
+    )
+    names = ", ".join(f"Cook{cook}" for cook in range(dishes))
+    return f"int[0, {dishes}] turn;\nint[0, 50] shared;{cooks}\nsystem {names};\n"
+
+
+def store() -> str:
+    """Every round the controller gives and the environment takes, both up to four."""
+    return """
+int[-9, 99] stock = 20;
+int[0, 4] given;
+clock x;
+process Store() {
+    state Give, Take { x <= 1 }, Wait { x <= 1 };
+    commit Give;
+    init Give;
+    trans Give -> Take { select g : int[0, 4]; assign given = g; },
+        Take -u-> Wait { guard x >= 1 && stock < 95 && stock > -5; select t : int[0, 4];
+            assign stock += given - t, given = 0; },
+        Wait -u-> Give { guard x >= 1; assign x = 0; };
+}
+system Store;
+"""
+
+
+def duel() -> str:
+    """Two who need a while between two blows; all moves are the environment's."""
+    return """
+int[0, 9] life[2] = {6, 6};
+int[0, 3] tricks[2] = {2, 2};
+chan hit[2], stun[2];
+process Fighter(const int[0, 1] pid) {
+    clock blow, trick, pause, rest;
+    state Ready { pause <= 4 }, Stunned { rest <= 2 }, Struck;
+    commit Struck;
+    init Ready;
+    trans Ready -u-> Ready { guard blow > 2; sync hit[1 - pid]!; assign blow = 0, pause = 0; },
+        Ready -u-> Ready { guard trick > 3 && tricks[pid] > 0; sync stun[1 - pid]!;
+            assign tricks[pid]--, trick = 0, pause = 0; },
+        Ready -u-> Struck { sync hit[pid]?; assign life[pid]--; },
+        Ready -u-> Stunned { sync stun[pid]?; assign rest = 0; },
+        Stunned -u-> Struck { sync hit[pid]?; assign life[pid]--; },
+        Stunned -u-> Ready { guard rest >= 2; assign pause = 0; },
+        Struck -u-> Ready { guard life[pid] > 0; assign pause = 0; };
+}
+system Fighter;
+"""
+
+
+def ring(players: int, latest: int) -> str:
+    """Players whose clocks are compared with their neighbours', and never grow large."""
+    return f"""
+const int N = {players};
+clock x[N];
+int[0, 9] hits;
+process Player(const int[0, N - 1] pid) {{
+    state aims {{ x[pid] <= {latest} }}, struck {{ x[pid] <= {latest} }};
+    init aims;
+    trans aims -> struck {{ guard x[pid] >= 1 && x[pid] - x[(pid + 1) % N] >= 1;
+            assign hits = hits < 9 ? hits + 1 : 9; }},
+        aims -u-> aims {{ guard x[pid] >= {latest}; assign x[pid] = 0; }},
+        aims -u-> struck {{ guard x[pid] >= 2 && x[(pid + 1) % N] - x[pid] <= 2
+            && x[pid] - x[(pid + 2) % N] <= {latest - 1}; }},
+        struck -u-> aims {{ guard x[pid] - x[(pid + 1) % N] <= 2; assign x[pid] = 0; }},
+        struck -> aims {{ guard x[pid] >= {latest}; assign x[pid] = 0, hits = 0; }};
+}}
+system Player;
+"""
