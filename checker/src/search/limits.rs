@@ -1,13 +1,13 @@
-//! Limits: a search reports its counters now and then, and is told whether to go on.
+//! Limits: a search reports its counters from time to time, and is told whether to continue.
 //!
 //! The search itself reads no clock and knows no limit; its caller does.
 
-/// What a search has done so far.
+/// What a search has done until now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// States whose successors were computed.
     pub explored: u64,
-    /// States that are stored: those that one with a larger zone took the place of do not count.
+    /// States that are stored. States that were replaced by one with a larger zone do not count.
     pub stored: u64,
     /// Stored states that wait for their successors to be computed.
     pub waiting: u64,
@@ -49,19 +49,20 @@ pub trait Watch {
     fn look(&mut self, counters: &Counters) -> Option<StopReason>;
 }
 
-/// States that a search may explore between two looks, of as many at most, at zones of this
-/// dimension: what a state takes grows with the third power of it, and what its successors take
-/// with that, too, where clocks have a process each.
+/// The states that a search may explore between two checks of the limits, at most `most`, for zones
+/// of this dimension. The cost of a state grows with the third power of the dimension; so does the
+/// cost of its successors where clocks have a process each.
 pub(crate) fn states_between_checks(most: u64, dimension: usize) -> u64 {
     (UNITS_BETWEEN_LOOKS / (dimension as u64).pow(3)).clamp(1, most)
 }
 
-/// Moves that a search may take between two looks.
+/// The moves that a search may take between two checks of the limits.
 pub(crate) fn moves_between_checks(most: u64, dimension: usize) -> u64 {
     (UNITS_BETWEEN_LOOKS / (dimension as u64).pow(2)).clamp(1, most)
 }
 
-/// Bounds that the zones of states and moves may have between two looks, about.
+/// The approximate number of bounds in the zones of states and moves between two checks of the
+/// limits.
 const UNITS_BETWEEN_LOOKS: u64 = 1 << 19;
 
 /// Never stops a search.

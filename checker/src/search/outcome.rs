@@ -12,7 +12,7 @@ pub enum Outcome<T> {
     Found(T),
     /// There is none.
     Exhausted,
-    /// A limit came first.
+    /// A limit was reached first.
     Stopped(StopReason),
 }
 

@@ -15,7 +15,7 @@ use super::ending::RunEnding;
 
 /// The part of a state that a run inside the predicate can reach.
 pub(super) struct Inside {
-    /// Its zones before extrapolation; those in which a run can end, if one can.
+    /// Its zones before extrapolation; if a run can end in it, the zones in which it can.
     pub(super) zones: Vec<Zone>,
     /// Whether a run can end in it.
     pub(super) ending: Option<RunEnding>,
@@ -23,12 +23,12 @@ pub(super) struct Inside {
     pub(super) is_coarse: bool,
 }
 
-/// How a run comes into a state.
+/// How a run enters a state.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry<'z> {
     /// The zone before time passes.
     pub zone: &'z Zone,
-    /// Whether time runs already, where the zone lies in an open part of a barrier.
+    /// Whether time runs already, if the zone lies in an open part of a barrier.
     pub is_running: bool,
 }
 
@@ -88,8 +88,8 @@ impl Inside {
 }
 
 /// The valuations of a state inside the predicate from which time can pass without limit, and those
-/// from which no wait leads to a move or out of the predicate; where clocks stand still, only such.
-/// `whole` is what the invariants allow.
+/// from which no wait leads to a move or out of the predicate. Where clocks stand still, both sets
+/// may be too small. `whole` is what the invariants allow.
 pub(in crate::search) fn endings(
     symbolic: &mut Symbolic<'_>,
     keep: &Predicate,
@@ -162,8 +162,8 @@ impl Passage {
         })
     }
 
-    /// The valuations from which time leads into a part of the frame; where that cannot be told,
-    /// those of the part alone if doubts count as staying, and else more.
+    /// The valuations from which time leads into a part of the frame. If that is not known, the
+    /// result is the part alone if doubts count as staying, and otherwise a larger set.
     fn past(&self, part: &Federation) -> Federation {
         let dimension = part.dimension();
         let mut past = part.clone();
@@ -181,7 +181,7 @@ impl Passage {
         past
     }
 
-    /// What delay inside the predicate reaches.
+    /// What delay reaches inside the predicate.
     fn reached(&self, entry: &Zone, is_running: bool) -> Federation {
         let dimension = self.whole.dimension();
         let mut reached = Federation::of_zone(dimension, self.whole.bounds());
@@ -199,13 +199,13 @@ impl Passage {
         reached
     }
 
-    /// Whether the state is treated as if more runs stayed in it than do.
+    /// Whether the state is treated as if more runs stayed in it than really do.
     fn is_coarse(&self) -> bool {
         let is_crossed = !self.stopped.is_empty() && !self.outside.is_empty();
         self.may_delay && (is_crossed || has_inexact_pasts(&self.stopped, self.whole.dimension()))
     }
 
-    /// Why a run may end in the part that is reached, and from which valuations of it.
+    /// Why a run may end in the reached part, and from which of its valuations.
     fn end(
         &self,
         symbolic: &mut Symbolic<'_>,
@@ -223,7 +223,7 @@ impl Passage {
         Ok((!stuck.is_empty()).then_some((RunEnding::Stuck, stuck)))
     }
 
-    /// The valuations of the part that is reached from which time can pass without limit.
+    /// The valuations of the reached part from which time can pass without limit.
     fn waiting(&self, inside: &Federation) -> Federation {
         let dimension = self.whole.dimension();
         let is_bounded = dbm::is_delay_bounded(self.whole.bounds(), dimension, &self.stopped);
@@ -237,7 +237,7 @@ impl Passage {
         waiting
     }
 
-    /// The valuations of the part that is reached from which no wait leads to a move or out of the
+    /// The valuations of the reached part from which no wait leads to a move or out of the
     /// predicate.
     fn stuck(
         &self,
@@ -278,8 +278,8 @@ fn has_inexact_pasts(stopped: &ClockSet, dimension: usize) -> bool {
     !stopped.is_empty() && dimension - 1 > stopped.len() + 1
 }
 
-/// Whether the past of this zone is one: its bounds on differences between running and stopped
-/// clocks say no more than those on each.
+/// Whether the past of this zone is a zone: its bounds on differences between running and stopped
+/// clocks follow from those on each clock.
 fn is_straight(zone: &[Bound], dimension: usize, stopped: &ClockSet) -> bool {
     let implied = |left: usize, right: usize| {
         zone[left * dimension + right] >= zone[left * dimension] + zone[right]

@@ -1,20 +1,21 @@
 //! Is there a run that stays inside a predicate for ever?
 //!
-//! A run counts if the predicate holds at all its moments and it cannot leave: it has infinitely
-//! many moves (in however little time), or from some moment on time can pass without limit inside
-//! predicate and invariants, or at some moment neither a move nor any wait that the invariants
-//! allow leads to a move or out of the predicate.
+//! A run counts if the predicate holds at all its moments and the run cannot leave it. There are
+//! three cases: it has infinitely many moves (in however little time); from some moment on time can
+//! pass without limit inside predicate and invariants; or at some moment no move, and no wait that
+//! the invariants allow, leads to a move or out of the predicate.
 //!
-//! The nodes of the search are words with a zone of valuations that lie inside the predicate and
-//! that some delay inside it reaches from the entry of the state ([`super::delay_inside`]). Every
-//! node is accepting, so one depth-first search is enough: there is a run with infinitely many
-//! moves exactly if the search comes back to a node on its stack, or to one that contains the zone
-//! of such a node (every valuation of that has a predecessor in itself, around and around, and the
-//! regions are finitely many). A node that was left without success starts no such run, nor does
-//! any that it contains.
+//! The nodes of the search are words with a zone of valuations inside the predicate that some delay
+//! inside it reaches from the entry of the state ([`super::delay_inside`]). Every node is
+//! accepting, so one depth-first search is enough: there is a run with infinitely many moves
+//! exactly if the search returns to a node on its stack, or to one that contains the zone of such a
+//! node. (Each valuation of that zone then has a predecessor in the zone again, without end, and
+//! there are finitely many regions.) A node that was left without success starts no such run, and
+//! neither does any node that it contains.
 //!
-//! For a run that is found, extrapolation must have kept all that comparisons can tell (Extra-M+),
-//! with those of the predicate among them. That there is none holds with any larger zones too.
+//! For a run that is found, extrapolation must have kept everything that comparisons can
+//! distinguish (Extra-M+), including those of the predicate. The answer that there is none also
+//! holds with larger zones.
 //!
 //! Source: S. Tripakis, "Checking Timed Büchi Automata Emptiness on Simulation Graphs", ACM TOCL
 //! 10, 2009 (cycles of zones are cycles of runs); A. Laarman, M. C. Olesen, A. E. Dalsgaard, K. G.
@@ -34,7 +35,7 @@ use crate::search::limits::{Counters, Watch, states_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
-/// States between two looks at the limits, at most.
+/// The greatest number of states between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
 
 /// No node.
@@ -55,7 +56,7 @@ struct Node {
     zone: ZoneId,
     /// The next node with the same words.
     next: u32,
-    /// Its place on the stack, [`NONE`] once it was left.
+    /// Its place on the stack; [`NONE`] after it was left.
     depth: u32,
 }
 
@@ -73,13 +74,14 @@ struct Frame {
     parts: Vec<Part>,
 }
 
-/// Searches for runs inside `keep`; remembers over several searches from which nodes there is none.
+/// Searches for runs inside `keep`. Several searches share what is known about nodes that start no
+/// run.
 pub struct Liveness<'p> {
     keep: &'p Predicate,
     store: StateStore,
     zones: ZoneTable,
     nodes: Vec<Node>,
-    /// By discrete state: its first node.
+    /// For each discrete state: its first node.
     heads: Vec<u32>,
     frames: Vec<Frame>,
     explored: u64,
@@ -103,12 +105,12 @@ impl<'p> Liveness<'p> {
         }
     }
 
-    /// Whether a doubt was counted as a run: what was found is certain only if not.
+    /// Whether a doubt was counted as a run: only if not, what was found is certain.
     pub fn is_coarse(&self) -> bool {
         self.is_coarse
     }
 
-    /// What was done so far.
+    /// What was done until now.
     pub fn counters(&self) -> Counters {
         let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
         let words = self
@@ -193,7 +195,7 @@ impl<'p> Liveness<'p> {
         Ok(Outcome::Exhausted)
     }
 
-    /// Goes one node down, to the next move, or one node up.
+    /// Moves one node down, to the next move, or one node up.
     fn step(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<RunEnding>, Failure> {
         let Some(frame) = self.frames.last_mut() else {
             return Ok(None);
@@ -251,8 +253,7 @@ impl<'p> Liveness<'p> {
         Ok(None)
     }
 
-    /// Goes to a node, unless it is known to be the start of no run; finds out whether it closes a
-    /// loop.
+    /// Moves to a node, unless it is known to start no run; checks whether it closes a loop.
     fn visit(
         &mut self,
         symbolic: &mut Symbolic<'_>,

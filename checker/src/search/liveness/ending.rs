@@ -1,9 +1,9 @@
-//! How a run ends that never leaves a predicate.
+//! How a run that never leaves a predicate ends.
 
 /// Why a run inside a predicate never leaves it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunEnding {
-    /// Its last state leads back to the state with this index by the last move.
+    /// The last move leads from its last state back to the state with this index.
     Loop(usize),
     /// Time passes for ever in its last state.
     Waits,

@@ -1,9 +1,9 @@
 //! `p --> q`: does q come after every p?
 //!
-//! It does not exactly if some reachable state satisfies p and starts a run that never meets q. So
-//! the search for reachable states looks, at each that satisfies p in some part where q does not
-//! hold, for a run inside `not q` that begins there ([`super::emptiness`]); what those searches
-//! learn they share.
+//! The answer is no exactly if some reachable state satisfies p and starts a run that never meets
+//! q. So at each reachable state that satisfies p in some part where q does not hold, the search
+//! looks for a run inside `not q` that begins there ([`super::emptiness`]). These searches share
+//! what they learn.
 
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
@@ -107,8 +107,8 @@ impl Goal for Unanswered<'_> {
     }
 }
 
-/// The way to a state, and then a run from it: one trace, and the index of the run's first state in
-/// it.
+/// Joins the path to a state with a run from it: one trace, and the index of the run's first state
+/// in it.
 pub fn joined(mut way: Trace, run: Trace) -> (Trace, usize) {
     let mut states = run.states.into_iter();
     let start = way.states.len().saturating_sub(1);

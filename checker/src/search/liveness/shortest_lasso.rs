@@ -1,10 +1,11 @@
 //! The run with the fewest moves that stays inside a predicate for ever.
 //!
-//! The nodes of the search are words with an extrapolated zone: on the way to a state in which the
-//! run opens, if there is such a condition, and of the run itself, as in [`super::emptiness`]. The
-//! run ends in a node in which it can stay without a move; or it closes, where a way leads from a
-//! node to one with the same words, and can be taken again and again: after some rounds the zone
-//! contains that of a round before. What counts is the moves up to there, those of the loop once.
+//! The nodes of the search are words with an extrapolated zone. If there is a condition on the
+//! state in which the run opens, some nodes are on the path to such a state; the others are nodes
+//! of the run itself, as in [`super::emptiness`]. A run can end in a node in which it can stay
+//! without a move. Or it can close: a path leads from a node to one with the same words, and can be
+//! repeated for ever, because after some rounds the zone contains that of an earlier round. The
+//! search counts the moves up to there, and those of the loop once.
 //!
 //! Nodes are made in the order of their distance from the start, so the first end is the nearest.
 //! Where a path returns to the words of one of its nodes, it gives a first loop. Then the search
@@ -12,8 +13,8 @@
 //! found. Among several paths of the same length from one node to another, the first one stands for
 //! all.
 //!
-//! Cost: as breadth-first search with equal zones for the same; for loops in the worst case its
-//! square.
+//! Cost: that of breadth-first search with equal zones as one state; for loops its square in the
+//! worst case.
 
 use std::collections::HashMap;
 
@@ -30,18 +31,19 @@ use crate::search::limits::{Counters, StopReason, Watch, states_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
-/// Steps between two looks at the limits, at most.
+/// The greatest number of steps between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
 
-/// Rounds of a loop after which its zones have settled, or it is given up.
+/// The number of rounds after which the zones of a loop no longer change, or the loop is given up.
 const MOST_ROUNDS: usize = 16;
 
-/// What is looked for: a run that stays in `keep` for ever.
+/// The search looks for a run that stays in `keep` for ever.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'p> {
-    /// It begins in a state, come to in any way, in which this holds; else in the initial state.
+    /// The run begins in a state, reached in any way, in which this holds; without it, in the
+    /// initial state.
     pub open: Option<&'p Predicate>,
-    /// What stays.
+    /// What must stay true.
     pub keep: &'p Predicate,
 }
 
@@ -50,7 +52,7 @@ pub struct Wanted<'p> {
 enum Origin {
     /// The run begins here.
     Start,
-    /// It opens in a state of the way.
+    /// The run opens in a state of the path.
     Opening(usize),
     /// By a move.
     Move(usize, Vec<Part>),
@@ -59,12 +61,12 @@ enum Origin {
 struct Node {
     discrete: DiscreteId,
     zone: ZoneId,
-    /// Whether it is one of the run, and not of the way to it.
+    /// Whether it is a node of the run, and not of the path to it.
     is_open: bool,
     from: Origin,
     /// The number of moves to it.
     distance: u32,
-    /// The nodes of the run that its moves lead to.
+    /// The nodes of the run to which its moves lead.
     next: Vec<(usize, Vec<Part>)>,
     is_explored: bool,
 }
@@ -84,16 +86,16 @@ pub struct LassoSearch<'s, 'a> {
     store: StateStore,
     zones: ZoneTable,
     nodes: Vec<Node>,
-    /// By words and zone: the node of the run.
+    /// For words and zone: the node of the run.
     open_nodes: HashMap<(DiscreteId, ZoneId), usize>,
-    /// By words: the nodes of the way.
+    /// For words: the nodes of the path.
     ways: HashMap<DiscreteId, Vec<usize>>,
     found: Option<(u32, Stay)>,
     steps: u64,
 }
 
 impl<'s, 'a> LassoSearch<'s, 'a> {
-    /// A search in zones that extrapolation leaves exact for what stays.
+    /// A search in zones that extrapolation leaves exact for what must stay true.
     pub fn new(symbolic: &'s mut Symbolic<'a>, wanted: Wanted<'s>) -> LassoSearch<'s, 'a> {
         LassoSearch {
             store: StateStore::new(symbolic.stepper.network()),
@@ -224,7 +226,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         Ok(())
     }
 
-    /// Adds the nodes of the way to the run for a zone, and those of the runs that open in it.
+    /// Adds the nodes of the path to the run for a zone, and those of the runs that open in it.
     fn extend_run(
         &mut self,
         from: &Origin,
@@ -319,7 +321,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         }
     }
 
-    /// Whether a run that comes from the head by this way can go around for ever.
+    /// Whether a run that comes from the head along this path can repeat it for ever.
     fn closes(&mut self, head: usize, way: &[(usize, Vec<Part>)]) -> Result<bool, Failure> {
         let Some((last, _)) = way.last() else {
             return Ok(false);
@@ -372,7 +374,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
 
     /// Looks for the shortest loop from a node, as long as it may be better than what was found.
     fn close(&mut self, head: usize, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
-        // By node: from where it was come to first, and by which of its moves.
+        // For each node: the node from which it was reached first, and by which of its moves.
         let mut came: HashMap<usize, (usize, usize)> = HashMap::new();
         let mut layer = vec![head];
         let mut moves = self.nodes[head].distance;
@@ -457,7 +459,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         trace.states.push((words, zone));
     }
 
-    /// Adds the states and moves up to what comes from there.
+    /// Adds the states and moves that lead to this origin.
     fn follow(&self, from: &Origin, trace: &mut Trace, opening: &mut usize) {
         let mut chain = Vec::new();
         let mut last = from;

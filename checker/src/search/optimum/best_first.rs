@@ -1,22 +1,22 @@
-//! A search without short cuts, least costs first: for shortest and fastest traces, and for the
-//! reached set of a certificate.
+//! A search without short cuts that explores states of least cost first. It finds shortest and
+//! fastest traces, and the reached set of a certificate.
 //!
-//! Every state is stored, those with committed locations too, and one is left out only if a stored
-//! one with the same words contains its zone. So the stored zones, extrapolated as they are,
-//! contain the successors of each of them: they are closed under all moves and delays, which is
-//! what a certificate claims. And since what contains a new state was met at no greater cost,
-//! nothing of least cost is lost.
+//! Every state is stored, even with committed locations. A state is left out only if a stored one
+//! with the same words contains its zone. So the stored extrapolated zones contain the successors
+//! of each of them: they are closed under all moves and delays, which is what a certificate claims.
+//! A stored state that contains a new one was reached at no greater cost, so no state of least cost
+//! is lost.
 //!
-//! *Moves* as costs make it a breadth-first search. *Time* as cost is the lower bound of a clock
-//! that is never set: the caller adds it to the network. Its upper bounds are forgotten in every
-//! state, as if any more time might have passed before: then states that differ in how much time
-//! may be wasted are the same, and those with bounded cost are finitely many.
+//! With *moves* as costs, this is a breadth-first search. *Time* as cost is the lower bound of a
+//! clock that is never set, which the caller adds to the network. Its upper bounds are forgotten in
+//! every state, as if any more time might have passed before. Then states that differ only in how
+//! much time may be wasted are the same, and there are finitely many with bounded cost.
 //!
 //! Source: G. Behrmann, A. Fehnker, T. Hune, K. G. Larsen, P. Pettersson, J. Romijn, F. Vaandrager,
 //! "Efficient Guiding Towards Cost-Optimality in UPPAAL", TACAS 2001 (least time by a clock of its
 //! own, best first).
 //!
-//! Cost: as a search with inclusion, times the states that short cuts would save.
+//! Cost: that of a search with inclusion, times the states that short cuts would save.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -33,13 +33,13 @@ use crate::search::reachability::goal::{Goal, Target};
 use crate::search::reachability::retrace;
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
-/// States between two looks at the limits, at most.
+/// The greatest number of states between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
 
 /// No node.
 const NONE: u32 = u32::MAX;
 
-/// What is to be least.
+/// What must be least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// The number of moves.
@@ -48,10 +48,10 @@ pub enum Measure {
     Time(usize),
 }
 
-/// A cost: a number, and 1 if it is only come near to.
+/// A cost: a number, and 1 if it can only be approached.
 pub type Cost = (i32, u32);
 
-/// A way of least cost: the indices of its moves among those of its states.
+/// A path of least cost: the indices of its moves among those of its states.
 #[derive(Clone, Debug)]
 pub struct Way {
     pub(super) steps: Vec<Step>,
@@ -60,7 +60,7 @@ pub struct Way {
 }
 
 impl Way {
-    /// The trace of the way. `symbolic` may be without the clock that measures time.
+    /// The trace of the path. `symbolic` may be without the clock that measures time.
     pub fn trace(&self, symbolic: &mut Symbolic<'_>, goal: &mut dyn Goal) -> Trace {
         retrace::retrace(symbolic, &self.steps, Some(goal))
     }
@@ -69,14 +69,14 @@ impl Way {
 /// The stored states: words with their zones.
 pub type Reached = Vec<(Vec<i32>, Vec<Zone>)>;
 
-/// A state as it was met.
+/// A state as it was reached first.
 #[derive(Clone, Debug)]
 pub struct Met {
     /// Its words.
     pub words: Vec<i32>,
     /// Its zone, extrapolated.
     pub zone: Zone,
-    /// Which state was left for it, an earlier one, and by which move; `None` for the initial one.
+    /// The earlier state from which it was reached, and the move; `None` for the initial state.
     pub from: Option<(usize, Vec<Part>)>,
 }
 
@@ -88,7 +88,7 @@ struct Node {
     cost: Cost,
 }
 
-/// What waits: a node to be explored, or one that was looked for.
+/// An entry of the worklist: a node to explore, or one that satisfies the goal.
 type Waiting = Reverse<(Cost, bool, u32)>;
 
 /// A search for a state of least cost.
@@ -98,7 +98,7 @@ pub struct BestFirst<'s, 'a> {
     measure: Measure,
     store: StateStore,
     nodes: Vec<Node>,
-    /// By discrete state: its nodes.
+    /// For each discrete state: its nodes.
     lists: Vec<Vec<u32>>,
     waiting: BinaryHeap<Waiting>,
     explored: u64,
@@ -166,7 +166,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
         Ok(Outcome::Exhausted)
     }
 
-    /// Comes to the successors of a node; a limit may come first.
+    /// Enters the successors of a node; a limit may stop this.
     fn explore(&mut self, node: u32, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
         let dimension = self.symbolic.dimension();
         let nodes_between = moves_between_checks(LOOK_EVERY, dimension) as usize;
@@ -205,7 +205,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
         Ok(None)
     }
 
-    /// Stores the zones of a state that was come to, unless a stored one contains them, and looks
+    /// Stores the zones of a state that was reached, unless a stored one contains them, and looks
     /// for the goal in them.
     fn enter(
         &mut self,
@@ -219,8 +219,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
                 forget_upper_bounds(zone, clock);
             }
         }
-        // The goal is looked for before extrapolation; where it holds, nothing is explored any
-        // more.
+        // The goal is evaluated before extrapolation; where it holds, nothing more is explored.
         for zone in &*zones {
             if let Some(cost) = self.goal_cost(words, zone, parent)? {
                 let goal = self.push(words, zone.clone(), parent, step, cost);
@@ -241,8 +240,8 @@ impl<'s, 'a> BestFirst<'s, 'a> {
             {
                 continue;
             }
-            // What the new zone contains was met before, at no greater cost: it stays for the ways
-            // through it, but not in the list.
+            // What the new zone contains was reached before, at no greater cost. It stays for the
+            // paths through it, but not in the list.
             list.retain(|&one| !dbm::is_subset(bounds_of(one), zone.bounds()));
             let cost = match self.measure {
                 Measure::Moves => self.moves_after(parent),
@@ -319,8 +318,8 @@ impl<'s, 'a> BestFirst<'s, 'a> {
         reached
     }
 
-    /// The first `most` states in the order in which they were met, also those that a later one
-    /// contains.
+    /// The first `most` states in the order in which they were reached, including those that a
+    /// later one contains.
     pub fn into_met(self, most: usize) -> Result<Vec<Met>, Failure> {
         let initial = &self.symbolic.stepper.network().initial;
         let mut moves = Moves::default();
@@ -332,7 +331,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
             let mut from = None;
             if node.parent != NONE {
                 let parent = node.parent as usize;
-                // What a state leads to was met in one go.
+                // All successors of a state were reached at once.
                 if moves_of != node.parent {
                     let mut source = met[parent].words.clone();
                     self.symbolic.moves(&mut source, &mut moves)?;

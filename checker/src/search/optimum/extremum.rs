@@ -7,15 +7,15 @@
 //! ceiling is exact, since such comparisons say whether it is reached and exceeded. Otherwise the
 //! ceiling doubles, and the search starts again.
 //!
-//! A supremum beyond the ceiling may be infinite. It is if time can pass without limit on the way
-//! to the state, or if the way holds a *pump*: two states of it with the same words, such that the
-//! later zone contains the earlier one with some clocks moved up by the same number. These clocks
-//! are above every constant of the model, and each has at the end of the pump the value of one of
-//! them, with what was added: they are not set, or copied among each other. Above all constants
-//! nothing depends on how far they are, and their differences do not change; so the way from the
-//! one state to the other can be taken again and again. If the clock that is measured grows without
-//! limit, the zones without such clocks are finitely many, and so the ways that exceed great
-//! ceilings have a pump.
+//! A supremum beyond the ceiling may be infinite. It is infinite if time can pass without limit on
+//! the path to the state, or if the path has a *pump*: two states of it with the same words, such
+//! that the later zone contains the earlier one with some clocks moved up by the same number. These
+//! clocks are above every constant of the model. At the end of the pump each of them has the value
+//! of one of them plus what was added: they are not set, or only copied among each other. Above all
+//! constants nothing depends on their values, and their differences do not change. So the path from
+//! the one state to the other can be repeated for ever. If the measured clock grows without limit,
+//! there are finitely many zones without such clocks, so the paths that exceed great ceilings have
+//! a pump.
 //!
 //! Source of the exactness of a ceiling: G. Behrmann, P. Bouyer, K. G. Larsen, R. Pelánek, "Lower
 //! and upper bounds in zone-based abstractions of timed automata", STTT 8, 2006; the pump is
@@ -37,7 +37,7 @@ use crate::search::reachability::search;
 /// A least or greatest value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extreme {
-    /// A value; `is_reached` is false if the clock comes as near to it as one likes and no nearer.
+    /// A value; `is_reached` is false if the clock only comes as near to it as one likes.
     Value {
         /// The value.
         value: i32,
@@ -48,7 +48,7 @@ pub enum Extreme {
     Infinite,
 }
 
-/// What is asked.
+/// The question of a query.
 #[derive(Clone, Copy, Debug)]
 pub struct Question<'q> {
     /// The states that count.
@@ -63,7 +63,7 @@ pub struct Question<'q> {
     pub further: &'q [ClockAtom],
 }
 
-/// The values of one item; `None` where they were not asked for, or no state counts.
+/// The values of one item; `None` if they were not asked for, or no state counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Extremes {
     /// The least.
@@ -84,9 +84,9 @@ pub enum Values {
 /// The end of a search for values.
 #[derive(Debug)]
 pub struct ValuesReport {
-    /// The values, or the failure and the way to the state whose exploration failed.
+    /// The values, or the failure and the path to the state whose exploration failed.
     pub outcome: Result<Values, (Failure, Trace)>,
-    /// What was done, in all rounds; the stored states are those of the last.
+    /// What was done in all rounds; the stored states are those of the last round.
     pub counters: Counters,
     /// Whether some zone may contain more than what is reachable.
     pub is_approximate: bool,
@@ -122,7 +122,7 @@ pub fn search<'a>(
                 let mut zones = symbolic(&measuring.atoms_without_ceiling());
                 if zones.splits() {
                     // Cut zones forget both bounds of a clock by the same ceiling, and without one
-                    // a pump would not show.
+                    // a pump would not be visible.
                     zones = symbolic(&measuring.atoms(false));
                 }
                 match measuring.exceeded(&mut zones, &trace) {
@@ -162,17 +162,17 @@ fn greatest_constant(network: &Network, question: &Question<'_>) -> i32 {
 /// An item of the question, while it is measured.
 #[derive(Clone, Copy, Debug)]
 struct Item {
-    /// Up to here a greatest value is exact.
+    /// A greatest value up to this one is exact.
     high_ceiling: i32,
-    /// Up to here a least value is exact.
+    /// A least value up to this one is exact.
     low_ceiling: i32,
     is_infinite: bool,
     least: Option<Measured>,
     greatest: Option<Measured>,
 }
 
-/// States of a way that are tried as the start of a pump, evenly over it: a way that exceeds a
-/// great ceiling has many.
+/// The number of states of a path, evenly spread, that are tried as the start of a pump: a path
+/// that exceeds a great ceiling has many pumps.
 const MOST_STARTS: usize = 64;
 
 /// A value, and whether it is reached.
@@ -212,7 +212,7 @@ impl<'q> Measuring<'q> {
         }
     }
 
-    /// The comparisons that the search must keep; those for the least values only if `least`.
+    /// The comparisons that the search must keep; those for the least values only with `least`.
     fn atoms(&self, least: bool) -> Vec<ClockAtom> {
         let reference = ClockRange {
             first: ClockId(0),
@@ -244,8 +244,8 @@ impl<'q> Measuring<'q> {
         atoms
     }
 
-    /// The same for the greatest values, but without limit for the clock that exceeded its ceiling:
-    /// no zone forgets how far it has come.
+    /// The same for the greatest values, but without a limit for the clock that exceeded its
+    /// ceiling, so that no zone forgets its value.
     fn atoms_without_ceiling(&self) -> Vec<ClockAtom> {
         let mut items = self.items.clone();
         if let Some(index) = self.exceeding {
@@ -255,7 +255,7 @@ impl<'q> Measuring<'q> {
         measuring.atoms(false)
     }
 
-    /// Takes a clock's bounds in a zone into account; false if its upper bound exceeds the ceiling.
+    /// Adds a clock's bounds in a zone; returns false if its upper bound exceeds the ceiling.
     fn take_clock(&mut self, index: usize, lower: Bound, upper: Bound) -> bool {
         let item = &mut self.items[index];
         if self.question.greatest && !item.is_infinite {
@@ -270,7 +270,7 @@ impl<'q> Measuring<'q> {
         true
     }
 
-    /// Whether all that was measured lies within the ceilings.
+    /// Whether all measured values lie within the ceilings.
     fn is_settled(&self) -> bool {
         let items = self.question.items.iter().zip(&self.items);
         items.into_iter().all(|((measure, _), item)| {
@@ -303,7 +303,7 @@ impl<'q> Measuring<'q> {
             |zone: &[Bound]| dbm::clock_bounds(zone, dimension, clock).1.is_infinite();
         let pump = Pump {
             clock,
-            // Extrapolation forgets how far a clock is above its constants only beyond them.
+            // Extrapolation forgets the values of a clock only above its constants.
             above: self.greatest_constant.saturating_add(1),
             predicate: self.question.predicate,
         };
@@ -444,21 +444,21 @@ fn doubled(ceiling: i32) -> Result<i32, Failure> {
     Ok(doubled)
 }
 
-/// By clock: the clock that its value comes from, if it does not come from a constant.
+/// For each clock: the clock from which its value comes, if it does not come from a constant.
 type Origins = Vec<Option<usize>>;
 
 /// A part of a run that can be repeated, each time with a clock that is greater by at least one.
 struct Pump<'p> {
     /// The clock at the end of the run.
     clock: usize,
-    /// Above this value nothing depends on a clock.
+    /// Nothing depends on the value of a clock above this one.
     above: i32,
     /// What must hold at the end of the run.
     predicate: &'p Predicate,
 }
 
 impl Pump<'_> {
-    /// Whether there is a pump on the way.
+    /// Whether the path has a pump.
     fn is_on(&self, symbolic: &mut Symbolic<'_>, trace: &Trace) -> Result<bool, Failure> {
         let count = trace.moves.len();
         let starts = (0..count).rev().step_by(count.div_ceil(MOST_STARTS).max(1));
@@ -487,7 +487,7 @@ impl Pump<'_> {
         }
         let unmoved: Origins = (0..zone.dimension()).map(Some).collect();
         let mut since_start = unmoved.clone();
-        // The state when it had these words last, and the origins of clocks since then.
+        // The last state with these words, and the origins of clocks since then.
         let (mut before, mut since) = (zone.clone(), unmoved.clone());
         // For each pump that was found: the clocks that it moves in the current state.
         let mut pumped: Vec<Vec<bool>> = Vec::new();
@@ -504,8 +504,8 @@ impl Pump<'_> {
                 assign(moved, &assignments, false);
             }
             if &words == first_words {
-                // What the start was cut to may take a round to wear off, so that each round is
-                // compared with the one before.
+                // The start was cut, and this may have an effect for one more round. So each round
+                // is compared with the one before.
                 for moved in self.movable(&before, &since) {
                     if self.grows(symbolic, &words, &before, &zone, &moved) {
                         pumped.push(moved);
@@ -526,13 +526,13 @@ impl Pump<'_> {
         )
     }
 
-    /// What a clock that nothing depends on is greater than, as a bound on its negative value.
+    /// The value that a clock exceeds when nothing depends on it, as a bound on its negative value.
     fn beyond(&self) -> Bound {
         Bound::strict(-self.above).unwrap_or(Bound::LT_ZERO)
     }
 
-    /// Sets of clocks that may have moved together since a zone: all of which nothing depends on,
-    /// and the one that is measured.
+    /// Sets of clocks that may have moved together since a zone: all clocks on which nothing
+    /// depends, and the measured one.
     fn movable(&self, before: &Zone, since: &Origins) -> Vec<Vec<bool>> {
         let is_beyond = |clock: usize| clock > 0 && before.bound(0, clock) <= self.beyond();
         let all: Vec<bool> = (0..since.len()).map(is_beyond).collect();
@@ -544,7 +544,7 @@ impl Pump<'_> {
     }
 
     /// Whether the later zone contains the earlier one with these clocks moved up: by one, or by as
-    /// much as a bound of the clock that is measured did.
+    /// much as a bound of the measured clock grew.
     fn grows(
         &self,
         symbolic: &mut Symbolic<'_>,
@@ -576,7 +576,8 @@ impl Pump<'_> {
     }
 }
 
-/// Takes a move of the trace from a zone; the zone that it leads to, and what it does to clocks.
+/// Takes a move of the trace from a zone; returns the zone that it leads to, and its effect on
+/// clocks.
 fn take(
     symbolic: &mut Symbolic<'_>,
     words: &mut [i32],
@@ -599,7 +600,7 @@ fn take(
     Ok(next.map(|zone| (zone, effect.assignments)))
 }
 
-/// Moves what is known of each clock along with its value; what becomes less, or comes from a
+/// Moves what is known about each clock along with its value. What becomes smaller, or comes from a
 /// constant, is `lost`.
 fn assign<T: Copy>(known: &mut [T], assignments: &[Assignment], lost: T) {
     for assignment in assignments {
@@ -614,8 +615,8 @@ fn assign<T: Copy>(known: &mut [T], assignments: &[Assignment], lost: T) {
     }
 }
 
-/// The greatest part of a set of clocks of which each has its value from one of them; `None` if it
-/// is empty, or another clock has too.
+/// The greatest subset of clocks in which each has its value from one of the subset; `None` if it
+/// is empty, or if a clock outside also has.
 fn carried(mut set: Vec<bool>, origins: &Origins) -> Option<Vec<bool>> {
     loop {
         let has_origin = |origin: &Option<usize>| origin.is_some_and(|origin| set[origin]);
@@ -629,10 +630,10 @@ fn carried(mut set: Vec<bool>, origins: &Origins) -> Option<Vec<bool>> {
     }
 }
 
-/// What became of the search for a pump from a state.
+/// The result of the search for a pump from a state.
 enum Attempt {
     Pump,
-    /// The clock has its value from a constant that is met later on the way: no pump begins here or
+    /// The clock has its value from a constant that comes later on the path: no pump begins here or
     /// earlier.
     IsSet,
     Nothing,

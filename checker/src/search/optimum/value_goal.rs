@@ -8,7 +8,7 @@ use crate::zones::{Bound, Federation, Zone};
 
 use crate::search::reachability::goal::{Goal, SharedGoal, Target};
 
-/// A value of a measure that some state has, or comes near to.
+/// A value of a measure that some state has, or that states approach.
 #[derive(Clone, Copy, Debug)]
 pub struct Taking<'q> {
     /// The states that count.
@@ -19,7 +19,7 @@ pub struct Taking<'q> {
     pub value: i32,
     /// Whether it is the greatest.
     pub is_greatest: bool,
-    /// Whether some state has it; otherwise one that comes nearer than 1 is looked for.
+    /// Whether some state has it; otherwise the search looks for one that differs by less than 1.
     pub is_reached: bool,
 }
 
@@ -51,8 +51,8 @@ impl Taking<'_> {
         ]
     }
 
-    /// What the value asks of the clocks in a state with these words; `None` if no valuation has
-    /// it.
+    /// The constraints on clocks for this value in a state with these words; `None` if no valuation
+    /// has the value.
     pub fn constraints(
         &self,
         symbolic: &mut Symbolic<'_>,

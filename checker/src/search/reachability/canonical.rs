@@ -1,21 +1,20 @@
-//! One state for all that differ only in which member of a scalar set is which, and the way back
-//! from it.
+//! One state that stands for all states that differ only by exchanges of members of a scalar set,
+//! and the way back from it.
 //!
 //! A search that stores representatives takes moves of them, which are not those of the state that
-//! was reached. So the exchanges that led to a representative stand in the way to it, after the
-//! moves; with them a trace is led back, from the initial state on, to the moves of the states that
-//! it is about.
+//! was reached. So the path to a representative also contains, after the moves, the exchanges that
+//! led to it. With them a trace is translated back, from the initial state on, into the moves of
+//! the real states.
 //!
-//! Cost: eight bytes for some ten exchanges on the way to a stored state, and what
-//! [`Symmetry::normalise`] costs.
+//! Cost: eight bytes for about ten exchanges on the path to a stored state, and the cost of
+//! [`Symmetry::normalise`].
 
 use crate::network::{Permutation, Symmetry};
 use crate::zones::Bound;
 
 use crate::search::outcome::Step;
 
-/// Marks a step that stands for exchanges; the bits below hold their numbers, each one more than it
-/// is.
+/// Marks a step that stands for exchanges. The bits below hold their numbers, each plus one.
 const EXCHANGES: Step = 1 << 62;
 
 /// Buffers for a representative.
@@ -28,7 +27,7 @@ pub(super) struct Representative {
 }
 
 impl Representative {
-    /// The representative of a state, and the way to it, given that to the state.
+    /// The representative of a state and the path to it, given the path to the state.
     pub(super) fn of(
         &mut self,
         symmetry: &Symmetry,
@@ -60,8 +59,7 @@ fn bits_of_exchange(symmetry: &Symmetry) -> u32 {
     (symmetry.exchanges() as Step + 1).ilog2() + 1
 }
 
-/// The moves of a way, each with what the members of the state that it is taken in were exchanged
-/// by before.
+/// The moves of a path, each with the exchanges of members that were applied to its state before.
 pub(super) fn unfold(symmetry: &Symmetry, way: &[Step]) -> Vec<(Step, Permutation)> {
     let bits = bits_of_exchange(symmetry);
     let mut permutation = symmetry.identity();

@@ -1,12 +1,11 @@
-//! The successors of a stored state, and of all committed ones below it.
+//! The successors of a stored state, and of all committed states below it.
 //!
-//! States with a committed location are explored where they arise, and stored only if they have a
-//! choice, so that choices one after the other do not multiply. The others are links of a chain;
-//! those that were explored last are remembered ([`RecentStates`]) and not explored again. Chains
-//! that are not short ([`LONGEST_CHAIN`], [`MOST_AT_ONCE`]) are stored after all, so that loops of
-//! them end.
+//! States with a committed location are explored where they are found. They are stored only if they
+//! have a choice, so that successive choices do not multiply. The others are links of a chain; the
+//! latest of them are remembered ([`RecentStates`]) and not explored again. Chains that are not
+//! short ([`LONGEST_CHAIN`], [`MOST_AT_ONCE`]) are stored after all, so that loops of them end.
 //!
-//! Where states are stored, and when they are explored, the [`Sink`] decides.
+//! The [`Sink`] decides where states are stored and when they are explored.
 
 use crate::ir::Urgency;
 use crate::network::{Agenda, Failure, KeptZone, KnownZone, Moves, StubbornSets, Symbolic};
@@ -20,27 +19,28 @@ use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::outcome::Step;
 use crate::search::store::packed_zones::Kept;
 
-/// Committed states that are explored one below the other without waiting.
+/// The greatest number of committed states in a chain that are explored without waiting.
 const LONGEST_CHAIN: usize = 64;
 
-/// Committed states that are explored below one stored state without waiting.
+/// The greatest number of committed states below one stored state that are explored without
+/// waiting.
 const MOST_AT_ONCE: u64 = 4096;
 
-/// Takes the states that exploration comes to, with what is to be stored of their zones (see
-/// [`Symbolic::to_stored`]). Ways begin at the state that is being explored.
+/// Takes the states that exploration reaches, with the stored form of their zones (see
+/// [`Symbolic::to_stored`]). Paths begin at the state that is being explored.
 pub(super) trait Sink {
-    /// Stores a state and lets it wait, unless a stored one contains it. Returns whether it is
-    /// known to wait now.
+    /// Stores a state and puts it on the worklist, unless a stored one contains it. Returns whether
+    /// it is known to wait now.
     fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool;
 
-    /// Stores a committed state that has a choice; returns whether it is to be explored at once,
-    /// and not if a stored state contains it.
+    /// Stores a committed state that has a choice. Returns whether it must be explored at once; it
+    /// need not if a stored state contains it.
     fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool;
 
     /// The bytes of a state's words that decide identity.
     fn pack(&mut self, words: &[i32]) -> &[u8];
 
-    /// How many states are stored, about.
+    /// The approximate number of stored states.
     fn stored(&self) -> usize;
 }
 
@@ -67,21 +67,21 @@ impl<S> Scene<'_, '_, S> {
     }
 }
 
-/// How far the exploration of a stored state has come.
+/// The result of exploring a stored state.
 pub(super) enum Visit {
-    /// To its end.
+    /// It is complete.
     Done,
-    /// As far as was allowed; it can go on.
+    /// It stopped as far as was allowed, and can continue.
     Paused,
-    /// To a state that was looked for.
+    /// It reached a state that the search looks for.
     Found,
-    /// To a limit.
+    /// It reached a limit.
     Stopped(StopReason),
 }
 
-/// What became of a move.
+/// The result of a move.
 enum Taken {
-    /// Nothing more to do: impossible, stored, or covered.
+    /// Nothing remains to do: it is impossible, stored, or covered.
     Nothing,
     /// The goal was found in the target.
     Found,
@@ -96,10 +96,10 @@ enum Taken {
 struct Frame {
     words: Vec<i32>,
     zone: Zone,
-    /// By what moves from the zone may be looked up.
+    /// The number by which moves from the zone can be looked up.
     known: Option<KnownZone>,
     moves: Moves,
-    /// In which order moves are taken, and whether all are.
+    /// The order in which moves are taken, and whether all are.
     agenda: Agenda,
     /// The place of the next move in it.
     next: usize,
@@ -108,7 +108,7 @@ struct Frame {
 /// Explores one stored state after the other.
 #[derive(Debug)]
 pub(super) struct Explorer {
-    /// The committed states that were explored last.
+    /// The latest committed states.
     recent: RecentStates,
     keeps_recent: bool,
     frames: Vec<Frame>,
@@ -117,9 +117,9 @@ pub(super) struct Explorer {
     /// The moves from the stored state to the current state.
     way: Vec<Step>,
     entries: Vec<Zone>,
-    /// What is stored of a zone that is still needed.
+    /// The stored form of a zone that is still needed.
     stored: Vec<Bound>,
-    /// What is stored instead of a state, where some states may be exchanged for others.
+    /// What is stored instead of a state, if some states may be exchanged for others.
     representative: Representative,
     /// Whether some location is committed.
     has_committed: bool,
@@ -262,7 +262,7 @@ impl Explorer {
         }
     }
 
-    /// Stores a committed state that has a choice; returns false if it is not to be explored here.
+    /// Stores a committed state that has a choice; returns false if it must not be explored here.
     fn is_link_or_new<S: Sink>(&mut self, scene: &mut Scene<'_, '_, S>, frame: &Frame) -> bool {
         if frame.moves.len() < 2 {
             return true;
@@ -339,7 +339,7 @@ impl Explorer {
         taken
     }
 
-    /// Looks at the target of a move, whose words and zone with time passed are in `target`, and
+    /// Evaluates the target of a move, whose words and zone with time passed are in `target`, and
     /// stores it or leaves it there.
     fn enter_whole<S: Sink>(
         &mut self,
@@ -389,8 +389,8 @@ impl Explorer {
         Ok(taken)
     }
 
-    /// As [`Explorer::enter_whole`], for the zones on entry before time passes, of which there may
-    /// be several.
+    /// Like [`Explorer::enter_whole`], for the zones on entry before time passes; there may be
+    /// several.
     fn enter<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
@@ -425,9 +425,9 @@ impl Explorer {
         Ok(Taken::Nothing)
     }
 
-    /// Hands a state to the sink, or the one that stands for it. The zone, which is overwritten,
-    /// must have been extrapolated unless it is stored reduced, and if states may be exchanged, so
-    /// that it is the same for as many of them as possible.
+    /// Gives a state, or the state that stands for it, to the sink. The zone is overwritten. It
+    /// must have been extrapolated unless it is stored reduced. It must also have been extrapolated
+    /// if states may be exchanged, so that it is the same for as many of them as possible.
     fn store<S: Sink>(
         &mut self,
         scene: &mut Scene<'_, '_, S>,
@@ -451,7 +451,7 @@ impl Explorer {
         add(scene.sink, words, zone, way)
     }
 
-    /// Whether a state is to be explored at once and not stored.
+    /// Whether a state must be explored at once and not stored.
     fn descends(&self, symbolic: &Symbolic<'_>, words: &[i32], depth: usize) -> bool {
         self.has_committed
             && depth < LONGEST_CHAIN
@@ -459,7 +459,7 @@ impl Explorer {
             && symbolic.stepper.is_committed(words)
     }
 
-    /// Goes down to a committed state, unless it was explored lately.
+    /// Moves down to a committed state, unless it was explored lately.
     fn descend<S: Sink>(&mut self, sink: &mut S, words: &[i32], zone: &[Bound]) -> Taken {
         let stored = sink.stored();
         if self.keeps_recent && self.recent.enter(sink.pack(words), zone, stored) {
@@ -471,7 +471,7 @@ impl Explorer {
     }
 }
 
-/// Comes to the initial states.
+/// Enters the initial states.
 pub(super) fn start<S: Sink>(scene: &mut Scene<'_, '_, S>) -> Result<Look, Failure> {
     let (mut words, zone, invariant) = scene.symbolic.start()?;
     let mut zones = vec![zone];
@@ -538,7 +538,7 @@ impl Frame {
         size_of_val(self.zone.bounds()) + size_of_val(&*self.words) + self.moves.heap_bytes()
     }
 
-    /// Whether all moves that are to be taken were.
+    /// Whether all moves that must be taken were taken.
     fn is_done(&self) -> bool {
         self.next >= self.agenda.end(self.moves.len())
     }

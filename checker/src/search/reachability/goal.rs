@@ -6,7 +6,7 @@ use crate::zones::{Federation, Zone};
 
 use crate::search::limits::{Counters, StopReason, Watch};
 
-/// A state that a search has come to, before extrapolation.
+/// A state that a search has reached, before extrapolation.
 pub struct Visited<'v, 'a> {
     /// Zones of the network.
     pub symbolic: &'v mut Symbolic<'a>,
@@ -14,13 +14,13 @@ pub struct Visited<'v, 'a> {
     pub words: &'v mut [i32],
     /// Its zone.
     pub zone: &'v Zone,
-    /// What the search has done so far.
+    /// What the search has done until now.
     pub counters: Counters,
     /// Says whether to continue, if looking at the state takes long.
     pub watch: &'v mut dyn Watch,
 }
 
-/// What a look at a state comes to.
+/// The result of looking at a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
     /// The search continues.
@@ -31,7 +31,7 @@ pub enum Look {
     Stopped(StopReason),
 }
 
-/// Looks at every state that a search comes to.
+/// Looks at every state that a search reaches.
 pub trait Goal {
     /// Looks at a state; by default the search ends where [`Goal::confirms`] says so.
     fn look(&mut self, visited: Visited<'_, '_>) -> Result<Look, Failure> {
@@ -54,19 +54,19 @@ pub trait Goal {
         zone: &Zone,
     ) -> Result<bool, Failure>;
 
-    /// Whether it depends on zones what looking comes to; else the goal may be shown any zone.
+    /// Whether the result depends on zones; otherwise the goal may be given any zone.
     fn depends_on_zones(&self) -> bool {
         true
     }
 
-    /// What looking has cost beyond the search itself.
+    /// The cost of looking at states, in addition to the search itself.
     fn counters(&self) -> Counters {
         Counters::default()
     }
 }
 
-/// A goal that several threads look for, each by its own copy. Looking at a state never takes so
-/// long that the limits must be looked at meanwhile.
+/// A goal that several threads look for, each with its own copy. Looking at a state is so fast that
+/// the limits need not be checked meanwhile.
 pub trait SharedGoal: Goal + Send + Sized {
     /// A copy that has seen nothing.
     #[must_use]
@@ -87,7 +87,7 @@ pub trait Target: Goal {
     ) -> Result<Federation, Failure>;
 }
 
-/// A predicate is looked for: some valuation of the zone satisfies it.
+/// The search looks for a predicate: some valuation of the zone must satisfy it.
 impl Goal for &Predicate {
     fn confirms(
         &mut self,

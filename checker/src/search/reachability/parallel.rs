@@ -1,24 +1,24 @@
 //! Reachability by several threads.
 //!
-//! Stored states are divided into as many *shards* as there are threads ([`super::shard`]), and
-//! each has a *worker*, which explores the states of its shard, level by level, breadth first. The
-//! search goes in rounds: in a round every worker takes in what the others have sent it, explores
-//! some of its states, and collects what it sends. Workers share nothing, and a round depends only
-//! on the one before it.
+//! Stored states are divided into *shards*, one for each thread ([`super::shard`]). Each shard has
+//! a *worker*, which explores its states level by level, breadth first. The search proceeds in
+//! rounds: in a round every worker takes in the states that the others have sent, explores some of
+//! its own states, and collects the states that it sends. Workers share nothing, and a round
+//! depends only on the one before it.
 //!
 //! Invariants:
-//! * With the same number of threads everything is the same whenever a query is asked: verdict,
-//!   counters, trace. Only a stop by time or by the user comes when it comes.
-//! * A level begins when all states of the one before were explored, so traces are shortest in
+//! * With the same number of threads, a query always has the same verdict, counters and trace. Only
+//!   a stop by time or by the user may come at any point.
+//! * A level begins when all states of the level before are explored, so traces are shortest in
 //!   stored states, as with one thread.
-//! * A search ends after the first round in which something was found. A failure in this round goes
-//!   before a state that was found; of two of a kind the one of the first shard counts.
-//! * Whether the workers of a round run at the same time makes no difference. While little waits,
-//!   one thread runs them all.
+//! * A search ends after the first round in which something was found. A failure in this round has
+//!   priority over a state that was found; among two of a kind, that of the first shard counts.
+//! * The result does not depend on whether the workers of a round run at the same time. While few
+//!   states wait, one thread runs all workers.
 //! * A worker that panics ends the search with its panic.
 //!
-//! Cost: between rounds threads wait for the slowest; rounds are long enough that this is little,
-//! and short enough that mail takes little memory.
+//! Cost: between rounds threads wait for the slowest one. Rounds are long enough that this costs
+//! little, and short enough that mail takes little memory.
 
 use std::panic;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,9 +39,9 @@ use super::tree::{self, Origin, Tree};
 use crate::search::limits::{Counters, Unlimited, Watch, moves_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 
-/// Moves of a worker between two looks at the time.
+/// Moves of a worker between two checks of the time.
 const PULSE_MOVES: u64 = 1 << 10;
-/// How often the time is looked at while others work.
+/// The time between two checks of the limits while others work.
 const PULSE: Duration = Duration::from_millis(20);
 
 /// The moves of a worker in a round: at first this many, and
@@ -54,7 +54,7 @@ const MOST_BOUNDS: u64 = 1 << 22;
 /// still in a cache when the others read them.
 const MOST_MAIL_BYTES: usize = 1 << 18;
 
-/// States of a round for each worker from which on threads are worth waking.
+/// From this number of states in a round for each worker, threads are worth waking.
 const WORTH_WAKING: usize = 48;
 
 /// The stack of a thread: as much as that of the first thread of a program.
@@ -64,7 +64,7 @@ const STACK_BYTES: usize = 8 << 20;
 /// thread is one of them.
 ///
 /// # Panics
-/// If there are no threads or more than [`tree::MOST_SHARDS`], or if a worker does.
+/// If there are no threads or more than [`tree::MOST_SHARDS`], or if a worker panics.
 pub(super) fn search<G: SharedGoal>(
     symbolic: &mut Symbolic<'_>,
     goal: &mut G,
@@ -99,7 +99,7 @@ pub(super) fn search<G: SharedGoal>(
     report
 }
 
-/// How a worker's round ended before its time.
+/// Why a worker's round ended early.
 #[derive(Clone, Copy, Debug)]
 enum Ending {
     Failed(Failure),
@@ -108,7 +108,7 @@ enum Ending {
     Cut,
 }
 
-/// What a worker is to do in a round.
+/// The work of a worker in a round.
 #[derive(Clone, Copy, Debug)]
 struct Task {
     /// Whether a level begins.
@@ -122,9 +122,9 @@ struct Worker<'s, 'a, G> {
     goal: &'s mut G,
     explorer: Explorer,
     shard: Shard,
-    /// By shard: what has come from it.
+    /// For each shard: the states that came from it.
     incoming: Vec<Mail>,
-    /// Whether a state has been begun and not ended.
+    /// Whether a state is begun and not ended.
     is_busy: bool,
     ending: Option<Ending>,
 }
@@ -165,7 +165,7 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         };
     }
 
-    /// Works for one round. `is_cut` is asked now and then whether to end it.
+    /// Works for one round. `is_cut` is asked from time to time whether to end it.
     fn work(&mut self, task: Task, is_cut: &mut dyn FnMut() -> bool) {
         self.shard.begin_round();
         for (sender, mail) in self.incoming.iter_mut().enumerate() {
@@ -249,7 +249,7 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
 type Place<'s, 'a, G> = Option<Box<Worker<'s, 'a, G>>>;
 
 struct ParallelSearch<'s, 'a, 'w, G> {
-    /// Each is in its place except while a thread has it.
+    /// Each worker is in its place except while a thread has it.
     workers: Vec<Place<'s, 'a, G>>,
     dimension: usize,
     watch: &'w mut dyn Watch,
@@ -324,7 +324,7 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
         workers.fold(Counters::default(), |sum, one| sum + one.counters())
     }
 
-    /// Hands all mail over.
+    /// Delivers all mail.
     fn exchange(&mut self) {
         for sender in 0..self.workers.len() {
             for receiver in 0..self.workers.len() {
@@ -336,8 +336,8 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
         }
     }
 
-    /// What the workers are to do, and how many states wait for them, about; `None` if there is
-    /// nothing.
+    /// The work of the next round, and the approximate number of states that wait for it; `None` if
+    /// there is nothing to do.
     fn task(&self, explored: u64) -> Option<(Task, usize)> {
         let (mut now, mut next, mut sent, mut is_level_over) = (0, 0, 0, true);
         for worker in self.workers.iter().flatten() {
@@ -351,7 +351,7 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
             return None;
         }
         let advances = is_level_over && now == 0;
-        // The memory is looked at between rounds.
+        // The memory is checked between rounds.
         let zone = self.dimension.pow(2) as u64;
         let most_moves = (MOST_BOUNDS / zone).clamp(1, MOST_MOVES);
         let task = Task {
@@ -361,7 +361,7 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
         Some((task, sent + if advances { next } else { now }))
     }
 
-    /// What the round has come to, if it is an end.
+    /// The result of the search, if it ends with this round.
     fn outcome(&mut self) -> Option<Result<Outcome<Trace>, (Failure, Trace)>> {
         let endings = self.workers.iter().flatten().map(|worker| worker.ending);
         let endings: Vec<Option<Ending>> = endings.collect();
@@ -375,7 +375,7 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
         Some(Ok(Outcome::Found(self.trace(index, true))))
     }
 
-    /// The way to the state that a worker is at.
+    /// The path to the current state of a worker.
     fn trace(&mut self, index: usize, is_found: bool) -> Trace {
         let workers = self.workers.iter().flatten();
         let trees: Vec<_> = workers.map(|worker| &worker.shard.tree).collect();
@@ -411,7 +411,7 @@ struct Thread<'t, 's, 'a, G> {
 }
 
 impl<'t, 'e, 's: 'e, 'a: 'e, G: SharedGoal + 'e> Crew<'t, 'e, 's, 'a, G> {
-    /// Lets all workers work for a round, each by its thread, the first by the caller's.
+    /// Lets all workers work for a round, each in its thread; the first works in the caller's.
     fn work(
         &mut self,
         workers: &mut [Place<'s, 'a, G>],
@@ -433,7 +433,8 @@ impl<'t, 'e, 's: 'e, 'a: 'e, G: SharedGoal + 'e> Crew<'t, 'e, 's, 'a, G> {
                 && let Some(worker) = place.take()
                 && let Err(refused) = thread.jobs.send((worker, task))
             {
-                // The thread has ended by a panic, which is passed on where its work is collected.
+                // The thread has ended by a panic. The panic is passed on when its work is
+                // collected.
                 *place = Some(refused.0.0);
             }
         }

@@ -1,13 +1,13 @@
-//! The committed states that were explored last, so that a state to which several ways lead is
+//! The committed states that were explored last, so that a state with several paths to it is
 //! explored once.
 //!
 //! Committed states are not stored; this is a cache of bounded size.
 //!
 //! Invariants:
-//! * What is found in it was entered before, word by word and bound by bound. What is not found may
-//!   have been entered before as well.
-//! * It takes at most [`MOST_BYTES`], however large states are: where there are thousands of clocks
-//!   it has few places, or none.
+//! * What is found in it was entered before, with equal words and equal bounds. What is not found
+//!   may have been entered before too.
+//! * It takes at most [`MOST_BYTES`], however large states are: with thousands of clocks it has few
+//!   places, or none.
 //!
 //! Cost: one hash and one comparison for each state.
 
@@ -47,8 +47,8 @@ impl RecentStates {
         self.words.len() + self.zones.len() * size_of::<Bound>()
     }
 
-    /// Enters a state, packed words and a zone; returns whether it was there already. With the
-    /// number of stored states the cache grows, and forgets everything then.
+    /// Enters a state, packed words and a zone; returns whether it was there already. The cache
+    /// grows with the number of stored states, and forgets everything when it does.
     pub(super) fn enter(&mut self, words: &[u8], zone: &[Bound], stored: usize) -> bool {
         let place_bytes = words.len() + size_of_val(zone);
         let Some(most) = (MOST_BYTES / place_bytes).min(MOST_PLACES).checked_ilog2() else {
@@ -57,7 +57,7 @@ impl RecentStates {
         let most = 1 << most;
         if self.places < most && 2 * self.places < stored.max(FEWEST_PLACES) {
             self.places = (2 * self.places).max(FEWEST_PLACES).min(most);
-            // The old places are given back before there are new ones.
+            // The old places are freed before new ones are allocated.
             (self.words, self.zones) = (Vec::new(), Vec::new());
             self.words = vec![0; self.places * words.len()];
             self.zones = vec![Bound::LT_ZERO; self.places * zone.len()];

@@ -1,4 +1,4 @@
-//! How a search for a reachable state is done, and how it ends.
+//! How a search for a reachable state works, and how it ends.
 
 use crate::network::Failure;
 use crate::search::limits::Counters;
@@ -6,7 +6,7 @@ use crate::search::outcome::{Outcome, Trace};
 
 use super::tree::MOST_SHARDS;
 
-/// In which order states are explored.
+/// The order in which states are explored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Order {
     /// Breadth first: traces are shortest in stored states.
@@ -21,10 +21,10 @@ pub enum Order {
 /// How to search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Manner {
-    /// In which order states are explored.
+    /// The order in which states are explored.
     pub order: Order,
-    /// How many threads share the work, from 1 to [`MOST_THREADS`]. Only breadth first is there
-    /// more than one.
+    /// The number of threads that share the work, from 1 to [`MOST_THREADS`]. Only a breadth-first
+    /// search has more than one.
     pub threads: usize,
 }
 
@@ -34,7 +34,7 @@ pub const MOST_THREADS: usize = MOST_SHARDS;
 /// The end of a search.
 #[derive(Debug)]
 pub struct Report {
-    /// What was found, or the failure and the way to the state whose exploration failed.
+    /// What was found, or the failure and the path to the state whose exploration failed.
     pub outcome: Result<Outcome<Trace>, (Failure, Trace)>,
     /// What was done.
     pub counters: Counters,

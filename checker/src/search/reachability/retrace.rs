@@ -1,4 +1,4 @@
-//! From the moves of a way to its states: the way is taken again, without extrapolation.
+//! Computes the states of a path from its moves: the moves are taken again, without extrapolation.
 
 use crate::network::{Failure, Moves, Part, Permutation, Symbolic};
 use crate::zones::Zone;
@@ -7,17 +7,17 @@ use super::canonical::unfold;
 use super::goal::Goal;
 use crate::search::outcome::{Step, Trace};
 
-/// A step, and by what the members of the state that it is a step of differ from those of the state
-/// of the trace, if they do.
+/// A step, and the permutation of members between its state and the state of the trace, if there is
+/// one.
 type Taken = (Step, Option<Permutation>);
 
 /// The words of a state that was entered, and its zones.
 type Entered = (Vec<i32>, Vec<Zone>);
 
-/// Takes the steps from the initial state. Where a state has several zones, the first is taken from
-/// which the rest of the way is possible, up to a state that the goal confirms if there is one.
-/// What cannot be computed again is the failure that the trace leads to, and is left out. Moves of
-/// representatives are led back to those that they stand for.
+/// Takes the steps from the initial state. If a state has several zones, it takes the first one
+/// from which the rest of the path is possible, up to a state that the goal confirms if there is
+/// one. A step that cannot be computed again is the failure to which the trace leads, and is left
+/// out. Moves of representatives are translated back to the moves that they stand for.
 pub(in crate::search) fn retrace(
     symbolic: &mut Symbolic<'_>,
     steps: &[Step],
@@ -75,8 +75,8 @@ fn take_all(
     Ok(())
 }
 
-/// Takes one step: the parts of the move, the words after it, and the zones that it leads to, last
-/// first.
+/// Takes one step: returns the parts of the move, the words after it, and the zones that it leads
+/// to, the last first.
 fn take(
     symbolic: &mut Symbolic<'_>,
     (step, exchanged): &Taken,
@@ -85,8 +85,8 @@ fn take(
 ) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
     let mut moves = Moves::default();
     symbolic.moves_within(&mut words, zone.bounds(), &mut moves)?;
-    // The zone is within the one of the search, where extrapolation let moves look possible that
-    // are not.
+    // The zone is within that of the search, in which extrapolation made some impossible moves look
+    // possible.
     let one = match exchanged {
         None => moves.with_rank(*step),
         Some(exchanged) => original(symbolic, (*step, exchanged), (&words, zone), &moves)?
@@ -101,7 +101,7 @@ fn take(
     let mut entries = Vec::new();
     effect.entry_zones(zone.bounds(), symbolic.dimension(), &mut entries);
     symbolic.let_time_pass(&mut words, &effect.invariant, &mut entries)?;
-    // What extrapolation adds is simulated by what was there, so that the same moves are possible.
+    // What extrapolation adds is simulated by what was there, so the same moves are possible.
     if entries.iter().any(|zone| symbolic.has_grown(zone.bounds())) {
         symbolic.extrapolate_all(&words, &mut entries);
     }

@@ -1,12 +1,12 @@
 //! Reachability: is there a state that a [`Goal`] finds, for example one in which a predicate
 //! holds?
 //!
-//! A search over the zone graph with inclusion: a symbolic state is not explored if a stored one
-//! with the same words contains its zone, and the passed list forgets stored ones that a new one
-//! contains. Which committed states are stored is told in [`super::expand`].
+//! A search of the zone graph with inclusion: a symbolic state is not explored if a stored one with
+//! the same words contains its zone, and the passed list forgets stored states that a new one
+//! contains. [`super::expand`] says which committed states are stored.
 //!
-//! Each stored state remembers its parent and the moves from it, so that a trace is found by taking
-//! the moves again.
+//! Each stored state remembers its parent and the moves from it, so that a trace can be found by
+//! taking the moves again.
 //!
 //! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 3.
 
@@ -26,9 +26,9 @@ use crate::search::outcome::{Outcome, Step, Trace};
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::Stored;
 
-/// States between two looks at the limits, at most.
+/// The greatest number of states between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
-/// Moves between two looks at the limits, at most.
+/// The greatest number of moves between two checks of the limits.
 const LOOK_EVERY_MOVES: u64 = 1 << 12;
 
 /// Searches for a state that `goal` finds.
@@ -49,7 +49,7 @@ pub fn search(
     }
 }
 
-/// As [`search`], by several threads if they are wanted and the order is breadth first: see
+/// Like [`search`], with several threads if they are wanted and the order is breadth first: see
 /// [`super::parallel`].
 pub fn search_shared<G: SharedGoal>(
     symbolic: &mut Symbolic<'_>,
@@ -189,7 +189,7 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    /// Puts the newest waiting nodes into an order that fits the search order.
+    /// Puts the newest waiting nodes into the search order.
     fn shuffle_from(&mut self, first: usize) {
         let Order::Random(_) = self.order else { return };
         let first = first.saturating_sub(1).min(self.store.waiting.len());
@@ -217,7 +217,8 @@ impl<'s, 'a> Search<'s, 'a> {
         }
     }
 
-    /// Explores a stored state to the end. So many moves may be taken until the next look.
+    /// Explores a stored state to the end. `moves` is the number of moves until the next check of
+    /// the limits.
     fn visit(&mut self, stored: Stored, moves: &mut u64) -> Result<Visit, Failure> {
         let counters = self.own_counters();
         let passed = &self.store.tree.passed;

@@ -1,8 +1,8 @@
 //! A shard of the stored states, and the mail between shards.
 //!
-//! The hash of its words decides to which shard a state belongs, so that states with the same words
-//! meet in one: what contains what is decided there, and shards share nothing. States for other
-//! shards are collected in [`Mail`], packed words and zones one after the other.
+//! The hash of its words decides to which shard a state belongs, so states with the same words are
+//! in one shard. Inclusion is decided there, and shards share nothing. States for other shards are
+//! collected in [`Mail`], as packed words and zones one after the other.
 //!
 //! Cost: a state for another shard is copied twice.
 
@@ -20,13 +20,13 @@ use crate::search::store::passed_list::Stored;
 #[derive(Clone, Copy, Debug)]
 struct Head {
     hash: u32,
-    /// The node that it was reached from, in the shard that sends it.
+    /// The node from which it was reached, in the shard that sends it.
     origin: u32,
-    /// How many moves lead from there, with [`IS_CHOICE`].
+    /// The number of moves from there, with [`IS_CHOICE`].
     steps: u32,
 }
 
-/// Marks a committed state, which belongs to the level of the state that it was reached from.
+/// Marks a committed state, which belongs to the level of the state from which it was reached.
 const IS_CHOICE: u32 = 1 << 31;
 
 /// States from one shard to another.
@@ -70,7 +70,8 @@ impl Mail {
     }
 }
 
-/// The stored states of one shard. As a sink it takes all states, and puts aside those of others.
+/// The stored states of one shard. As a sink it takes all states, and collects those of other
+/// shards.
 #[derive(Debug)]
 pub(super) struct Shard {
     pub(super) tree: Tree,
@@ -81,9 +82,9 @@ pub(super) struct Shard {
     now: VecDeque<Stored>,
     /// Those of the next level.
     next: VecDeque<Stored>,
-    /// By shard: what is to be sent to it.
+    /// For each shard: the states that will be sent to it.
     pub(super) outgoing: Vec<Mail>,
-    /// The bytes of the states that were put aside since [`Shard::begin_round`].
+    /// The bytes of the states that were collected since [`Shard::begin_round`].
     pub(super) sent_bytes: usize,
 }
 
@@ -101,7 +102,7 @@ impl Shard {
         }
     }
 
-    /// Begins a round; what was put aside has been handed over.
+    /// Begins a round; the collected states were delivered.
     pub(super) fn begin_round(&mut self) {
         self.sent_bytes = 0;
     }
@@ -170,8 +171,8 @@ impl Shard {
             + self.outgoing.iter().map(Mail::bytes).sum::<usize>()
     }
 
-    /// Stores a state that belongs here unless a stored one contains it, and gives it back; puts
-    /// any other aside.
+    /// Stores a state that belongs here, unless a stored one contains it, and returns it; collects
+    /// any other state.
     fn store_or_send(
         &mut self,
         words: &[i32],
@@ -224,6 +225,7 @@ impl Sink for Shard {
 
 /// The shard of states with this hash.
 fn owner(hash: u32, shards: usize) -> usize {
-    // The upper bits decide, so that the tables of the shards still tell the lower ones apart.
+    // The upper bits decide, so that the lower bits still distinguish entries in the tables of the
+    // shards.
     ((u64::from(hash) * shards as u64) >> 32) as usize
 }

@@ -1,11 +1,10 @@
-//! The tree of a search: stored states, each with the one that it was reached from and the moves
-//! from there.
+//! The tree of a search: stored states, each with its parent and the moves from there.
 //!
-//! Several trees make one where the states of a search are divided: each is a *shard* of the whole,
-//! and a state may have been reached from one of another shard.
+//! If the states of a search are divided, several trees form one: each is a *shard* of the whole,
+//! and the parent of a state may be in another shard.
 //!
-//! Cost: eight bytes a state; the moves of a way of more than one take four bytes each and four
-//! more.
+//! Cost: eight bytes for each state. A path of more than one move takes four bytes for each move
+//! and four more.
 
 use crate::network::Symbolic;
 
@@ -14,7 +13,7 @@ use crate::search::store::packed_paths;
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::{PassedList, Stored};
 
-/// The most trees that make one.
+/// The greatest number of trees that form one.
 pub(super) const MOST_SHARDS: usize = 1 << (31 - SHARD_SHIFT);
 
 /// Where the shard of the parent begins in a word, above a single move or the length of a way.
@@ -47,9 +46,9 @@ impl Origin {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     parent: u32,
-    /// The only move from the parent with the parent's shard; or, with [`MANY_STEPS`], where in
-    /// `paths` the number of moves stands with the shard, and then they, packed (see [`paths`]):
-    /// the number is that of their words.
+    /// The only move from the parent, with the parent's shard. With [`MANY_STEPS`]: the place in
+    /// `paths` that has the number of words of the path with the shard, and then these words (see
+    /// [`paths`]).
     path: u32,
 }
 
@@ -90,7 +89,7 @@ impl Tree {
         Some(stored)
     }
 
-    /// As [`Tree::add`], for the words that were proposed last, which have this hash.
+    /// Like [`Tree::add`], for the words that were proposed last, which have this hash.
     pub(super) fn add_proposed(
         &mut self,
         hash: u32,

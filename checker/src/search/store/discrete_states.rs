@@ -4,12 +4,11 @@
 //! * Two states get the same [`DiscreteId`] exactly if their identity words are equal; no hash
 //!   stands in for a state.
 //! * Words that no update ever writes are not stored: they have their initial value in every state.
-//!   `meta` words are stored with the first state of an identity, and not compared.
+//!   `meta` words are stored with the first state of an identity, and are not compared.
 //! * Ids count from 0 in the order of first insertion.
 //!
 //! A word takes one, two or four bytes, as the range of its variable or the number of locations
-//! needs; that a value lies in its range is checked where it is assigned, and once more where it is
-//! packed.
+//! needs. An assignment checks that a value lies in its range; packing checks it again.
 //!
 //! Cost: a state takes its written words; records lie in blocks that are never moved. A look-up
 //! hashes the bytes once and compares them once, on a match of 32 bits of the hash.
@@ -69,7 +68,7 @@ impl Width {
     }
 }
 
-/// Neighbouring words that are stored alike.
+/// Successive words that are stored in the same way.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     first: usize,
@@ -216,8 +215,8 @@ impl StateStore {
         self.intern_proposed(hash)
     }
 
-    /// Packs a state, to be interned by [`StateStore::intern_proposed`] or handed to another store
-    /// of the same network; returns its hash, which only its identity decides.
+    /// Packs a state, for [`StateStore::intern_proposed`] or for another store of the same network;
+    /// returns its hash, which depends only on its identity.
     pub(super) fn propose(&mut self, words: &[i32]) -> u32 {
         hash_bytes(self.pack(words))
     }

@@ -57,8 +57,8 @@ impl Matrices {
         id
     }
 
-    /// Gives entries twice as many bytes, block by block, so that the old and the new ones never
-    /// stand side by side.
+    /// Doubles the bytes of entries, block by block, so that the old and the new blocks never exist
+    /// together.
     pub(super) fn widen(&mut self, widened: impl Fn(&[u8], &mut Vec<u8>)) {
         cancellation::ask_for(self.bytes());
         self.size *= 2;

@@ -1,12 +1,12 @@
-//! Zones, each stored once, in as few bytes a bound as the widest one needs; reduced (see
-//! [`simulation`]), if zones are compared by what comparisons can tell.
+//! Zones; each is stored once, with as few bytes for a bound as the widest one needs. They are
+//! reduced (see [`simulation`]) if zones are compared by what comparisons can distinguish.
 //!
 //! Invariants:
 //! * Two zones get the same [`ZoneId`] exactly if their matrices are equal.
 //! * All matrices have entries of the same width: one byte until a bound does not fit, then two,
 //!   then four. The order of bounds is that of the entries, so inclusion is decided on the packed
 //!   form.
-//! * A zone counts how often it is in use; after the last use its place is used again.
+//! * A zone counts its uses; after the last use its place is used again.
 //!
 //! Cost: packing and comparing touch each bound once, a vector of them at a time.
 
@@ -34,14 +34,14 @@ enum Width {
 pub(in crate::search) struct Kept<'r> {
     /// Its closed matrix, or its reduced form if there are limits.
     pub(in crate::search) matrix: &'r [Bound],
-    /// The limits of its ceilings if zones count as contained in what simulates them. Whether there
-    /// are any is the same for all zones, and they are the same for zones that are compared.
+    /// The limits of its ceilings, if zones count as contained in what simulates them. Either all
+    /// zones have limits or none has, and zones that are compared have the same limits.
     pub(in crate::search) limits: &'r [Bound],
     /// By what it is known, if it is.
     pub(in crate::search) known: Option<KeptZone>,
 }
 
-/// How the packed matrices of two zones lie to each other.
+/// How the packed matrices of two zones relate to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Comparison {
     /// No entry of the first exceeds its counterpart.

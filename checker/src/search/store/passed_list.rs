@@ -1,9 +1,9 @@
 //! The passed list: stored symbolic states, none of which contains another.
 //!
 //! Invariants:
-//! * Of two stored states with the same words neither zone contains the other, as a set or, where
-//!   zones are stored reduced, by what simulates what (see [`crate::zones::simulation`]). A state
-//!   that a new one contains is forgotten, and its node is covered from then on.
+//! * Among two stored states with the same words, neither zone contains the other: as a set or, if
+//!   zones are stored reduced, by simulation (see [`crate::zones::simulation`]). A state that a new
+//!   one contains is forgotten, and its node is covered from then on.
 //! * Nodes are numbered in the order in which they were stored; a number is never used again.
 //!
 //! Source: G. Behrmann, J. Bengtsson, A. David, K. G. Larsen, P. Pettersson, W. Yi, "UPPAAL
@@ -126,8 +126,8 @@ impl PassedList {
         }
         let signature = self.zones.propose(zone);
         if !is_new {
-            // None of the stored ones lies within another, so that what one contains contains none
-            // of them.
+            // No stored zone contains another. So if one contains the candidate, the candidate
+            // contains none of them.
             let zones = &mut self.zones;
             let contains = |other| zones.contains_candidate(other, zone.limits);
             if self.lists.any_above(discrete, signature, contains) {

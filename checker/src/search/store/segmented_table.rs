@@ -1,9 +1,8 @@
-//! A hash table that grows piece by piece, so that an old and a new copy of the whole of it never
-//! stand side by side.
+//! A hash table that grows piece by piece, so that the old and the new copy of the whole table
+//! never exist together.
 //!
-//! The hash of an entry decides to which of the pieces it belongs, each of which is a table that
-//! grows for itself. So what a search takes while a table grows is hardly more than what it takes
-//! afterwards, which is what the memory limit is about.
+//! The hash of an entry decides its piece, and each piece is a table that grows alone. So a search
+//! takes hardly more memory while a table grows than afterwards. The memory limit needs this.
 //!
 //! Invariant: `bytes` is what the pieces have allocated.
 //!
@@ -15,7 +14,7 @@ use hashbrown::hash_table::OccupiedEntry;
 /// How many pieces there are.
 const PIECES: usize = 16;
 
-/// Where in a hash the bits stand that decide the piece: between those that tables look at.
+/// Where a hash has the bits that decide the piece: between the bits that the tables use.
 const PIECE_SHIFT: u32 = 48;
 
 /// Entries by their hashes.

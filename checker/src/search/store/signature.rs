@@ -1,22 +1,22 @@
-//! Signatures of zones: digests that grow with a zone, so that most zones are told apart without
-//! comparing them.
+//! Signatures of zones: digests that grow with a zone, so that most zones can be distinguished
+//! without comparing them.
 
 use crate::zones::Bound;
 
 /// Sums of bytes with at most such a sum of weights are below 2^15.
 const NARROW: i32 = 255;
 
-/// Where zones have fewer clocks than this, with the reference clock, hardly more than one bound
-/// counts for each number of a signature, whichever way they are shared out.
+/// If zones have fewer clocks than this, with the reference clock, hardly more than one bound
+/// counts for each number of a signature, however they are divided.
 const FEW_CLOCKS: usize = 6;
 
 /// The number of successive bounds after which the numbers of a signature start again with the
 /// first one, and whether bounds have weights.
 ///
-/// Where a clock was reset a little later, the bounds of its column are greater and those of its
-/// row smaller, or the other way round. So a number is the sum of columns: those of one clock show
-/// it in one direction, all others in the other one. In sums that mix rows and columns it would
-/// cancel out.
+/// If a clock was reset a little later, the bounds of its column are greater and those of its row
+/// smaller, or the other way round. So a number is the sum of columns: the columns of one clock
+/// show the change in one direction, all others in the opposite direction. In sums that mix rows
+/// and columns it would cancel out.
 fn period(dimension: usize) -> Period {
     if dimension < FEW_CLOCKS {
         Period {

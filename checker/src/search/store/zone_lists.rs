@@ -1,14 +1,14 @@
 //! The zones of each discrete state, with their signatures.
 //!
-//! Short lists lie side by side and are gone through whole. A long one is split by its mean
-//! signature: a zone that lies in another one is in no number of its signature greater, so that the
-//! numbers which are at least the mean's tell in which parts a larger or smaller zone may lie.
-//! Parts that grow long are split again.
+//! Short lists are searched as a whole. A long one is split by its mean signature: if a zone lies
+//! in another one, no number of its signature is greater. So the numbers that are at least the
+//! mean's show in which parts a larger or smaller zone may lie. Parts that grow long are split
+//! again.
 //!
 //! Nothing that a caller sees depends on the order in a list.
 //!
-//! Cost: a list of n entries that is not split is gone through in less than a nanosecond an entry;
-//! of one that is, about (3/4)^8 of the parts are, if the eight numbers are independent.
+//! Cost: a search in a list that is not split takes less than a nanosecond for each entry. In a
+//! list that is split, it visits about (3/4)^8 of the parts, if the eight numbers are independent.
 
 use crate::zones::zone_table::ZoneId;
 

@@ -11,14 +11,14 @@
 //!
 //! A strict bound is a weak one with an infinitesimal distance: times are pairs of an integer and a
 //! count of infinitesimals. In the end the infinitesimal becomes `1 / (n + 1)`, where n is the
-//! greatest count: a bound that is not met exactly then has at least one whole unit of room, which
-//! n of them do not fill.
+//! greatest count. Then a bound that is not met exactly has at least one whole unit of room, and n
+//! infinitesimals do not fill it.
 //!
-//! Where clocks stand still at times, a clock's value is the sum of the waits in which it ran, and
+//! If clocks stand still at times, a clock's value is the sum of the waits in which it ran, and
 //! bounds become linear in durations ([`super::simplex`]), with the same alternatives.
 //!
-//! Invariant: without such clocks times are the least that satisfy all bounds so far, or the bounds
-//! contradict each other.
+//! Invariant: without such clocks, times are the least that satisfy all bounds until now, or the
+//! bounds contradict each other.
 //!
 //! Source: R. Dechter, I. Meiri, J. Pearl, "Temporal constraint networks", Artificial Intelligence
 //! 49, 1991 (times as shortest paths, alternatives by backtracking); A. Armando, C. Castellini, E.
@@ -43,7 +43,7 @@ use crate::search::liveness::delay_inside;
 /// Alternatives that are tried before a schedule is given up.
 const MOST_ATTEMPTS: usize = 100_000;
 
-/// What is asked of the end of a run.
+/// What must hold at the end of a run.
 #[derive(Clone, Debug)]
 pub enum Finish<'t> {
     /// Nothing: it ends on entry of its last state.
@@ -74,14 +74,14 @@ pub struct Wanted<'t> {
     pub stays: Option<Stays<'t>>,
     /// How it ends.
     pub finish: Finish<'t>,
-    /// When it ends at the latest; with 1, before one unit has passed since then.
+    /// The latest time of its end; with 1, it must end before one unit has passed since then.
     pub deadline: Option<(i32, u32)>,
-    /// On entry of which state all clocks have the values that they have on entry of the last, if
-    /// it goes back there.
+    /// If the run returns to a state: on entry of that state, all clocks have the same values as on
+    /// entry of the last one.
     pub closing: Option<Closing>,
 }
 
-/// How a run comes back to a state of its own.
+/// How a run returns to a state of its own.
 #[derive(Clone, Copy, Debug)]
 pub struct Closing {
     /// The index of the state.
@@ -90,7 +90,7 @@ pub struct Closing {
     pub above: Option<i64>,
 }
 
-/// How the value of a clock came about: what it was set to, and the waits in which it ran since.
+/// How a clock got its value: what it was set to, and the waits in which it ran since then.
 type Value = (i64, Vec<usize>);
 
 /// Exact times of a run.
@@ -100,9 +100,9 @@ pub struct Schedule {
     pub ticks_per_unit: i64,
     /// When each move happens.
     pub moves: Vec<i64>,
-    /// From when on something stays; 0 if nothing has to.
+    /// The time from which something stays true; 0 if nothing has to.
     pub from: i64,
-    /// When the end is looked at.
+    /// The time at which the end is checked.
     pub end: i64,
 }
 
@@ -152,9 +152,9 @@ pub fn schedule(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<Sche
 struct Plan<'s, 'a> {
     symbolic: &'s mut Symbolic<'a>,
     words: Vec<i32>,
-    /// By clock: the event that set it last, and to what; nothing for the reference clock.
+    /// For each clock: the event that set it last, and its value; unused for the reference clock.
     set: Vec<(usize, i64)>,
-    /// By clock: the waits in which it ran since then, if durations are looked for.
+    /// For each clock: the waits in which it ran since then, if the search looks for durations.
     ran: Vec<Vec<usize>>,
     /// Whether a clock stands still in some wait.
     meets_stopped: bool,
@@ -360,8 +360,8 @@ impl<'s, 'a> Plan<'s, 'a> {
         self.require_all(end, &invariant.unwrap_or_default())?;
         let barriers = self.symbolic.barriers(&mut self.words, whole.bounds())?;
         let mut stops = barriers.stops;
-        // Inside an open part time may run; that it does not run out of it, the times need not
-        // show.
+        // Inside an open part time may run. The times need not show that it does not run out of the
+        // part.
         barriers.open.iter().for_each(|part| stops.subtract(part));
         for barrier in stops.zones() {
             self.avoid(start..end, barrier, true);
@@ -482,9 +482,9 @@ impl<'s, 'a> Plan<'s, 'a> {
     /// The wait between two events does not pass through the zone; with `may_meet` it may end in
     /// the zone's first moment.
     ///
-    /// All bounds of the closed zone count, not only the minimal ones: that a lower bound is met
-    /// after an upper one has failed shows in the bound on their difference that follows from the
-    /// two.
+    /// All bounds of the closed zone count, not only the minimal ones. Suppose that a lower bound
+    /// is first met after an upper one has failed: then the bound on their difference, which
+    /// follows from the two, shows it.
     fn avoid(&mut self, wait: Range<usize>, zone: &[Bound], may_meet: bool) {
         let dimension = self.symbolic.dimension();
         let mut alternatives = Alternatives::new();
@@ -495,7 +495,7 @@ impl<'s, 'a> Plan<'s, 'a> {
             }
             let is_lower = left == 0;
             let failing = if is_lower && may_meet {
-                // Ends where the lower bound is met at the latest.
+                // The wait ends at the latest when the lower bound is met.
                 Constraint {
                     left: right,
                     right: 0,
@@ -505,9 +505,9 @@ impl<'s, 'a> Plan<'s, 'a> {
                 let one = Constraint { left, right, bound };
                 one.negated()
             };
-            // A lower bound fails up to the end, and an upper one from the start on; one on a
-            // difference fails all the time if it does so at both, for it changes in one direction
-            // where one of the clocks stands still, and else not at all.
+            // A lower bound fails until the end, and an upper one fails from the start on. A bound
+            // on a difference fails all the time if it fails at both ends: it changes in one
+            // direction if one of the clocks stands still, and otherwise not at all.
             let events = match (left, right) {
                 (0, _) => vec![wait.end],
                 (_, 0) => vec![wait.start],
@@ -518,7 +518,7 @@ impl<'s, 'a> Plan<'s, 'a> {
             alternatives.extend(limits.collect::<Option<Vec<Limit>>>());
         }
         if may_meet {
-            // No wait meets nothing new.
+            // A wait of no length meets nothing new.
             alternatives.push(vec![Limit::Apart(Distance {
                 earlier: wait.end,
                 later: wait.start,
@@ -587,7 +587,7 @@ impl<'s, 'a> Plan<'s, 'a> {
 
     /// Finds times that satisfy one of each alternatives.
     fn choose(&mut self) -> Result<(), Unscheduled> {
-        // By decision: what is chosen from, which is tried next, and the state before.
+        // For each decision: its alternatives, the next one to try, and the state before.
         let mut decisions: Vec<(usize, usize, Mark)> = Vec::new();
         let mut attempts = 0;
         while let Some(violated) = self.first_violated()? {

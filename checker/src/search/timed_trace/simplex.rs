@@ -1,4 +1,4 @@
-//! Durations of waits under linear bounds, exactly: for runs in which clocks stand still at times.
+//! Exact durations of waits under linear bounds, for runs in which clocks stand still at times.
 //!
 //! A clock's value is the sum of the durations of the waits in which it ran since it was set. So
 //! bounds on clocks are linear in durations, with coefficients -1, 0 and 1. A number is a fraction
@@ -28,10 +28,10 @@ const MOST_PIVOTS: u32 = 20_000;
 /// Coefficients of all rows, at most.
 const MOST_CELLS: usize = 1_000_000;
 
-/// So many are asked for before they are made.
+/// This many are allocated only after asking for memory.
 const MANY_CELLS: usize = 1 << 15;
 
-/// What it takes to add a multiple of a fraction: see [`cancellation::work`].
+/// The work of adding a multiple of a fraction: see [`cancellation::work`].
 const UNITS_FOR_CELL: usize = 16;
 
 /// A fraction in lowest terms, with a positive denominator.
@@ -137,8 +137,8 @@ impl Amount {
     }
 }
 
-/// A sum of durations that is at least so much: waits that count once, those that count negatively,
-/// and the least value with how many infinitesimals more.
+/// A sum of durations with a lower bound: the waits that count positively, those that count
+/// negatively, and the least value with its number of infinitesimals.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct LinearBound {
     pub(super) plus: Vec<usize>,
@@ -152,15 +152,15 @@ type Row = Vec<(usize, Fraction)>;
 /// Durations under bounds, with a way back.
 #[derive(Debug, Default)]
 pub(super) struct Durations {
-    /// By variable: its value, and the least one that it may have. Those of waits come as they were
-    /// added.
+    /// For each variable: its value, and its least value. Those of waits are in the order in which
+    /// they were added.
     value: Vec<Amount>,
     least: Vec<Option<Amount>>,
     /// The variables of the waits.
     waits: Vec<usize>,
-    /// By row: its basic variable, and what that is the sum of.
+    /// For each row: its basic variable, and the sum that equals it.
     rows: Vec<(usize, Row)>,
-    /// By variable: its row, if it is basic.
+    /// For each variable: its row, if it is basic.
     row_of: Vec<Option<usize>>,
     /// The variables of bounds in the order in which they were required.
     required: Vec<usize>,
@@ -188,7 +188,7 @@ impl Durations {
         self.required.len()
     }
 
-    /// Takes back what was required since; what was required before could be satisfied.
+    /// Undoes what was required since then; what was required before could be satisfied.
     pub(super) fn undo(&mut self, mark: usize) -> Result<(), TooHard> {
         for variable in self.required.drain(mark..) {
             self.least[variable] = None;
