@@ -16,9 +16,9 @@ use crate::ir::{Edge, FunctionId, Network, Process, Shape};
 use super::function_reads::read_words;
 use super::read_before_write::{Exposure, Exposures, WordSet};
 
-/// Larger variables are not looked at, for they are hardly ever written as a whole.
+/// Larger variables are ignored, because they are hardly ever written as a whole.
 const MOST_WORDS_OF_VARIABLE: u32 = 64;
-/// The most words that are looked at.
+/// The greatest number of words that are tracked.
 const MOST_WORDS: usize = 4096;
 /// Nothing is found out where it takes more bits than this: one for each word and function or
 /// location.
@@ -37,7 +37,8 @@ pub struct LiveVariables {
 #[derive(Clone, Debug)]
 struct WordReader {
     process: u32,
-    /// By location: the words that are live there, as bits of as many integers as all of them need.
+    /// For each location: the words that are live there, as bits of as many integers as all of them
+    /// need.
     live: Vec<u64>,
 }
 
@@ -170,9 +171,9 @@ struct LiveSearch<'n> {
     network: &'n Network,
     exposures: Exposures<'n>,
     count: usize,
-    /// By channel: what all senders surely write; without any, everything.
+    /// For each channel: what all senders certainly write; without any, everything.
     senders: Vec<WordSet>,
-    /// By channel: what all receivers surely write.
+    /// For each channel: what all receivers certainly write.
     receivers: Vec<WordSet>,
 }
 
@@ -232,7 +233,8 @@ impl LiveSearch<'_> {
         (before, after)
     }
 
-    /// By location of a process: what it may read from there on before it is surely written.
+    /// For each location of a process: what it may read from there on before it is certainly
+    /// written.
     fn live_in(&mut self, process: &Process) -> Vec<WordSet> {
         let mut live: Vec<WordSet> = process
             .locations
@@ -242,7 +244,7 @@ impl LiveSearch<'_> {
                 self.reads(rates.chain([location.invariant.function]))
             })
             .collect();
-        // By edge and branch: the source, the target, and what is surely written on the way.
+        // For each edge and branch: the source, the target, and what is certainly written by it.
         let mut ways = Vec::new();
         for edge in process.edges.iter().filter(|edge| !edge.guard.never_holds) {
             let source = edge.source.0 as usize;

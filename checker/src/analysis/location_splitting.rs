@@ -1,4 +1,4 @@
-//! What a process can do in a location, told apart by the values of a few variables that only it
+//! What a process can do in a location, distinguished by the values of a few variables that only it
 //! writes.
 //!
 //! A comparison of clocks often depends on a flag that a process keeps: `running && x <= 5`. While
@@ -457,7 +457,7 @@ struct Valuation<'a> {
     values: &'a [i32],
 }
 
-/// What a run left behind.
+/// The results of a run.
 struct FunctionRun<'a> {
     result: Result<i32, ()>,
     state: &'a [i32],

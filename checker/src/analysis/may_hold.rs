@@ -11,16 +11,16 @@ use crate::ir::{
     Terminator,
 };
 
-/// Instructions that are looked at for all questions together: a few milliseconds.
+/// The greatest number of instructions for all questions together: a few milliseconds.
 const MOST_STEPS: u32 = 1 << 20;
 
-/// Instructions that are looked at for one truth value of one function.
+/// The greatest number of instructions for one truth value of one function.
 const MOST_STEPS_OF_A_QUESTION: u32 = 1 << 14;
 
 /// Answers whether predicates can hold.
 pub struct Possibility<'a> {
     network: &'a Network,
-    /// By word: its value, if it is always the same.
+    /// For each word: its value, if it is always the same.
     words: Vec<Option<i32>>,
     steps: u32,
 }

@@ -45,8 +45,8 @@ pub struct Evidence {
     pub verification: Option<Verification>,
     /// Plans, if they were wanted.
     pub plans: Option<Vec<Plan>>,
-    /// Whether there are more plans than were wanted, or may be: after the first, no other is
-    /// looked for.
+    /// Whether there are more plans than were wanted, or may be: after the first plan the search
+    /// may stop.
     pub has_more_plans: bool,
 }
 
@@ -156,7 +156,7 @@ impl Answer {
         Answer { verdict, ..self }
     }
 
-    /// Adds a remark for the user behind those that are there.
+    /// Adds a remark for the user after the existing ones.
     pub(crate) fn remark(&mut self, remark: impl Into<String>) {
         let remark = remark.into();
         self.message = Some(match self.message.take() {

@@ -159,7 +159,7 @@ impl LoadedModel {
         self.model.network.overflow = overflow;
     }
 
-    /// The names of the strategies so far.
+    /// The names of the strategies that exist until now.
     pub(crate) fn strategy_names(&self) -> Vec<String> {
         let names = self.strategies.iter().map(|one| one.name.clone());
         names.collect()

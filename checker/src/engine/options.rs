@@ -1,4 +1,4 @@
-//! How a query is to be answered: every option with its meaning and its default.
+//! How a query is answered: every option with its meaning and its default.
 
 use std::path::PathBuf;
 
@@ -88,7 +88,7 @@ impl Default for Reductions {
     }
 }
 
-/// How a query is to be answered.
+/// How a query is answered.
 #[derive(Clone, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent wish")]
 pub struct Options {
@@ -112,9 +112,9 @@ pub struct Options {
     pub plans: Option<usize>,
     /// Whether a strategy is wanted.
     pub strategy: bool,
-    /// Whether the strategy is to be checked in closed loop.
+    /// Whether the strategy is checked in closed loop.
     pub verify: bool,
-    /// Whether traces are to be timed exactly, and replayed.
+    /// Whether traces get exact times and are replayed.
     pub runs: bool,
     /// Where the files of `saveStrategy` and `loadStrategy` lie; `None` is the folder of the model.
     pub folder: Option<PathBuf>,

@@ -42,7 +42,7 @@ pub struct States {
     pub zones: Vec<Vec<Constraint>>,
 }
 
-/// What was looked at.
+/// What was checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Coverage {
     /// Different words.
@@ -439,7 +439,7 @@ impl ClosureCheck<'_> {
     }
 }
 
-/// What is known of a zone that a predicate is looked for in.
+/// What is known about a zone in which a predicate is searched.
 struct Looked<'l> {
     words: &'l [i32],
     possible: &'l [Possible],

@@ -22,7 +22,7 @@ use crate::ir::{ClockId, Edge, FixedConstraint, FunctionId, Guard, Network, Upda
 
 use super::moves::{Error, Part};
 
-/// What it takes to look at the edges of a process: see [`cancellation::work`].
+/// The work of looking at the edges of a process: see [`cancellation::work`].
 const UNITS_FOR_PROCESS: usize = 1 << 10;
 
 /// Runs the code of a network on the interpreter.
@@ -106,7 +106,7 @@ impl<'a> Code<'a> {
         self.network.processes[process].locations[words[process] as usize].urgency
     }
 
-    /// By clock, the reference included: whether its rate is 0.
+    /// For each clock, including the reference: whether its rate is 0.
     pub(super) fn stopped(&self, words: &[i32]) -> Result<Vec<bool>, Error> {
         let mut is_stopped = vec![false; self.network.clocks.len().max(1)];
         for (process, &location) in self.network.processes.iter().zip(words) {

@@ -95,7 +95,7 @@ impl<'a> Semantics<'a> {
             || moves.iter().any(|one| one.is_urgent)
     }
 
-    /// By clock: whether its rate is 0.
+    /// For each clock: whether its rate is 0.
     pub fn stopped(&self, state: &State) -> Result<Vec<bool>, Error> {
         self.code.stopped(&state.words)
     }
@@ -112,8 +112,8 @@ impl<'a> Semantics<'a> {
         Ok(later)
     }
 
-    /// All moves whose guards hold; whether the invariants of their targets do is not looked at,
-    /// nor are priorities.
+    /// All moves whose guards hold. It checks neither the invariants of their targets nor
+    /// priorities.
     pub fn moves(&self, state: &State) -> Result<Vec<Move>, Error> {
         let found = self.combinations(state)?;
         Ok(found.into_iter().map(|one| self.to_move(one)).collect())

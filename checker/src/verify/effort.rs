@@ -1,4 +1,4 @@
-//! How much a check may look at before it gives up.
+//! The effort that a check may take before it gives up.
 
 /// Regions between two questions whether somebody wants the check to end.
 const BETWEEN_QUESTIONS: u64 = 256;

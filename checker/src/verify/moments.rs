@@ -18,7 +18,7 @@ use super::regions;
 /// constant.
 const MOST_VALUES: i64 = 4096;
 
-/// Moments of one wait that are looked at, at most.
+/// The greatest number of moments of one wait that are checked.
 const MOST_MOMENTS: usize = 1 << 20;
 
 /// The constants that clocks meet.
@@ -143,9 +143,9 @@ impl Moments {
         Ok(stretches.collect())
     }
 
-    /// The waits from a state to look at: 0, those at which something may change, one between each
-    /// two, and the last. Without a limit the last is one after which nothing changes. All in
-    /// ticks; values and the limit must be even numbers of ticks.
+    /// The waits from a state that must be checked: 0, those at which something may change, one
+    /// between each two of them, and the last one. Without a limit, nothing changes after the last
+    /// one. All are in ticks; values and the limit must be even numbers of ticks.
     pub(super) fn of(
         &self,
         state: &State,

@@ -16,7 +16,7 @@
 //!
 //! What the machine says that it knows is not used.
 //!
-//! Cost: one look at each pair and its moves; memory for each pair.
+//! Cost: each pair and its moves are visited once; memory for each pair.
 
 use std::collections::HashMap;
 
@@ -84,7 +84,7 @@ type Place = (usize, State);
 /// observed there.
 type Successor = (Step, Option<usize>, State);
 
-/// A place on the path, with its successors that are still to be looked at.
+/// A place on the path, with its successors that must still be visited.
 struct Frame {
     place: Place,
     successors: Vec<Successor>,

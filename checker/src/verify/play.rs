@@ -16,7 +16,7 @@ use super::moves::{Error, Part, State};
 use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules, is_same_entry};
 use super::timed::Timed;
 
-/// What a strategy does in a state, as long as nothing else happens.
+/// What a strategy does in a state if nothing else happens.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Advice {
     /// The decisions that apply, by index.
@@ -51,7 +51,7 @@ pub fn advice(
     let applying = |clocks: &[i64]| {
         let mut indices = decisions.indices_at(clocks, unit, is_permissive);
         let mut actions = Vec::new();
-        // States that the solver tells apart may allow the same.
+        // States that the solver distinguishes may allow the same.
         indices.retain(|&index| {
             let action = &decisions.decisions[index].action;
             let is_new = !actions.contains(&action);
@@ -96,7 +96,7 @@ fn first_tick(stretch: &Stretch) -> i64 {
     stretch.first + i64::from(stretch.is_open())
 }
 
-/// The constants that tell the decisions for some words apart.
+/// The constants that distinguish the decisions for some words.
 fn constants_of(network: &Network, decisions: &Decisions) -> Moments {
     let decisions = decisions.decisions.iter().chain(&decisions.legs);
     let zones = decisions.flat_map(|one| &one.zones);

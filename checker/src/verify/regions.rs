@@ -52,7 +52,7 @@ impl Regions {
         2 * network.clocks.len().max(1) as i64
     }
 
-    /// The regions that tell apart what the network tells apart, and comparisons of a clock with
+    /// The regions that distinguish what the network distinguishes, and comparisons of a clock with
     /// constants up to `constant`, or of two clocks if `has_differences`.
     pub fn new(network: &Network, constant: i64, has_differences: bool) -> Result<Regions, Error> {
         if network.features.stopwatches {

@@ -10,10 +10,10 @@
 //!   so that the same moves are possible again and again; waiting forever; or without any move, now
 //!   or after any wait.
 //!
-//! What must hold during a wait is looked at at all moments at which something may change
+//! What must hold during a wait is checked at all moments at which something may change
 //! ([`super::moments`]).
 //!
-//! Cost: one look at each step; a region for each loop.
+//! Cost: each step is visited once; a region for each loop.
 
 use std::collections::HashMap;
 
@@ -93,7 +93,7 @@ pub enum Claim<'a> {
     Takes(&'a Predicate, &'a Measure, Shown),
 }
 
-/// What was looked at.
+/// What was checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Coverage {
     /// States on entry.
@@ -319,7 +319,7 @@ impl Replay<'_> {
         Ok(Ok(()))
     }
 
-    /// The moments of a wait at which something must be looked at.
+    /// The moments of a wait at which something must be checked.
     fn moments_of(
         &self,
         state: &State,
@@ -476,7 +476,7 @@ fn never_ending(claim: &Claim<'_>) -> Result<(), Defect> {
     }
 }
 
-/// The regions that tell the predicates apart too.
+/// The regions that also distinguish the predicates.
 fn regions_for(network: &Network, predicates: &[&Predicate]) -> Result<Regions, Error> {
     let (constant, has_differences) = moments::constants(predicates);
     if network.features.stopwatches {
@@ -493,9 +493,9 @@ pub fn indifferent_above(network: &Network, predicates: &[&Predicate]) -> Option
     }
 }
 
-/// The indices of two states that lie in the same region, a first one and one after it; `None` if
-/// all regions differ. The predicates are told apart by the regions too. With stopwatches regions
-/// are single values.
+/// The indices of two states in the same region, the first state and a later one; `None` if all
+/// regions differ. The regions also distinguish the predicates. With stopwatches regions are single
+/// values.
 pub fn repeated(
     network: &Network,
     states: &[&State],

@@ -25,10 +25,10 @@
 //!   at one.
 //!
 //! If the game is played under a strategy of the controller ([`Claim::under`]), the controller has
-//! no moves but those that this allows, and where it does not allow waiting no time passes: the
+//! only the moves that this strategy allows. Where it does not allow waiting, no time passes: the
 //! controller must move, and has lost if it cannot.
 //!
-//! Cost: one look at each region and move of the closed loop; memory for each region.
+//! Cost: each region and move of the closed loop is visited once; memory for each region.
 
 use std::collections::{HashMap, HashSet};
 
@@ -42,7 +42,7 @@ use super::timed::{Timed, least_multiple};
 
 pub use super::rules::{Aim, Claim, Constraint, Decision, Decisions, Forcing, Owner};
 
-/// What was looked at.
+/// What was checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Coverage {
     /// Regions of the closed loop, goals included.
@@ -119,7 +119,7 @@ pub enum Outcome {
     Verified(Coverage),
     /// It does not.
     Violated(Box<Violation>, Coverage),
-    /// There is more than what may be looked at.
+    /// There is more to check than is allowed.
     GivenUp(GivenUp, Coverage),
 }
 
@@ -186,7 +186,7 @@ enum Mark {
     Done,
 }
 
-/// A region on the path, with its successors that are still to be looked at.
+/// A region on the path, with its successors that must still be visited.
 struct Frame {
     state: State,
     successors: Vec<(Step, State)>,

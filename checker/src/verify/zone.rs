@@ -244,8 +244,8 @@ impl Zone {
             .all(|part| part.is_covered(others))
     }
 
-    /// What it becomes while time passes and the clocks of `stopped` keep their values; where
-    /// [`is_exact`] says so, and else the least zone around it.
+    /// The zone after time has passed, while the clocks of `stopped` keep their values. It is exact
+    /// where [`is_exact`] says so, and otherwise the least zone that contains the result.
     pub(super) fn future(&self, stopped: &[bool]) -> Zone {
         let mut later = self.clone();
         for clock in (1..self.clocks).filter(|&clock| !stopped[clock]) {

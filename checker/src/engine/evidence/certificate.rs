@@ -30,7 +30,7 @@ use crate::engine::limits::{cut_as_interrupted, stop_text};
 /// What a file with a certificate says that it is.
 pub const FORMAT: &str = "ntagen-certificate";
 
-/// Bytes of a certificate between two looks at the memory that it takes.
+/// Bytes of a certificate between two checks of the memory that it takes.
 const BYTES_BETWEEN_LOOKS: usize = 1 << 20;
 
 /// The network with `meta` variables as ordinary ones: whether states that differ in them alone are

@@ -11,7 +11,7 @@ use super::strategy_check;
 pub struct Checked {
     /// Whether what the file claims is right; `None` if the check does not cover it.
     pub holds: Option<bool>,
-    /// What was looked at, or what is wrong, line by line.
+    /// What was checked, or what is wrong, line by line.
     pub lines: Vec<String>,
 }
 

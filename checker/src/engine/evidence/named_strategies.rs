@@ -35,8 +35,8 @@ pub(crate) struct StrategyFile<'q> {
 }
 
 impl LoadedModel {
-    /// The strategy that a query is asked under, or that is to be saved; it is made within these
-    /// limits if that is due.
+    /// The strategy under which a query is asked, or that must be saved. If it is not made yet, it
+    /// is made within these limits.
     pub(crate) fn existing_strategy(
         &mut self,
         name: &str,
@@ -66,8 +66,8 @@ impl LoadedModel {
         Err(Rejection::new(vec![diagnostic], &self.sources))
     }
 
-    /// Makes a strategy that is due. Returns what is known of why there is none; then it is tried
-    /// again with the next use.
+    /// Makes a strategy. Returns why there is none, if it cannot be made; then the next use tries
+    /// again.
     fn make_strategy(&mut self, name: &str, due: Due, options: &Options) -> Option<String> {
         let with_strategy = Options {
             strategy: true,

@@ -154,7 +154,7 @@ fn new_part(place: &Path, is_replaced: bool) -> io::Result<(PathBuf, File)> {
         let number = PARTS.fetch_add(1, Ordering::Relaxed);
         let part = place.with_file_name(format!(".ntagen-{}-{number}.part", std::process::id()));
         match options.open(&part) {
-            // Left behind by a process that was killed, and had the same number.
+            // A process with the same number was killed and left it there.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             opened => return opened.map(|file| (part, file)),
         }

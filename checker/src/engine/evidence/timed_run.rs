@@ -21,10 +21,10 @@ use crate::zones::dbm::Constraint;
 
 use super::witness::{Missing, Proof};
 
-/// Times that the loop of a trace is taken, at most.
+/// The greatest number of rounds of the loop of a trace.
 const MOST_ROUNDS: usize = 64;
 
-/// Moves of a run, at most, when its loop is taken again.
+/// The greatest number of moves of a run when its loop is repeated.
 const MOST_MOVES: usize = 20_000;
 
 /// What a trace shows.
@@ -207,7 +207,8 @@ pub(crate) fn timed(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<
     })
 }
 
-/// Rounds of a loop, at most, before the one in which a run with stopwatches closes it.
+/// The greatest number of rounds of a loop before the one in which a run with stopwatches closes
+/// it.
 const MOST_EARLIER_ROUNDS: usize = 3;
 
 /// A trace that ends in a loop.

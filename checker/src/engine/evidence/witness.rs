@@ -51,7 +51,7 @@ impl Witness {
 /// What became of the run with exact times.
 #[derive(Clone, Debug)]
 pub enum Proof {
-    /// It was replayed: the states on entry, in ticks, and what was looked at.
+    /// It was replayed: the states on entry, in ticks, and what was checked.
     Replayed(Run, Vec<State>, Coverage),
     /// The replay shows a mistake in it.
     Violated(Run, Violation),

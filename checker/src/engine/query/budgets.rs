@@ -16,13 +16,13 @@ pub(super) const CROWD: usize = 4;
 /// The same in time-optimal games: with more of them, there will be more still.
 pub(super) const CROWD_IN_RACES: usize = 2;
 
-/// Discrete states that are explored instead, at most. More of them are rather such that no run
-/// reaches.
+/// The greatest number of discrete states that are explored instead. If there are more, runs reach
+/// few of them.
 const MOST_DISCRETE_STATES: u64 = 64 * STATES_BEFORE_CROWD;
 
-/// Bytes that a discrete state may take, on average, before zones that are reached are looked at
-/// again: winning sets of all that invariants allow can fall into many more pieces than those of
-/// what is reached.
+/// The average number of bytes that a discrete state may take before reached zones are tried again:
+/// winning sets of everything that invariants allow can have many more pieces than those of what is
+/// reached.
 const MOST_BYTES_OF_DISCRETE_STATE: u64 = 64 << 10;
 
 /// Units of work ([`crate::cancellation::work`]) that computing what a discrete state wins may

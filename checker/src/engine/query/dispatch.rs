@@ -184,10 +184,10 @@ fn answer_within(subject: Subject<'_>, query: &Query, watch: &mut LimitWatch) ->
     }
 }
 
-/// Answers with a search that takes states that differ only by exchanged members of scalar sets for
-/// the same, if that is wanted and sound. Whether a failure is met can depend on the order in which
-/// a quantifier runs through members, so that one that is found so is looked for again among all
-/// states.
+/// Answers with a search that treats states as the same if they differ only by exchanged members of
+/// scalar sets, if that is wanted and sound. Whether a failure is met can depend on the order in
+/// which a quantifier runs through members. So a failure that is found in this way is searched
+/// again among all states.
 fn reduced(
     subject: Subject<'_>,
     mut answer: impl FnMut(Option<&Arc<Symmetry>>) -> Answer,

@@ -75,7 +75,7 @@ pub(super) fn verified(
     strategy_check::verify(subject.network, asked, played, rules, effort)
 }
 
-/// How much a check may look at.
+/// The effort that a check may take.
 pub(super) fn effort_of<'a>(options: &Options) -> Effort<'a> {
     Effort::up_to(
         options

@@ -1,8 +1,8 @@
 //! Is there a run that never ends? `E[]`, `A<>` and `-->`, with the shortest trace if that is
 //! wanted.
 //!
-//! A run is first looked for in zones that may be too large, where that is sound for there being
-//! none; what they have is looked for again in exact ones.
+//! A run is first searched in zones that may be too large, if the answer that there is none is
+//! sound in them. A run that is found there is searched again in exact zones.
 
 use crate::analysis::Abstraction;
 use crate::ir::Predicate;
@@ -24,8 +24,8 @@ use crate::engine::evidence::timed_run::Shows;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::{Options, TraceWanted};
 
-/// What a search in coarser zones came to, unless it found something that may not be there; else
-/// that of the same search in exact ones.
+/// The result of a search in coarser zones, unless it found something that may not exist; otherwise
+/// the result of the same search in exact zones.
 fn settle<'a, T>(
     subject: Subject<'a>,
     predicates: &[&Predicate],
@@ -175,7 +175,7 @@ fn best(
         Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
         Ok(Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
         Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
-        // The search for any run did not come to the state that fails.
+        // The search for any run did not reach the state that fails.
         Err(_) => Err("the model fails in a state beside it".to_owned()),
     }
 }

@@ -73,7 +73,7 @@ pub(super) fn best(
         Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
         Ok(Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
         Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
-        // The search for any trace did not come to the state that fails.
+        // The search for any trace did not reach the state that fails.
         Err(_) => Err("the model fails in a state beside it".to_owned()),
     }
 }

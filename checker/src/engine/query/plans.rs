@@ -49,7 +49,7 @@ enum EndOfPlans {
     Stopped,
 }
 
-/// Plans between two looks at the memory that they take.
+/// Plans between two checks of the memory that they take.
 const PLANS_BETWEEN_LOOKS: usize = 256;
 
 /// At most this many plans, and what follows them.

@@ -61,8 +61,8 @@ pub(super) fn reachable<'a>(
     conclude(subject, goal, searched, watch)
 }
 
-/// A deadlock is first looked for in zones that are too large for it: one that is found counts if
-/// it remains in the exact zones of its trace.
+/// A deadlock is first searched in zones that are too large for it. One that is found counts if it
+/// remains in the exact zones of its trace.
 fn attempts(subject: Subject<'_>, goal: &Predicate) -> &'static [Accuracy] {
     // The zones of a certificate must be free of deadlocks themselves, and the best trace is found
     // in them.

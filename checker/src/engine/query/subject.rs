@@ -20,7 +20,7 @@ pub(crate) struct Subject<'a> {
     pub(crate) executor: &'a dyn Executor,
     /// The strategy that the controller follows.
     pub(crate) under: Option<Followed<'a>>,
-    /// How the query is to be answered.
+    /// The options for the answer.
     pub(crate) options: &'a Options,
 }
 

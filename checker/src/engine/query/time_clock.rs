@@ -1,7 +1,7 @@
-//! The clock that measures time: for traces, and for games that are to be won within a time.
+//! The clock that measures time: for traces, and for games that must be won within a time.
 //!
 //! Nothing sets it, and no model can name it. It is the last clock of a network that has it. A game
-//! that is to be won within a limit is an ordinary game of such a network, whose predicates compare
+//! that must be won within a limit is an ordinary game of such a network, whose predicates compare
 //! the clock with the limit.
 
 use std::borrow::Cow;
@@ -31,7 +31,7 @@ pub(super) fn with_time(network: &Network) -> (Network, usize) {
     (timed, clock)
 }
 
-/// The network that a strategy is about: with the clock if the strategy looks at it.
+/// The network of a strategy: with the clock if the strategy uses it.
 pub fn network_of<'n>(network: &'n Network, strategy: &Strategy) -> Cow<'n, Network> {
     with_limit(network, strategy.time_limit)
 }

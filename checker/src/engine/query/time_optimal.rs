@@ -8,10 +8,10 @@
 //! the goal, that is the least time. Without u, the limit is doubled until it is enough, if the
 //! goal can be forced at all.
 //!
-//! The clock tells apart when a state is reached, so that there are soon many zones for each
-//! discrete state. Then there is one node for each, if that is possible: how much time is needed
-//! does not depend on how much has passed. The limit has no part in how many these are, so that a
-//! generous one is tried first.
+//! The clock distinguishes states by the time at which they are reached, so there are soon many
+//! zones for each discrete state. Then there is one node for each discrete state, if that is
+//! possible: the time that is needed does not depend on the time that has passed. The number of
+//! these nodes does not depend on the limit, so a generous limit is tried first.
 //!
 //! For a strategy the game is solved again, with the time that was found as the limit and a clock
 //! that starts at 0.
@@ -210,7 +210,7 @@ struct ClockedGame<'a, 'q> {
 }
 
 impl ClockedGame<'_, '_> {
-    /// What the nodes of graphs are in which the time is looked for, one after the other.
+    /// The kinds of graphs in which the time is searched, one after the other.
     fn attempts(&self) -> &'static [Nodes] {
         let Subject {
             network, options, ..

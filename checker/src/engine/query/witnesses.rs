@@ -56,8 +56,8 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         self.is_doubtful
     }
 
-    /// Adds a trace, with its run if runs are wanted; returns the verdict on what it shows: a run
-    /// is also looked for where there is a doubt, since then it alone makes sure.
+    /// Adds a trace, with its run if runs are wanted; returns the verdict that it shows. If there
+    /// is a doubt, the run is computed too, since then only the run gives certainty.
     pub(super) fn add(
         &mut self,
         trace: Trace,

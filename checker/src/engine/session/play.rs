@@ -38,17 +38,17 @@ pub struct Follower {
     pub query: String,
     /// The strategy.
     pub strategy: Arc<Strategy>,
-    /// By the words that tell states apart: the index of the first state in the strategy with
-    /// these.
+    /// For the words that distinguish states: the index of the first state in the strategy with
+    /// these words.
     by_words: HashTable<u32>,
-    /// By state: the index of the next one with the same words, [`NONE`] without one.
+    /// For each state: the index of the next one with the same words, [`NONE`] without one.
     next: Vec<u32>,
 }
 
 /// No state.
 const NONE: u32 = u32::MAX;
 
-/// The hash of the words that tell states apart.
+/// The hash of the words that distinguish states.
 fn hash(words: &[i32]) -> u64 {
     FxBuildHasher.hash_one(words)
 }
@@ -198,8 +198,8 @@ impl Follower {
         Ok(json!({ "over": false, "now": described(&advice.now), "waiting": waiting }))
     }
 
-    /// Checks in closed loop that the owner wins: whether that is so (`None` if the check does not
-    /// cover it), and what was looked at.
+    /// Checks in closed loop that the owner wins. Returns whether this is so (`None` if the check
+    /// does not cover it), and what was checked.
     pub fn verify(
         &self,
         model: &mut LoadedModel,
@@ -607,8 +607,8 @@ impl Play {
         self.states.truncate(self.start + length + 1);
     }
 
-    /// The play so far as a trace that [`LoadedModel::verify_evidence`] checks; `None` if its times
-    /// have no common resolution.
+    /// The play until now, as a trace that [`LoadedModel::verify_evidence`] checks; `None` if its
+    /// times have no common resolution.
     pub fn trace(&self, network: &Network) -> Result<Option<Json>, verify::Error> {
         let units = self.states.iter().map(|state| 2 * state.ticks_per_unit);
         let unit = units.into_iter().try_fold(1, least_multiple);

@@ -1,6 +1,6 @@
 //! Walking through a model by hand: a state, its moves, the state after one of them.
 //!
-//! A state is symbolic: its zone holds all clock values that the moves so far allow. A move is
+//! A state is symbolic: its zone holds all clock values that the moves until now allow. A move is
 //! listed if it is possible at some of them. Nothing is extrapolated, except in the list of all
 //! states, which would have no end otherwise.
 
@@ -103,7 +103,7 @@ impl LoadedModel {
             Ok(Err(Failure::Interrupted)) => Some(watch.stop()),
             Ok(Err(failure)) => return Err(failure),
         };
-        // The search looks at its limits now and then only, so that it may have met more.
+        // The search checks its limits only from time to time, so it may have found more.
         let is_cut = search.counters().stored > most as u64;
         let states = search.into_met(most)?;
         Ok((states, stop.or(is_cut.then_some(StopReason::States))))
