@@ -92,4 +92,7 @@ def _read(file: Path) -> str:
     try:
         return read_file(file, EVIDENCE_BYTES).decode()
     except UnicodeDecodeError as error:
-        raise InputError(f"{file}: this is not text in UTF-8: {error.reason}") from None
+        raise InputError(
+            f"{file}: this is not text in UTF-8: {error.reason}\n"
+            "hint: give a trace, certificate or strategy as JSON, which `ntagen check` wrote"
+        ) from None

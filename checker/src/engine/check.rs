@@ -74,7 +74,7 @@ impl LoadedModel {
         let Some(name) = query.strategy.clone() else {
             return Ok(answer);
         };
-        let text = unnamed(self.sources.text(query.span)).to_owned();
+        let text = unnamed(&query.text).to_owned();
         // Where the query is not satisfied, the strategy is the environment's.
         let is_won = answer.verdict == Verdict::Satisfied;
         let known = is_won.then(|| answer.evidence.strategy.clone()).flatten();

@@ -31,6 +31,8 @@ pub struct LoadedModel {
     pub(super) strategies: Vec<NamedStrategy>,
     /// The queries of the file.
     pub queries: Vec<QueryText>,
+    /// The queries of the `.q` file that was read last.
+    listed: Vec<QueryText>,
     /// Warnings of loading the model and files of queries, rendered.
     pub warnings: Vec<String>,
     /// Seconds that loading took, compilation of code included once a query was checked.
@@ -67,6 +69,7 @@ impl LoadedModel {
                 .unwrap_or_default(),
             strategies: Vec::new(),
             queries,
+            listed: Vec::new(),
             warnings,
             load_seconds,
             code: None,
@@ -99,11 +102,18 @@ impl LoadedModel {
         }
         let warnings = Rejection::new(diagnostics, &self.sources).rendered;
         self.warnings.extend(warnings);
+        self.listed.clone_from(&queries);
         Ok(queries)
     }
 
-    /// A query given as text.
+    /// A query given as text. If a file that was read has this query, mistakes are shown there.
     pub fn add_query(&mut self, text: &str) -> QueryText {
+        let words = || text.split_whitespace();
+        let mut known = self.listed.iter().chain(&self.queries);
+        let is_it = |one: &&QueryText| self.sources.text(one.span).split_whitespace().eq(words());
+        if let Some(known) = known.find(is_it) {
+            return known.clone();
+        }
         let span = syntax::add_query_text(text, &mut self.sources);
         QueryText {
             span,

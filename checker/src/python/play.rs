@@ -9,7 +9,6 @@ use pyo3::types::PyBytes;
 use super::answer::Answer;
 use super::convert::{FailedError, priority_rule, rejected, rules};
 use super::model::Model;
-use crate::diagnostics::Span;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{strategy_json, text};
 use crate::engine::query::time_clock;
@@ -69,7 +68,7 @@ impl Strategy {
     #[staticmethod]
     fn read(model: &Bound<'_, Model>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Strategy> {
         let follower = model.get().with(|model| {
-            let read = model.read_strategy(path, data.as_bytes(), Span::default());
+            let read = model.read_strategy(path, data.as_bytes());
             let (query, strategy) = read.map_err(rejected)?;
             let strategy = Arc::new(strategy);
             Ok::<_, PyErr>(Follower::new(model.network(), query, strategy))

@@ -96,7 +96,14 @@ pub fn read_queries(
     let queries = match encoding::decode(path, bytes, sources, &mut diagnostics) {
         Some(text) => {
             let span = add_file(path, text, sources);
-            q_file::split(span, sources, &mut diagnostics)
+            let mut queries = q_file::split(span, sources, &mut diagnostics);
+            if let Some(plain) = q_file::plain(sources.text(span), &queries) {
+                let plain = add_file(path, plain, sources);
+                for query in &mut queries {
+                    query.span.source = plain.source;
+                }
+            }
+            queries
         }
         None => Vec::new(),
     };

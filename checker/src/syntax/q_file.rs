@@ -182,6 +182,27 @@ pub(super) fn collapsed(text: &str) -> String {
     result
 }
 
+/// The file with blanks in the place of comments and continuation marks inside its queries; all else
+/// keeps its place. `None` if there are no such comments and marks.
+pub(super) fn plain(text: &str, queries: &[QueryText]) -> Option<String> {
+    let mut plain = text.as_bytes().to_vec();
+    for query in queries {
+        let (mut position, end) = (query.span.start as usize, query.span.end as usize);
+        while position < end {
+            let (piece, length) = next_piece(text, position)?;
+            let is_mark = matches!(piece, Piece::Blank) && text[position..].starts_with('\\');
+            if is_mark || matches!(piece, Piece::Comment(_)) {
+                let left_out = plain[position..position + length].iter_mut();
+                left_out
+                    .filter(|byte| **byte != b'\n')
+                    .for_each(|byte| *byte = b' ');
+            }
+            position += length;
+        }
+    }
+    String::from_utf8(plain).ok().filter(|plain| plain != text)
+}
+
 /// Where a formula starts and ends without the blanks and comments around it; `None` if there is
 /// nothing else.
 pub(super) fn trimmed(text: &str) -> Option<(usize, usize)> {

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import ntagen
+from ntagen.checker import RejectedError
 from ntagen.checker.runs import Choice, Run, State
 from ntagen.cli import main
 
@@ -142,6 +143,25 @@ def test_goal_that_depends_on_clocks_does_not_end_play_elsewhere() -> None:
     (state,) = (one for one in strategy if one.locations == {"P": "L"})
     assert not state.is_goal
     assert strategy.action({"P": "L", "x": 0, "y": 0}).delay == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("hello", ": error[E0805]: this is no JSON: expected value at line 1 column 1"),
+        ('{"format": "ntagen-trace"}', ": error[E0805]: this is no strategy of ntagen"),
+        ('{"format": "ntagen-strategy", "version": 9}', ": error[E0805]: at version: version 9"),
+    ],
+)
+def test_what_is_no_strategy_is_refused_with_its_file(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "file.json"
+    path.write_text(text)
+    with pytest.raises(RejectedError) as refused:
+        ntagen.load_strategy(path, ntagen.load(RACE))
+    told = str(refused.value)
+    assert told.startswith(f"{path}{said}")
+    assert "\n  help: " in told
+    assert "prelude" not in told
 
 
 def test_saved_strategy_is_read_again(tmp_path: Path) -> None:

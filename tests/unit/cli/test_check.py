@@ -69,6 +69,26 @@ def test_satisfied_and_not_satisfied_queries(
     assert "no " in out
 
 
+def test_mistakes_in_a_file_of_queries_are_shown_at_their_places(
+    gate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "gate.q"
+    file.write_text(
+        "// the first\nE<> Gate.Open\n\n  E<> Gate.Opn\n"
+        "E<> Gate.Open /* twice */ && \\\n   Gate.Shut\n"
+        'strategy S = loadStrategy("none.json")\n'
+        "E<> 5 / (Gate.n - Gate.n) == 1\n"
+    )
+    out, err = check_run(capsys, 2, gate, file)
+    assert f"{file}:4:12: error" in err
+    assert "  |   E<> Gate.Opn\n  |            ^" in err
+    assert f"{file}:6:9: error" in err
+    assert f"{file}:7:1: error[E0805]" in err
+    assert f"division by zero, at {file}:8:5: " in out
+    _, err = check_run(capsys, 2, gate, "--query", "E<> Gate.Opn")
+    assert err.startswith("<text>:1:10: error")
+
+
 def test_json_has_the_promised_fields_and_nothing_else_is_printed(
     gate: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

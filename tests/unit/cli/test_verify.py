@@ -65,6 +65,32 @@ def test_trace_holds_until_a_wait_is_changed(
 
 
 @pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"hello", "it is no JSON: expected value at line 1 column 1"),
+        (b"", "it is no JSON"),
+        (b"[1]", 'its "format" is null and its "version" null'),
+        (b'{"format": "ntagen-trace", "version": 9}', '"ntagen-trace" and its "version" 9'),
+    ],
+)
+def test_what_is_no_evidence_is_refused_with_the_formats_that_are(
+    data: bytes, said: str, lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(data)
+    check_exit(2, "verify", lamp, file)
+    told = capsys.readouterr().err
+    assert f"error: {file}: " in told
+    assert said in told
+    for kind in ("certificate", "trace", "strategy", "machine"):
+        assert f"ntagen-{kind}" in told
+    file.write_bytes(b"\xff")
+    check_exit(2, "verify", lamp, file)
+    assert "not text in UTF-8" in (told := capsys.readouterr().err)
+    assert "hint: give a trace, certificate or strategy as JSON" in told
+
+
+@pytest.mark.parametrize(
     ("place", "value", "said"),
     [
         (("states", 1, "locations", "Lamp"), "On", "states[1].locations.Lamp"),

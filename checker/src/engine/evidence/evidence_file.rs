@@ -17,8 +17,8 @@ use crate::engine::options::Rules;
 use crate::engine::query::partial_observation::{self, ObservedGame};
 use crate::engine::rejection::Rejection;
 
-/// What a file of evidence is.
-const HINT: &str = "hint: it must come from `ntagen check` for this model: with --certificate FILE, --trace FILE.json or --strategy FILE.json; or from `ntagen play` with --log FILE";
+/// Which files are evidence.
+const HINT: &str = "hint: expected is a file that `ntagen check` or `ntagen play` wrote for this model, of version 1 of a format: ntagen-certificate (--certificate FILE), ntagen-trace (--trace FILE.json, --log FILE), ntagen-strategy or ntagen-machine (--strategy FILE.json)";
 
 impl LoadedModel {
     /// Checks a certificate, a trace or a strategy that was written for this model, independently
@@ -48,10 +48,13 @@ impl LoadedModel {
             ]
             .contains(&kind.as_str())
         {
-            return Err(unreadable(
-                "it is neither a certificate nor a trace nor a strategy nor a machine of version 1"
-                    .to_owned(),
-            ));
+            let shown =
+                |name: &str| -> String { header[name].to_string().chars().take(40).collect() };
+            return Err(unreadable(format!(
+                "its \"format\" is {} and its \"version\" {}",
+                shown("format"),
+                shown("version")
+            )));
         }
         let query = header["query"].as_str().unwrap_or_default();
         let query_text = self.add_query(query);
@@ -62,7 +65,7 @@ impl LoadedModel {
             json::TRACE_FORMAT => trace_file::check_file(network, &compiled.kind, &header),
             MACHINE_FORMAT => check_machine(network, &compiled.kind, &header, rules),
             _ => strategy_json::read(network, text.as_bytes())
-                .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))
+                .map_err(|mismatch| mismatch.to_string())
                 .and_then(|(_, strategy)| {
                     check_strategy(network, &compiled.kind, &strategy, rules)
                 }),
@@ -104,7 +107,7 @@ fn check_machine(
         return Err("the query of a machine has observations".to_owned());
     };
     let machine = machine_json::read(network, file, observations.len())
-        .map_err(|mismatch| format!("at {}: {}", mismatch.place, mismatch.message))?;
+        .map_err(|mismatch| mismatch.to_string())?;
     let asked = ObservedGame {
         objective,
         observations: &observations[..],

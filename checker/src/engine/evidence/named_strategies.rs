@@ -122,7 +122,11 @@ impl LoadedModel {
             let Refusal { message, help } = refusal;
             self.refused(codes::STRATEGY_FILE, span, message, Some(&help))
         })?;
-        let (query, strategy) = self.read_strategy(&path.display().to_string(), &bytes, span)?;
+        let (query, strategy) =
+            strategy_json::read(self.network(), &bytes).map_err(|mismatch| {
+                let message = format!("{}: {mismatch}", path.display());
+                self.refused(codes::STRATEGY_FILE, span, message, mismatch.help)
+            })?;
         let strategy = Arc::new(strategy);
         let states = strategy.states.len();
         let known = Some(Arc::clone(&strategy));
@@ -142,19 +146,17 @@ impl LoadedModel {
 
     /// Reads a strategy from the bytes of a file; gives the query that it answers, and the
     /// strategy. `path` names the file.
-    pub fn read_strategy(
-        &self,
-        path: &str,
-        bytes: &[u8],
-        span: Span,
-    ) -> Result<(String, Strategy), Rejection> {
+    pub fn read_strategy(&self, path: &str, bytes: &[u8]) -> Result<(String, Strategy), Rejection> {
         strategy_json::read(self.network(), bytes).map_err(|mismatch| {
-            let message = if mismatch.place.is_empty() {
-                format!("{path}: {}", mismatch.message)
-            } else {
-                format!("{path}, at {}: {}", mismatch.place, mismatch.message)
-            };
-            self.refused(codes::STRATEGY_FILE, span, message, mismatch.help)
+            let code = codes::STRATEGY_FILE.code;
+            let help = mismatch.help.map(|help| format!("\n  help: {help}"));
+            Rejection {
+                diagnostics: Vec::new(),
+                rendered: vec![format!(
+                    "{path}: error[{code}]: {mismatch}{}",
+                    help.unwrap_or_default()
+                )],
+            }
         })
     }
 

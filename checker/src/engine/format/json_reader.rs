@@ -1,6 +1,8 @@
 //! Reading JSON files: each part is known with its place, so that a message can say where in the
 //! file something is wrong. What a file shows for information is compared with the facts.
 
+use std::fmt;
+
 use serde_json::{Map, Value as Json};
 
 /// Why a file is no strategy for the model.
@@ -14,11 +16,24 @@ pub struct Mismatch {
     pub help: Option<&'static str>,
 }
 
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.place.is_empty() {
+            write!(f, "at {}: ", self.place)?;
+        }
+        f.write_str(&self.message)
+    }
+}
+
 /// What a file with a strategy over observations says that it is.
 pub const MACHINE_FORMAT: &str = "ntagen-machine";
 
 /// How to fix a file that is not of the format.
 pub(super) const SEE_FORMAT: &str = "docs/strategy.md describes the format";
+
+/// How to get a file of the format.
+pub(super) const WRITE_ONE: &str =
+    "`ntagen check --strategy FILE.json` writes such a file; docs/strategy.md describes the format";
 
 /// A part of the file with its place.
 pub(crate) struct At<'j>(pub(crate) &'j Json, pub(super) String);
@@ -107,7 +122,7 @@ pub(crate) enum Difference {
 
 impl From<Mismatch> for Difference {
     fn from(mismatch: Mismatch) -> Difference {
-        Difference::Unknown(format!("at {}: {}", mismatch.place, mismatch.message))
+        Difference::Unknown(mismatch.to_string())
     }
 }
 

@@ -22,7 +22,7 @@ use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
 
 use super::json;
-use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT, integer};
+use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT, WRITE_ONE, integer};
 use super::text::{self, ValuePlace};
 use crate::engine::query::time_clock;
 use crate::engine::query_form::without_under;
@@ -169,7 +169,7 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
     let file: Json = serde_json::from_slice(bytes).map_err(|error| Mismatch {
         place: String::new(),
         message: format!("this is no JSON: {error}"),
-        help: Some(SEE_FORMAT),
+        help: Some(WRITE_ONE),
     })?;
     read_whole(network, &At::whole(&file))
 }
@@ -183,7 +183,7 @@ fn read_whole(network: &Network, whole: &At<'_>) -> Result<(String, Strategy), M
     }
     if format != FORMAT {
         let message = format!("this is no strategy of ntagen: its \"format\" is not \"{FORMAT}\"");
-        return Err(whole.wrong(message, SEE_FORMAT));
+        return Err(whole.wrong(message, WRITE_ONE));
     }
     whole.only(&[
         "format",
