@@ -182,8 +182,8 @@ pub(super) fn collapsed(text: &str) -> String {
     result
 }
 
-/// The file with blanks in the place of comments and continuation marks inside its queries; all else
-/// keeps its place. `None` if there are no such comments and marks.
+/// The file with blanks in the place of comments and continuation marks inside its queries; all
+/// else keeps its place. `None` if there are no such comments and marks.
 pub(super) fn plain(text: &str, queries: &[QueryText]) -> Option<String> {
     let mut plain = text.as_bytes().to_vec();
     for query in queries {
