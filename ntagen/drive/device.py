@@ -8,6 +8,7 @@ never goes back.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from ntagen.needle.measurement import Measurement
@@ -24,8 +25,8 @@ class Sensor(Protocol):
         """
 
 
-class Device(Sensor, Protocol):
-    """A needle that can be pushed, rolled and pulled, with its sensor."""
+class Actuator(Protocol):
+    """What moves a needle: it can be pushed, rolled and pulled."""
 
     def now_s(self) -> float:
         """The time on the device's clock."""
@@ -53,3 +54,44 @@ class Device(Sensor, Protocol):
 
     def stop(self) -> None:
         """Stops the needle where it is: the safe state. It must work at any time, also twice."""
+
+
+class Device(Actuator, Sensor, Protocol):
+    """A needle that can be moved, with its sensor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assembly:
+    """A device of two parts: what moves the needle, and what measures it.
+
+    Attributes:
+        actuator: Moves the needle.
+        sensor: Measures it.
+    """
+
+    actuator: Actuator
+    sensor: Sensor
+
+    def now_s(self) -> float:
+        """The time on the actuator's clock."""
+        return self.actuator.now_s()
+
+    def push(self, length_mm: float) -> None:
+        """See `Actuator.push`."""
+        self.actuator.push(length_mm)
+
+    def roll(self, angle_rad: float) -> None:
+        """See `Actuator.roll`."""
+        self.actuator.roll(angle_rad)
+
+    def pull(self, length_mm: float) -> None:
+        """See `Actuator.pull`."""
+        self.actuator.pull(length_mm)
+
+    def stop(self) -> None:
+        """See `Actuator.stop`."""
+        self.actuator.stop()
+
+    def measure(self) -> Measurement:
+        """See `Sensor.measure`."""
+        return self.sensor.measure()
