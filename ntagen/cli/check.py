@@ -72,7 +72,7 @@ class _Outputs:
     certificate: Path | None
     strategy: str | None
     controller: Path | None
-    plans: Path | None
+    plans: str | None
     ranking: str
     written: set[str] = field(default_factory=set)
     """The options whose output has been written."""
@@ -161,10 +161,10 @@ class _Outputs:
 )
 @click.option(
     "--plans",
-    metavar="FILE.json",
-    type=click.Path(path_type=Path),
-    help="Write all plans of a control query; with several, FILE has those of the last. Plans of "
-    "an environment are also ranked and certified.",
+    metavar="FILE.json|-",
+    help="Write all plans of a control query to FILE, or list them (-); with several, FILE has "
+    "those of the last. Plans of an environment are also ranked, certified and marked if they hold "
+    "in exact kinematics.",
 )
 @click.option(
     "--rank",
@@ -189,7 +189,7 @@ def command(
     certificate: Path | None,
     strategy: str | None,
     controller: Path | None,
-    plans: Path | None,
+    plans: str | None,
     ranking: str,
     given: dict[str, Any],
     overflow: Any,  # noqa: ANN401
@@ -225,10 +225,11 @@ def command(
     """  # noqa: D301  click wants the control character
     from ntagen.checker import Options
 
-    if as_json and strategy == "-":
-        raise click.UsageError(
-            "--json and --strategy - both write to standard output; give --strategy a FILE"
-        )
+    for option, target in (("--strategy", strategy), ("--plans", plans)):
+        if as_json and target == "-":
+            raise click.UsageError(
+                f"--json and {option} - both write to standard output; give {option} a FILE"
+            )
     if second_path and query_file:
         raise click.UsageError(f"two files of queries: {query_file} and {second_path}; give one")
     _check_ranking(ranking)
@@ -508,26 +509,35 @@ def _write_strategy(answer: Answer, target: str, text: str) -> list[str]:
     return [f"{whose} written to {target}"]
 
 
-def _write_plans(answer: Answer, path: Path, ranking: str, scene: Scene | None) -> list[str]:
+def _write_plans(answer: Answer, target: str, ranking: str, scene: Scene | None) -> list[str]:
     if scene is None:
-        write_files({path: f"{answer.plans_json()}\n"})
-        return [f"{answer.plan_count} plans written to {path}"]
+        if target == "-":
+            echo(answer.plans_json() or "")
+            return []
+        write_files({Path(target): f"{answer.plans_json()}\n"})
+        return [f"{answer.plan_count} plans written to {target}"]
     from ntagen.plan.document import document
     from ntagen.plan.extract import extract
     from ntagen.plan.rank import certified, parse_ranking
+    from ntagen.plan.synthesise import Margins
+    from ntagen.plan.wording import counted, judged, ranked_by, required
 
-    criteria = parse_ranking(ranking)
+    criteria, margins = parse_ranking(ranking), Margins()
     ranked = certified(extract(answer.plans, scene), scene, criteria)
-    write_files({path: json.dumps(document(scene, ranked, criteria), indent=1) + "\n"})
-    holding = [candidate for candidate in ranked if candidate.certificate.holds()]
-    written = "1 plan" if len(ranked) == 1 else f"{len(ranked)} plans"
-    notes = [f"{written} written to {path}; {len(holding)} hold on the exact arc, best:"]
-    for place, candidate in enumerate(holding[:BEST_SHOWN], start=1):
-        clearance = candidate.certificate.critical_clearance_mm
-        shown = (
-            "no critical region" if clearance == float("inf") else f"clearance {clearance:.2f} mm"
-        )
-        notes.append(f"  {place}. {candidate.plan}  ({shown})")
+    holding = [candidate for candidate in ranked if margins.allow(candidate.certificate)]
+    notes = [counted(len(ranked), len(holding)), required(margins)]
+    if target == "-":
+        shown = list(enumerate(ranked, start=1))
+    else:
+        plans = document(scene, ranked, criteria, margins)
+        write_files({Path(target): json.dumps(plans, indent=1) + "\n"})
+        notes.insert(0, f"plans written to {target}")
+        shown = [one for one in enumerate(ranked, start=1) if one[1] in holding[:BEST_SHOWN]]
+    if shown:
+        notes.append(f"{ranked_by(criteria)}:")
+    for place, candidate in shown:
+        verdict = judged(candidate.certificate, margins)
+        notes.append(f"  {place:>3}. {verdict}  {candidate.plan}")
     return notes
 
 

@@ -115,5 +115,5 @@ def _of_scene(
     scene, warnings = load_with_warnings(source, include=include)
     for warning in warnings:
         echo(warning.render(), err=True)
-    candidates = EngineSynthesiser(ranking=ranking)(scene).candidates if shown > 0 else ()
-    return picture_of_plans(scene, candidates, shown)
+    synthesis = EngineSynthesiser(ranking=ranking)(scene) if shown > 0 else None
+    return picture_of_plans(scene, synthesis, shown)

@@ -105,7 +105,8 @@ class Log:
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
         """Attaches the scene, the model and the best plans of a synthesis."""
         folder = f"rebuild-{number:04d}"
-        plans = document(synthesis.scene, synthesis.candidates[:_PLANS_LOGGED])
+        best = synthesis.candidates[:_PLANS_LOGGED]
+        plans = document(synthesis.scene, best, synthesis.ranking, synthesis.margins)
         self._attach(f"{folder}/scene.json", scene_to_json(synthesis.scene).encode())
         self._attach(f"{folder}/model.xml", synthesis.model_xml.encode(), "application/xml")
         self._attach(f"{folder}/plans.json", json.dumps(plans).encode())

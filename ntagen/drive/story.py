@@ -12,6 +12,7 @@ from ntagen.drive.records import (
     Visited,
 )
 from ntagen.drive.states import Event, State
+from ntagen.plan.wording import counted
 from ntagen.scene import Vector
 
 _FAR_MM = 1e8
@@ -65,12 +66,12 @@ def _transition(record: Transition) -> str | None:
 
 def _synthesis(record: Synthesised) -> str:
     place = f"synthesis {record.number} from {record.depth_mm:.2f} mm deep"
+    count = counted(record.found, record.accepted)
     if not record.plan:
-        refused = f" ({record.found} refused)" if record.found else ""
-        return f"{place}: no plan{refused}"
+        return f"{place}: {count}"
     far = record.clearance_mm > _FAR_MM
     clearance = "" if far else f", {record.clearance_mm:.2f} mm from critical regions"
-    return f"{place}: {record.found} plans, {record.accepted} hold; best: {record.plan}{clearance}"
+    return f"{place}: {count}; best: {record.plan}{clearance}"
 
 
 def _point(position_mm: Vector) -> str:

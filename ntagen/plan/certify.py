@@ -90,13 +90,24 @@ class Certificate:
         depths = [a.depth_mm if a.entered_at_mm is not None else -math.inf for a in self.arrivals]
         return min(depths, default=math.inf)
 
-    def holds(self, clearance_mm: float = 0.0, depth_mm: float = 0.0) -> bool:
-        """Whether the plan avoids critical regions and reaches its targets, with these margins.
+    def holds(
+        self, clearance_mm: float = 0.0, depth_mm: float = 0.0, detection_mm: float = 0.0
+    ) -> bool:
+        """Whether the plan avoids its regions and reaches its targets, with these margins.
 
-        A path that touches a critical region does not hold, whatever the margin.
+        A path that touches a critical or a detection region does not hold, whatever the margin. The
+        model also gives up a path that is in one of them, at its start too; with `safety sampled`
+        it does not ask at the end of a path that has reached the last target. A certificate asks
+        there too.
+
+        Args:
+            clearance_mm: The path is farther than this from every critical region.
+            depth_mm: The path's end lies at least this deep in the last target.
+            detection_mm: The path is farther than this from every detection region.
         """
         free = self.critical_clearance_mm > clearance_mm
-        return free and self.target_depth_mm >= depth_mm
+        unfelt = self.detection_clearance_mm > detection_mm
+        return free and unfelt and self.target_depth_mm >= depth_mm
 
     def _smallest(self, kind: RegionKind) -> float:
         return min((c.distance_mm for c in self.clearances if c.kind == kind), default=math.inf)

@@ -4,31 +4,43 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any, Final
 
 from ntagen.errors import InputError
 from ntagen.plan.actions import Action, Plan, Push, Roll
 from ntagen.plan.certify import Certificate
 from ntagen.plan.rank import DEFAULT_RANKING, Candidate
+from ntagen.plan.synthesise import Margins
 from ntagen.scene import Scene
 from ntagen.units import deg_from_rad, rad_from_deg
 
 FORMAT: Final = "ntagen-plans"
 VERSION: Final = 1
 
+_MARGINS: Final = Margins()
+
 
 def document(
-    scene: Scene, candidates: Sequence[Candidate], ranking: Sequence[str] = DEFAULT_RANKING
+    scene: Scene,
+    candidates: Sequence[Candidate],
+    ranking: Sequence[str] = DEFAULT_RANKING,
+    margins: Margins = _MARGINS,
 ) -> dict[str, Any]:
-    """The plans of a scene, best first, with their certificates; in mm and degrees."""
+    """The plans of a scene, best first, with their certificates; in mm and degrees.
+
+    ``holds`` says of each plan whether it holds in exact kinematics, with the margins.
+    """
     return {
         "format": FORMAT,
         "version": VERSION,
         "scene": scene.name,
         "ranking": list(ranking),
+        "margins": asdict(margins),
         "plans": [
             {
                 "rank": place,
+                "holds": margins.allow(candidate.certificate),
                 "actions": plan_to_json(candidate.plan),
                 "certificate": _certificate(candidate.certificate),
             }
@@ -79,6 +91,7 @@ def _certificate(certificate: Certificate) -> dict[str, Any]:
         "end_mm": list(certificate.end_mm),
         "end_distance_mm": certificate.end_distance_mm,
         "critical_clearance_mm": _finite(certificate.critical_clearance_mm),
+        "detection_clearance_mm": _finite(certificate.detection_clearance_mm),
         "clearances": [
             {
                 "region": c.region,

@@ -13,6 +13,7 @@ from typing import Final, Protocol
 
 from ntagen.errors import LimitError, ModelError
 from ntagen.plan.actions import Plan
+from ntagen.plan.certify import Certificate
 from ntagen.plan.extract import extract
 from ntagen.plan.rank import DEFAULT_RANKING, Candidate, certified
 from ntagen.scene import Scene
@@ -28,10 +29,16 @@ class Margins:
     Attributes:
         clearance_mm: The path's distance to every critical region is greater than this.
         depth_mm: The path's end lies at least this deep in the last target.
+        detection_mm: The path's distance to every detection region is greater than this.
     """
 
     clearance_mm: float = 0.0
     depth_mm: float = 0.3
+    detection_mm: float = 0.0
+
+    def allow(self, certificate: Certificate) -> bool:
+        """Whether a plan with this certificate holds."""
+        return certificate.holds(self.clearance_mm, self.depth_mm, self.detection_mm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +51,8 @@ class Synthesis:
         found: The number of plans of the model.
         candidates: The plans that hold in exact kinematics, best first.
         seconds: The time that the engine took.
+        margins: The margins with which the candidates hold.
+        ranking: The criteria by which they are ranked.
     """
 
     scene: Scene
@@ -51,6 +60,8 @@ class Synthesis:
     found: int
     candidates: tuple[Candidate, ...]
     seconds: float
+    margins: Margins = Margins()
+    ranking: tuple[str, ...] = DEFAULT_RANKING
 
     @property
     def best(self) -> Candidate | None:
@@ -75,7 +86,7 @@ def select(
     return tuple(
         candidate
         for candidate in certified(plans, scene, ranking)
-        if candidate.certificate.holds(margins.clearance_mm, margins.depth_mm)
+        if margins.allow(candidate.certificate)
     )
 
 
@@ -134,6 +145,8 @@ class EngineSynthesiser:
             found=len(plans),
             candidates=select(self._heard(plans), scene, self.margins, self.ranking),
             seconds=answer.seconds,
+            margins=self.margins,
+            ranking=self.ranking,
         )
 
     def _heard(self, plans: Iterable[Plan]) -> Iterator[Plan]:

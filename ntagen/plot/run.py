@@ -13,7 +13,8 @@ from ntagen.errors import InputError
 from ntagen.needle.path import sample_poses
 from ntagen.plan.actions import Plan
 from ntagen.plan.document import plan_from_json
-from ntagen.plan.rank import Candidate
+from ntagen.plan.synthesise import Synthesis
+from ntagen.plan.wording import clearance_of, counted
 from ntagen.plot.picture import Curve, Picture
 from ntagen.scene import Needle, Scene, Vector
 
@@ -22,17 +23,17 @@ _GAP_MM: Final = 1.0
 """Tip positions farther apart than this are on different curves: the tip was pulled back."""
 
 
-def picture_of_plans(scene: Scene, candidates: tuple[Candidate, ...], shown: int) -> Picture:
-    """The picture of a scene with its best plans, at most `shown` of them."""
+def picture_of_plans(scene: Scene, synthesis: Synthesis | None, shown: int) -> Picture:
+    """The picture of a scene with its best plans, at most `shown` of them.
+
+    Without a synthesis it shows the scene alone.
+    """
+    candidates = () if synthesis is None else synthesis.candidates
     plans = [candidate.plan for candidate in candidates[:shown]]
-    caption = ""
+    caption = "" if synthesis is None else counted(synthesis.found, len(candidates))
     if candidates:
-        caption = f"{_plans(len(candidates))} on the exact arc; best: {candidates[0].plan}"
-        clearance_mm = candidates[0].certificate.critical_clearance_mm
-        if math.isfinite(clearance_mm):
-            caption += f"; {clearance_mm:.1f} mm from critical regions"
-    elif shown > 0:
-        caption = "no plan"
+        clearance = clearance_of(candidates[0].certificate)
+        caption += f"; best: {candidates[0].plan}{clearance and f', {clearance}'}"
     return Picture(
         scene=scene,
         best=curve(plans[0], scene.needle) if plans else (),
@@ -107,7 +108,3 @@ def _split(points: list[Vector]) -> list[Curve]:
         else:
             curves.append([point])
     return [curve for curve in curves if len(curve) > 1]
-
-
-def _plans(count: int) -> str:
-    return "1 plan" if count == 1 else f"{count} plans"

@@ -9,6 +9,11 @@ import pytest
 
 import ntagen
 from ntagen.cli import main
+from ntagen.drive.records import Synthesised
+from ntagen.drive.story import tell
+from ntagen.nsl import load
+from ntagen.plan.synthesise import EngineSynthesiser
+from ntagen.plot.run import picture_of_plans
 
 PAPER = Path(__file__).resolve().parents[3] / "examples" / "paper.nsl"
 
@@ -213,10 +218,35 @@ def test_plans_of_an_environment_are_ranked_and_certified(
 ) -> None:
     path = tmp_path / "plans.json"
     out, _ = check_run(capsys, 0, PAPER, "--query", "ReachFinalTR", "--plans", path)
-    plans = json.loads(path.read_text())["plans"]
+    document = json.loads(path.read_text())
+    plans = document["plans"]
     assert len(plans) == 129
-    assert "129 plans" in out
+    assert "129 plans found, 101 hold in exact kinematics" in out
+    assert "best first: by clearance (up to 5 mm counts), then rolls, then length" in out
     assert plans[0]["certificate"]
+    assert sum(plan["holds"] for plan in plans) == 101
+    assert document["margins"]["depth_mm"] == 0.3
+
+
+def test_plans_on_the_terminal_are_marked(capsys: pytest.CaptureFixture[str]) -> None:
+    out, _ = check_run(capsys, 0, PAPER, "--query", "ReachFinalTR", "--plans", "-")
+    lines = [line.split() for line in out.splitlines() if line.strip()[:1].isdigit()]
+    verdicts = [line[1] for line in lines if line[0].endswith(".")]
+    assert (verdicts.count("holds"), verdicts.count("fails")) == (101, 28)
+    _, err = check_run(capsys, 2, PAPER, "--plans", "-", "--json")
+    assert "give --plans a FILE" in err
+
+
+def test_check_plot_and_drive_count_plans_in_the_same_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    count = "129 plans found, 101 hold in exact kinematics"
+    picture = picture_of_plans(load(PAPER), EngineSynthesiser()(load(PAPER)), 1)
+    assert picture.caption.startswith(count)
+    record = Synthesised(1.0, 1, 0.0, 129, 101, "push 1 mm", 1.0, "")
+    assert count in (tell(record) or "")
+    out, _ = check_run(capsys, 0, PAPER, "--plans", tmp_path / "plans.json")
+    assert count in out
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,9 @@ from ntagen.plan.actions import Action, Plan, Push, Roll
 from ntagen.plan.certify import certify
 from ntagen.plan.document import document, plan_from_json, plan_to_json
 from ntagen.plan.extract import extract
-from ntagen.plan.rank import Candidate, parse_ranking, rank
+from ntagen.plan.rank import CRITERIA, Candidate, parse_ranking, rank
+from ntagen.plan.synthesise import Margins
+from ntagen.plan.wording import ranked_by
 from ntagen.scene import Scene
 from tests.oracles import planner
 from tests.steering import CRITICAL, PAPER, TARGET, scene, sphere
@@ -104,6 +106,25 @@ def test_a_path_between_the_samples_through_a_small_region_is_not_certified() ->
     assert certificate.critical_clearance_mm < 0.0
     assert certificate.clearances[0].at_mm == pytest.approx(3.0, abs=0.1)
     assert not certificate.holds()
+
+
+def test_a_plan_that_enters_a_detection_region_does_not_hold() -> None:
+    vessel = sphere("C", "critical", (0.0, -4.0, 4.0), 1.0)
+    target = sphere("T", "target", (0.0, -8.0, 0.0), 3.0)
+    plan = Plan.of([Push(8.0)])
+    for margin_mm, holds in ((2.0, True), (4.0, False)):
+        shell = sphere("D", "detection", vessel.center_mm, vessel.radius_mm + margin_mm)
+        certificate = certify(plan, scene(vessel, shell, targets=[target]))
+        assert certificate.critical_clearance_mm > 2.0
+        assert certificate.holds() is holds
+        assert Margins().allow(certificate) is holds
+        assert not certificate.holds(detection_mm=certificate.detection_clearance_mm)
+
+
+def test_the_words_for_a_ranking_name_its_criteria_in_order() -> None:
+    said = ranked_by(("length", "clearance"))
+    assert said == "best first: by length, then clearance (up to 5 mm counts)"
+    assert len({ranked_by((name,)) for name in CRITERIA}) == len(CRITERIA)
 
 
 def test_targets_count_in_their_order() -> None:

@@ -14,6 +14,7 @@ from ntagen.drive.reading import read_log
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import simulate
 from ntagen.errors import InputError
+from ntagen.plan.wording import counted
 from ntagen.plot.picture import Picture, draw
 from ntagen.plot.run import picture_of_plans, picture_of_run
 from ntagen.plot.save import save
@@ -28,7 +29,7 @@ def slow(ending: str) -> object:
 
 
 def plans_picture(shown: int) -> Picture:
-    return picture_of_plans(PAPER, oracle_synthesis(PAPER).candidates, shown)
+    return picture_of_plans(PAPER, oracle_synthesis(PAPER) if shown else None, shown)
 
 
 def run_picture(folder: Path) -> Picture:
@@ -57,10 +58,13 @@ def test_a_scene_without_plans_names_only_its_regions() -> None:
 
 
 def test_the_caption_says_what_the_best_plan_is() -> None:
-    best = oracle_synthesis(PAPER).best
-    assert best is not None
-    assert str(best.plan) in plans_picture(5).caption
-    assert picture_of_plans(PAPER, (), 5).caption == "no plan"
+    synthesis = oracle_synthesis(PAPER)
+    assert synthesis.best is not None
+    caption = plans_picture(5).caption
+    assert str(synthesis.best.plan) in caption
+    assert counted(synthesis.found, len(synthesis.candidates)) in caption
+    none = replace(synthesis, found=0, candidates=())
+    assert picture_of_plans(PAPER, none, 5).caption == "no plan found"
 
 
 def test_a_run_shows_truth_measurements_and_what_was_learned(tmp_path: Path) -> None:

@@ -1,0 +1,63 @@
+"""The words for plans, the same wherever they are printed: check, plot, drive and pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from ntagen.plan.certify import Certificate
+from ntagen.plan.rank import USEFUL_CLEARANCE_MM
+from ntagen.plan.synthesise import Margins
+
+_CRITERIA: Final = {
+    "clearance": f"clearance (up to {USEFUL_CLEARANCE_MM:g} mm counts)",
+    "rolls": "rolls",
+    "length": "length",
+    "target": "distance of the end to the target's centre",
+}
+"""The criteria of a ranking in words."""
+
+
+def counted(found: int, hold: int) -> str:
+    """How many plans the model has, and how many of them hold in exact kinematics."""
+    plans = "1 plan" if found == 1 else f"{found} plans"
+    if found == 0:
+        return "no plan found"
+    return f"{plans} found, {hold} {'holds' if hold == 1 else 'hold'} in exact kinematics"
+
+
+def ranked_by(ranking: Sequence[str]) -> str:
+    """The order in which plans are listed, on one line."""
+    return f"best first: by {', then '.join(_CRITERIA[name] for name in ranking)}"
+
+
+def required(margins: Margins) -> str:
+    """What a plan must do to hold, on one line."""
+    return (
+        f"a plan holds if its whole path stays more than {margins.clearance_mm:g} mm away from "
+        "critical regions and out of detection regions, and ends at least "
+        f"{margins.depth_mm:g} mm deep in the target"
+    )
+
+
+def judged(certificate: Certificate, margins: Margins) -> str:
+    """Whether a plan holds, with its distances: what a list of plans says of each."""
+    verdict = "holds" if margins.allow(certificate) else "fails"
+    distances = [clearance_of(certificate)]
+    detection_mm = certificate.detection_clearance_mm
+    if detection_mm <= margins.detection_mm:
+        distances.append(f"{-detection_mm:.2f} mm inside of a detection region")
+    depth_mm = certificate.target_depth_mm
+    if not math.isfinite(depth_mm):
+        distances.append("misses a target")
+    elif depth_mm < margins.depth_mm:
+        distances.append(f"only {depth_mm:.2f} mm deep in the target")
+    said = ", ".join(part for part in distances if part)
+    return f"{verdict} ({said})" if said else verdict
+
+
+def clearance_of(certificate: Certificate) -> str:
+    """The distance of a plan to critical regions, for the end of a line; empty without one."""
+    clearance_mm = certificate.critical_clearance_mm
+    return f"{clearance_mm:.2f} mm from critical regions" if math.isfinite(clearance_mm) else ""
