@@ -103,6 +103,8 @@ _LEAST: Final = {
     "learned_radius_mm": 0.01,
     "deviation_count": 1.0,
     **dict.fromkeys((field.name for field in dataclasses.fields(Priors)), 1e-12),
+    # Without drift or lag the needle is as the paper has it.
+    **dict.fromkeys(("curvature_drift", "turn_drift_rad", "lag_rad"), 0.0),
 }
 """The least values of the settings that cannot be 0."""
 

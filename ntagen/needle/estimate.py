@@ -3,17 +3,19 @@
 The measured positions alone tell little about the direction in which a needle will bend: on the
 first 5 mm of a circle of 30 mm the tip moves 0.4 mm sideways, and the noise of a tracker is 0.1 mm.
 But the commands are known. The estimator replays them (pushes, rolls and pulls) on the tree of all
-channels that were cut, with a few unknowns:
+channels that were cut (`ntagen.needle.channels`), with a few unknowns:
 
 * the entry pose (three for the position, three small rotations),
-* the curvature, as a factor of the expected one,
-* the error of each roll, since a shaft does not turn its tip exactly as it is turned at its base.
+* the curvature at the entry, as a factor of the expected one,
+* the error of each roll, since a shaft does not turn its tip exactly as it is turned at its base,
+* the changes of curvature and bend plane from one stretch of 10 mm to the next (a random walk), if
+  their priors are not 0. So old measurements say less about the present curvature than new ones.
 
 Non-linear least squares finds the unknowns with the greatest posterior density. The noise weighs
 each measurement, and the prior weighs each unknown. Measurements in a channel that the needle has
 left still count: they tell about the entry, the curvature and the rolls.
 
-Cost: about 0.3 ms for one residual vector of 200 measurements; an estimate needs ten to forty.
+Cost: `tests/benchmarks/estimates.py` measures it.
 """
 
 from __future__ import annotations
@@ -25,20 +27,21 @@ import numpy as np
 import scipy.optimize  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from ntagen.needle.channels import ENTRY, STRETCH_MM, Channel, Placed, Stretch, place
 from ntagen.needle.circle import CurvaturePrior, fit_circle
-from ntagen.needle.kinematics import bending_axis, orthonormal, push, roll
+from ntagen.needle.kinematics import Arc, bending_axis, orthonormal, push
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
-from ntagen.needle.vectors import add, rotate
-from ntagen.scene import Pose, Vector
+from ntagen.needle.path import Stretch as PathStretch
+from ntagen.scene import Pose
 
 _Array = NDArray[np.float64]
 
-_ENTRY = -1
-"""The index of the entry in the tree of channels."""
-
 _POSE_UNKNOWNS = 7
-"""Position (3), rotations (3) and curvature (1) come before the rolls."""
+"""Position (3), rotations (3) and curvature (1) come before all other unknowns."""
+
+_LAG_DEPTH_MM = 100.0
+"""The depth for which `Priors.lag_rad` is given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +56,11 @@ class Priors:
         roll_rad: The error of each roll.
         noise_mm: Each coordinate of a measured position.
         direction_rad: A measured direction, if the sensor reports directions.
+        curvature_drift: The change of the curvature over 10 mm, as a ratio; 0 for a curvature
+            that stays the same.
+        turn_drift_rad: The turn of the bend plane over 10 mm without a roll; 0 for none.
+        lag_rad: A further error of each roll at a depth of 100 mm, since friction holds the shaft.
+            It grows with the square of the depth (Reed et al., 2009).
     """
 
     position_mm: float = 0.2
@@ -62,6 +70,13 @@ class Priors:
     roll_rad: float = math.radians(1.0)
     noise_mm: float = 0.1
     direction_rad: float = math.radians(1.0)
+    curvature_drift: float = 0.0
+    turn_drift_rad: float = 0.0
+    lag_rad: float = 0.0
+
+    def roll_std_rad(self, depth_mm: float) -> float:
+        """The standard deviation of the error of a roll at a depth."""
+        return math.hypot(self.roll_rad, self.lag_rad * (depth_mm / _LAG_DEPTH_MM) ** 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,30 +85,75 @@ class Estimate:
 
     Attributes:
         path: The estimated channel in which the needle lies now; its end is the tip.
-        radius_mm: The radius of the motion circle.
+        radius_mm: The radius of the motion circle at the tip.
         radius_std_mm: Its standard deviation.
         rms_mm: Root mean square of the distances between measured and estimated positions.
+        covariance: Of the tip, in seven rows: position (x, y, z in mm), rotation vector (about x,
+            y, z in rad), logarithm of the curvature.
+        curvature_drift: `Priors.curvature_drift`, for predictions.
+        turn_drift_rad: `Priors.turn_drift_rad`, for predictions.
     """
 
     path: Path
     radius_mm: float
     radius_std_mm: float
     rms_mm: float
+    covariance: tuple[tuple[float, ...], ...]
+    curvature_drift: float = 0.0
+    turn_drift_rad: float = 0.0
 
     @property
     def tip(self) -> Pose:
         """The pose of the tip."""
         return orthonormal(self.path.tip)
 
+    def position_covariance_mm2(self, length_mm: float) -> _Array:
+        """The covariance of the tip's position after a further push, along x, y and z, in mm².
 
-@dataclass(slots=True)
-class _Channel:
-    """An arc of the tree: where it leaves its parent, and the rolls made there."""
+        It contains what the estimator knows of its own errors: those of the tip's position,
+        direction and bend plane and of the curvature, with their correlations, and the drift of
+        curvature and bend plane during the push (`Priors`). It does not contain the noise of a
+        measurement at that place, nor the error of a roll that is made before the push, nor what
+        the priors do not say (layers, a moving target).
 
-    parent: int
-    offset_mm: float
-    roll_rad: float
-    rolls: tuple[int, ...]
+        A drift that begins ``u`` mm before the end of the push displaces the end by ``k u^2 / 2``
+        times its size, to the side or out of the plane. For a random walk of variance ``q`` per mm
+        over ``s`` mm this gives the variance ``k^2 q s^5 / 20``.
+
+        Args:
+            length_mm: The length of the push, at least 0.
+        """
+        tip, curvature = self.tip, 1.0 / self.radius_mm
+        ahead = Placed(tip, curvature, np.zeros((3, 7)), np.zeros((3, 7)), np.zeros(7))
+        ahead.rotation[:, 3:6] = np.eye(3)
+        ahead.shift[:, :3] = np.eye(3)
+        x, y, z = tip.position_mm
+        # The rotation is about the tip, not about the origin.
+        ahead.shift[:, 3:6] = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        ahead.growth[6] = 1.0
+        slopes = ahead.positions(np.array([length_mm]))[1][0]
+        covariance = slopes @ np.array(self.covariance) @ slopes.T
+        end = push(tip, self.radius_mm, length_mm)
+        spread_mm2 = curvature**2 * length_mm**5 / (20.0 * STRETCH_MM)
+        for drift, direction in (
+            (self.curvature_drift, np.array(end.bevel)),
+            (self.turn_drift_rad, np.array(bending_axis(end))),
+        ):
+            covariance += drift**2 * spread_mm2 * np.outer(direction, direction)
+        return np.asarray(covariance)
+
+    def position_std_mm(self, length_mm: float) -> float:
+        """The standard deviation of the tip's position after a further push, in mm.
+
+        This is the largest one of all directions: the square root of the greatest eigenvalue of
+        `position_covariance_mm2`, which says what it contains. It has no noise of a measurement: a
+        measured position has the variance ``position_std_mm(s)^2 + noise_mm^2``.
+
+        Args:
+            length_mm: The length of the push from the present tip; 0 for the tip itself.
+        """
+        largest = np.linalg.eigvalsh(self.position_covariance_mm2(length_mm))[-1]
+        return math.sqrt(max(0.0, float(largest)))
 
 
 @dataclass(slots=True)
@@ -116,13 +176,15 @@ class Estimator:
         self._entry = entry
         self._radius_mm = radius_mm
         self._priors = priors
-        self._channels: list[_Channel] = []
+        self._channels: list[Channel] = []
         self._inserted: list[tuple[int, float]] = []
         self._pending_rad = 0.0
         self._pending_rolls: tuple[int, ...] = ()
-        self._roll_count = 0
         self._readings: list[_Reading] = []
         self._solution = np.zeros(_POSE_UNKNOWNS)
+        self._stds = [priors.position_mm] * 3
+        self._stds += [priors.bevel_rad, priors.heading_rad, priors.heading_rad]
+        self._stds += [priors.curvature_ratio]
 
     @property
     def depth_mm(self) -> float:
@@ -133,21 +195,23 @@ class Estimator:
         """Notes a push."""
         if length_mm <= 0.0:
             return
-        channel, inserted_mm = self._inserted[-1] if self._inserted else (_ENTRY, 0.0)
-        if channel != _ENTRY and not self._pending_rolls:
+        channel, inserted_mm = self._inserted[-1] if self._inserted else (ENTRY, 0.0)
+        if channel != ENTRY and not self._pending_rolls:
             self._inserted[-1] = (channel, inserted_mm + length_mm)
+            self._extend(self._channels[channel], inserted_mm + length_mm)
             return
+        depth_mm = self.depth_mm
         self._channels.append(
-            _Channel(channel, inserted_mm, self._pending_rad, self._pending_rolls)
+            Channel(channel, inserted_mm, depth_mm, self._pending_rad, self._pending_rolls)
         )
         self._inserted.append((len(self._channels) - 1, length_mm))
         self._pending_rad, self._pending_rolls = 0.0, ()
+        self._extend(self._channels[-1], length_mm)
 
     def roll(self, angle_rad: float) -> None:
         """Notes a roll."""
         self._pending_rad += angle_rad
-        self._pending_rolls += (self._roll_count,)
-        self._roll_count += 1
+        self._pending_rolls += (self._unknown(self._priors.roll_std_rad(self.depth_mm)),)
 
     def pull(self, length_mm: float) -> None:
         """Notes a pull along the channel; the shaft keeps its rolls (see `ntagen.needle.path`)."""
@@ -164,131 +228,175 @@ class Estimator:
 
     def measure(self, measurement: Measurement) -> None:
         """Notes a measurement at the present place."""
-        channel, inserted_mm = self._inserted[-1] if self._inserted else (_ENTRY, 0.0)
+        channel, inserted_mm = self._inserted[-1] if self._inserted else (ENTRY, 0.0)
         self._readings.append(_Reading(channel, inserted_mm, measurement))
 
     def estimate(self) -> Estimate:
         """The best estimate from everything noted so far; deterministic."""
-        unknown_count = _POSE_UNKNOWNS + self._roll_count
-        start = np.zeros(unknown_count)
+        stds = np.array(self._stds)
+        start = np.zeros(len(stds))
         start[: len(self._solution)] = self._solution
-        places = _Places(self._readings, len(self._channels))
-        weights = self._prior_weights(unknown_count)
-
-        def residuals(unknowns: _Array) -> _Array:
-            starts, curvature = self._starts(unknowns)
-            return np.concatenate(
-                [places.residuals(starts, curvature, self._priors), unknowns / weights]
-            )
+        problem = _Problem(self._readings, self._channels, self._priors, stds)
+        expected = (self._entry, 1.0 / self._radius_mm)
 
         # Unknowns are in units of their standard deviations, so that one step size fits all.
-        result = scipy.optimize.least_squares(residuals, start, method="lm", x_scale=weights)
+        result = scipy.optimize.least_squares(
+            lambda unknowns: problem.at(unknowns, *expected)[0],
+            start,
+            jac=lambda unknowns: problem.at(unknowns, *expected)[1],
+            method="lm",
+            x_scale=stds,
+        )
         self._solution = result.x
-        starts, curvature = self._starts(result.x)
-        covariance = np.linalg.pinv(result.jac.T @ result.jac)
-        radius_mm = 1.0 / curvature
+        begin, placed = place(self._channels, *expected, result.x)
+        unknowns_covariance = np.linalg.pinv(result.jac.T @ result.jac)
+        path, tip = self._path(result.x, begin, placed)
+        to_tip = _slopes_of(tip)
+        covariance = to_tip @ unknowns_covariance @ to_tip.T
         return Estimate(
-            path=self._path(result.x, starts[_ENTRY], radius_mm),
-            radius_mm=radius_mm,
-            radius_std_mm=float(radius_mm * math.sqrt(covariance[6, 6])),
-            rms_mm=places.rms_mm(starts, curvature),
+            path=path,
+            radius_mm=tip.radius_mm,
+            radius_std_mm=float(tip.radius_mm * math.sqrt(covariance[6, 6])),
+            rms_mm=problem.rms_mm(result.fun),
+            covariance=tuple(tuple(float(value) for value in row) for row in covariance),
+            curvature_drift=self._priors.curvature_drift,
+            turn_drift_rad=self._priors.turn_drift_rad,
         )
 
-    def _prior_weights(self, unknown_count: int) -> _Array:
-        priors = self._priors
-        rolls = [priors.roll_rad] * (unknown_count - _POSE_UNKNOWNS)
-        return np.array(
-            [priors.position_mm] * 3
-            + [priors.bevel_rad, priors.heading_rad, priors.heading_rad, priors.curvature_ratio]
-            + rolls
-        )
+    def _unknown(self, std: float) -> int:
+        """The index of a new unknown with this standard deviation."""
+        self._stds.append(std)
+        return len(self._stds) - 1
 
-    def _starts(self, unknowns: _Array) -> tuple[dict[int, Pose], float]:
-        """The pose at the start of each channel, and the curvature."""
-        values = [float(value) for value in unknowns]
-        curvature = math.exp(values[6]) / self._radius_mm
-        starts = {_ENTRY: self._entry_pose(values)}
-        for index, channel in enumerate(self._channels):
-            parent = starts[channel.parent]
-            there = push(parent, 1.0 / curvature, channel.offset_mm)
-            errors_rad = sum(values[_POSE_UNKNOWNS + i] for i in channel.rolls)
-            starts[index] = roll(there, channel.roll_rad + errors_rad)
-        return starts, curvature
+    def _extend(self, channel: Channel, extent_mm: float) -> None:
+        """Notes how far a channel was cut; new stretches get their unknowns."""
+        if extent_mm <= channel.extent_mm:
+            return
+        drift, turn_rad = self._priors.curvature_drift, self._priors.turn_drift_rad
+        if drift > 0.0 or turn_rad > 0.0:
+            for offset_mm in channel.new_boundaries(extent_mm):
+                channel.stretches.append(
+                    Stretch(
+                        offset_mm,
+                        curvature=self._unknown(drift) if drift > 0.0 else None,
+                        turn=self._unknown(turn_rad) if turn_rad > 0.0 else None,
+                    )
+                )
+        channel.extent_mm = extent_mm
 
-    def _entry_pose(self, values: list[float]) -> Pose:
-        entry = self._entry
-        heading, bevel = entry.heading, entry.bevel
-        for axis, angle_rad in (
-            (entry.heading, values[3]),
-            (entry.bevel, values[4]),
-            (bending_axis(entry), values[5]),
-        ):
-            heading, bevel = rotate(heading, axis, angle_rad), rotate(bevel, axis, angle_rad)
-        moved: Vector = (values[0], values[1], values[2])
-        return Pose(add(entry.position_mm, moved), heading, bevel)
+    def _path(
+        self, unknowns: _Array, entry: Placed, placed: list[list[Placed]]
+    ) -> tuple[Path, Placed]:
+        """The channel in which the needle lies now, and what would begin at the tip.
 
-    def _path(self, unknowns: _Array, entry: Pose, radius_mm: float) -> Path:
-        """The channel in which the needle lies now, with the estimated errors of its rolls."""
-
-        def turned_rad(nominal_rad: float, rolls: tuple[int, ...]) -> float:
-            return nominal_rad + sum(float(unknowns[_POSE_UNKNOWNS + i]) for i in rolls)
-
-        path = Path(entry)
+        The estimated errors of rolls count as rolls of the shaft: to undo a roll is to undo its
+        error too. The turns of the bend plane do not: they belong to the tissue at their places.
+        """
+        stretches: list[PathStretch] = []
+        tip = entry
         for index, length_mm in self._inserted:
             channel = self._channels[index]
-            if channel.rolls:
-                path = path.roll(turned_rad(channel.roll_rad, channel.rolls))
-            path = path.push(radius_mm, length_mm)
+            roll_rad = channel.roll_rad + sum(float(unknowns[i]) for i in channel.rolls)
+            for number in range(channel.stretch_at(length_mm) + 1):
+                part = placed[index][number]
+                offset_mm = channel.stretches[number].offset_mm
+                end_mm = length_mm
+                if number + 1 < len(channel.stretches):
+                    end_mm = min(end_mm, channel.stretches[number + 1].offset_mm)
+                arc = Arc(part.start, part.radius_mm, end_mm - offset_mm)
+                stretches.append(PathStretch(arc, roll_rad if number == 0 else 0.0))
+                tip = part.beyond(end_mm - offset_mm)
+        pending_rad = self._pending_rad
+        pending_rad += sum(float(unknowns[i]) for i in self._pending_rolls)
         if self._pending_rolls:
-            path = path.roll(turned_rad(self._pending_rad, self._pending_rolls))
-        return path
+            tip = tip.rolled(pending_rad, self._pending_rolls)
+        return Path(entry.start, tuple(stretches), pending_rad), tip
 
 
-class _Places:
-    """The measurements as arrays, by the channel in which they were taken."""
+def _slopes_of(tip: Placed) -> _Array:
+    """The derivatives of position, rotation vector and curvature at the tip by the unknowns."""
+    slopes = tip.positions(np.zeros(1))[1][0]
+    return np.vstack([slopes, tip.rotation, tip.growth])
 
-    def __init__(self, readings: list[_Reading], channel_count: int) -> None:
-        self._groups: list[tuple[int, _Array, _Array]] = []
-        for channel in range(_ENTRY, channel_count):
-            here = [r for r in readings if r.channel == channel]
-            if here:
-                offsets = np.array([r.offset_mm for r in here])
-                positions = np.array([r.measurement.position_mm for r in here])
-                self._groups.append((channel, offsets, positions))
-        self._directed = [r for r in readings if r.measurement.heading is not None]
 
-    def residuals(self, starts: dict[int, Pose], curvature: float, priors: Priors) -> _Array:
-        """Measured minus predicted, in standard deviations."""
-        parts = [part.ravel() / priors.noise_mm for part in self._errors(starts, curvature)]
-        for reading in self._directed:
-            predicted = push(starts[reading.channel], 1.0 / curvature, reading.offset_mm)
-            measured = (reading.measurement.heading, reading.measurement.bevel)
-            for seen, expected in zip(measured, (predicted.heading, predicted.bevel), strict=True):
-                if seen is not None:
-                    parts.append((np.array(seen) - np.array(expected)) / priors.direction_rad)
-        return np.concatenate(parts) if parts else np.zeros(0)
+class _Problem:
+    """The least-squares problem: residuals in standard deviations, and their derivatives."""
 
-    def rms_mm(self, starts: dict[int, Pose], curvature: float) -> float:
+    def __init__(
+        self,
+        readings: list[_Reading],
+        channels: list[Channel],
+        priors: Priors,
+        stds: _Array,
+    ) -> None:
+        self._channels = channels
+        self._priors = priors
+        self._stds = stds
+        self._groups: list[tuple[int, int, _Array, _Array]] = []
+        self._directed: list[tuple[int, int, float, Measurement]] = []
+        self._last: tuple[bytes, _Array, _Array] | None = None
+        places: dict[tuple[int, int], list[tuple[float, Measurement]]] = {}
+        for reading in readings:
+            number, along_mm = 0, reading.offset_mm
+            if reading.channel != ENTRY:
+                channel = channels[reading.channel]
+                number = channel.stretch_at(reading.offset_mm)
+                along_mm -= channel.stretches[number].offset_mm
+            places.setdefault((reading.channel, number), []).append((along_mm, reading.measurement))
+            if reading.measurement.heading is not None:
+                self._directed.append((reading.channel, number, along_mm, reading.measurement))
+        for (channel_index, number), group in sorted(places.items(), key=lambda item: item[0]):
+            self._groups.append(
+                (
+                    channel_index,
+                    number,
+                    np.array([along_mm for along_mm, _ in group]),
+                    np.array([measurement.position_mm for _, measurement in group]),
+                )
+            )
+        self._position_count = 3 * len(readings)
+
+    def at(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> tuple[_Array, _Array]:
+        """Residuals and derivatives; the last ones are kept, since both are asked for in turn."""
+        key = unknowns.tobytes()
+        if self._last is None or self._last[0] != key:
+            begin, placed = place(self._channels, entry, curvature_per_mm, unknowns)
+            self._last = (key, *self._evaluated(unknowns, begin, placed))
+        return self._last[1], self._last[2]
+
+    def rms_mm(self, residuals: _Array) -> float:
         """Root mean square of the distances between measured and predicted positions."""
-        errors = self._errors(starts, curvature)
-        if not errors:
+        if not self._position_count:
             return 0.0
-        return float(np.sqrt(np.mean(np.sum(np.concatenate(errors) ** 2, axis=1))))
+        squares = float(np.sum(residuals[: self._position_count] ** 2))
+        return self._priors.noise_mm * math.sqrt(3.0 * squares / self._position_count)
 
-    def _errors(self, starts: dict[int, Pose], curvature: float) -> list[_Array]:
-        return [
-            positions - _positions(starts[channel], curvature, offsets)
-            for channel, offsets, positions in self._groups
-        ]
+    def _evaluated(
+        self, unknowns: _Array, begin: Placed, placed: list[list[Placed]]
+    ) -> tuple[_Array, _Array]:
+        def part(channel: int, number: int) -> Placed:
+            return begin if channel == ENTRY else placed[channel][number]
 
-
-def _positions(start: Pose, curvature: float, offsets_mm: _Array) -> _Array:
-    """The positions on the circle at these arc lengths (`ntagen.needle.kinematics.push`)."""
-    half = 0.5 * curvature * offsets_mm
-    chord = offsets_mm * np.sinc(half / math.pi)
-    heading, bevel = np.array(start.heading), np.array(start.bevel)
-    along = (chord * np.cos(half))[:, None] * heading
-    return np.asarray(np.array(start.position_mm) + along - (chord * np.sin(half))[:, None] * bevel)
+        residuals, slopes = [], []
+        for channel, number, along_mm, measured in self._groups:
+            expected, moved = part(channel, number).positions(along_mm)
+            residuals.append((measured - expected).ravel() / self._priors.noise_mm)
+            slopes.append(moved.reshape(-1, len(unknowns)) / -self._priors.noise_mm)
+        for channel, number, along, measurement in self._directed:
+            pose, rotation = part(channel, number).directions(along)
+            seen_and_expected = (
+                (measurement.heading, pose.heading),
+                (measurement.bevel, pose.bevel),
+            )
+            for seen, direction in seen_and_expected:
+                if seen is not None:
+                    difference = np.array(seen) - np.array(direction)
+                    residuals.append(difference / self._priors.direction_rad)
+                    turned = np.cross(rotation.T, direction).T
+                    slopes.append(turned / -self._priors.direction_rad)
+        residuals.append(unknowns / self._stds)
+        slopes.append(np.diag(1.0 / self._stds))
+        return np.concatenate(residuals), np.vstack(slopes)
 
 
 def pose_from_points(

@@ -9,8 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ntagen.needle.channels import ENTRY as AT_ENTRY
+from ntagen.needle.channels import place
 from ntagen.needle.estimate import Estimate, Estimator, Priors, pose_from_points
-from ntagen.needle.vectors import distance, dot
+from ntagen.needle.kinematics import bending_axis, orthonormal, push
+from ntagen.needle.measurement import Measurement
+from ntagen.needle.vectors import add, distance, dot, rotate
 from ntagen.needle.virtual import Errors, SimulatedClock, VirtualNeedle
 from ntagen.scene import Needle, Pose
 from tests.steering import ENTRY
@@ -27,6 +31,14 @@ PULLED: Moves = [
     ("roll", 1.57),
     ("push", 6.0),
 ]
+
+GOLDEN = (
+    (0.577086, -19.5967614, -6.5452366),
+    (-0.9800751, -0.1874106, -0.0658033),
+    (29.8913811, 0.5387437),
+    0.1718099,
+)
+"""Position, bevel, radius with its standard deviation, and residual of one estimate."""
 
 
 def driven(
@@ -127,3 +139,98 @@ def test_points_alone_give_the_pose_of_a_long_arc() -> None:
     pose, radius_mm = pose_from_points(np.array(points), 0.1)
     assert radius_mm == pytest.approx(30.0, abs=3.0)
     assert dot(pose.heading, needle.true_tip.heading) > math.cos(math.radians(3.0))
+
+
+def test_without_drift_the_curvature_is_one_for_all() -> None:
+    # Numbers of the estimator with one curvature and numeric derivatives, before it had stretches.
+    errors = Errors(noise_mm=0.1, roll_rad=math.radians(1.0))
+    estimate, _ = driven(PULLED, errors, seed=3)
+    assert estimate.tip.position_mm == pytest.approx(GOLDEN[0], abs=1e-6)
+    assert estimate.tip.bevel == pytest.approx(GOLDEN[1], abs=1e-6)
+    assert (estimate.radius_mm, estimate.radius_std_mm) == pytest.approx(GOLDEN[2], abs=1e-6)
+    assert estimate.rms_mm == pytest.approx(GOLDEN[3], abs=1e-6)
+
+
+def test_the_derivatives_are_those_of_the_positions() -> None:
+    priors = Priors(curvature_drift=0.1, turn_drift_rad=0.1, lag_rad=0.2)
+    estimator = Estimator(ENTRY, 30.0, priors)
+    for kind, value in PULLED:
+        getattr(estimator, kind)(value)
+    generator = np.random.default_rng(1)
+    unknowns = generator.normal(size=len(estimator._stds)) * estimator._stds
+    entry = orthonormal(ENTRY)
+
+    def ends(values: np.ndarray) -> np.ndarray:
+        _, placed = place(estimator._channels, entry, 1.0 / 30.0, values)
+        return np.array([part.positions(np.array([7.0]))[0][0] for p in placed for part in p])
+
+    _, placed = place(estimator._channels, entry, 1.0 / 30.0, unknowns)
+    exact = np.array([part.positions(np.array([7.0]))[1][0] for p in placed for part in p])
+    assert len(unknowns) == 7 + 3 + 3 * 2, "boundaries at 10 and 20 mm, and at 20 mm again"
+    for index in range(len(unknowns)):
+        step = np.zeros(len(unknowns))
+        step[index] = 1e-6
+        slope = (ends(unknowns + step) - ends(unknowns - step)) / 2e-6
+        assert slope == pytest.approx(exact[:, :, index], abs=1e-6)
+    assert estimator._channels[0].parent == AT_ENTRY
+
+
+def test_a_predicted_position_errs_as_much_as_the_estimate_says() -> None:
+    """Truths are drawn from the priors; normalised squares have the mean 3 of three coordinates."""
+    priors = Priors(roll_rad=math.radians(3.0))
+    generator = np.random.default_rng(4)
+    for length_mm in (0.0, 20.0):
+        squares = []
+        for seed in range(60):
+            spread = generator.normal(size=7)
+            heading, bevel = ENTRY.heading, ENTRY.bevel
+            stds = (priors.bevel_rad, priors.heading_rad, priors.heading_rad)
+            axes = (ENTRY.heading, ENTRY.bevel, bending_axis(ENTRY))
+            for axis, angle in zip(axes, spread[3:6] * stds, strict=True):
+                heading, bevel = rotate(heading, axis, angle), rotate(bevel, axis, angle)
+            x, y, z = (priors.position_mm * float(value) for value in spread[:3])
+            start = Pose(add(ENTRY.position_mm, (x, y, z)), heading, bevel)
+            radius_mm = 30.0 / math.exp(priors.curvature_ratio * spread[6])
+            errors = Errors(priors.noise_mm, priors.roll_rad)
+            estimate, true = driven(
+                ROLLED, errors, seed, Needle(orthonormal(start), radius_mm, 1.0), priors
+            )
+            guess = push(estimate.tip, estimate.radius_mm, length_mm).position_mm
+            error = np.subtract(push(true, radius_mm, length_mm).position_mm, guess)
+            covariance = estimate.position_covariance_mm2(length_mm)
+            squares.append(error @ np.linalg.solve(covariance, error))
+            largest = np.linalg.eigvalsh(covariance)[-1]
+            assert estimate.position_std_mm(length_mm) == pytest.approx(math.sqrt(largest))
+        # Four standard deviations of the mean of 60 chi-squares with three degrees of freedom.
+        assert np.mean(squares) == pytest.approx(3.0, abs=4.0 * math.sqrt(6.0 / 60.0))
+
+
+def test_drift_makes_predictions_less_certain() -> None:
+    still, _ = driven(ROLLED, Errors(noise_mm=0.1))
+    drifting = Priors(curvature_drift=0.1, turn_drift_rad=math.radians(5.0))
+    moving, _ = driven(ROLLED, Errors(noise_mm=0.1), priors=drifting)
+    for length_mm in (5.0, 20.0):
+        assert moving.position_std_mm(length_mm) > 1.5 * still.position_std_mm(length_mm)
+
+
+def test_a_curvature_that_changes_on_the_way_is_followed() -> None:
+    """A needle that bends 1.5 times as much from 20 mm on, as in another layer."""
+    tip = ENTRY
+    memories = [
+        Estimator(ENTRY, 30.0, Priors(noise_mm=0.02)),
+        Estimator(ENTRY, 30.0, Priors(noise_mm=0.02, curvature_drift=0.2)),
+    ]
+    for step in range(160):
+        tip = push(tip, 30.0 if step < 80 else 20.0, 0.25)
+        for estimator in memories:
+            estimator.push(0.25)
+            estimator.measure(Measurement(0.0, tip.position_mm, 0.0))
+    long, short = (abs(estimator.estimate().radius_mm - 20.0) for estimator in memories)
+    assert short < 0.5 < 2.0 < long
+    assert distance(memories[1].estimate().tip.position_mm, tip.position_mm) < 0.02
+
+
+def test_a_roll_deep_in_the_tissue_is_less_certain() -> None:
+    priors = Priors(roll_rad=0.01, lag_rad=0.5)
+    assert priors.roll_std_rad(0.0) == 0.01
+    assert priors.roll_std_rad(50.0) == pytest.approx(math.hypot(0.01, 0.125))

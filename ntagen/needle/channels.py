@@ -1,0 +1,247 @@
+"""All channels that a needle has cut, as a tree of stretches, and how they depend on the unknowns.
+
+A push cuts a channel. After a pull and a roll, the next push leaves it: a new channel begins there.
+Each channel is divided where the depth is a multiple of `STRETCH_MM`; at these places curvature and
+bend plane may change (`ntagen.needle.estimate`). Without such changes, a channel is one stretch.
+
+The derivatives are exact. If an unknown changes by ``dx``, all that lies beyond it moves as a rigid
+body: a point ``x`` by ``w x x + v``, with a rotation vector ``w`` and a translation ``v`` that are
+linear in ``dx``. So a stretch needs two matrices, ``w`` and ``v`` at its start. A roll adds a
+rotation about the heading, and a change of curvature adds that of the end of its stretch.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ntagen.needle.kinematics import bending_axis, push, roll
+from ntagen.needle.vectors import add, rotate
+from ntagen.scene import Pose, Vector
+
+_Array = NDArray[np.float64]
+
+ENTRY = -1
+"""The index of the entry in the tree of channels."""
+
+STRETCH_MM = 10.0
+"""The length of the stretches: shorter than what a fit of the curvature needs (about 20 mm)."""
+
+_NOTHING_MM = 1e-9
+
+
+@dataclass(slots=True)
+class Stretch:
+    """A part of a channel with one curvature, in one plane.
+
+    Attributes:
+        offset_mm: Where it begins in its channel.
+        curvature: The index of the unknown change of the curvature's logarithm at its beginning.
+        turn: The index of the unknown turn of the bend plane there.
+    """
+
+    offset_mm: float
+    curvature: int | None = None
+    turn: int | None = None
+
+
+@dataclass(slots=True)
+class Channel:
+    """Where a channel leaves its parent, the rolls made there, and its stretches.
+
+    Attributes:
+        parent: The index of the channel that it leaves, or `ENTRY`.
+        branch_mm: Where it leaves its parent, in mm from the parent's beginning.
+        depth_mm: The depth of its beginning.
+        roll_rad: The sum of the rolls.
+        rolls: The indices of the unknown errors of these rolls.
+        stretches: Its stretches in order.
+        extent_mm: The greatest length that was cut.
+    """
+
+    parent: int
+    branch_mm: float
+    depth_mm: float
+    roll_rad: float
+    rolls: tuple[int, ...]
+    stretches: list[Stretch] = field(default_factory=lambda: [Stretch(0.0)])
+    extent_mm: float = 0.0
+
+    def new_boundaries(self, extent_mm: float) -> list[float]:
+        """Where stretches begin in the part that is cut when the channel grows to this length."""
+        first = math.ceil((self.depth_mm + self.extent_mm) / STRETCH_MM - _NOTHING_MM)
+        last = math.ceil((self.depth_mm + extent_mm) / STRETCH_MM - _NOTHING_MM)
+        offsets_mm = [number * STRETCH_MM - self.depth_mm for number in range(first, last)]
+        # The channel's own beginning has a stretch already.
+        return [offset_mm for offset_mm in offsets_mm if offset_mm > _NOTHING_MM]
+
+    def stretch_at(self, offset_mm: float) -> int:
+        """The index of the stretch in which a place lies; its end belongs to it."""
+        number = len(self.stretches) - 1
+        while number > 0 and self.stretches[number].offset_mm > offset_mm - _NOTHING_MM:
+            number -= 1
+        return number
+
+
+@dataclass(slots=True)
+class Placed:
+    """A stretch in space, with its derivatives by the unknowns.
+
+    Attributes:
+        start: The pose at its beginning, after rolls and turns.
+        curvature_per_mm: Its curvature.
+        rotation: The rotation vector of the beginning, 3 rows, one column for each unknown.
+        shift: The translation, in the same form.
+        growth: The derivative of the curvature's logarithm by each unknown.
+    """
+
+    start: Pose
+    curvature_per_mm: float
+    rotation: _Array
+    shift: _Array
+    growth: _Array
+
+    @property
+    def radius_mm(self) -> float:
+        """One over the curvature."""
+        return 1.0 / self.curvature_per_mm
+
+    def positions(self, along_mm: _Array) -> tuple[_Array, _Array]:
+        """Positions at these lengths from the beginning, and their derivatives.
+
+        Returns:
+            One row a place; one 3-row matrix a place, with one column for each unknown.
+        """
+        turned = self.curvature_per_mm * along_mm
+        half = 0.5 * turned
+        chord = along_mm * np.sinc(half / math.pi)
+        heading, bevel = np.array(self.start.heading), np.array(self.start.bevel)
+        ahead, aside = chord * np.cos(half), chord * np.sin(half)
+        places = np.array(self.start.position_mm) + np.outer(ahead, heading)
+        places -= np.outer(aside, bevel)
+        # Derivatives of both parts by the curvature's logarithm.
+        ahead_growth = along_mm * np.cos(turned) - ahead
+        aside_growth = along_mm * np.sin(turned) - aside
+        own = np.outer(ahead_growth, heading) - np.outer(aside_growth, bevel)
+        slopes = _moved(places, self.rotation, self.shift) + own[:, :, None] * self.growth
+        return places, slopes
+
+    def directions(self, along_mm: float) -> tuple[Pose, _Array]:
+        """The pose at a length from the beginning, and the derivative of its rotation vector."""
+        turn_rad = self.curvature_per_mm * along_mm
+        axis = np.array(bending_axis(self.start))
+        return (
+            push(self.start, self.radius_mm, along_mm),
+            self.rotation + np.outer(turn_rad * axis, self.growth),
+        )
+
+    def beyond(self, along_mm: float) -> Placed:
+        """What begins after this length: the same curvature, further on."""
+        pose, rotation = self.directions(along_mm)
+        _, slopes = self.positions(np.array([along_mm]))
+        shift = slopes[0] - _cross(rotation, pose.position_mm)
+        return Placed(pose, self.curvature_per_mm, rotation, shift, self.growth)
+
+    def rolled(self, angle_rad: float, unknowns: tuple[int, ...]) -> Placed:
+        """The same after a roll whose errors are these unknowns."""
+        start = roll(self.start, angle_rad)
+        rotation, shift = self.rotation, self.shift
+        if unknowns:
+            rotation, shift = rotation.copy(), shift.copy()
+            for unknown in unknowns:
+                _turn_about(rotation, shift, unknown, start.heading, start.position_mm)
+        return Placed(start, self.curvature_per_mm, rotation, shift, self.growth)
+
+    def bent(self, change: float, unknown: int) -> Placed:
+        """The same with another curvature, by an unknown change of its logarithm."""
+        growth = self.growth.copy()
+        growth[unknown] += 1.0
+        curvature_per_mm = self.curvature_per_mm * math.exp(change)
+        return Placed(self.start, curvature_per_mm, self.rotation, self.shift, growth)
+
+
+def placed_entry(entry: Pose, curvature_per_mm: float, unknowns: _Array) -> Placed:
+    """The beginning at the entry, from the first seven unknowns.
+
+    These are three translations, rotations about heading, bevel and bending axis, and the
+    logarithm of the curvature relative to `curvature_per_mm`.
+    """
+    heading, bevel = entry.heading, entry.bevel
+    moved: Vector = (float(unknowns[0]), float(unknowns[1]), float(unknowns[2]))
+    position = add(entry.position_mm, moved)
+    rotation, shift = np.zeros((3, len(unknowns))), np.zeros((3, len(unknowns)))
+    shift[:, :3] = np.eye(3)
+    axes = (entry.heading, entry.bevel, bending_axis(entry))
+    angles = [float(angle_rad) for angle_rad in unknowns[3:6]]
+    for number, (axis, angle_rad) in enumerate(zip(axes, angles, strict=True)):
+        heading, bevel = rotate(heading, axis, angle_rad), rotate(bevel, axis, angle_rad)
+        # The rotations are made one after the other: a later one also turns this one's axis.
+        turned = axis
+        for later in range(number + 1, 3):
+            turned = rotate(turned, axes[later], angles[later])
+        _turn_about(rotation, shift, 3 + number, turned, position)
+    growth = np.zeros(len(unknowns))
+    growth[6] = 1.0
+    curvature = math.exp(float(unknowns[6])) * curvature_per_mm
+    return Placed(Pose(position, heading, bevel), curvature, rotation, shift, growth)
+
+
+def place(
+    channels: list[Channel], entry: Pose, curvature_per_mm: float, unknowns: _Array
+) -> tuple[Placed, list[list[Placed]]]:
+    """The entry, and the stretches of each channel, for these unknowns."""
+    start = placed_entry(entry, curvature_per_mm, unknowns)
+    placed: list[list[Placed]] = []
+    for channel in channels:
+        if channel.parent == ENTRY:
+            begin = start
+        else:
+            parent = channels[channel.parent]
+            number = parent.stretch_at(channel.branch_mm)
+            along_mm = channel.branch_mm - parent.stretches[number].offset_mm
+            begin = placed[channel.parent][number].beyond(along_mm)
+        error_rad = sum(float(unknowns[i]) for i in channel.rolls)
+        current = begin.rolled(channel.roll_rad + error_rad, channel.rolls)
+        parts = [current]
+        for before, stretch in zip(channel.stretches, channel.stretches[1:], strict=False):
+            current = current.beyond(stretch.offset_mm - before.offset_mm)
+            if stretch.curvature is not None:
+                current = current.bent(float(unknowns[stretch.curvature]), stretch.curvature)
+            if stretch.turn is not None:
+                current = current.rolled(float(unknowns[stretch.turn]), (stretch.turn,))
+            parts.append(current)
+        placed.append(parts)
+    return start, placed
+
+
+def _turn_about(
+    rotation: _Array, shift: _Array, unknown: int, axis: Vector, point_mm: Vector
+) -> None:
+    """Adds a rotation about an axis through a point to the derivatives by an unknown."""
+    rotation[:, unknown] += axis
+    shift[:, unknown] -= np.cross(axis, point_mm)
+
+
+def _cross(rotation: _Array, point_mm: Vector) -> _Array:
+    """The vector product of each column with a point."""
+    x, y, z = point_mm
+    return np.stack(
+        [
+            rotation[1] * z - rotation[2] * y,
+            rotation[2] * x - rotation[0] * z,
+            rotation[0] * y - rotation[1] * x,
+        ]
+    )
+
+
+def _moved(places: _Array, rotation: _Array, shift: _Array) -> _Array:
+    """How each place moves with each unknown: ``w x place + v``."""
+    x, y, z = places[:, 0, None], places[:, 1, None], places[:, 2, None]
+    moved = np.empty((len(places), 3, rotation.shape[1]))
+    moved[:, 0] = rotation[1] * z - rotation[2] * y
+    moved[:, 1] = rotation[2] * x - rotation[0] * z
+    moved[:, 2] = rotation[0] * y - rotation[1] * x
+    return np.asarray(moved + shift)
