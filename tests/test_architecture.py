@@ -48,10 +48,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
     "drive": BASE | {"files", "needle", "nsl", "plan", "render", "checker"},
+    "openigtlink": {"errors"},
+    "tracking": BASE | {"files", "needle", "drive", "openigtlink"},
     "plot": BASE | {"files", "needle", "plan", "drive"},
     "cli": BASE
     | {"files", "needle", "nsl", "plan", "render", "loading", "explanations"}
-    | {"drive", "plot"}
+    | {"drive", "plot", "tracking"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "__main__": {"cli"},
 }
@@ -60,7 +62,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 The face of the engine is split by module; ``checker`` alone is what it shows to the other rooms.
 """
 
-NEEDLE = {"rules", "scene", "nsl", "render", "needle", "plan", "drive", "plot"}
+NEEDLE = {"rules", "scene", "nsl", "render", "needle", "plan", "drive", "plot", "tracking"}
 """The rooms that are about needles; the face of the engine serves any model."""
 
 SPLIT = {"checker"}
@@ -81,11 +83,12 @@ ONLY_IN: dict[str, set[str]] = {
     "foxglove_schemas_protobuf": {"drive"},
     "serial": {"drive"},
     # Devices and clocks.
-    "socket": {"drive"},
+    "socket": {"drive", "openigtlink"},
+    "selectors": {"openigtlink"},
     "select": {"drive"},
     "asyncio": {"drive"},
-    "threading": {"drive", "cli"},
-    "time": {"drive", "cli"},
+    "threading": {"drive", "cli", "openigtlink"},
+    "time": {"drive", "cli", "openigtlink"},
     "datetime": {"drive"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
     "random": {"needle", "drive", "checker.runs", "checker.play"},

@@ -1,0 +1,412 @@
+"""The contents of OpenIGTLink messages, as values and as bytes.
+
+Numbers are big-endian on the wire. Matrices have 32-bit floating-point numbers there, so that a
+position of 100 mm is exact to 4 nm. A text of fixed length ends at its first zero byte. Sources:
+openigtlink.org/protocols/v2_*.html and v3_*.html.
+
+A new message type is a class with `TYPE`, `to_bytes` and `from_bytes`, and a line in `TYPES`.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import struct
+from dataclasses import dataclass
+from typing import ClassVar, Final, Protocol, Self
+
+Vector = tuple[float, float, float]
+"""Three numbers along the axes x, y, z."""
+
+Columns = tuple[Vector, Vector, Vector, Vector]
+"""The columns of a homogeneous matrix without its last row: three axes and the origin, in mm."""
+
+NEWTON: Final = 0x0B << 54 | 1 << 50
+"""The unit N, as the library of the protocol packs it (`igtl_unit.h`)."""
+
+_PREFIX_EXPONENTS: Final = {
+    **{0: 0, 1: 1, 2: 2, 3: 3, 4: 6, 5: 9, 6: 12, 7: 15},
+    **{0x9: -1, 0xA: -2, 0xB: -3, 0xC: -6, 0xD: -9, 0xE: -12, 0xF: -15},
+}
+"""Powers of ten by the number of their prefix, the first four bits of a unit."""
+
+_ASCII: Final = 3
+_UTF_8: Final = 106
+_MATRIX: Final = struct.Struct(">12f")
+_TOOL: Final = struct.Struct(">20sBx12f")
+_START: Final = struct.Struct(">i32s")
+_STATUS: Final = struct.Struct(">Hq20s")
+_SENSOR: Final = struct.Struct(">BBQ")
+_TEXT: Final = struct.Struct(">HH")
+
+
+class MalformedError(ValueError):
+    """The bytes are not a message of the type that they claim to be."""
+
+
+class Content(Protocol):
+    """The content of a message."""
+
+    TYPE: ClassVar[str]
+    """The name of the type, at most 12 letters."""
+
+    def to_bytes(self) -> bytes:
+        """The content on the wire.
+
+        Raises:
+            ValueError: A text is too long, or a number does not fit.
+        """
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """The content that these bytes are.
+
+        Raises:
+            MalformedError: They are not such a content.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """TRANSFORM: the pose of a device.
+
+    Attributes:
+        columns: The matrix from the device's frame to that of the tracker.
+    """
+
+    TYPE: ClassVar[str] = "TRANSFORM"
+
+    columns: Columns
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        return packed(_MATRIX, *_flat(self.columns))
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        _require_size(cls.TYPE, data, _MATRIX.size)
+        return cls(_columns(_MATRIX.unpack(data)))
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """POSITION: a position and, perhaps, an orientation.
+
+    Attributes:
+        position_mm: The position.
+        quaternion: The orientation as x, y, z, w. A message may leave it out, or only w, which then
+            follows from length 1 and is not negative.
+    """
+
+    TYPE: ClassVar[str] = "POSITION"
+
+    position_mm: Vector
+    quaternion: tuple[float, float, float, float] | None = None
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        numbers = (*self.position_mm, *(self.quaternion or ()))
+        return packed(struct.Struct(f">{len(numbers)}f"), *numbers)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        if len(data) not in (12, 24, 28):
+            raise MalformedError(f"POSITION has {len(data)} bytes, not 12, 24 or 28")
+        x, y, z, *turn = struct.unpack(f">{len(data) // 4}f", data)
+        if not turn:
+            return cls((x, y, z))
+        if len(turn) == 3:
+            rest = 1.0 - sum(number * number for number in turn)
+            turn.append(math.sqrt(rest) if rest > 0.0 else 0.0)
+        return cls((x, y, z), (turn[0], turn[1], turn[2], turn[3]))
+
+
+class Freedom(enum.IntEnum):
+    """What is known of a tool in TDATA."""
+
+    TRACKER = 1
+    POSE = 2
+    POSITION = 3
+    HEADING = 4
+    """Five degrees of freedom: the position and the direction of the tool's own z axis."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """One tool of TDATA: its name, what is known of it, and its matrix."""
+
+    name: str
+    freedom: Freedom
+    columns: Columns
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingData:
+    """TDATA: the poses of all tools of a tracker."""
+
+    TYPE: ClassVar[str] = "TDATA"
+
+    tools: tuple[Tool, ...]
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        return b"".join(
+            packed(_TOOL, fixed(tool.name, 20), tool.freedom, *_flat(tool.columns))
+            for tool in self.tools
+        )
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        if len(data) % _TOOL.size:
+            raise MalformedError(
+                f"TDATA has {len(data)} bytes, which is no multiple of {_TOOL.size}"
+            )
+        tools = []
+        for name, kind, *numbers in _TOOL.iter_unpack(data):
+            if kind not in Freedom.__members__.values():
+                raise MalformedError(f"TDATA has a tool of type {kind}")
+            tools.append(Tool(until_zero(name), Freedom(kind), _columns(tuple(numbers))))
+        return cls(tuple(tools))
+
+
+@dataclass(frozen=True, slots=True)
+class StartTracking:
+    """STT_TDATA: asks a server to send TDATA.
+
+    Attributes:
+        interval_ms: The least time between two messages; 0 for as fast as possible.
+        frame: The frame in which the poses are wanted; empty for the server's own.
+    """
+
+    TYPE: ClassVar[str] = "STT_TDATA"
+
+    interval_ms: int
+    frame: str = ""
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        return packed(_START, self.interval_ms, fixed(self.frame, 32))
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        _require_size(cls.TYPE, data, _START.size)
+        interval_ms, frame = _START.unpack(data)
+        return cls(interval_ms, until_zero(frame))
+
+
+@dataclass(frozen=True, slots=True)
+class StopTracking:
+    """STP_TDATA: asks a server to end TDATA. Many servers close the connection then."""
+
+    TYPE: ClassVar[str] = "STP_TDATA"
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        return b""
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        _require_size(cls.TYPE, data, 0)
+        return cls()
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingReply:
+    """RTS_TDATA: whether the server does what STT_TDATA or STP_TDATA asked for."""
+
+    TYPE: ClassVar[str] = "RTS_TDATA"
+
+    accepted: bool
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        return bytes([0 if self.accepted else 1])
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        _require_size(cls.TYPE, data, 1)
+        return cls(data[0] == 0)
+
+
+STATUS_NAMES: Final = (
+    "invalid packet",
+    "OK",
+    "unknown error",
+    "panic mode, emergency",
+    "not found",
+    "access denied",
+    "busy",
+    "time out",
+    "overflow",
+    "checksum error",
+    "configuration error",
+    "not enough resources",
+    "unknown instruction",
+    "device not ready",
+    "manual mode",
+    "device disabled",
+    "device not present",
+    "unknown device version",
+    "hardware failure",
+    "exiting",
+)
+"""What the code of a STATUS means, by its number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """STATUS: how a device is.
+
+    Attributes:
+        code: 1 means that all is well; `STATUS_NAMES` has the others.
+        subcode: A number that the device's maker chose.
+        name: A name that the device's maker chose.
+        message: Words for people.
+    """
+
+    TYPE: ClassVar[str] = "STATUS"
+
+    code: int
+    subcode: int = 0
+    name: str = ""
+    message: str = ""
+
+    @property
+    def is_ok(self) -> bool:
+        """Whether all is well."""
+        return self.code == 1
+
+    def __str__(self) -> str:
+        known = STATUS_NAMES[self.code] if self.code < len(STATUS_NAMES) else f"code {self.code}"
+        return ", ".join(part for part in (known, self.name, self.message) if part)
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        head = packed(_STATUS, self.code, self.subcode, fixed(self.name, 20))
+        return head + self.message.encode() + b"\0"
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        if len(data) < _STATUS.size:
+            raise MalformedError(f"STATUS has {len(data)} bytes, fewer than {_STATUS.size}")
+        code, subcode, name = _STATUS.unpack_from(data)
+        return cls(code, subcode, until_zero(name), until_zero(data[_STATUS.size :]))
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """SENSOR: the readings of a sensor.
+
+    Attributes:
+        values: At most 255 numbers.
+        unit: Their unit, as the protocol packs it; 0 if the server does not say it.
+    """
+
+    TYPE: ClassVar[str] = "SENSOR"
+
+    values: tuple[float, ...]
+    unit: int = 0
+
+    @property
+    def newtons(self) -> float | None:
+        """The factor that makes newtons of the values; `None` if the unit is no force."""
+        exponent = _PREFIX_EXPONENTS.get(self.unit >> 60)
+        is_force = self.unit & (2**60 - 1) == NEWTON
+        return 10.0**exponent if is_force and exponent is not None else None
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        head = packed(_SENSOR, len(self.values), 0, self.unit)
+        return head + struct.pack(f">{len(self.values)}d", *self.values)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        if len(data) < _SENSOR.size:
+            raise MalformedError(f"SENSOR has {len(data)} bytes, fewer than {_SENSOR.size}")
+        count, _, unit = _SENSOR.unpack_from(data)
+        _require_size(cls.TYPE, data, _SENSOR.size + 8 * count)
+        return cls(struct.unpack_from(f">{count}d", data, _SENSOR.size), unit)
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """STRING: a text."""
+
+    TYPE: ClassVar[str] = "STRING"
+
+    text: str
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        data = self.text.encode()
+        return packed(_TEXT, _ASCII if self.text.isascii() else _UTF_8, len(data)) + data
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        if len(data) < _TEXT.size:
+            raise MalformedError(f"STRING has {len(data)} bytes, fewer than {_TEXT.size}")
+        _, length = _TEXT.unpack_from(data)
+        _require_size(cls.TYPE, data, _TEXT.size + length)
+        return cls(data[_TEXT.size :].decode(errors="replace"))
+
+
+TYPES: Final[dict[str, type[Content]]] = {
+    kind.TYPE: kind
+    for kind in (
+        *(Transform, Position, TrackingData, StartTracking, StopTracking, TrackingReply),
+        *(Status, Sensor, Text),
+    )
+}
+"""The contents that are understood, by the names of their types."""
+
+
+def fixed(text: str, length: int) -> bytes:
+    """A text in a field of fixed length.
+
+    Raises:
+        ValueError: It is too long, or has a zero byte.
+    """
+    data = text.encode()
+    if len(data) > length or b"\0" in data:
+        raise ValueError(f"'{text}' does not fit into {length} bytes of an OpenIGTLink message")
+    return data
+
+
+def until_zero(data: bytes) -> str:
+    """The text in such a field."""
+    return data.partition(b"\0")[0].decode(errors="replace")
+
+
+def packed(form: struct.Struct, *values: object) -> bytes:
+    """The bytes of some numbers.
+
+    Raises:
+        ValueError: A number does not fit.
+    """
+    try:
+        return form.pack(*values)
+    except (struct.error, OverflowError) as error:
+        raise ValueError(f"this does not fit into an OpenIGTLink message: {error}") from error
+
+
+def _flat(columns: Columns) -> tuple[float, ...]:
+    return tuple(number for column in columns for number in column)
+
+
+def _columns(numbers: tuple[float, ...]) -> Columns:
+    a, b, c, d, e, f, g, h, i, x, y, z = numbers
+    return ((a, b, c), (d, e, f), (g, h, i), (x, y, z))
+
+
+def _require_size(name: str, data: bytes, size: int) -> None:
+    if len(data) != size:
+        raise MalformedError(f"{name} has {len(data)} bytes, not {size}")
