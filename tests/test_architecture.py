@@ -47,13 +47,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
-    "drive": BASE | {"files", "needle", "nsl", "plan", "render", "checker"},
+    "grbl": {"errors", "units"},
+    "drive": BASE | {"files", "needle", "nsl", "plan", "render", "checker", "grbl"},
     "openigtlink": {"errors"},
     "tracking": BASE | {"files", "needle", "drive", "openigtlink"},
     "plot": BASE | {"files", "needle", "plan", "drive"},
     "cli": BASE
     | {"files", "needle", "nsl", "plan", "render", "loading", "explanations"}
-    | {"drive", "plot", "tracking"}
+    | {"grbl", "drive", "plot", "tracking"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "__main__": {"cli"},
 }
@@ -81,14 +82,14 @@ ONLY_IN: dict[str, set[str]] = {
     "zstandard": {"drive"},
     "mcap_protobuf": {"drive"},
     "foxglove_schemas_protobuf": {"drive"},
-    "serial": {"drive"},
+    "serial": {"grbl"},
     # Devices and clocks.
     "socket": {"drive", "openigtlink"},
     "selectors": {"openigtlink"},
-    "select": {"drive"},
+    "select": {"drive", "grbl"},
     "asyncio": {"drive"},
-    "threading": {"drive", "cli", "openigtlink"},
-    "time": {"drive", "cli", "openigtlink"},
+    "threading": {"drive", "grbl", "cli", "openigtlink"},
+    "time": {"drive", "grbl", "cli", "openigtlink"},
     "datetime": {"drive"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
     "random": {"needle", "drive", "checker.runs", "checker.play"},
