@@ -19,6 +19,11 @@ from typing import Final
 
 _STRAIGHT: Final = 0.999_999
 _TINY: Final = 1e-9
+_NEAR: Final = 1e-7
+"""So close to its end, a block is done."""
+
+_SHORTEST: Final = 1e-6
+"""Shorter blocks are less than a step of any axis, and move nothing."""
 
 Position = tuple[float, ...]
 
@@ -133,7 +138,7 @@ class Planner:
         start = self.target
         way = tuple(b - a for a, b in zip(start, target, strict=True))
         length = math.hypot(*way)
-        if length < _TINY:
+        if length < _SHORTEST:
             return
         unit = tuple(w / length for w in way)
         acceleration = _along(unit, limits.accelerations)
@@ -194,14 +199,14 @@ class Planner:
             if phase.end_s > self._now_s + _TINY:
                 return
             self._phases.popleft()
-            if phase.way(phase.end_s) >= phase.block.length - _TINY:
+            if phase.way(phase.end_s) >= phase.block.length - _NEAR:
                 self._position = phase.block.at(phase.block.length)
                 self._blocks.popleft()
 
     def _ahead(self) -> list[Block]:
         """The blocks that are not yet completed by the phases that stay."""
         blocks = list(self._blocks)
-        done = sum(p.way(p.end_s) >= p.block.length - _TINY for p in self._phases)
+        done = sum(p.way(p.end_s) >= p.block.length - _NEAR for p in self._phases)
         return blocks[done:]
 
     def _cut(self) -> tuple[float, float, float]:
@@ -215,7 +220,7 @@ class Planner:
         cut_s = min(limit_s, last.end_s)
         self._append(_Phase(last.start_s, cut_s - last.start_s, last.block, last.s, last.v, last.a))
         s, v = last.way(cut_s), last.speed(cut_s)
-        return cut_s, (0.0 if s >= last.block.length - _TINY else s), v
+        return cut_s, (0.0 if s >= last.block.length - _NEAR else s), v
 
     def _way_in_first(self) -> float:
         """How far the standing axes are along the first block."""
