@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
-5 device fault, 70 internal error, 130 interrupted, 143 ended by SIGTERM."""
+4 no strategy that holds in exact kinematics, 5 device fault, 6 no strategy that ends in time,
+70 internal error, 130 interrupted, 143 ended by SIGTERM."""
 
 
 def _seconds(_ctx: click.Context, _option: click.Parameter, text: str) -> float:
@@ -165,7 +166,9 @@ def command(
     for warning in warnings:
         echo(warning.render(), err=True)
     errors = Errors(noise_mm=noise_mm, roll_rad=rad_from_deg(roll_error_deg))
-    settings = settings_for(Settings(timeout_s=timeout_s, ranking=parse_ranking(ranking)), errors)
+    settings = settings_for(
+        Settings(timeout_s=timeout_s, ranking=parse_ranking(ranking)), errors, scene, known
+    )
     speaks = not (as_json or quiet)
     with (
         _operator() as operator,
@@ -392,6 +395,8 @@ def _exit_code(outcome: str) -> int:
     return {
         State.TARGET_REACHED: 0,
         State.NO_STRATEGY: 1,
+        State.NONE_HOLDS: 4,
+        State.NO_TIME_LEFT: 6,
         State.TIMED_OUT: 3,
         State.FAULTED: 5,
         State.INTERRUPTED: 130,

@@ -17,10 +17,12 @@ If there is no plan, the driver does not pull back at once. It first looks for a
 tip, on the known channel, from which there is a strategy. If there is none back to the entry, the
 run ends where it is.
 
+The first push belongs to a plan from the entry. If there is none, the push is made only if no known
+region is near it for any start error (`ntagen.drive.first_push`).
+
 The driver looks at known points whether somebody wants the run to end: before each motion and each
 synthesis. Between two such points something is always recorded, so that a replay knows at which
-point the run ended. A motion counts as made when it is commanded: nobody knows how far the needle
-got if a motion failed.
+point the run ended.
 """
 
 from __future__ import annotations
@@ -28,18 +30,18 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
+from ntagen.drive.deviation import DeviationMonitor
 from ntagen.drive.device import Device
+from ntagen.drive.first_push import is_free
+from ntagen.drive.force import ForceMonitor, Rise
 from ntagen.drive.knowledge import Knowledge
 from ntagen.drive.records import (
-    Command,
     Ended,
-    Estimated,
     Journal,
     Learned,
-    Measured,
     Predicted,
     Record,
     Synthesised,
@@ -49,19 +51,35 @@ from ntagen.drive.records import (
 )
 from ntagen.drive.settings import Settings
 from ntagen.drive.states import ENDS, Event, State, next_state
+from ntagen.drive.steering import Steering
 from ntagen.errors import DeviceError, LimitError
-from ntagen.needle.estimate import Estimate, Estimator
+from ntagen.needle.estimate import Estimate
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.vectors import distance
-from ntagen.plan.actions import Push, Roll
+from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Pose, Scene
 
 _SMALL_MM: Final = 1e-9
 _NO_REGION_MM: Final = 1e9
-_ROLL_NEGLIGIBLE_RAD: Final = 1e-9
+
+
+@dataclass(slots=True)
+class _Lack:
+    """Why no plan is left, over all places from which one was looked for."""
+
+    found: bool = False
+    held: bool = False
+
+    def event(self) -> tuple[Event, str]:
+        """The event, and the reason in words."""
+        if self.held:
+            return Event.NO_TIME_LEFT, "no plan can end within the time limit"
+        if self.found:
+            return Event.NONE_HOLDS, "no plan of the model holds in exact kinematics"
+        return Event.NO_STRATEGY, "no plan is left, even from the entry"
 
 
 class Controller:
@@ -85,19 +103,18 @@ class Controller:
         journal: Journal,
         listen: Callable[[], None] = lambda: None,
     ) -> None:
-        self._device = device
         self._synthesise = synthesise
         self._settings = settings
         self._journal = journal
         self._listen = listen
         self._knowledge = Knowledge(scene)
-        self._estimator = Estimator(scene.needle.tip, scene.needle.radius_mm, settings.priors)
-        self._path = Path(scene.needle.tip)
-        self._estimate: Estimate | None = None
-        self._measurement: Measurement | None = None
+        self._needle = Steering(scene.needle, device, settings, journal, listen)
+        self._force = ForceMonitor(settings, scene.needle.length_mm)
+        self._deviation = DeviationMonitor(settings, scene.needle.length_mm)
+        self._rise: Rise | None = None
         self._moves: Iterator[tuple[Push | Roll, Pose]] = iter(())
         self._predicted: Pose = scene.needle.tip
-        self._deviating = 0
+        self._lack = _Lack()
         self._retreat_mm: float | None = None
         self._adjustments = 0
         self._syntheses = 0
@@ -127,14 +144,14 @@ class Controller:
                 state = following
         except BaseException:
             # A bug, or a log that cannot be written: the needle must not move on.
-            self._device.stop()
+            self._needle.stop_at_once()
             raise
         self._halt()
         ended = Ended(
             time_s=self._now_s(),
             outcome=state.value,
             reason=self._reason,
-            depth_mm=self._path.depth_mm,
+            depth_mm=self._needle.depth_mm,
             adjustments=self._adjustments,
             syntheses=self._syntheses,
         )
@@ -159,29 +176,16 @@ class Controller:
     # The tasks, in the order of the workflow.
 
     def _arm(self) -> Event:
-        self._started_s = self._device.now_s()
-        self._measure()
+        self._started_s = self._now_s()
+        measurement = self._needle.measure()
+        if self._settings.force_sensing:
+            tip_mm = self._knowledge.a_priori.needle.tip.position_mm
+            allowed_n = self._knowledge.expected_force_n(tip_mm, self._settings)
+            self._force.note(0.0, measurement.force_n, allowed_n)
         return Event.ARMED
 
-    def _initial_push(self) -> Event:
-        return self._push_watching(self._settings.initial_push_mm)
-
     def _make_estimate(self) -> Event:
-        estimate = self._estimator.estimate()
-        self._estimate = estimate
-        self._path = estimate.path
-        tip = estimate.tip
-        self._note(
-            Estimated(
-                self._now_s(),
-                tip.position_mm,
-                tip.heading,
-                tip.bevel,
-                estimate.radius_mm,
-                estimate.radius_std_mm,
-                estimate.rms_mm,
-            )
-        )
+        tip = self._needle.estimated().tip
         self._visit(tip.position_mm, last_too=True)
         if self._knowledge.visited == len(self._knowledge.a_priori.targets):
             self._reason = "the tip is in the last target"
@@ -189,96 +193,128 @@ class Controller:
         return Event.ESTIMATED
 
     def _find_strategy(self) -> Event:
-        here = self._ask(self._known_estimate().tip, self._path.depth_mm)
+        self._lack = _Lack()
+        is_first = self._syntheses == 0
+        here = self._ask(self._estimate().tip, self._needle.depth_mm)
         if here.best is not None:
             self._adopt(here)
-            return Event.STRATEGY_FOUND
+            return Event.FIRST_STRATEGY if is_first else Event.STRATEGY_FOUND
+        if is_first and not self._lack.held and self._first_push_is_free():
+            push = Push(self._settings.initial_push_mm)
+            self._moves = _moves(self._here(), (push,), self._settings.spacing_mm)
+            return Event.PUSH_IS_FREE
         return self._look_back()
 
     def _look_back(self) -> Event:
         """Looks for the nearest place behind the tip from which there is a strategy."""
         stride_mm = self._settings.pull_mm - self._settings.push_mm
-        depth_mm = self._path.depth_mm
+        path = self._needle.path
+        depth_mm = path.depth_mm
         while depth_mm > _SMALL_MM:
             self._require_time()
             depth_mm = max(0.0, depth_mm - stride_mm)
-            behind = self._path.pull(self._path.depth_mm - depth_mm)
+            behind = path.pull(path.depth_mm - depth_mm)
             if self._ask(_unrolled(behind), depth_mm).best is not None:
                 self._retreat_mm = depth_mm
                 return Event.STRATEGY_BEHIND
-        self._reason = "no plan is left, even from the entry"
-        return Event.NO_STRATEGY
+        event, self._reason = self._lack.event()
+        return event
+
+    def _initial_push(self) -> Event:
+        """Makes the first moves of the plan, or the free push if there is none."""
+        goal_mm = self._settings.initial_push_mm
+        for action, _ in self._moves:
+            self._require_time()
+            if not self._act(action):
+                continue
+            measurement = self._needle.measure()
+            if self._feels(measurement):
+                return Event.FORCE
+            self._visit(measurement.position_mm, last_too=False)
+            if self._needle.depth_mm >= goal_mm - _SMALL_MM:
+                break
+        return Event.PUSHED
 
     def _execute(self) -> Event:
         move = next(self._moves, None)
         if move is None:
             return Event.PLAN_DONE
         action, self._predicted = move
-        if isinstance(action, Roll):
-            self._roll(action.angle_rad)
-        else:
-            self._push(action.length_mm)
+        self._act(action)
         return Event.ACTED
 
     def _monitor(self) -> Event:
-        measurement = self._measure()
-        deviation_mm = distance(measurement.position_mm, self._predicted.position_mm)
+        measurement = self._needle.measure()
         predicted = self._predicted
+        is_off = self._deviation.note(measurement.position_mm, predicted.position_mm)
         self._note(
             Predicted(
                 self._now_s(),
                 predicted.position_mm,
                 predicted.heading,
                 predicted.bevel,
-                deviation_mm,
+                distance(measurement.position_mm, predicted.position_mm),
             )
         )
         if self._feels(measurement):
             return Event.FORCE
         self._visit(measurement.position_mm, last_too=False)
-        self._deviating = self._deviating + 1 if deviation_mm > self._settings.deviation_mm else 0
-        if self._deviating >= self._settings.deviation_count:
-            self._deviating = 0
-            return Event.DEVIATION
-        return Event.AS_PREDICTED
+        return Event.DEVIATION if is_off else Event.AS_PREDICTED
 
     def _stop(self) -> Event:
-        self._note(Command(self._now_s(), "stop", 0.0))
-        self._device.stop()
-        if self._measurement is not None and self._feels(self._measurement):
-            self._learn()
+        self._needle.stop()
+        if self._rise is not None:
+            self._learn(self._rise)
+            self._rise = None
         return Event.STOPPED
 
     def _pull_back(self) -> Event:
         """Goes back in the channel to where the next push starts."""
         self._adjustments += 1
-        depth_mm = self._path.depth_mm
         goal_mm = self._retreat_mm
         if goal_mm is None:
-            goal_mm = max(0.0, depth_mm - self._settings.pull_mm + self._settings.push_mm)
+            goal_mm = max(
+                0.0, self._needle.depth_mm - self._settings.pull_mm + self._settings.push_mm
+            )
         # At the entry there is no channel to push in: the next plan starts there.
         self._retreat_mm = goal_mm
-        start_mm = max(0.0, goal_mm - self._settings.push_mm) if goal_mm > 0.0 else 0.0
-        while self._path.depth_mm > start_mm + _SMALL_MM:
-            self._undo_roll()
-            last_mm = self._path.stretches[-1].arc.length_mm
-            self._pull(min(last_mm, self._path.depth_mm - start_mm))
-        self._undo_roll()
+        self._needle.pull_back_to(max(0.0, goal_mm - self._settings.push_mm))
         return Event.PULLED
 
     def _push_again(self) -> Event:
-        goal_mm = self._retreat_mm if self._retreat_mm is not None else self._path.depth_mm
+        """Pushes in the open channel, and measures."""
+        goal_mm = self._retreat_mm if self._retreat_mm is not None else self._needle.depth_mm
         self._retreat_mm = None
-        return self._push_watching(goal_mm - self._path.depth_mm)
+        length_mm = goal_mm - self._needle.depth_mm
+        for piece_mm in _pieces(length_mm, self._settings.spacing_mm):
+            self._require_time()
+            self._needle.push(piece_mm)
+            if self._feels(self._needle.measure()):
+                return Event.FORCE
+        return Event.PUSHED
 
     # Knowledge.
 
-    def _learn(self) -> None:
-        """Turns a contact at the current place into a region."""
-        tip = self._estimator.estimate().tip
+    def _feels(self, measurement: Measurement) -> bool:
+        """Whether the force rises more than plain insertion and known regions explain."""
+        if not self._settings.force_sensing or not self._needle.cuts:
+            return False
+        tip_mm = self._needle.path.tip.position_mm
+        allowed_n = self._knowledge.expected_force_n(tip_mm, self._settings)
+        self._rise = self._force.note(self._needle.depth_mm, measurement.force_n, allowed_n)
+        return self._rise is not None
+
+    def _learn(self, rise: Rise) -> None:
+        """Turns a rise of the force into a region, ahead of the place where it began."""
+        self._force.forget_rise()
+        path = self._needle.glance().path
+        began = path.pull(rise.felt_mm - rise.began_mm)
         before = set(self._knowledge.learned)
         self._knowledge = self._knowledge.with_contact(
-            tip, self._settings.sensing_margin_mm, self._settings.learned_radius_mm
+            orthonormal(began.tip),
+            self._settings.sensing_margin_mm,
+            self._settings.learned_radius_mm,
+            self._needle.channels,
         )
         for region in self._knowledge.learned:
             if region not in before:
@@ -297,11 +333,22 @@ class Controller:
             self._knowledge = self._knowledge.visiting()
             self._note(Visited(self._now_s(), target.name))
 
+    def _here(self) -> Scene:
+        """The known scene with the needle where it is."""
+        estimate = self._estimate()
+        return self._knowledge.scene(estimate.tip, estimate.radius_mm, self._needle.depth_mm)
+
+    def _first_push_is_free(self) -> bool:
+        return is_free(self._here(), self._settings.initial_push_mm, self._settings.priors)
+
     def _ask(self, tip: Pose, depth_mm: float) -> Synthesis:
-        """The synthesis from a pose, with the current knowledge."""
-        scene = self._knowledge.scene(tip, self._known_estimate().radius_mm, depth_mm)
+        """The synthesis from a pose, with the current knowledge, and in the time left."""
+        scene = self._knowledge.scene(tip, self._estimate().radius_mm, depth_mm)
         self._listen()
-        synthesis = self._in_time(self._synthesise(scene))
+        whole = self._synthesise(scene)
+        synthesis = self._in_time(whole, self._needle.depth_mm - depth_mm)
+        self._lack.found |= whole.found > 0
+        self._lack.held |= bool(whole.candidates)
         number, best = self._syntheses + 1, synthesis.best
         self._journal.synthesised(number, synthesis)
         clearance_mm = best.certificate.critical_clearance_mm if best else -1.0
@@ -322,12 +369,30 @@ class Controller:
         self._note(Timed(self._now_s(), number, synthesis.seconds))
         return synthesis
 
-    def _in_time(self, synthesis: Synthesis) -> Synthesis:
-        """The synthesis without the plans that cannot end within the time limit."""
+    def _in_time(self, synthesis: Synthesis, back_mm: float) -> Synthesis:
+        """The synthesis without the plans that cannot end within the time limit.
+
+        Args:
+            synthesis: The synthesis.
+            back_mm: How far the needle must be pulled back before.
+        """
         left_s = self._settings.timeout_s - (self._now_s() - self._started_s)
-        longest_mm = left_s * synthesis.scene.needle.speed_mm_per_s
-        kept = tuple(c for c in synthesis.candidates if c.plan.length_mm <= longest_mm)
+        if back_mm > 0.0:
+            # Pulling may be faster than pushing, and never slower.
+            back_mm += 2.0 * self._settings.push_mm
+        speed_mm_per_s = synthesis.scene.needle.speed_mm_per_s
+        left_s -= back_mm / speed_mm_per_s
+        kept = tuple(
+            candidate
+            for candidate in synthesis.candidates
+            if self._seconds(candidate.plan, speed_mm_per_s) <= left_s
+        )
         return replace(synthesis, candidates=kept)
+
+    def _seconds(self, plan: Plan, speed_mm_per_s: float) -> float:
+        """How long a plan takes: its pushes and its rolls."""
+        rolls_rad = sum(abs(one.angle_rad) for one in plan.actions if isinstance(one, Roll))
+        return plan.length_mm / speed_mm_per_s + rolls_rad / self._settings.roll_rad_per_s
 
     def _adopt(self, synthesis: Synthesis) -> None:
         """Chooses the best plan as the one to follow."""
@@ -335,93 +400,35 @@ class Controller:
         if best is None:
             raise AssertionError("a synthesis without a plan was adopted")
         self._moves = _moves(synthesis.scene, best.plan.actions, self._settings.spacing_mm)
-        self._deviating = 0
+        self._deviation.begin()
 
-    def _known_estimate(self) -> Estimate:
-        if self._estimate is None:
-            raise AssertionError("a strategy was asked for before the first estimate")
-        return self._estimate
+    def _estimate(self) -> Estimate:
+        if self._needle.estimate is None:
+            raise AssertionError("the estimate comes before this")
+        return self._needle.estimate
 
-    # The device: every command and every reading goes through here, to estimator and journal.
-
-    def _push_watching(self, length_mm: float) -> Event:
-        """Pushes in pieces; checks the force, but has no prediction."""
-        for piece_mm in _pieces(length_mm, self._settings.spacing_mm):
-            self._require_time()
-            self._push(piece_mm)
-            if self._feels(self._measure()):
-                return Event.FORCE
-        return Event.PUSHED
-
-    def _push(self, length_mm: float) -> None:
-        self._command("push", length_mm)
-        self._estimator.push(length_mm)
-        self._path = self._path.push(self._radius_mm(), length_mm)
-        self._device.push(length_mm)
-
-    def _roll(self, angle_rad: float) -> None:
-        self._command("roll", angle_rad)
-        self._estimator.roll(angle_rad)
-        self._path = self._path.roll(angle_rad)
-        self._device.roll(angle_rad)
-
-    def _pull(self, length_mm: float) -> None:
-        self._command("pull", length_mm)
-        self._estimator.pull(length_mm)
-        self._path = self._path.pull(length_mm)
-        self._device.pull(length_mm)
-
-    def _command(self, kind: str, value: float) -> None:
-        """Records a motion that begins now, unless somebody wants the run to end."""
-        self._listen()
-        self._note(Command(self._now_s(), kind, value))
-
-    def _undo_roll(self) -> None:
-        """Undoes the rolls at or beyond this place, so that the tip fits its channel again."""
-        angle_rad = math.remainder(self._path.pending_roll_rad, 2.0 * math.pi)
-        if abs(angle_rad) > _ROLL_NEGLIGIBLE_RAD:
-            self._roll(-angle_rad)
-
-    def _measure(self) -> Measurement:
-        measurement = self._device.measure()
-        _require_finite(measurement)
-        self._measurement = measurement
-        self._estimator.measure(measurement)
-        self._note(
-            Measured(
-                time_s=measurement.time_s,
-                depth_mm=self._path.depth_mm,
-                position_mm=measurement.position_mm,
-                force_n=measurement.force_n,
-                heading=measurement.heading or (),
-                bevel=measurement.bevel or (),
-            )
-        )
-        return measurement
+    def _act(self, action: Push | Roll) -> bool:
+        """Makes a move; returns whether it cuts."""
+        if isinstance(action, Roll):
+            self._needle.roll(action.angle_rad)
+            return False
+        self._needle.push(action.length_mm)
+        return True
 
     def _halt(self) -> None:
         """Stops the needle at the end of a run, whatever the reason."""
-        self._note(Command(self._now_s(), "stop", 0.0))
         try:
-            self._device.stop()
+            self._needle.stop()
         except DeviceError as error:
             # The run ends anyway, but the report must say that the device did not stop.
             self._reason = f"{self._reason}; it cannot be stopped: {error}"
-
-    def _feels(self, measurement: Measurement) -> bool:
-        return measurement.force_n > self._settings.force_n
 
     def _require_time(self) -> None:
         if self._now_s() - self._started_s >= self._settings.timeout_s:
             raise LimitError(f"the limit of {self._settings.timeout_s:g} s is over")
 
-    def _radius_mm(self) -> float:
-        if self._estimate is None:
-            return self._knowledge.a_priori.needle.radius_mm
-        return self._estimate.radius_mm
-
     def _now_s(self) -> float:
-        return self._device.now_s()
+        return self._needle.now_s()
 
     def _note(self, record: Record) -> None:
         self._journal.record(record)
@@ -453,9 +460,3 @@ def _pieces(length_mm: float, spacing_mm: float) -> list[float]:
 def _unrolled(path: Path) -> Pose:
     """The pose at the end of a channel, after the rolls beyond it have been undone."""
     return orthonormal(Path(path.entry, path.stretches).tip)
-
-
-def _require_finite(measurement: Measurement) -> None:
-    numbers = (*measurement.position_mm, measurement.force_n, measurement.time_s)
-    if not all(math.isfinite(number) for number in numbers):
-        raise DeviceError(f"the sensor reported {measurement}: not a number")

@@ -17,15 +17,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
+from ntagen.needle.kinematics import Arc
 from ntagen.needle.vectors import add, combine, distance, scale
-from ntagen.scene import Pose, Region, Scene
+from ntagen.scene import Pose, Region, Scene, Vector
 
 _EXPLAINED_MM = 1.0
 """A contact this near to a known detection region is explained by that region."""
 
 _GROWTH_MM = 1.0
 """A contact near a known region makes its shell wider by this length."""
+
+
+EXPECTED_RISE_RATIO = 2.0
+"""Near a known region, the force may rise by this much more than the least rise."""
+
+_OUTSIDE_MM = 0.1
+"""A shell in which the tip lies is made smaller until the tip is this far outside."""
 
 
 def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, ...]:
@@ -95,22 +104,63 @@ class Knowledge:
     contacts: int = 0
 
     def scene(self, tip: Pose, radius_mm: float, depth_mm: float = 0.0) -> Scene:
-        """The known scene, for a needle with this pose and radius, inserted to this depth."""
+        """The known scene, for a needle with this pose and radius, inserted to this depth.
+
+        A shell in which the tip already lies gets smaller: a plan may leave it, but not lead deeper
+        into it.
+        """
         needle_known = self.a_priori.with_needle(tip, radius_mm, depth_mm)
         scene = needle_known.with_regions(*self.learned)
+        scene = replace(
+            scene,
+            detections=tuple(
+                smaller
+                for shell in scene.detections
+                if (smaller := _without(shell, tip.position_mm)) is not None
+            ),
+        )
         return scene.with_targets(scene.targets[self.visited :])
+
+    def expected_force_n(self, tip_mm: Vector, settings: Settings) -> float:
+        """The force that the known regions explain when the tip is here.
+
+        Only regions that the driver was given count: where a learned one lies is a guess.
+        """
+        gain = EXPECTED_RISE_RATIO * settings.force_rise_n_per_mm
+        return max(
+            (
+                gain * max(0.0, self._reach_mm(region, settings) + _EXPLAINED_MM - away_mm)
+                for region in self.a_priori.criticals
+                if (away_mm := distance(tip_mm, region.center_mm)) > region.radius_mm
+            ),
+            default=0.0,
+        )
+
+    def _reach_mm(self, region: Region, settings: Settings) -> float:
+        """The distance from the centre of a known region at which it is felt."""
+        shells = shells_of(region, self.a_priori.detections)
+        alone_mm = region.radius_mm + settings.sensing_margin_mm
+        return max((shell.radius_mm for shell in shells), default=alone_mm)
 
     def visiting(self) -> Knowledge:
         """The knowledge after one more target was reached."""
         return replace(self, visited=self.visited + 1)
 
-    def with_contact(self, tip: Pose, margin_mm: float, radius_mm: float) -> Knowledge:
+    def with_contact(
+        self,
+        tip: Pose,
+        margin_mm: float,
+        radius_mm: float,
+        channels: tuple[Arc, ...] = (),
+    ) -> Knowledge:
         """The knowledge after the force rose.
 
         Args:
-            tip: The tip's pose at the contact.
+            tip: The tip's pose where the force began to rise.
             margin_mm: The expected distance from a region at which the force rises.
             radius_mm: The first radius of an unknown region.
+            channels: What was cut before without a rise: the safe region of the paper. No learned
+                region is put over it.
         """
         contacts = self.contacts + 1
         felt = self._felt(tip, margin_mm)
@@ -119,7 +169,7 @@ class Knowledge:
         else:
             center = combine(1.0, tip.position_mm, margin_mm + radius_mm, tip.heading)
             ball = Region(f"learned {contacts}", "critical", center, radius_mm)
-            learned = self._with_ball(ball, margin_mm)
+            learned = self._with_ball(ball, margin_mm, channels)
         return replace(self, learned=learned, contacts=contacts)
 
     def _felt(self, tip: Pose, margin_mm: float) -> Region | None:
@@ -140,17 +190,23 @@ class Knowledge:
         shell = Region(name, "detection", felt.center_mm, reach_mm, around=felt.name)
         return (*(region for region in self.learned if region.name != name), shell)
 
-    def _with_ball(self, ball: Region, margin_mm: float) -> tuple[Region, ...]:
-        """Adds a ball and its shell; balls whose shells overlap become one."""
+    def _with_ball(
+        self, ball: Region, margin_mm: float, channels: tuple[Arc, ...]
+    ) -> tuple[Region, ...]:
+        """Adds a ball and its shell; balls whose shells overlap become one.
+
+        They stay apart if the ball around them would cover what was cut safely.
+        """
         balls = [region for region in self.learned if region.kind == "critical"]
         apart: list[Region] = []
         pending = [ball]
         while pending:
             current = pending.pop()
             near = [other for other in balls if _overlap(current, other, margin_mm)]
-            balls = [other for other in balls if other not in near]
-            if near:
-                pending.append(_around([current, *near]))
+            joined = _around([current, *near])
+            if near and not _covers(joined, channels):
+                balls = [other for other in balls if other not in near]
+                pending.append(joined)
             else:
                 apart.append(current)
         known = [r for r in self.learned if r.kind == "detection" and r.name.endswith(" felt")]
@@ -160,6 +216,17 @@ class Knowledge:
             for b in kept
         ]
         return (*kept, *shells, *known)
+
+
+def _without(shell: Region, point_mm: Vector) -> Region | None:
+    """The part of a shell that does not contain a point, as a ball; None if that is nothing."""
+    radius_mm = min(shell.radius_mm, distance(point_mm, shell.center_mm) - _OUTSIDE_MM)
+    return replace(shell, radius_mm=radius_mm) if radius_mm > 0.0 else None
+
+
+def _covers(ball: Region, channels: tuple[Arc, ...]) -> bool:
+    """Whether a ball contains a point of a channel."""
+    return any(arc.nearest_to(ball.center_mm).distance_mm <= ball.radius_mm for arc in channels)
 
 
 def _overlap(one: Region, other: Region, margin_mm: float) -> bool:

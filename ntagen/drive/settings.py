@@ -6,6 +6,7 @@ If no source gives a value, the default is our choice; the docstring says so wit
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -26,15 +27,25 @@ class Settings:
             runs need 5.1 s for it and its fit, at 1 mm/s.
         spacing_mm: A push is made in pieces of this length, with a measurement after each. Ours:
             small compared with a detection margin of 2 to 3 mm.
-        deviation_mm: The measured position may differ this much from the prediction. Ours; the
-            authors tried 0 to 10 mm.
-        deviation_count: The number of measurements in a row that must differ for an alarm, so that
-            one bad measurement is not enough.
-        force_n: A force above this is an alarm. The authors used rises of 0.1 to 0.2 in an unknown
-            unit.
+        deviation_mm: The tip may be off the plan by this much, in the mean of the last
+            measurements (`ntagen.drive.deviation`). Ours; the authors tried 0 to 10 mm.
+        deviation_count: The least number of measurements whose mean counts, so that one bad
+            measurement is not enough. With more noise, more of them count.
+        force_sensing: Whether the force is watched. Without it, the driver relies on known regions
+            only.
+        force_n: The rise of the force that must be felt (`ntagen.drive.force`). The authors used
+            rises of 0.1 to 0.2 in an unknown unit.
+        force_noise_n: The standard deviation of a measured force; ours.
+        force_rise_n_per_mm: The least rise of the force on the way towards a region, once it rises;
+            ours.
+        false_alarm: The probability that noise alone stops a run, for the force and for the
+            deviation each; ours.
+        overrun_mm: How far the needle moves on after it was told to stop. 0 for needles that are
+            moved in steps (the virtual ones); 0.8 mm is enough for GRBL at 5 mm/s.
         pull_mm: The length by which the needle is pulled back to readjust. It is fixed, as in the
             paper; the value is ours.
         push_mm: The length of the push before the next estimate; less than `pull_mm`; ours.
+        roll_rad_per_s: The speed of rolls, to know how long a plan takes; ours.
         timeout_s: A run ends after this time (paper, section 4).
         sensing_margin_mm: The expected distance from an unknown region at which the force rises;
             ours.
@@ -48,9 +59,15 @@ class Settings:
     spacing_mm: float = 0.25
     deviation_mm: float = 1.5
     deviation_count: int = 3
+    force_sensing: bool = True
     force_n: float = 0.1
+    force_noise_n: float = 0.01
+    force_rise_n_per_mm: float = 0.5
+    false_alarm: float = 0.001
+    overrun_mm: float = 0.0
     pull_mm: float = 10.0
     push_mm: float = 2.0
+    roll_rad_per_s: float = math.pi
     timeout_s: float = 120.0
     sensing_margin_mm: float = 3.0
     learned_radius_mm: float = 2.0
@@ -78,6 +95,10 @@ class Settings:
             )
         parse_ranking(",".join(self.ranking))
 
+    def with_spacing(self, spacing_mm: float) -> Settings:
+        """The same settings with pushes of another length."""
+        return dataclasses.replace(self, spacing_mm=spacing_mm)
+
     def to_json(self) -> dict[str, Any]:
         """The settings as JSON."""
         return dataclasses.asdict(self)
@@ -102,6 +123,10 @@ _LEAST: Final = {
     "spacing_mm": 0.01,
     "learned_radius_mm": 0.01,
     "deviation_count": 1.0,
+    "force_n": 1e-6,
+    "force_rise_n_per_mm": 1e-6,
+    "false_alarm": 1e-9,
+    "roll_rad_per_s": 1e-3,
     **dict.fromkeys((field.name for field in dataclasses.fields(Priors)), 1e-12),
     # Without drift or lag the needle is as the paper has it.
     **dict.fromkeys(("curvature_drift", "turn_drift_rad", "lag_rad"), 0.0),

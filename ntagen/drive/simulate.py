@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from ntagen.drive.controller import Controller
+from ntagen.drive.force import fitting_spacing_mm
 from ntagen.drive.knowledge import sensing_margin_mm, told
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
 from ntagen.drive.settings import Settings
@@ -85,12 +86,33 @@ def simulate(
     )
 
 
-def settings_for(settings: Settings, errors: Errors) -> Settings:
-    """The settings with priors that fit the needle's errors, as after a calibration."""
-    priors = settings.priors
-    roll_rad = max(priors.roll_rad, errors.roll_rad)
-    noise_mm = max(priors.noise_mm, errors.noise_mm)
-    return replace(settings, priors=replace(priors, roll_rad=roll_rad, noise_mm=noise_mm))
+def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -> Settings:
+    """The settings that fit the virtual needle and the scene, as after a calibration.
+
+    The priors are at least the needle's errors. The sensing margin is that of the thinnest shell in
+    the scene. If the driver does not know all regions, pushes become so short that it feels a
+    region before it can pierce it.
+
+    Raises:
+        InputError: No push is short enough for that.
+    """
+    priors = replace(
+        settings.priors,
+        roll_rad=max(settings.priors.roll_rad, errors.roll_rad),
+        noise_mm=max(settings.priors.noise_mm, errors.noise_mm),
+    )
+    margin_mm = min(
+        (
+            sensing_margin_mm(region, scene.detections, settings.sensing_margin_mm)
+            for region in scene.criticals
+        ),
+        default=settings.sensing_margin_mm,
+    )
+    margin_mm = min(margin_mm, settings.sensing_margin_mm)
+    settings = replace(settings, priors=priors, sensing_margin_mm=margin_mm)
+    if known == "all" or not settings.force_sensing:
+        return settings
+    return settings.with_spacing(fitting_spacing_mm(settings, margin_mm, scene.needle.length_mm))
 
 
 class _Witness:

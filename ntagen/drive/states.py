@@ -2,15 +2,23 @@
 
 ::
 
-    arm ─▶ initial push ─▶ estimate ─▶ synthesise ─▶ execute ⇄ monitor
-                              ▲            │             │  deviation, force
-                              │            │ from farther back             ▼
-                              └── push ◀── pull back ◀─────────────────── stop
+                       initial push
+                        │        ▲ first time
+                        ▼        │
+    arm ───────────▶ estimate ─▶ synthesise ─▶ execute ⇄ monitor
+                        ▲            │             │  deviation, force
+                        │            │ from farther back             ▼
+                        └── push ◀── pull back ◀─────────────────── stop
+
+The initial push belongs to a plan: the first synthesis is made before anything moves. Only if it
+finds no plan, and the push is proven to be free of known regions, it is made without one: what it
+tells about the needle may give a plan.
 
 Each state is a task that ends with one of its events; the table gives the next state. `EVENTS`
 lists the events of each state, and `TRANSITIONS` has exactly one entry for each pair of state and
 event: nothing is undefined. Time-out, device fault and interruption can end every task; each has
-its own final state, with the needle stopped.
+its own final state, with the needle stopped. That there is no plan has three final states: the
+model has none, none holds in exact kinematics, or none can end in time.
 """
 
 from __future__ import annotations
@@ -35,6 +43,8 @@ class State(Enum):
 
     TARGET_REACHED = "target reached"
     NO_STRATEGY = "no strategy"
+    NONE_HOLDS = "no strategy that holds"
+    NO_TIME_LEFT = "no strategy in the time left"
     TIMED_OUT = "time-out"
     FAULTED = "device fault"
     INTERRUPTED = "interrupted"
@@ -48,9 +58,13 @@ class Event(Enum):
     PUSHED = "pushed"
     ESTIMATED = "estimated"
     IN_TARGET = "in the last target"
+    FIRST_STRATEGY = "strategy from the entry"
+    PUSH_IS_FREE = "no strategy from the entry, and the first push is free of known regions"
     STRATEGY_FOUND = "strategy found"
     STRATEGY_BEHIND = "strategy from farther back"
     NO_STRATEGY = "no strategy, even from the entry"
+    NONE_HOLDS = "no strategy that holds, even from the entry"
+    NO_TIME_LEFT = "no strategy that ends in time"
     ACTED = "acted"
     PLAN_DONE = "plan done"
     AS_PREDICTED = "as predicted"
@@ -68,6 +82,8 @@ ENDS: Final = frozenset(
     {
         State.TARGET_REACHED,
         State.NO_STRATEGY,
+        State.NONE_HOLDS,
+        State.NO_TIME_LEFT,
         State.TIMED_OUT,
         State.FAULTED,
         State.INTERRUPTED,
@@ -83,7 +99,9 @@ ABORTS: Final = {
 """The events that can end every task, and the states to which they lead."""
 
 _WORKFLOW: Final = {
-    (State.ARM, Event.ARMED): State.INITIAL_PUSH,
+    (State.ARM, Event.ARMED): State.ESTIMATE,
+    (State.SYNTHESISE, Event.FIRST_STRATEGY): State.INITIAL_PUSH,
+    (State.SYNTHESISE, Event.PUSH_IS_FREE): State.INITIAL_PUSH,
     (State.INITIAL_PUSH, Event.PUSHED): State.ESTIMATE,
     (State.INITIAL_PUSH, Event.FORCE): State.STOP,
     (State.ESTIMATE, Event.ESTIMATED): State.SYNTHESISE,
@@ -91,6 +109,8 @@ _WORKFLOW: Final = {
     (State.SYNTHESISE, Event.STRATEGY_FOUND): State.EXECUTE,
     (State.SYNTHESISE, Event.STRATEGY_BEHIND): State.PULL_BACK,
     (State.SYNTHESISE, Event.NO_STRATEGY): State.NO_STRATEGY,
+    (State.SYNTHESISE, Event.NONE_HOLDS): State.NONE_HOLDS,
+    (State.SYNTHESISE, Event.NO_TIME_LEFT): State.NO_TIME_LEFT,
     (State.EXECUTE, Event.ACTED): State.MONITOR,
     (State.EXECUTE, Event.PLAN_DONE): State.ESTIMATE,
     (State.MONITOR, Event.AS_PREDICTED): State.EXECUTE,

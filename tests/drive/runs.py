@@ -55,7 +55,7 @@ def drive(
     result = simulate(
         scene,
         synthesise,
-        settings_for(settings or Settings(), errors),
+        settings_for(settings or Settings(), errors, scene, known),
         diary,
         known=known,
         errors=errors,

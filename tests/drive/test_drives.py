@@ -15,7 +15,7 @@ from ntagen.errors import DeviceError, LimitError, ModelError
 from ntagen.needle.virtual import Errors, SimulatedClock, VirtualNeedle
 from ntagen.nsl import load
 from ntagen.plan.synthesise import Synthesis
-from ntagen.scene import Scene
+from ntagen.scene import Region, Scene
 from tests.drive.runs import Diary, drive
 from tests.oracles.synthesiser import oracle_synthesis
 from tests.steering import HIDDEN, PAPER, scene, sphere
@@ -109,22 +109,83 @@ def test_several_targets_are_visited_in_their_order() -> None:
     far = sphere("far", "target", (0.0, -45.0, 0.0), 8.0)
     result, diary = drive(scene(targets=[near, far]))
     assert result.ended.outcome == State.TARGET_REACHED.value
-    assert len(diary.syntheses) == 1
+    # From the entry, and after the initial push.
+    assert len(diary.syntheses) == 2
 
 
-def test_the_time_limit_ends_the_run_with_the_needle_stopped() -> None:
-    result, diary = drive(PAPER, settings=Settings(timeout_s=3.0))
+def test_the_time_limit_ends_the_run_with_the_needle_stopped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Slow(VirtualNeedle):
+        """A needle that needs twice as long as it is said to."""
+
+        def push(self, length_mm: float) -> None:
+            super().push(length_mm)
+            self._clock.advance(length_mm / self._needle.speed_mm_per_s)
+
+    monkeypatch.setattr("ntagen.drive.simulate.VirtualNeedle", Slow)
+    result, diary = drive(PAPER, settings=Settings(timeout_s=60.0))
     assert result.ended.outcome == State.TIMED_OUT.value
-    assert result.ended.time_s == pytest.approx(3.0, abs=0.5)
+    # At most one push or roll begins before the limit and ends after it.
+    assert 60.0 <= result.ended.time_s <= 60.0 + 1.5
     assert diary.of(Command)[-1].kind == "stop"
 
 
 def test_plans_that_the_time_limit_would_cut_are_not_begun() -> None:
     result, diary = drive(PAPER, settings=Settings(timeout_s=30.0))
-    assert result.ended.outcome == State.NO_STRATEGY.value
+    assert result.ended.outcome == State.NO_TIME_LEFT.value
     assert diary.of(Synthesised)[0].found > 0
     assert diary.of(Synthesised)[0].accepted == 0
-    assert result.ended.depth_mm == pytest.approx(5.0)
+    assert result.ended.depth_mm == 0.0
+
+
+def test_rolls_take_time_too() -> None:
+    shortest_s = (
+        min(candidate.plan.length_mm for candidate in oracle_synthesis(PAPER).candidates)
+        / PAPER.needle.speed_mm_per_s
+    )
+    slow = Settings(timeout_s=shortest_s + 1.0, roll_rad_per_s=0.1)
+    result, diary = drive(PAPER, settings=slow)
+    assert result.ended.outcome == State.NO_TIME_LEFT.value
+    assert not [c for c in diary.of(Command) if c.kind != "stop"]
+
+
+def test_the_first_push_belongs_to_a_plan() -> None:
+    beside = sphere("K", "critical", (0.0, -4.9, -0.75), 0.5)
+    for seed in range(1, 4):
+        result, diary = drive(scene(beside), noise_mm=0.05, seed=seed)
+        assert result.ended.outcome == State.TARGET_REACHED.value
+        assert result.clearance_mm > 0.0
+        # From the entry the plans that hold roll first.
+        assert diary.of(Command)[0].kind == "roll"
+        events = [t.event for t in diary.of(Transition)]
+        assert Event.FIRST_STRATEGY.value in events
+
+
+def test_without_a_plan_a_push_near_a_known_region_is_not_made() -> None:
+    # The target lies behind the needle: no plan leads there.
+    behind = sphere("T", "target", (0.0, 40.0, 0.0), 5.0)
+    near = sphere("K", "critical", (0.0, -4.9, -0.75), 0.5)
+    free, _ = drive(scene(targets=[behind]))
+    assert (free.ended.outcome, free.ended.depth_mm) == (State.NO_STRATEGY.value, 5.0)
+    refused, _ = drive(scene(near, targets=[behind]))
+    assert (refused.ended.outcome, refused.ended.depth_mm) == (State.NO_STRATEGY.value, 0.0)
+
+
+def test_a_shell_around_the_entry_may_be_left() -> None:
+    beside = sphere("K", "critical", (3.0, 1.0, 0.0), 1.5)
+    shell = Region("D", "detection", (3.0, 1.0, 0.0), 4.5, around="K")
+    for seed in range(1, 4):
+        result, _ = drive(scene(beside, shell), noise_mm=0.1, seed=seed)
+        assert result.ended.outcome == State.TARGET_REACHED.value
+        assert result.clearance_mm > 0.0
+
+
+@pytest.mark.parametrize("noise_mm", [0.5, 1.0, 2.0])
+def test_noise_that_the_estimator_knows_is_no_deviation(noise_mm: float) -> None:
+    result, diary = drive(PAPER, noise_mm=noise_mm, seed=3)
+    assert Event.DEVIATION.value not in [t.event for t in diary.of(Transition)]
+    assert result.ended.outcome == State.TARGET_REACHED.value
 
 
 def test_pulling_back_stays_in_the_channel_and_undoes_rolls() -> None:
@@ -156,6 +217,7 @@ def test_plans_that_fail_their_certificate_are_not_driven() -> None:
     result, diary = drive(where, settings=Settings(initial_push_mm=2.0))
     assert diary.of(Synthesised)[0].found > 0
     assert diary.of(Synthesised)[0].accepted < diary.of(Synthesised)[0].found
+    assert result.ended.outcome in (State.NONE_HOLDS.value, State.TARGET_REACHED.value)
     assert result.clearance_mm > 0.0
 
 

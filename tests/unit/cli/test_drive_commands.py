@@ -33,7 +33,8 @@ def test_drive_reaches_the_target_and_tells_how(capsys: pytest.CaptureFixture[st
     assert main(["drive", PAPER, "--seed", "1"]) == 0
     out = capsys.readouterr().out
     assert "initial push" in out
-    assert "synthesis 1 from 5.00 mm deep" in out
+    assert "synthesis 1 from 0.00 mm deep" in out
+    assert "synthesis 2 from 5.00 mm deep" in out
     assert "target reached: the tip is in the last target" in out
     assert "mm inside T1" in out
 
@@ -46,8 +47,9 @@ def test_drive_says_that_there_is_no_strategy(capsys: pytest.CaptureFixture[str]
 
 
 def test_drive_ends_at_the_time_limit(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["drive", PAPER, "--timeout", "0.05 min", "--quiet"]) == 3
-    assert capsys.readouterr().out == "time-out: the limit of 3 s is over\n"
+    assert main(["drive", PAPER, "--timeout", "0.05 min", "--quiet"]) == 6
+    out = capsys.readouterr().out
+    assert out == "no strategy in the time left: no plan can end within the time limit\n"
 
 
 def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -> None:

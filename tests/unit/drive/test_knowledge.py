@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ntagen.drive.knowledge import Knowledge, sensing_margin_mm, shells_of, told
+from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
+from ntagen.needle.kinematics import Arc
 from ntagen.needle.vectors import distance
 from ntagen.scene import Pose, Region
 from tests.steering import CRITICAL, DETECTION, ENTRY, PAPER, scene, sphere
@@ -115,3 +119,34 @@ def test_visited_targets_are_planned_for_no_more() -> None:
     far = sphere("far", "target", (0.0, -20.0, 0.0), 3.0)
     knowledge = Knowledge(scene(targets=[near, far])).visiting()
     assert knowledge.scene(ENTRY, 30.0).targets == (far,)
+
+
+def test_what_was_cut_safely_is_never_covered_by_a_learned_region() -> None:
+    channel = (Arc(pose_at(4.0, 0.0, 0.0), math.inf, 40.0),)
+    places = [(0.0, -10.0, 0.0), (8.0, -10.0, 0.0)]
+    free, beside = Knowledge(scene()), Knowledge(scene())
+    for place in places:
+        free = free.with_contact(pose_at(*place), 3.0, 2.0)
+        beside = beside.with_contact(pose_at(*place), 3.0, 2.0, channel)
+    (joined,) = (region for region in free.learned if region.kind == "critical")
+    assert channel[0].nearest_to(joined.center_mm).distance_mm < joined.radius_mm
+    balls = [region for region in beside.learned if region.kind == "critical"]
+    assert len(balls) == 2
+    for ball in balls:
+        assert channel[0].nearest_to(ball.center_mm).distance_mm > ball.radius_mm
+
+
+def test_a_plan_may_leave_a_shell_but_not_lead_deeper_into_it() -> None:
+    inside = pose_at(0.0, -21.0, 0.0)
+    (shell,) = Knowledge(PAPER).scene(inside, 30.0).detections
+    assert shell.radius_mm == pytest.approx(4.0 - 0.1)
+    (whole,) = Knowledge(PAPER).scene(pose_at(0.0, 0.0, 0.0), 30.0).detections
+    assert whole.radius_mm == 5.0
+
+
+def test_known_regions_explain_a_rise_up_to_their_surface() -> None:
+    knowledge, settings = Knowledge(PAPER), Settings()
+    forces = [
+        knowledge.expected_force_n((0.0, -25.0 + away, 0.0), settings) for away in (9.0, 5.5, 3.0)
+    ]
+    assert forces[0] == 0.0 < forces[1] < forces[2]

@@ -1,0 +1,184 @@
+"""The needle in the driver's hands: every command and every reading goes through here.
+
+A command reaches the journal first, then the estimator and the path, then the device. So nothing
+moves that the log does not tell. A motion counts as made when it is commanded: nobody knows how far
+the needle got if a motion failed.
+
+Invariant: `Steering.path` is the channel in which the needle lies, by the last estimate and by all
+commands after it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from ntagen.drive.device import Device
+from ntagen.drive.records import Command, Estimated, Journal, Measured
+from ntagen.drive.settings import Settings
+from ntagen.errors import DeviceError
+from ntagen.needle.estimate import Estimate, Estimator
+from ntagen.needle.kinematics import Arc
+from ntagen.needle.measurement import Measurement
+from ntagen.needle.path import Path
+from ntagen.scene import Needle
+
+_ROLL_NEGLIGIBLE_RAD: Final = 1e-9
+
+
+class Steering:
+    """A needle that is steered, and what is known of where it is.
+
+    Args:
+        needle: The needle at the entry, as the scene describes it.
+        device: The needle.
+        settings: How to drive.
+        journal: Records commands, measurements and estimates.
+        listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
+    """
+
+    def __init__(
+        self,
+        needle: Needle,
+        device: Device,
+        settings: Settings,
+        journal: Journal,
+        listen: Callable[[], None],
+    ) -> None:
+        self._device = device
+        self._journal = journal
+        self._listen = listen
+        self._estimator = Estimator(needle.tip, needle.radius_mm, settings.priors)
+        self._radius_mm = needle.radius_mm
+        self._cut_mm = 0.0
+        self._left: tuple[Arc, ...] = ()
+        self.path = Path(needle.tip)
+        self.measurement: Measurement | None = None
+        self.estimate: Estimate | None = None
+
+    @property
+    def depth_mm(self) -> float:
+        """The commanded insertion depth."""
+        return self.path.depth_mm
+
+    @property
+    def cuts(self) -> bool:
+        """Whether the tip is at the end of its channel, so that the next push cuts."""
+        return self.path.depth_mm >= self._cut_mm - 1e-9
+
+    def now_s(self) -> float:
+        """The time on the device's clock."""
+        return self._device.now_s()
+
+    def push(self, length_mm: float) -> None:
+        """Inserts the needle."""
+        self._command("push", length_mm)
+        self._estimator.push(length_mm)
+        self.path = self.path.push(self._radius_mm, length_mm)
+        self._cut_mm = max(self._cut_mm, self.path.depth_mm)
+        self._device.push(length_mm)
+
+    def roll(self, angle_rad: float) -> None:
+        """Turns the needle: the next push leaves the old channel, if it lies in one."""
+        self._turn(angle_rad)
+        self._cut_mm = min(self._cut_mm, self.path.depth_mm)
+
+    def _turn(self, angle_rad: float) -> None:
+        self._command("roll", angle_rad)
+        self._estimator.roll(angle_rad)
+        self.path = self.path.roll(angle_rad)
+        self._device.roll(angle_rad)
+
+    @property
+    def channels(self) -> tuple[Arc, ...]:
+        """All arcs that were cut, by the estimates at their times, also those that were left."""
+        return (*self._left, *self.path.arcs)
+
+    def pull(self, length_mm: float) -> None:
+        """Pulls the needle back along its channel."""
+        self._left += self.path.arcs
+        self._command("pull", length_mm)
+        self._estimator.pull(length_mm)
+        self.path = self.path.pull(length_mm)
+        self._device.pull(length_mm)
+
+    def undo_roll(self) -> None:
+        """Undoes the rolls at or beyond this place, so that the tip fits its channel again."""
+        angle_rad = math.remainder(self.path.pending_roll_rad, 2.0 * math.pi)
+        if abs(angle_rad) > _ROLL_NEGLIGIBLE_RAD:
+            self._turn(-angle_rad)
+
+    def pull_back_to(self, depth_mm: float) -> None:
+        """Pulls the needle back to this depth in its channel, and undoes rolls where they were."""
+        while self.path.depth_mm > depth_mm + 1e-9:
+            self.undo_roll()
+            last_mm = self.path.stretches[-1].arc.length_mm
+            self.pull(min(last_mm, self.path.depth_mm - depth_mm))
+        self.undo_roll()
+
+    def measure(self) -> Measurement:
+        """Measures the needle now.
+
+        Raises:
+            DeviceError: There is no reading, or it is not a number.
+        """
+        measurement = self._device.measure()
+        _require_finite(measurement)
+        self.measurement = measurement
+        self._estimator.measure(measurement)
+        self._journal.record(
+            Measured(
+                time_s=measurement.time_s,
+                depth_mm=self.path.depth_mm,
+                position_mm=measurement.position_mm,
+                force_n=measurement.force_n,
+                heading=measurement.heading or (),
+                bevel=measurement.bevel or (),
+            )
+        )
+        return measurement
+
+    def estimated(self) -> Estimate:
+        """Estimates pose and circle from all commands and measurements, and records that."""
+        estimate = self._estimator.estimate()
+        self.estimate = estimate
+        self.path = estimate.path
+        self._radius_mm = estimate.radius_mm
+        tip = estimate.tip
+        self._journal.record(
+            Estimated(
+                self.now_s(),
+                tip.position_mm,
+                tip.heading,
+                tip.bevel,
+                estimate.radius_mm,
+                estimate.radius_std_mm,
+                estimate.rms_mm,
+            )
+        )
+        return estimate
+
+    def glance(self) -> Estimate:
+        """An estimate now that changes nothing: path, record and radius stay."""
+        return self._estimator.estimate()
+
+    def stop(self) -> None:
+        """Records the stop, and stops the needle."""
+        self._journal.record(Command(self.now_s(), "stop", 0.0))
+        self._device.stop()
+
+    def stop_at_once(self) -> None:
+        """Stops the needle without a record: for ends in which the journal may fail."""
+        self._device.stop()
+
+    def _command(self, kind: str, value: float) -> None:
+        """Records a motion that begins now, unless somebody wants the run to end."""
+        self._listen()
+        self._journal.record(Command(self.now_s(), kind, value))
+
+
+def _require_finite(measurement: Measurement) -> None:
+    numbers = (*measurement.position_mm, measurement.force_n, measurement.time_s)
+    if not all(math.isfinite(number) for number in numbers):
+        raise DeviceError(f"the sensor reported {measurement}: not a number")

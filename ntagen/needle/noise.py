@@ -1,0 +1,14 @@
+"""What noise alone does to measured positions."""
+
+from __future__ import annotations
+
+
+def squared_length_bound(probability: float) -> float:
+    """The squared length that a noise vector passes with this probability.
+
+    The vector has three independent coordinates with mean 0 and standard deviation 1, so that its
+    squared length has a chi-square distribution with three degrees of freedom.
+    """
+    from scipy.stats import chi2  # type: ignore[import-untyped]
+
+    return float(chi2.isf(probability, 3))

@@ -1,0 +1,86 @@
+"""The force as a signal: false alarms, what is felt in time, where a rise began."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ntagen.drive.force import ForceMonitor, PageTest, fitting_spacing_mm
+from ntagen.drive.settings import Settings
+from ntagen.errors import InputError
+
+LENGTH_MM = 100.0
+SETTINGS = Settings(force_noise_n=0.05, false_alarm=0.05)
+
+
+def readings(seed: int, friction_n_per_mm: float, start_mm: float = 1e9) -> np.ndarray:
+    """Forces of an insertion: an offset, friction, noise, and a rise of 1 N/mm from a depth on."""
+    depths = np.arange(0.0, LENGTH_MM, SETTINGS.spacing_mm)
+    noise = np.random.default_rng(seed).normal(0.0, SETTINGS.force_noise_n, len(depths))
+    return 0.3 + friction_n_per_mm * depths + np.maximum(0.0, depths - start_mm) + noise
+
+
+def first_alarm(forces: np.ndarray) -> tuple[float, float] | None:
+    """Where a rise is felt for sure, and where it began."""
+    monitor = ForceMonitor(SETTINGS, LENGTH_MM)
+    for index, force_n in enumerate(forces):
+        rise = monitor.note(index * SETTINGS.spacing_mm, float(force_n))
+        if rise is not None:
+            return rise.felt_mm, rise.began_mm
+    return None
+
+
+@pytest.mark.parametrize("friction_n_per_mm", [0.0, 0.02])
+def test_noise_and_friction_alone_alarm_as_seldom_as_stated(friction_n_per_mm: float) -> None:
+    runs = 400
+    alarms = sum(first_alarm(readings(seed, friction_n_per_mm)) is not None for seed in range(runs))
+    # Five standard deviations above the stated rate.
+    rate = SETTINGS.false_alarm
+    assert alarms <= runs * rate + 5.0 * (runs * rate * (1.0 - rate)) ** 0.5
+
+
+@pytest.mark.parametrize("start_mm", [20.0, 61.0])
+def test_a_rise_is_felt_soon_and_its_beginning_is_found(start_mm: float) -> None:
+    for seed in range(50):
+        alarm = first_alarm(readings(seed, 0.02, start_mm))
+        assert alarm is not None
+        felt_mm, began_mm = alarm
+        # The sum may have left 0 by noise a few readings before.
+        assert start_mm - 3.0 <= began_mm <= felt_mm <= start_mm + 1.0
+
+
+def test_the_bound_gives_the_false_alarms_of_a_simulation() -> None:
+    test = PageTest.of(replace(SETTINGS, false_alarm=1.0), LENGTH_MM)
+    rng = np.random.default_rng(1)
+    lengths = []
+    for _ in range(300):
+        total, count = 0.0, 0
+        while total <= test.bound:
+            total = max(0.0, total + rng.normal() - test.slack)
+            count += 1
+        lengths.append(count)
+    wanted = LENGTH_MM / SETTINGS.spacing_mm
+    assert 0.7 * wanted <= np.mean(lengths) <= 1.4 * wanted
+
+
+def test_a_rise_that_is_allowed_is_no_alarm_and_teaches_nothing() -> None:
+    monitor = ForceMonitor(Settings(), LENGTH_MM)
+    for index in range(40):
+        assert monitor.note(0.25 * index, 0.0) is None
+    for index in range(40, 60):
+        assert monitor.note(0.25 * index, 1.0, allowed_n=1.5) is None
+    assert monitor.expected_n(15.0) == pytest.approx(0.0)
+    assert monitor.note(15.0, 1.0) is not None
+
+
+def test_thin_margins_need_short_pushes_and_too_thin_ones_are_refused() -> None:
+    settings = Settings()
+    assert fitting_spacing_mm(settings, 3.0, LENGTH_MM) == settings.spacing_mm
+    assert fitting_spacing_mm(settings, 0.2, LENGTH_MM) < settings.spacing_mm
+    with pytest.raises(InputError, match="could be pierced before it is felt"):
+        fitting_spacing_mm(settings, 0.05, LENGTH_MM)
+    # The way that the needle moves on after a stop counts.
+    with pytest.raises(InputError, match="stops"):
+        fitting_spacing_mm(replace(settings, overrun_mm=0.8), 0.8, LENGTH_MM)
