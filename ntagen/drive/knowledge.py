@@ -30,6 +30,9 @@ _GROWTH_MM = 1.0
 """A contact near a known region makes its shell wider by this length."""
 
 
+_SURELY_KNOWN_MM = 0.25
+"""A tip that is measured without noise is known this well."""
+
 EXPECTED_RISE_RATIO = 2.0
 """Near a known region, the force may rise by this much more than the least rise."""
 
@@ -126,10 +129,11 @@ class Knowledge:
 
         Only regions that the driver was given count: where a learned one lies is a guess.
         """
+        unsure_mm = min(_EXPLAINED_MM, _SURELY_KNOWN_MM + settings.priors.noise_mm)
         gain = EXPECTED_RISE_RATIO * settings.force_rise_n_per_mm
         return max(
             (
-                gain * max(0.0, self._reach_mm(region, settings) + _EXPLAINED_MM - away_mm)
+                gain * max(0.0, self._reach_mm(region, settings) + unsure_mm - away_mm)
                 for region in self.a_priori.criticals
                 if (away_mm := distance(tip_mm, region.center_mm)) > region.radius_mm
             ),

@@ -64,9 +64,11 @@ def check_felt_and_avoided(noise_mm: float, seed: int) -> None:
     forces = [m.force_n for m in diary.of(Measured)]
     events = [t.event for t in diary.of(Transition)]
     assert Event.FORCE.value in events
-    # Felt within a fraction of the margin: threshold and one piece of a push.
-    assert max(forces) <= 0.1 + 0.25 + 1e-9
-    assert result.clearance_mm >= 3.0 - 0.1 - 0.25 - 1e-9
+    # Felt within a fraction of the margin: threshold, one piece of a push, and what the known
+    # region beside it explains.
+    felt_mm = 0.1 + 0.25 + (0.25 + noise_mm)
+    assert max(forces) <= felt_mm + 1e-9
+    assert result.clearance_mm >= 3.0 - felt_mm - 1e-9
     assert diary.of(Learned)
     assert result.ended.adjustments >= 1
     assert result.ended.outcome == State.TARGET_REACHED.value
