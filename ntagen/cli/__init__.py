@@ -37,6 +37,7 @@ COMMANDS: Final = {
     "explain": "Explain a diagnostic: what it means and how to fix it.",
     "plot": "Draw a scene, its plans or a run.",
     "drive": "Steer a needle to the target and log the run.",
+    "calibrate": "Find where the scene lies for a tracker, from pairs of points.",
     "replay": "Repeat the decisions of a logged run and compare them.",
     "fmt": "Format environment files.",
 }

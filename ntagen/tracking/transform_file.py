@@ -1,0 +1,84 @@
+"""The file of a registration: JSON that `ntagen calibrate` writes and `ntagen drive` reads."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any, Final
+
+from ntagen.errors import InputError
+from ntagen.files import read_file
+from ntagen.needle.vectors import cross, dot
+from ntagen.scene import Vector
+from ntagen.tracking.frames import Transform
+from ntagen.tracking.registration import Fit
+
+FORMAT: Final = "ntagen-registration"
+VERSION: Final = 1
+
+_LARGEST_BYTES: Final = 2**20
+_TOLERANCE: Final = 1e-6
+
+
+def to_json(fit: Fit) -> dict[str, Any]:
+    """The document of a registration, with its errors."""
+    transform = fit.transform
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "from": transform.source,
+        "to": transform.target,
+        "rotation": [list(row) for row in transform.rotation],
+        "translation_mm": list(transform.translation_mm),
+        "fre_mm": fit.fre_mm,
+        "fle_mm": fit.fle_mm,
+        "points": [
+            {"name": name, "residual_mm": residual_mm, "left_out_mm": left_out_mm}
+            for name, residual_mm, left_out_mm in zip(
+                fit.names, fit.residuals_mm, fit.left_out_mm, strict=True
+            )
+        ],
+    }
+
+
+def read_transform(path: Path) -> Transform:
+    """The transform in the file of a registration.
+
+    Raises:
+        InputError: The file cannot be read, or its transform is not rigid.
+    """
+    try:
+        document = json.loads(read_file(path, _LARGEST_BYTES))
+        if document["format"] != FORMAT or document["version"] != VERSION:
+            raise ValueError("it has another format or version")
+        x, y, z = (_vector(row) for row in document["rotation"])
+        transform = Transform(
+            str(document["from"]),
+            str(document["to"]),
+            (x, y, z),
+            _vector(document["translation_mm"]),
+        )
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise InputError(
+            f"{path}: this is not a registration: {error}\n"
+            "hint: make one with `ntagen calibrate POINTS -o FILE`"
+        ) from None
+    products = [
+        dot(x, x) - 1.0,
+        dot(y, y) - 1.0,
+        dot(x, y),
+        *(a - b for a, b in zip(cross(x, y), z, strict=True)),
+    ]
+    if max(abs(one) for one in products) > _TOLERANCE:
+        raise InputError(f"{path}: the rotation is not a rotation: it scales, shears or mirrors")
+    return transform
+
+
+def _vector(values: Any) -> Vector:  # noqa: ANN401  from JSON
+    x, y, z = (float(value) for value in values)
+    if not all(map(math.isfinite, (x, y, z))):
+        raise ValueError("a number is not finite")
+    return (x, y, z)
