@@ -12,6 +12,7 @@ protocol shows that a silent peer is alive, so that silence is the only sign of 
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 import socket
 import threading
@@ -156,22 +157,33 @@ class Client:
     ) -> None:
         self.close()
 
-    def pose(self, device: str | None = None, *, after_s: float | None = None) -> Sample[Pose]:
+    def now_s(self) -> float:
+        """The clock of all times of receipt: monotonic, of this machine."""
+        return time.monotonic()
+
+    def pose(
+        self, device: str | None = None, *, after_s: float | None = None, any_age: bool = False
+    ) -> Sample[Pose]:
         """The newest sample that says where a device is; waits for it for `Policy.stale_s`.
 
         Args:
             device: The name of the device; `None` if the server sends only one.
             after_s: The sample must have come after this time on the monotonic clock; by default
                 it must be younger than `Policy.stale_s`.
+            any_age: Whether a sample of any age will do, as long as the connection stands.
 
         Raises:
             DeviceError: There is no such sample in this time.
         """
-        return self._newest(self._poses, device, after_s, "position")
+        return self._newest(self._poses, device, -math.inf if any_age else after_s, "position")
 
-    def sensor(self, device: str | None = None, *, after_s: float | None = None) -> Sample[Sensor]:
+    def sensor(
+        self, device: str | None = None, *, after_s: float | None = None, any_age: bool = False
+    ) -> Sample[Sensor]:
         """The newest reading of a sensor, as `pose`."""
-        return self._newest(self._sensors, device, after_s, "sensor reading")
+        return self._newest(
+            self._sensors, device, -math.inf if any_age else after_s, "sensor reading"
+        )
 
     def status(self, device: str) -> Sample[Status] | None:
         """The newest STATUS of a device, of any age; `None` if there was none."""
@@ -221,7 +233,8 @@ class Client:
                 sample = (
                     _only(samples, self._place, what) if device is None else samples.get(device)
                 )
-                if sample is not None and sample.received_s > least_s:
+                # A sample of a connection that is lost says nothing, even if it is young.
+                if sample is not None and sample.received_s > least_s and not self._trouble:
                     return sample
                 if now_s >= end_s or self._ended:
                     raise DeviceError(self._why(samples, device, what, now_s))

@@ -71,7 +71,7 @@ def read_points(path: Path, frames: Iterator[str]) -> list[Points]:
         InputError: The file cannot be read, has a mistake, or nobody says its frame.
     """
     name = path.name.lower()
-    text = _text(path)
+    text = text_of(path)
     if name.endswith(".fcsv"):
         return [_fcsv(path, text, frames)]
     if name.endswith(".json"):
@@ -117,7 +117,33 @@ def pair(source: Points, target: Points, *, by_order: bool = False) -> Pairs:
     )
 
 
-def _text(path: Path) -> str:
+def axis_columns(path: Path, head: Sequence[str]) -> dict[str, list[tuple[int, float]]]:
+    """By frame, the columns of x, y and z, with the millimetres in their units.
+
+    Raises:
+        InputError: There are none, or one of three is missing.
+    """
+    axes: dict[str, dict[str, tuple[int, float]]] = {}
+    for index, cell in enumerate(head):
+        match = _AXIS.fullmatch(cell)
+        if match:
+            of_frame = axes.setdefault(match["frame"] or "", {})
+            of_frame[match["axis"].lower()] = (index, MM_PER[match["unit"].lower()])
+    if not axes or any(set(one) != set("xyz") for one in axes.values()):
+        raise InputError(
+            f"{path}:1: the columns are {', '.join(head)}\n"
+            "hint: name them x_mm, y_mm, z_mm, or with frames: tracker_x_mm, …, scene_x_mm, …; "
+            "units are mm, cm, m, um; names of points are in the column name"
+        )
+    return {frame: [one[axis] for axis in "xyz"] for frame, one in axes.items()}
+
+
+def text_of(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        InputError: It cannot be read, or is no text.
+    """
     try:
         return read_file(path, LARGEST_BYTES).decode("utf-8-sig")
     except OSError as error:
@@ -209,7 +235,7 @@ def _csv(path: Path, text: str, frames: Iterator[str]) -> list[Points]:
     if not rows:
         raise InputError(f"{path}: this file is empty")
     head = [cell.strip() for cell in rows[0][1]]
-    sets = _columns(path, head)
+    sets = axis_columns(path, head)
     named = next((head.index(word) for word in _NAMES if word in head), None)
     found: dict[str, dict[str, Vector]] = {prefix: {} for prefix in sets}
     for count, (number, row) in enumerate(rows[1:], start=1):
@@ -223,23 +249,6 @@ def _csv(path: Path, text: str, frames: Iterator[str]) -> list[Points]:
             ]
             _add(found[prefix], name, _scaled(numbers, 1.0), place)
     return [Points(_frame(path, prefix or None, frames), found[prefix]) for prefix in sets]
-
-
-def _columns(path: Path, head: Sequence[str]) -> dict[str, list[tuple[int, float]]]:
-    """By frame, the columns of x, y and z, with the millimetres in their units."""
-    axes: dict[str, dict[str, tuple[int, float]]] = {}
-    for index, cell in enumerate(head):
-        match = _AXIS.fullmatch(cell)
-        if match:
-            of_frame = axes.setdefault(match["frame"] or "", {})
-            of_frame[match["axis"].lower()] = (index, MM_PER[match["unit"].lower()])
-    if not axes or any(set(one) != set("xyz") for one in axes.values()):
-        raise InputError(
-            f"{path}:1: the columns are {', '.join(head)}\n"
-            "hint: name them x_mm, y_mm, z_mm, or with frames: tracker_x_mm, …, scene_x_mm, …; "
-            "units are mm, cm, m, um; names of points are in the column name"
-        )
-    return {frame: [one[axis] for axis in "xyz"] for frame, one in axes.items()}
 
 
 # Parts.

@@ -1,0 +1,217 @@
+"""A recorded run as a tracker: its samples come again at the times at which they were measured.
+
+A recording begins with the first measurement that is asked for. From then on each measurement is
+the newest sample up to the present moment, on the clock of the actuator. So a recording serves with
+a simulated clock as well as with a real one. What is asked beyond its end is a fault: a needle that
+moves on after the recording has ended would be steered blindly.
+"""
+
+from __future__ import annotations
+
+import bisect
+import csv
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+from ntagen.drive.reading import read_log
+from ntagen.drive.records import Measured
+from ntagen.errors import DeviceError, InputError
+from ntagen.needle.measurement import Measurement
+from ntagen.needle.vectors import dot, unit
+from ntagen.scene import Vector
+from ntagen.tracking.frames import IDENTITY, Transform
+from ntagen.tracking.points import axis_columns, text_of
+
+HOLD_S: Final = 5.0
+"""Within the recording, a sample counts for so long; the samples of a run are as far apart as its
+motions."""
+
+END_S: Final = 0.5
+"""The last sample counts for so long after the end."""
+
+_DIRECTIONS: Final = ("heading", "bevel")
+_RIGHT_ANGLE: Final = 1e-2
+_SAME_S: Final = 1e-6
+"""Times that differ by less are equal: sums of floating-point numbers are not exact."""
+
+
+class Playback:
+    """A `ntagen.drive.device.Sensor` that repeats samples.
+
+    Args:
+        name: Where they come from, for messages.
+        samples: The samples in the frame of the scene, in the order of time.
+        now_s: The clock.
+
+    Raises:
+        InputError: There are no samples, or their times go back.
+    """
+
+    measures_force = True
+
+    def __init__(
+        self, name: str, samples: Sequence[Measurement], now_s: Callable[[], float]
+    ) -> None:
+        if not samples:
+            raise InputError(f"{name}: there are no measurements in this file")
+        self._name = name
+        self._samples = samples
+        self._times = [sample.time_s for sample in samples]
+        for earlier_s, later_s in zip(self._times, self._times[1:], strict=False):
+            if later_s < earlier_s:
+                raise InputError(
+                    f"{name}: the time goes back, from {earlier_s:g} s to {later_s:g} s"
+                )
+        self._now_s = now_s
+        self._began_s: float | None = None
+
+    def measure(self) -> Measurement:
+        """The sample of this moment, with the present time.
+
+        Raises:
+            DeviceError: The recording has ended, or has no sample for this moment.
+        """
+        now_s = self._now_s()
+        if self._began_s is None:
+            self._began_s = now_s
+        first_s, last_s = self._times[0], self._times[-1]
+        at_s = now_s - self._began_s + first_s
+        if at_s > last_s + END_S:
+            raise DeviceError(
+                f"the recording {self._name} has ended: it has {last_s - first_s:.2f} s, and the "
+                f"run is at {at_s - first_s:.2f} s\nhint: give a longer recording"
+            )
+        sample = self._samples[bisect.bisect_right(self._times, at_s + _SAME_S) - 1]
+        age_s = max(0.0, at_s - sample.time_s)
+        if age_s > HOLD_S:
+            raise DeviceError(
+                f"the recording {self._name} has a gap: no sample for {age_s:.2f} s, and "
+                f"{HOLD_S:g} s is allowed"
+            )
+        return Measurement(
+            now_s - age_s, sample.position_mm, sample.force_n, sample.heading, sample.bevel
+        )
+
+
+def samples_of_log(path: Path) -> list[Measurement]:
+    """The measurements of a run that `ntagen drive --log` wrote.
+
+    Raises:
+        InputError: The file is not such a log.
+    """
+    return [
+        Measurement(
+            record.time_s,
+            record.position_mm,
+            record.force_n,
+            _optional(record.heading),
+            _optional(record.bevel),
+        )
+        for record in read_log(path).records
+        if isinstance(record, Measured)
+    ]
+
+
+def samples_of_table(path: Path, transform: Transform) -> list[Measurement]:
+    """The measurements in a CSV file, in the frame of the scene.
+
+    The first line names the columns: ``time_s``; ``x_mm``, ``y_mm``, ``z_mm`` for positions in the
+    scene's frame, or ``tracker_x_mm``, … for another one; and, if they were measured, ``force_n``,
+    ``heading_x``, …, ``bevel_x``, …, the latter in the frame of the positions.
+
+    Args:
+        path: The file.
+        transform: The registration; the identity if there is none.
+
+    Raises:
+        InputError: The file has a mistake, or its frame is not that of the transform.
+    """
+    rows = [
+        (number, [cell.strip() for cell in row])
+        for number, row in enumerate(csv.reader(text_of(path).splitlines()), start=1)
+        if row and not row[0].startswith("#")
+    ]
+    if not rows:
+        raise InputError(f"{path}: this file is empty")
+    table = _Table(path, rows[0][1], transform)
+    return [table.measurement(number, row) for number, row in rows[1:]]
+
+
+class _Table:
+    """The columns of a table of measurements."""
+
+    def __init__(self, path: Path, head: list[str], transform: Transform) -> None:
+        self._path = path
+        self._head = head
+        self._transform = transform
+        frames = axis_columns(path, head)
+        if len(frames) != 1:
+            raise InputError(f"{path}:1: there are positions in {len(frames)} frames, not in one")
+        (frame, self._axes), *_ = frames.items()
+        if "time_s" not in head:
+            raise InputError(f"{path}:1: there is no column time_s")
+        expected = transform.source if transform != IDENTITY else ""
+        if frame.lower() != expected.lower():
+            raise InputError(_other_frame(path, frame, expected))
+
+    def measurement(self, number: int, row: list[str]) -> Measurement:
+        """The measurement in a row."""
+        place = f"{self._path}:{number}"
+        if len(row) != len(self._head):
+            raise InputError(f"{place}: {len(row)} cells, but the first line has {len(self._head)}")
+        cells = dict(zip(self._head, row, strict=True))
+        x, y, z = (_number(row[column], place) * factor for column, factor in self._axes)
+        heading, bevel = (self._direction(cells, name, place) for name in _DIRECTIONS)
+        if heading and bevel and abs(dot(heading, bevel)) > _RIGHT_ANGLE:
+            raise InputError(f"{place}: heading and bevel are not at a right angle")
+        return Measurement(
+            time_s=_number(cells["time_s"], place),
+            position_mm=self._transform.point((x, y, z)),
+            force_n=_number(cells.get("force_n", "0"), place),
+            heading=heading,
+            bevel=bevel,
+        )
+
+    def _direction(self, cells: dict[str, str], name: str, place: str) -> Vector | None:
+        """A direction of length 1; none without columns, or with empty cells."""
+        texts = [cells.get(f"{name}_{axis}", "") for axis in "xyz"]
+        if not any(texts):
+            return None
+        x, y, z = (_number(text, place) for text in texts)
+        try:
+            return self._transform.direction(unit((x, y, z)))
+        except ValueError:
+            raise InputError(f"{place}: the {name} has no direction") from None
+
+
+def _other_frame(path: Path, frame: str, expected: str) -> str:
+    """The message about positions in a frame that is not that of the registration."""
+    if not frame:
+        return (
+            f"{path}: the columns x_mm, … are positions in the scene's frame, but there is a "
+            f"registration from {expected}\nhint: leave it out, or name the columns {expected}_x_mm"
+        )
+    if not expected:
+        return (
+            f"{path}: the positions are in the frame {frame}, and nothing says how the scene lies "
+            "in it\nhint: give --registration FILE; `ntagen calibrate` makes one"
+        )
+    return (
+        f"{path}: the positions are in the frame {frame}, but the registration is from {expected}"
+    )
+
+
+def _number(text: str, place: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f"{place}: '{text}' is not a number")
+    return number
+
+
+def _optional(numbers: tuple[float, ...]) -> Vector | None:
+    return (numbers[0], numbers[1], numbers[2]) if len(numbers) == 3 else None
