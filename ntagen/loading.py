@@ -8,25 +8,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ntagen import checker
 from ntagen.checker import Model, OverflowRule
 from ntagen.checker.strategy import Strategy
-from ntagen.scene import Scene
+
+if TYPE_CHECKING:
+    from ntagen.nsl import Task
 
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A model, and the scene from which it was made.
+    """A model, and the task from which it was made.
 
     Attributes:
         model: The model.
-        scene: The scene that an environment describes; ``None`` for a UPPAAL model.
+        task: What an environment describes; ``None`` for a UPPAAL model.
         warnings: The warnings about the environment; those about the model are `Model.warnings`.
     """
 
     model: Model
-    scene: Scene | None = None
+    task: Task | None = None
     warnings: tuple[str, ...] = ()
 
 
@@ -80,10 +83,10 @@ def load_file(path: Path, *, include: Sequence[str | Path] = ()) -> Loaded:
     """
     if path.suffix.lower() != ".nsl":
         return Loaded(checker.load_file(path))
-    from ntagen.nsl import load_with_warnings
+    from ntagen.nsl import load_task
     from ntagen.render import render
 
-    scene, warnings = load_with_warnings(path, include=include)
-    text = render(scene, source=path.name)
+    task = load_task(path, include=include)
+    text = render(task.scene, source=path.name)
     model = checker.load(text, path=str(path.with_suffix(".xml")))
-    return Loaded(model, scene, tuple(warning.render() for warning in warnings))
+    return Loaded(model, task, tuple(warning.render() for warning in task.warnings))

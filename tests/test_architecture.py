@@ -15,13 +15,15 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "ntagen"
 
-BASE = {"errors", "rules", "scene", "units"}
+BASE = {"errors", "hardware", "parameters", "rules", "scene", "units"}
 MAY_IMPORT: dict[str, set[str]] = {
     "cache": set(),
     "errors": set(),
     "units": set(),
     "rules": {"units"},
     "scene": {"errors", "rules"},
+    "parameters": {"rules", "units"},
+    "hardware": {"errors", "rules"},
     "nsl": BASE | {"cache", "files"},
     "render": BASE | {"cache"},
     "files": {"errors"},

@@ -30,7 +30,7 @@ from ntagen.files import require_apart, write_files
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, QueryForm
     from ntagen.checker.facts import Query
-    from ntagen.scene import Scene
+    from ntagen.nsl import Task
 
 STOPPED: Final = 3
 """Exit code after a limit or a ``maybe``."""
@@ -73,7 +73,7 @@ class _Outputs:
     strategy: str | None
     controller: Path | None
     plans: str | None
-    ranking: str
+    ranking: tuple[str, ...]
     written: set[str] = field(default_factory=set)
     """The options whose output has been written."""
 
@@ -170,10 +170,9 @@ class _Outputs:
     "--rank",
     "ranking",
     metavar="CRITERIA",
-    default="clearance,rolls,length",
-    show_default=True,
+    default=None,
     help="How plans of an environment are ranked, the most important criterion first: clearance, "
-    "rolls, length, target.",
+    "rolls, length, target.  [default: as drive { … } says, else clearance,rolls,length]",
 )
 @engine_options
 @overflow_rule()
@@ -190,7 +189,7 @@ def command(
     strategy: str | None,
     controller: Path | None,
     plans: str | None,
-    ranking: str,
+    ranking: str | None,
     given: dict[str, Any],
     overflow: Any,  # noqa: ANN401
     include: tuple[Path, ...],
@@ -232,8 +231,8 @@ def command(
             )
     if second_path and query_file:
         raise click.UsageError(f"two files of queries: {query_file} and {second_path}; give one")
-    _check_ranking(ranking)
-    outputs = _Outputs(trace, certificate, strategy, controller, plans, ranking)
+    criteria = _criteria(ranking)
+    outputs = _Outputs(trace, certificate, strategy, controller, plans, criteria)
     query_path = query_file or second_path
     inputs = {"model": model_path} | ({"queries": query_path} if query_path else {})
     require_apart(outputs.wanted(), inputs)
@@ -252,7 +251,7 @@ def command(
         todo = _queries(loaded.model, asked, query_path)
         show_warnings(loaded.model.warnings[shown_already:])
         _say_idle_options(
-            [query.form for query in todo if query.form], is_environment=loaded.scene is not None
+            [query.form for query in todo if query.form], is_environment=loaded.task is not None
         )
         if not as_json:
             _header(model_path, loaded.model)
@@ -283,7 +282,7 @@ def command(
                 return INTERNAL_ERROR
             show_warnings(answer.warnings)
             covered = answer.verification if verify else ()
-            notes = [*covered, *_write_evidence(answer, query, outputs, loaded.scene)]
+            notes = [*covered, *_write_evidence(answer, query, outputs, loaded.task)]
             if as_json:
                 echo(json.dumps(_record(answer, query)))
             else:
@@ -293,10 +292,11 @@ def command(
     return worst
 
 
-def _check_ranking(text: str) -> None:
+def _criteria(text: str | None) -> tuple[str, ...]:
+    """The ranking on the command line; empty without one."""
     from ntagen.plan.rank import parse_ranking
 
-    parse_ranking(text)
+    return () if text is None else parse_ranking(text)
 
 
 def _say_idle_options(queries: Sequence[QueryForm], *, is_environment: bool) -> None:
@@ -454,7 +454,7 @@ def _edge(edge: dict[str, Any]) -> str:
 
 
 def _write_evidence(
-    answer: Answer, query: _Asked, outputs: _Outputs, scene: Scene | None
+    answer: Answer, query: _Asked, outputs: _Outputs, task: Task | None
 ) -> list[str]:
     """Writes what was asked for; returns a line for the user about each output."""
     notes: list[str] = []
@@ -477,7 +477,7 @@ def _write_evidence(
         notes.append(f"controller written to {outputs.controller}")
     if outputs.plans and answer.plan_count is not None:
         outputs.written.add("--plans")
-        notes += _write_plans(answer, outputs.plans, outputs.ranking, scene)
+        notes += _write_plans(answer, outputs.plans, outputs.ranking, task)
     return notes
 
 
@@ -509,20 +509,23 @@ def _write_strategy(answer: Answer, target: str, text: str) -> list[str]:
     return [f"{whose} written to {target}"]
 
 
-def _write_plans(answer: Answer, target: str, ranking: str, scene: Scene | None) -> list[str]:
-    if scene is None:
+def _write_plans(
+    answer: Answer, target: str, ranking: tuple[str, ...], task: Task | None
+) -> list[str]:
+    if task is None:
         if target == "-":
             echo(answer.plans_json() or "")
             return []
         write_files({Path(target): f"{answer.plans_json()}\n"})
         return [f"{answer.plan_count} plans written to {target}"]
+    from ntagen.drive.configure import configure
     from ntagen.plan.document import document
     from ntagen.plan.extract import extract
-    from ntagen.plan.rank import certified, parse_ranking
-    from ntagen.plan.synthesise import Margins
+    from ntagen.plan.rank import certified
     from ntagen.plan.wording import counted, judged, ranked_by, required
 
-    criteria, margins = parse_ranking(ranking), Margins()
+    scene, settings = task.scene, configure(task.given, task.scene).settings
+    criteria, margins = ranking or settings.ranking, settings.margins
     ranked = certified(extract(answer.plans, scene), scene, criteria)
     holding = [candidate for candidate in ranked if margins.allow(candidate.certificate)]
     notes = [counted(len(ranked), len(holding)), required(margins)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import re
 import signal
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,6 +15,7 @@ import click
 from ntagen.cli.effects import say_idle
 from ntagen.cli.models import include_option
 from ntagen.cli.signals import TERMINATED, handled
+from ntagen.cli.steering import show_settings, steering_options
 from ntagen.cli.terminal import echo
 from ntagen.drive.operator import Operator
 from ntagen.drive.states import State
@@ -24,10 +25,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
+    from ntagen.drive.configure import Configuration
     from ntagen.drive.records import Journal, Record
-    from ntagen.drive.settings import Settings
     from ntagen.drive.simulate import Result
-    from ntagen.needle.virtual import Errors
+    from ntagen.parameters import Given
     from ntagen.plan.synthesise import Synthesis
     from ntagen.scene import Scene
 
@@ -35,25 +36,6 @@ _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
 4 no strategy that holds in exact kinematics, 5 device fault, 6 no strategy that ends in time,
 70 internal error, 130 interrupted, 143 ended by SIGTERM."""
-
-
-def _seconds(_ctx: click.Context, _option: click.Parameter, text: str) -> float:
-    """A time with or without a unit; seconds without one."""
-    from ntagen.units import S_PER
-
-    match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([a-z]*)\s*", text)
-    factor = S_PER.get(match[2] or "s") if match else None
-    seconds = float(match[1]) * factor if match and factor else 0.0
-    if not 0.0 < seconds < math.inf:
-        raise click.BadParameter(f"'{text}' is not a time above 0; write for example 120s or 2min")
-    return seconds
-
-
-def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float:
-    """A finite number that is not negative."""
-    if not 0.0 <= number < math.inf:
-        raise click.BadParameter(f"{number:g} is not a number of 0 or more")
-    return number
 
 
 @click.command("drive", epilog=_EPILOG)
@@ -65,52 +47,11 @@ def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float
     help="Which needle to steer. The only one until now is virtual: a simulation.",
 )
 @click.option(
-    "--seed",
-    default=0,
-    show_default=True,
-    type=click.IntRange(min=0),
-    help="For --noise and --roll-error: the same seed gives the same errors.",
-)
-@click.option(
-    "--noise",
-    "noise_mm",
-    metavar="MM",
-    default=0.0,
-    callback=_size,
-    help="Standard deviation of each measured coordinate, in mm.  [default: 0]",
-)
-@click.option(
-    "--roll-error",
-    "roll_error_deg",
-    metavar="DEG",
-    default=0.0,
-    callback=_size,
-    help="Standard deviation of the angle of each roll, in degrees.  [default: 0]",
-)
-@click.option(
     "--known",
     metavar="all|none|NAME,…",
     default="all",
     show_default=True,
     help="The critical regions that the driver knows at the start. It must feel the others.",
-)
-@click.option(
-    "--rank",
-    "ranking",
-    metavar="CRITERION,…",
-    default="clearance,rolls,length",
-    show_default=True,
-    help="How plans are ranked, the most important criterion first: clearance, rolls, length, "
-    "target.",
-)
-@click.option(
-    "--timeout",
-    "timeout_s",
-    default="120s",
-    show_default=True,
-    callback=_seconds,
-    help="Stop the run after this time on the needle's clock; a number without a unit is in "
-    "seconds.",
 )
 @click.option(
     "--log",
@@ -121,20 +62,24 @@ def _size(_ctx: click.Context, _option: click.Parameter, number: float) -> float
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 @click.option("--quiet", is_flag=True, help="Print only how the run ended.")
+@click.option(
+    "--settings",
+    "only_settings",
+    is_flag=True,
+    help="Print all settings and where each comes from, and do not drive.",
+)
 @include_option()
+@steering_options
 def command(
     environment: Path,
     needle: str,
-    seed: int,
-    noise_mm: float,
-    roll_error_deg: float,
     known: str,
-    ranking: str,
-    timeout_s: float,
     log_path: Path | None,
     as_json: bool,
     quiet: bool,
+    only_settings: bool,
     include: tuple[Path, ...],
+    given: tuple[Given, ...],
 ) -> int:
     """Steer a needle to the target and log the run.
 
@@ -148,40 +93,52 @@ def command(
     \b
     Examples:
       ntagen drive examples/paper.nsl --log run.mcap
-      ntagen drive examples/paper.nsl --seed 1 --noise 0.1 --known none
+      ntagen drive examples/paper.nsl --seed 1 --noise 0.1mm --known none
+      ntagen drive examples/paper.nsl --pull 8mm --true-radius 33mm --force-sensing off
+      ntagen drive examples/paper.nsl --settings
+
+    \b
+    Values have a unit, as in 4mm, 2deg, 60s, 0.1N or 1GiB; a plain number is in the unit that the
+    option names. The braces drive { … } of ENV.nsl give the same settings by their words, for
+    example `initial push 4 mm` for --initial-push 4mm; the command line wins.
     """  # noqa: D301  click wants the control character
-    from ntagen.drive.settings import Settings
-    from ntagen.drive.simulate import settings_for
-    from ntagen.needle.virtual import Errors
-    from ntagen.nsl import load_with_warnings
-    from ntagen.plan.rank import parse_ranking
-    from ntagen.units import rad_from_deg
+    from ntagen.drive.configure import configure
+    from ntagen.nsl import load_task
 
     _require_virtual(needle)
-    if not (noise_mm or roll_error_deg):
-        say_idle({"seed": "--seed"}, "without --noise or --roll-error")
     if as_json:
         say_idle({"quiet": "--quiet"}, "with --json")
-    scene, warnings = load_with_warnings(environment, include=include)
-    for warning in warnings:
+    task = load_task(environment, include=include)
+    for warning in task.warnings:
         echo(warning.render(), err=True)
-    errors = Errors(noise_mm=noise_mm, roll_rad=rad_from_deg(roll_error_deg))
-    settings = settings_for(
-        Settings(timeout_s=timeout_s, ranking=parse_ranking(ranking)), errors, scene, known
-    )
+    configuration = configure((*task.given, *given), task.scene, known)
+    errors = configuration.errors
+    if not (errors.noise_mm or errors.roll_rad):
+        say_idle({"given_needle_seed": "--seed"}, "without --noise or --roll-error")
+    if only_settings:
+        show_settings(configuration)
+        return 0
+    run = _Run(environment, task.scene, configuration, known)
     speaks = not (as_json or quiet)
-    with (
-        _operator() as operator,
-        _log(log_path, environment, scene, settings, errors, seed, known) as log,
-    ):
-        result = _drive(scene, settings, errors, seed, known, log, speaks, operator)
+    with _operator() as operator, _log(log_path, run) as log:
+        result = _drive(run, log, speaks, operator)
     if as_json:
-        echo(json.dumps(_summary(result, seed, noise_mm, roll_error_deg, known, log_path)))
+        echo(json.dumps(_summary(result, run, log_path)))
     else:
-        _report(result, scene, log_path, short=quiet)
+        _report(result, task.scene, log_path, short=quiet)
     if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
         return TERMINATED
     return _exit_code(result.ended.outcome)
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What is driven: the file, the true scene, the settings, and the regions that are known."""
+
+    environment: Path
+    scene: Scene
+    configuration: Configuration
+    known: str
 
 
 class _Signalled(Operator):
@@ -218,47 +175,28 @@ def _require_virtual(needle: str) -> None:
         raise InputError(f"there is no needle '{needle}'\nhint: the only one is `--needle virtual`")
 
 
-def _drive(
-    scene: Scene,
-    settings: Settings,
-    errors: Errors,
-    seed: int,
-    known: str,
-    log: list[Journal],
-    speaks: bool,
-    operator: Operator,
-) -> Result:
+def _drive(run: _Run, log: list[Journal], speaks: bool, operator: Operator) -> Result:
     from ntagen.drive.records import Journals
-    from ntagen.drive.simulate import simulate
-    from ntagen.plan.synthesise import EngineSynthesiser
+    from ntagen.drive.simulate import simulate, synthesiser_for
 
-    synthesise = EngineSynthesiser(
-        margins=settings.margins, ranking=settings.ranking, listen=operator.listen
-    )
+    settings = run.configuration.settings
+    synthesise = synthesiser_for(settings, operator.listen)
     with contextlib.ExitStack() as stack:
         terminal = stack.enter_context(_terminal()) if speaks else []
         return simulate(
-            scene,
+            run.scene,
             synthesise,
             settings,
             Journals(*log, *terminal),
-            known=known,
-            errors=errors,
-            seed=seed,
+            known=run.known,
+            errors=run.configuration.errors,
+            seed=run.configuration.seed,
             listen=operator.listen,
         )
 
 
 @contextlib.contextmanager
-def _log(
-    path: Path | None,
-    environment: Path,
-    scene: Scene,
-    settings: Settings,
-    errors: Errors,
-    seed: int,
-    known: str,
-) -> Iterator[list[Journal]]:
+def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
     """The journal that writes the log, if one is wanted."""
     if path is None:
         yield []
@@ -269,18 +207,24 @@ def _log(
     from ntagen.nsl.source import MAX_SOURCE_BYTES
 
     # Mistakes on the command line must be found before an earlier log is replaced.
-    told(scene, known)
+    environment, configuration = run.environment, run.configuration
+    errors = configuration.errors
+    told(run.scene, run.known)
     require_apart({"--log": path}, {"environment": environment})
     metadata = {
         "program": f"ntagen {_version()}",
         "environment": environment.name.encode(errors="replace").decode(),
-        "seed": seed,
-        "known": known,
+        "seed": configuration.seed,
+        "known": run.known,
         "noise_mm": errors.noise_mm,
         "roll_error_rad": errors.roll_rad,
-        "settings": settings.to_json(),
+        "true_radius_mm": errors.radius_mm,
+        "true_bevel_rad": errors.bevel_rad,
+        "settings": configuration.settings.to_json(),
+        "origins": dict(configuration.origins),
     }
-    attachments = {ACTUAL: scene_to_json(scene).encode()}
+    actual = replace(run.scene, needle=errors.true_needle(run.scene.needle))
+    attachments = {ACTUAL: scene_to_json(actual).encode()}
     # A pipe can be read only once.
     if environment.is_file():
         attachments[SOURCE] = read_file(environment, MAX_SOURCE_BYTES)
@@ -346,15 +290,11 @@ def _terminal() -> Iterator[list[Journal]]:
         yield [_Lines(status)]
 
 
-def _summary(
-    result: Result,
-    seed: int,
-    noise_mm: float,
-    roll_error_deg: float,
-    known: str,
-    log_path: Path | None,
-) -> dict[str, Any]:
+def _summary(result: Result, run: _Run, log_path: Path | None) -> dict[str, Any]:
+    from ntagen.units import deg_from_rad
+
     ended = result.ended
+    errors = run.configuration.errors
     clearance_mm = result.clearance_mm
     return {
         "outcome": ended.outcome,
@@ -365,10 +305,10 @@ def _summary(
         "syntheses": ended.syntheses,
         "true_clearance_mm": clearance_mm if math.isfinite(clearance_mm) else None,
         "true_target_distance_mm": result.target_distance_mm,
-        "seed": seed,
-        "noise_mm": noise_mm,
-        "roll_error_deg": roll_error_deg,
-        "known": known,
+        "seed": run.configuration.seed,
+        "noise_mm": errors.noise_mm,
+        "roll_error_deg": deg_from_rad(errors.roll_rad),
+        "known": run.known,
         "log": None if log_path is None else str(log_path),
     }
 

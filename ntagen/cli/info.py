@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Iterable, Sequence
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
     from ntagen.checker import Model
     from ntagen.checker.facts import Channel, Clock, Process, Template, Variable
+    from ntagen.drive.configure import Configuration
+    from ntagen.nsl import Task
 
 ROWS_SHOWN: Final = 40
 """A table shows at most this many rows; the JSON object has all."""
@@ -49,6 +52,8 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
       ntagen info model.xml --json | jq .features
       ntagen info model.xta --svg pictures
 
+    For an environment, it also shows all settings of `ntagen drive` and where each comes from.
+
     \b
     The JSON object has "format": "ntagen-model", "version": 1, and
       templates  as written: name, parameters, locations (id, name, kind, initial, invariant,
@@ -64,17 +69,57 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
       state      words (of 32 bits) of the discrete state: location_, variable_ and meta_words
       queries    text, comment, expect (the verdict that the file states, or null)
       warnings, load_seconds
+      settings   of an environment: by their words, field, value, shown and origin
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(not as_json):
-        model = load_model(path, include).model
+        loaded = load_model(path, include)
+    model, configuration = loaded.model, None
+    if loaded.task is not None:
+        from ntagen.drive.configure import configure
+
+        configuration = configure(loaded.task.given, loaded.task.scene)
     if folder is not None:
         write_files(_pictures(model.templates, folder))
     if as_json:
-        echo(model.facts_json())
+        text = model.facts_json()
+        if configuration is not None:
+            text = json.dumps(json.loads(text) | {"settings": _settings(configuration)})
+        echo(text)
         return
     _show(path, model)
+    if loaded.task is not None and configuration is not None:
+        _show_task(loaded.task, configuration)
     if folder is not None:
         echo(f"{_count(len(model.templates), 'picture')} written to {folder}")
+
+
+def _settings(configuration: Configuration) -> dict[str, dict[str, object]]:
+    """The settings for JSON, by their words: value in the unit of the log, and origin."""
+    from ntagen.parameters import PARAMETERS
+
+    return {
+        parameter.words: {
+            "field": parameter.field,
+            "value": configuration.value(parameter),
+            "shown": parameter.shown(configuration.value(parameter)),
+            "origin": configuration.origin(parameter),
+        }
+        for parameter in PARAMETERS
+    }
+
+
+def _show_task(task: Task, configuration: Configuration) -> None:
+    """Prints regions, devices and settings of an environment."""
+    from ntagen.cli.steering import show_settings
+
+    kinds = [region.kind for region in task.scene.regions]
+    counts = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
+    echo(f"\nregions: {', '.join(counts)}")
+    for device in (task.device, task.tracker):
+        if device is not None:
+            echo(str(device))
+    echo("settings of ntagen drive, and where they come from:")
+    show_settings(configuration)
 
 
 def _pictures(templates: Sequence[Template], folder: Path) -> dict[Path, str]:

@@ -50,7 +50,7 @@ def load_model(path: Path, include: Sequence[Path], overflow: OverflowRule = "wr
     from ntagen.loading import load_file
 
     loaded = load_file(path, include=include)
-    if loaded.scene is None:
+    if loaded.task is None:
         say_idle({"include": "--include"}, "here: only environments (.nsl) include files")
     loaded.model.overflow = overflow
     show_warnings((*loaded.warnings, *loaded.model.warnings))

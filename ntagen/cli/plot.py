@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -45,14 +46,13 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     "--rank",
     "ranking",
     metavar="CRITERION,…",
-    default="clearance,rolls,length",
-    show_default=True,
+    default=None,
     help="How plans are ranked, the most important criterion first: clearance, rolls, length, "
-    "target.",
+    "target.  [default: as drive { … } says, else clearance,rolls,length]",
 )
 @include_option()
 def command(
-    source: Path, output: Path | None, shown: int, ranking: str, include: tuple[Path, ...]
+    source: Path, output: Path | None, shown: int, ranking: str | None, include: tuple[Path, ...]
 ) -> None:
     """Draw a scene with its plans, or a run from its log.
 
@@ -68,7 +68,7 @@ def command(
     from ntagen.plan.rank import parse_ranking
     from ntagen.plot.save import format_of, save
 
-    criteria = parse_ranking(ranking)
+    criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
         say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
         say_idle({"include": "--include"}, "here: the log of a run contains its scene")
@@ -108,12 +108,14 @@ def _of_run(source: Path, shown: int) -> Picture:
 def _of_scene(
     source: Path, shown: int, ranking: tuple[str, ...], include: tuple[Path, ...]
 ) -> Picture:
-    from ntagen.nsl import load_with_warnings
-    from ntagen.plan.synthesise import EngineSynthesiser
+    from ntagen.drive.configure import configure
+    from ntagen.drive.simulate import synthesiser_for
+    from ntagen.nsl import load_task
     from ntagen.plot.run import picture_of_plans
 
-    scene, warnings = load_with_warnings(source, include=include)
-    for warning in warnings:
+    task = load_task(source, include=include)
+    for warning in task.warnings:
         echo(warning.render(), err=True)
-    synthesis = EngineSynthesiser(ranking=ranking)(scene) if shown > 0 else None
-    return picture_of_plans(scene, synthesis, shown)
+    settings = configure(task.given, task.scene).settings
+    synthesise = replace(synthesiser_for(settings), ranking=ranking or settings.ranking)
+    return picture_of_plans(task.scene, synthesise(task.scene) if shown > 0 else None, shown)

@@ -37,11 +37,10 @@ def command(log: Path, as_json: bool) -> int:
     """  # noqa: D301  click wants the control character
     from ntagen.drive.reading import read_log
     from ntagen.drive.replay import replay
-    from ntagen.plan.synthesise import EngineSynthesiser
+    from ntagen.drive.simulate import synthesiser_for
 
     run = read_log(log)
-    settings = run.settings
-    synthesise = EngineSynthesiser(margins=settings.margins, ranking=settings.ranking)
+    synthesise = synthesiser_for(run.settings)
     if not as_json:
         _tell(run, log)
     comparison = replay(run, synthesise)

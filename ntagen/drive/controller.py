@@ -37,18 +37,20 @@ from ntagen.drive.deviation import DeviationMonitor
 from ntagen.drive.device import Device
 from ntagen.drive.first_push import is_free
 from ntagen.drive.force import ForceMonitor, Rise
-from ntagen.drive.knowledge import Knowledge, position_unsure_mm
+from ntagen.drive.knowledge import Knowledge
 from ntagen.drive.records import (
     Ended,
     Journal,
     Learned,
     Predicted,
     Record,
+    Relied,
     Synthesised,
     Timed,
     Transition,
     Visited,
 )
+from ntagen.drive.reliance import relies_on
 from ntagen.drive.settings import Settings
 from ntagen.drive.states import ENDS, Event, State, next_state
 from ntagen.drive.steering import Steering
@@ -135,6 +137,7 @@ class Controller:
     def run(self) -> Ended:
         """Drives until the run ends and the needle is stopped; returns the last record."""
         self._journal.started(self._knowledge.a_priori)
+        self._note(Relied(self._now_s(), relies_on(self._settings, self._knowledge.a_priori)))
         state = State.ARM
         try:
             while state not in ENDS:
@@ -315,7 +318,6 @@ class Controller:
             self._settings.sensing_margin_mm,
             self._settings.learned_radius_mm,
             self._needle.channels,
-            position_unsure_mm(self._settings),
         )
         for region in self._knowledge.learned:
             if region not in before:

@@ -37,6 +37,7 @@ KINDS: Final[tuple[type[Record], ...]] = (
     records.Visited,
     records.Ended,
     records.Truth,
+    records.Relied,
 )
 """All kinds of records, in the order of the file of descriptors."""
 

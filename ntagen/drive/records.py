@@ -176,6 +176,13 @@ class Truth(Record):
     clearance_mm: float
 
 
+@dataclass(frozen=True, slots=True)
+class Relied(Record):
+    """What the driver relies on, in words; the first record of a run."""
+
+    text: str
+
+
 class Journal(Protocol):
     """Anything that records a run: the log, the terminal, a replay."""
 

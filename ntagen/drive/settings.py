@@ -1,19 +1,23 @@
 """The driver's settings: with scene, device and seed, they determine a run.
 
+`ntagen.parameters` has how each of them is written in a file and on the command line.
+
 If no source gives a value, the default is our choice; the docstring says so with "ours".
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
 from ntagen.needle.estimate import Priors
+from ntagen.parameters import NEEDLE, PARAMETERS, Value
 from ntagen.plan.rank import DEFAULT_RANKING, parse_ranking
 from ntagen.plan.synthesise import Margins
 
@@ -32,7 +36,7 @@ class Settings:
         deviation_count: The least number of measurements whose mean counts, so that one bad
             measurement is not enough. With more noise, more of them count.
         force_sensing: Whether the force is watched. Without it, the driver relies on known regions
-            only.
+            only, and plans keep more distance from them (`ntagen.drive.reliance`).
         force_n: The rise of the force that must be felt (`ntagen.drive.force`). The authors used
             rises of 0.1 to 0.2 in an unknown unit.
         force_noise_n: The standard deviation of a measured force; ours.
@@ -53,6 +57,9 @@ class Settings:
         margins: The margins that a plan must have in exact kinematics.
         ranking: The criteria by which the plan is chosen.
         priors: The assumptions of the estimator.
+        max_plans: A synthesis lists at most this many plans.
+        engine_time_s: The engine stops after this time of a synthesis.
+        engine_memory_bytes: The engine stops when its states take this much.
     """
 
     initial_push_mm: float = 5.0
@@ -74,6 +81,9 @@ class Settings:
     margins: Margins = field(default_factory=Margins)
     ranking: tuple[str, ...] = DEFAULT_RANKING
     priors: Priors = field(default_factory=Priors)
+    max_plans: int = 100_000
+    engine_time_s: float = 60.0
+    engine_memory_bytes: int = 2 << 30
 
     def __post_init__(self) -> None:
         """Refuses settings with which the driver cannot work.
@@ -81,17 +91,18 @@ class Settings:
         Raises:
             InputError: A value is not a number, or too large or too small.
         """
-        for name, value in _numbers(self):
-            least = _LEAST.get(name, 0.0)
-            if not isinstance(value, int | float) or not least <= value <= _LARGEST:
-                raise InputError(
-                    f"the setting {name} is {value!r}, which is not allowed\n"
-                    f"hint: choose a number from {least:g} to {_LARGEST:g}"
-                )
-        if self.pull_mm - self.push_mm < _LEAST["spacing_mm"]:
+        for parameter in STEERING:
+            value = value_of(self, parameter.field)
+            is_number = isinstance(value, int | float)
+            if not is_number and parameter.kind != "words":
+                raise InputError(f"the setting {parameter.field} is {value!r}, which is no number")
+            breach = parameter.breach(value)
+            if breach is not None:
+                raise InputError(f"{breach.message}, but this is {value!r}\nhint: {breach.hint}")
+        if self.pull_mm - self.push_mm < _LEAST_PULLED_MM:
             raise InputError(
-                "pull_mm must be greater than push_mm by at least "
-                f"{_LEAST['spacing_mm']:g} mm: the needle must be pulled back"
+                f"`pull` ({self.pull_mm:g} mm) must be greater than `push` ({self.push_mm:g} mm) "
+                f"by at least {_LEAST_PULLED_MM:g} mm: the needle must be pulled back"
             )
         parse_ranking(",".join(self.ranking))
 
@@ -116,27 +127,30 @@ class Settings:
             raise InputError(f"the settings of the run cannot be read: {error}") from error
 
 
-_LARGEST: Final = 1e6
-"""The largest value of any setting, in its unit."""
+STEERING: Final = tuple(
+    parameter for parameter in PARAMETERS if not parameter.field.startswith(f"{NEEDLE}.")
+)
+"""The settings of the driver; the others are those of the simulated needle."""
 
-_LEAST: Final = {
-    "spacing_mm": 0.01,
-    "learned_radius_mm": 0.01,
-    "deviation_count": 1.0,
-    "force_n": 1e-6,
-    "force_rise_n_per_mm": 1e-6,
-    "false_alarm": 1e-9,
-    "roll_rad_per_s": 1e-3,
-    **dict.fromkeys((field.name for field in dataclasses.fields(Priors)), 1e-12),
-    # Without drift or lag the needle is as the paper has it.
-    **dict.fromkeys(("curvature_drift", "turn_drift_rad", "lag_rad"), 0.0),
-}
-"""The least values of the settings that cannot be 0."""
+_LEAST_PULLED_MM: Final = 0.01
 
 
-def _numbers(settings: Settings) -> Iterator[tuple[str, object]]:
-    """All numbers by name, including those of its parts."""
-    for part in (settings, settings.margins, settings.priors):
-        for one in dataclasses.fields(part):
-            if one.name not in ("margins", "priors", "ranking"):
-                yield one.name, getattr(part, one.name)
+def value_of(settings: Settings, field: str) -> Any:  # noqa: ANN401  it depends on the field
+    """The value of a field, which may be a part and a field with a dot between them."""
+    return functools.reduce(getattr, field.split("."), settings)
+
+
+def with_values(settings: Settings, values: Mapping[str, Value]) -> Settings:
+    """The settings with other values of some fields.
+
+    Raises:
+        InputError: The driver cannot work with the settings.
+    """
+    changes: dict[str, Any] = {}
+    for field_name, value in values.items():
+        part, _, inner = field_name.rpartition(".")
+        if part:
+            changes[part] = replace(changes.get(part, getattr(settings, part)), **{inner: value})
+        else:
+            changes[inner] = value
+    return replace(settings, **changes)

@@ -15,7 +15,7 @@ from ntagen.drive.settings import Settings
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.vectors import distance
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
-from ntagen.plan.synthesise import Synthesis, Synthesiser
+from ntagen.plan.synthesise import EngineSynthesiser, Synthesis, Synthesiser
 from ntagen.scene import Scene
 
 _NO_REGION_MM: Final = 1e9
@@ -54,7 +54,7 @@ def simulate(
     """Drives the virtual needle through the scene.
 
     Args:
-        scene: The actual scene.
+        scene: The actual scene; the true needle may differ from its own by `errors`.
         synthesise: Finds plans.
         settings: How to drive.
         journal: Records what happens.
@@ -70,7 +70,9 @@ def simulate(
         )
         for region in scene.criticals
     )
-    needle = VirtualNeedle(scene.needle, obstacles, errors or Errors(), seed, SimulatedClock())
+    errors = errors or Errors()
+    true_needle = errors.true_needle(scene.needle)
+    needle = VirtualNeedle(true_needle, obstacles, errors, seed, SimulatedClock())
     witness = _Witness(needle, journal)
     controller = Controller(
         told(scene, known), needle, synthesise, settings, Journals(journal, witness), listen
@@ -113,6 +115,20 @@ def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -
     if known == "all" or not settings.force_sensing:
         return settings
     return settings.with_spacing(fitting_spacing_mm(settings, margin_mm, scene.needle.length_mm))
+
+
+def synthesiser_for(
+    settings: Settings, listen: Callable[[], None] = lambda: None
+) -> EngineSynthesiser:
+    """The synthesiser with the margins, the ranking and the budgets of the settings."""
+    return EngineSynthesiser(
+        margins=settings.margins,
+        ranking=settings.ranking,
+        max_plans=settings.max_plans,
+        timeout_s=settings.engine_time_s,
+        memory_bytes=settings.engine_memory_bytes,
+        listen=listen,
+    )
 
 
 class _Witness:

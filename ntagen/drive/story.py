@@ -7,6 +7,7 @@ from ntagen.drive.records import (
     Estimated,
     Learned,
     Record,
+    Relied,
     Synthesised,
     Transition,
     Visited,
@@ -41,6 +42,8 @@ def _text(record: Record) -> str | None:
                 f"learned: {record.kind} region '{record.name}' at "
                 f"{_point(record.center_mm)} mm, radius {record.radius_mm:.2f} mm"
             )
+        case Relied():
+            return record.text
         case Visited():
             return f"target {record.target} reached"
         case Ended():

@@ -30,6 +30,7 @@ from ntagen.drive.records import (
     Measured,
     Predicted,
     Record,
+    Relied,
     Transition,
     Visited,
 )
@@ -118,6 +119,8 @@ def _text(record: Record) -> str:
             return f"{record.state}: {record.event} -> {record.following}"
         case Learned():
             return f"learned {record.kind} region '{record.name}'"
+        case Relied():
+            return record.text
         case Visited():
             return f"reached target '{record.target}'"
         case Ended():

@@ -17,21 +17,46 @@ or a `SourceError`, nothing else.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
 from ntagen.nsl.diagnostics import Diagnostic, Reporter, SourceError
 from ntagen.nsl.source import Source
+from ntagen.parameters import Given
 from ntagen.scene import Scene
 
 __all__ = [
     "Diagnostic",
     "SourceError",
+    "Task",
     "format_text",
     "load",
+    "load_task",
     "load_with_warnings",
     "loads",
+    "loads_task",
     "loads_with_warnings",
 ]
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """All that an environment file describes.
+
+    Attributes:
+        scene: The scene.
+        given: The settings of the driver that the file gives, in the order written.
+        device: The device that moves the needle, if the file describes one.
+        tracker: What measures the needle, if the file describes it.
+        warnings: What is odd, but no error.
+    """
+
+    scene: Scene
+    given: tuple[Given, ...] = ()
+    device: GrblDevice | None = None
+    tracker: OpenIGTLinkTracker | None = None
+    warnings: tuple[Diagnostic, ...] = ()
 
 
 def load(path: str | Path, *, include: Sequence[str | Path] = ()) -> Scene:
@@ -44,20 +69,26 @@ def load(path: str | Path, *, include: Sequence[str | Path] = ()) -> Scene:
     Raises:
         SourceError: The file cannot be read, or has mistakes; the error has all of them.
     """
-    return load_with_warnings(path, include=include)[0]
+    return load_task(path, include=include).scene
 
 
 def load_with_warnings(
     path: str | Path, *, include: Sequence[str | Path] = ()
 ) -> tuple[Scene, tuple[Diagnostic, ...]]:
     """The scene that a file describes, and the warnings; all else is as in `load`."""
+    task = load_task(path, include=include)
+    return task.scene, task.warnings
+
+
+def load_task(path: str | Path, *, include: Sequence[str | Path] = ()) -> Task:
+    """All that a file describes: scene, settings, devices; all else is as in `load`."""
     from ntagen.nsl.reading import read_source
 
     reporter = Reporter()
     source = read_source(str(path), reporter)
     if source is None:
         raise SourceError(reporter.diagnostics)
-    return _scene(source, reporter, include)
+    return _task(source, reporter, include)
 
 
 def loads(text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()) -> Scene:
@@ -66,14 +97,20 @@ def loads(text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()
     Raises:
         SourceError: The text has mistakes; the error has all of them.
     """
-    return loads_with_warnings(text, path, include=include)[0]
+    return loads_task(text, path, include=include).scene
 
 
 def loads_with_warnings(
     text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()
 ) -> tuple[Scene, tuple[Diagnostic, ...]]:
     """The scene that a text describes, and the warnings; all else is as in `loads`."""
-    return _scene(Source(path, text), Reporter(), include)
+    task = loads_task(text, path, include=include)
+    return task.scene, task.warnings
+
+
+def loads_task(text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()) -> Task:
+    """All that a text describes: scene, settings, devices; all else is as in `loads`."""
+    return _task(Source(path, text), Reporter(), include)
 
 
 def format_text(text: str, path: str = "<text>") -> str:
@@ -87,16 +124,14 @@ def format_text(text: str, path: str = "<text>") -> str:
     return format_source(Source(path, text))
 
 
-def _scene(
-    source: Source, reporter: Reporter, include: Sequence[str | Path]
-) -> tuple[Scene, tuple[Diagnostic, ...]]:
+def _task(source: Source, reporter: Reporter, include: Sequence[str | Path]) -> Task:
     """Runs the phases, one after the other."""
     from ntagen.nsl.build import build
     from ntagen.nsl.resolve import resolve
 
     reporter.enter(source.path)
     draft = resolve(source, reporter, include)
-    scene = None if draft is None else build(draft, reporter)
-    if scene is None or reporter.has_errors:
+    built = None if draft is None else build(draft, reporter)
+    if built is None or reporter.has_errors:
         raise SourceError(reporter.diagnostics)
-    return scene, reporter.diagnostics
+    return Task(built.scene, built.given, built.device, built.tracker, reporter.diagnostics)

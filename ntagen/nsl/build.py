@@ -13,10 +13,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Literal, cast
 
-from ntagen import rules
+from ntagen import hardware, rules
+from ntagen.hardware import Axis, GrblDevice, OpenIGTLinkTracker
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
-from ntagen.nsl.resolve import Draft, DraftRegion, Placed
+from ntagen.nsl.resolve import Draft, DraftDevice, DraftRegion, Placed
 from ntagen.nsl.source import Span
+from ntagen.parameters import Given
 from ntagen.scene import (
     DEFAULT_LENGTH_MM,
     Limits,
@@ -44,9 +46,29 @@ DEFAULT_RESOLUTION_PER_MM: Final = 1000
 _ABSURD_MM: Final = 1e100
 
 
-def build(draft: Draft, reporter: Reporter) -> Scene | None:
-    """The scene that the draft describes, or None after an error, which is reported."""
-    return _Builder(draft, reporter).scene()
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What a draft describes.
+
+    Attributes:
+        scene: The scene.
+        given: The settings of the driver, in the order written.
+        device: The device that moves the needle.
+        tracker: What measures it.
+    """
+
+    scene: Scene
+    given: tuple[Given, ...] = ()
+    device: GrblDevice | None = None
+    tracker: OpenIGTLinkTracker | None = None
+
+
+def build(draft: Draft, reporter: Reporter) -> Built | None:
+    """What the draft describes, or None after an error, which is reported."""
+    builder = _Builder(draft, reporter)
+    device, tracker = builder.device(), builder.tracker()
+    scene = builder.scene()
+    return None if scene is None else Built(scene, tuple(draft.given), device, tracker)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +86,49 @@ class _Builder:
         self._draft = draft
         self._reporter = reporter
         self._report = reporter.report
+
+    def device(self) -> GrblDevice | None:
+        """The device that the file describes, or None without one or after an error."""
+        draft = self._draft.devices.get("device")
+        if draft is None or draft.address.value is None:
+            return None
+        axes = {}
+        for word in ("insert", "roll"):
+            axis = self._axis(word, draft)
+            if axis is not None:
+                axes[word] = axis
+        if len(axes) < 2:
+            return None
+        return GrblDevice(draft.address.value, axes["insert"], axes["roll"])
+
+    def _axis(self, word: str, draft: DraftDevice) -> Axis | None:
+        """An axis of a device, or None after an error."""
+        if word not in draft.axes:
+            if f"axis {word}" not in self._draft.seen and not self._draft.has_gaps:
+                form = "insert X 80 steps/mm" if word == "insert" else "roll A 8.89 steps/deg"
+                self._report(
+                    "axis-missing",
+                    draft.address.span,
+                    f"the device has no axis to {word}",
+                    hint=f"add for example `{form}`",
+                )
+            return None
+        letter, steps = draft.axes[word]
+        if letter.value is None or steps.value is None:
+            return None
+        is_right = self._obeys(hardware.axis_letter(letter.value), letter.span)
+        if not self._obeys(hardware.axis_steps(steps.value), steps.span) or not is_right:
+            return None
+        return Axis(letter.value, steps.value)
+
+    def tracker(self) -> OpenIGTLinkTracker | None:
+        """The tracker that the file describes, or None without one or after an error."""
+        draft = self._draft.devices.get("tracker")
+        if draft is None or draft.address.value is None:
+            return None
+        if not self._obeys(hardware.address(draft.address.value), draft.address.span):
+            return None
+        return OpenIGTLinkTracker(*hardware.host_and_port(draft.address.value), draft.name)
 
     def scene(self) -> Scene | None:
         """The scene, or None after an error."""

@@ -11,6 +11,8 @@ from ntagen.nsl.source import Source, Span
 if TYPE_CHECKING:
     import lark
 
+    from ntagen.scene import RegionKind
+
 
 class TreeBuilder:
     """Converts lark's trees to those of `ntagen.nsl.tree`."""
@@ -25,8 +27,10 @@ class TreeBuilder:
         match keyword:
             case "environment":
                 return tree.Environment(span, self._identifier(parts[0]), ())
-            case "needle" | "motion":
+            case "needle" | "motion" | "drive":
                 return tree.Section(span, keyword, ())
+            case "parameter" | "device" | "axis" | "tracker":
+                return self._driving(keyword, parts, span)
             case "loop":
                 return tree.Loop(
                     span,
@@ -38,8 +42,7 @@ class TreeBuilder:
             case "let":
                 return tree.Let(span, self._identifier(parts[0]), self.expression(parts[1]))
             case "include":
-                path = self._identifier(parts[0])
-                return tree.Include(span, tree.Identifier(path.span, path.text[1:-1]))
+                return tree.Include(span, self._text(parts[0]))
             case "region":
                 return self._region(node, span)
             case "roll":
@@ -52,10 +55,23 @@ class TreeBuilder:
                 return tree.Setting(span, keyword, self.expression(parts[0]))
         raise AssertionError(f"the grammar has a statement that the tree has not: {keyword}")
 
+    def _driving(self, keyword: str, parts: Sequence[object], span: Span) -> tree.Statement:
+        """A setting of the driver, a device, its axis, or a tracker."""
+        if keyword == "parameter":
+            words, *values = parts
+            return tree.Parameter(span, str(words), tuple(map(self.expression, values)))
+        if keyword == "axis":
+            word = cast("Literal['insert', 'roll']", str(parts[0]))
+            return tree.Axis(span, word, self._identifier(parts[1]), self.expression(parts[2]))
+        kind, text = self._identifier(parts[0]), self._text(parts[1])
+        if keyword == "device":
+            return tree.Device(span, kind, text, ())
+        return tree.Tracker(span, kind, text, self._text(parts[2]) if len(parts) > 2 else None)
+
     def _region(self, node: lark.Tree[lark.Token], span: Span) -> tree.Region:
         """A region with its shape."""
         kind, name, shape = node.children
-        keyword = cast("Literal['target', 'critical', 'detection']", str(kind))
+        keyword = cast("RegionKind", str(kind))
         shape = cast("lark.Tree[lark.Token]", shape)
         first, second = shape.children
         shape_span = self._span(shape)
@@ -139,6 +155,11 @@ class TreeBuilder:
         token = cast("lark.Token", token)
         start = cast(int, token.start_pos)
         return tree.Identifier(self._source.span(start, start + len(token)), str(token))
+
+    def _text(self, token: object) -> tree.Identifier:
+        """A text in quotes without them, with its place."""
+        quoted = self._identifier(token)
+        return tree.Identifier(quoted.span, quoted.text[1:-1])
 
     def _span(self, node: lark.Tree[lark.Token]) -> Span:
         """The place of a node."""

@@ -149,6 +149,11 @@ KINDS: Final = _kinds(
         "With `safety swept`, a step goes less than half round the circle.",
     ),
     ("N085", "uppaal-model", "error", "The file is a UPPAAL model, and not an environment."),
+    # Driver and devices.
+    ("N086", "setting-out-of-range", "error", "The driver cannot work with this value."),
+    ("N087", "axis-malformed", "error", "An axis has a letter of GRBL, and its steps."),
+    ("N088", "axis-missing", "error", "A device has an axis to insert and one to roll."),
+    ("N089", "address-malformed", "error", "An address is a host and a port."),
 )
 """All kinds of mistakes by name, in the order of their codes."""
 

@@ -33,6 +33,7 @@ from ntagen.nsl.tokens import (
     BLOCKS,
     KEYWORDS,
     NAMING,
+    PHRASES,
     REGIONS,
     RESERVED,
     STRAY,
@@ -42,7 +43,7 @@ from ntagen.nsl.tokens import (
     grammar,
     tokenise,
 )
-from ntagen.nsl.wording import FORMS, STRAY_HINTS, TERMINAL_WORDS, describe, quoted, visible
+from ntagen.nsl.wording import STRAY_HINTS, TERMINAL_WORDS, describe, form_of, quoted, visible
 
 if TYPE_CHECKING:
     import lark
@@ -138,7 +139,13 @@ class _Parser:
         """The statement that begins here, with its braces."""
         words = self._cut(kind)
         keyword = words[0].text
-        is_misplaced = keyword in KEYWORDS and kind is not None and keyword not in ALLOWED[kind]
+        is_phrase = words[0].type in PHRASES.values()
+        is_misplaced = (
+            keyword in KEYWORDS
+            and not is_phrase
+            and kind is not None
+            and (keyword not in ALLOWED[kind] or kind in PHRASES)
+        )
         if is_misplaced and kind is not None:
             self._report_misplaced(words[0], kind)
         parsed = self._parse_words(words)
@@ -247,10 +254,15 @@ class _Parser:
 
     def _as_keyword(self, token: Token, kind: BlockKind | None) -> Token:
         """The first word of a statement; a misspelt keyword is reported and replaced."""
-        if token.text in KEYWORDS or token.type in ("QUERY", "REGION_KIND"):
+        if token.text in KEYWORDS or token.type in ("QUERY", "REGION_KIND", *PHRASES.values()):
             return token
         allowed = KEYWORDS if kind is None else ALLOWED[kind]
-        meant = suggest(token.text, allowed) or suggest(token.text, KEYWORDS)
+        begun = [words for words in allowed if words.startswith(f"{token.text} ")]
+        meant = (
+            (begun[0] if len(begun) == 1 else None)
+            or suggest(token.text, allowed)
+            or suggest(token.text, KEYWORDS)
+        )
         words = ", ".join(f"`{word}`" for word in sorted(allowed))
         self._reporter.report(
             "unknown-keyword",
@@ -258,9 +270,11 @@ class _Parser:
             f"no statement begins with {quoted(token)}",
             hint=f"did you mean `{meant}`?" if meant else f"possible words here: {words}",
         )
-        if meant is None or meant == "query":
+        if meant is None or meant == "query" or " " in meant:
             return token
         terminal = "REGION_KIND" if meant in REGIONS else meant.upper()
+        if kind is not None and kind in PHRASES and meant in allowed:
+            terminal = PHRASES[kind]
         return Token(terminal, meant, token.span, token.line)
 
     def _begins_unknown_statement(self, previous: Token, token: Token) -> bool:
@@ -303,7 +317,8 @@ class _Parser:
         broken = tree.Broken(span, words[0].text.split()[0], _declared_name(words))
         if words[0].type == "QUERY":
             return self._query(words) or tree.Broken(span, "query")
-        if words[0].text not in KEYWORDS or self._is_too_deep(words):
+        is_known = words[0].text in KEYWORDS or words[0].type in PHRASES.values()
+        if not is_known or self._is_too_deep(words):
             return broken
         parsed = self._parse_with_grammar(words)
         if parsed is None or self._has_gap(words):
@@ -442,7 +457,7 @@ class _Parser:
             "unexpected-word",
             found.span if found else words[-1].span.behind(),
             f"expected {expected}{', found' if found else ' before'} {what}",
-            hint=hint or FORMS.get(words[0].text),
+            hint=hint or form_of(words[0]),
         )
 
 
@@ -466,6 +481,6 @@ def _declared_name(words: Sequence[Token]) -> str | None:
 
 def _with_body(parsed: tree.Statement, body: tuple[tree.Statement, ...]) -> tree.Statement:
     """A statement with the statements in its braces."""
-    if isinstance(parsed, tree.Section | tree.Loop | tree.Environment | tree.Broken):
+    if isinstance(parsed, tree.Section | tree.Device | tree.Loop | tree.Environment | tree.Broken):
         return replace(parsed, body=body)
     return parsed

@@ -1,42 +1,41 @@
-"""Values with a dimension: numbers, lengths, angles, times, speeds, and vectors of them.
+"""Values with a dimension: numbers, lengths, angles, times, speeds, forces, and vectors of them.
 
-Everything is stored in mm, rad and s. An angle is a dimension of its own here, although it is a
-plain number in physics: this finds a missing ``deg``.
+Everything is stored in mm, rad, s, N and bytes. An angle is a dimension of its own here, although
+it is a plain number in physics: this finds a missing ``deg``.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Final
 
-from ntagen.units import MM_PER, RAD_PER, S_PER
+from ntagen.units import BYTES_PER, MM_PER, N_PER, RAD_PER, S_PER
 
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """Exponents of length, angle and time."""
+    """Exponents of length, angle, time, force, size of data, and steps of a motor."""
 
     length: int = 0
     angle: int = 0
     time: int = 0
+    force: int = 0
+    data: int = 0
+    steps: int = 0
 
     def __mul__(self, other: Dimension) -> Dimension:
-        return Dimension(
-            self.length + other.length, self.angle + other.angle, self.time + other.time
-        )
+        return Dimension(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
     def __truediv__(self, other: Dimension) -> Dimension:
-        return Dimension(
-            self.length - other.length, self.angle - other.angle, self.time - other.time
-        )
+        return Dimension(*(a - b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
     def root(self) -> Dimension | None:
         """The dimension of the square root; None if it has none."""
-        if self.length % 2 or self.angle % 2 or self.time % 2:
+        if any(exponent % 2 for exponent in astuple(self)):
             return None
-        return Dimension(self.length // 2, self.angle // 2, self.time // 2)
+        return Dimension(*(exponent // 2 for exponent in astuple(self)))
 
     def __str__(self) -> str:
         """The dimension as it is named in a message, with its article."""
@@ -44,7 +43,7 @@ class Dimension:
 
     def _formula(self) -> str:
         """The dimension as a product of units: ``mm^2/s``."""
-        units = (("mm", self.length), ("rad", self.angle), ("s", self.time))
+        units = tuple(zip(("mm", "rad", "s", "N", "B", "steps"), astuple(self), strict=True))
         above = [_power(unit, exponent) for unit, exponent in units if exponent > 0]
         below = [_power(unit, -exponent) for unit, exponent in units if exponent < 0]
         return "/".join(["*".join(above) or "1", *below])
@@ -60,6 +59,13 @@ LENGTH: Final = Dimension(length=1)
 ANGLE: Final = Dimension(angle=1)
 TIME: Final = Dimension(time=1)
 SPEED: Final = LENGTH / TIME
+FORCE: Final = Dimension(force=1)
+DATA: Final = Dimension(data=1)
+STEPS: Final = Dimension(steps=1)
+FORCE_PER_LENGTH: Final = FORCE / LENGTH
+TURNING: Final = ANGLE / TIME
+STEPS_PER_LENGTH: Final = STEPS / LENGTH
+STEPS_PER_ANGLE: Final = STEPS / ANGLE
 
 _DIMENSION_NAMES: Final = {
     NUMBER: "a plain number",
@@ -67,13 +73,30 @@ _DIMENSION_NAMES: Final = {
     ANGLE: "an angle",
     TIME: "a time",
     SPEED: "a speed",
+    FORCE: "a force",
+    DATA: "a size",
+    STEPS: "a number of steps",
+    STEPS_PER_LENGTH: "a number of steps per length",
+    STEPS_PER_ANGLE: "a number of steps per angle",
     Dimension(length=2): "an area",
     Dimension(length=3): "a volume",
     Dimension(length=1, time=-2): "an acceleration",
-    Dimension(angle=1, time=-1): "an angular speed",
+    TURNING: "an angular speed",
+    FORCE_PER_LENGTH: "a force per length",
 }
 
-USUAL_UNIT: Final = {LENGTH: "mm", ANGLE: "deg", TIME: "s", SPEED: "mm/s"}
+USUAL_UNIT: Final = {
+    LENGTH: "mm",
+    ANGLE: "deg",
+    TIME: "s",
+    SPEED: "mm/s",
+    FORCE: "N",
+    DATA: "MiB",
+    FORCE_PER_LENGTH: "N/mm",
+    TURNING: "deg/s",
+    STEPS_PER_LENGTH: "steps/mm",
+    STEPS_PER_ANGLE: "steps/deg",
+}
 """The unit that a hint proposes for a dimension."""
 
 ALIASES: Final = {
@@ -105,13 +128,19 @@ UNITS: Final[dict[str, tuple[float, Dimension]]] = {
     **{name: (factor, LENGTH) for name, factor in MM_PER.items()},
     **{name: (factor, ANGLE) for name, factor in RAD_PER.items()},
     **{name: (factor, TIME) for name, factor in S_PER.items()},
+    **{name: (factor, FORCE) for name, factor in N_PER.items()},
+    **{name: (factor, DATA) for name, factor in BYTES_PER.items()},
+    "steps": (1.0, STEPS),
 }
-"""Units by name: how many mm, rad or s they are, and their dimension."""
+"""Units by name: how many mm, rad, s, N, bytes or steps they are, and their dimension."""
+
+_RESERVED: Final = frozenset({*MM_PER, *RAD_PER, *S_PER})
+"""The units that cannot be names. Others can: a unit stands behind a value, where no name can."""
 
 
 def is_unit(name: str) -> bool:
     """Whether a name is reserved because it is a unit."""
-    return name in UNITS
+    return name in _RESERVED
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,10 +21,17 @@ from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Evaluator, Scope
 from ntagen.nsl.parser import MAX_DEPTH, parse
 from ntagen.nsl.quantity import (
     ANGLE,
+    DATA,
+    FORCE,
+    FORCE_PER_LENGTH,
     LENGTH,
     NUMBER,
     SPEED,
+    STEPS_PER_ANGLE,
+    STEPS_PER_LENGTH,
     TIME,
+    TURNING,
+    Dimension,
     Quantity,
     is_unit,
     scalar,
@@ -32,7 +39,9 @@ from ntagen.nsl.quantity import (
 from ntagen.nsl.reading import read_source
 from ntagen.nsl.source import Source, Span
 from ntagen.nsl.tokens import ALLOWED, BLOCKS, BlockKind
+from ntagen.parameters import BY_WORDS, Given, Kind, Parameter, Value
 from ntagen.scene import RegionKind, Vector
+from ntagen.units import RAD_PER
 
 MAX_ROUNDS: Final = 10_000
 """All loops of an environment together make at most this many rounds."""
@@ -93,6 +102,18 @@ class Draft:
     broken_names: set[str] = field(default_factory=set)
     queries: dict[str, Placed[str]] = field(default_factory=dict)
     has_gaps: bool = False
+    given: list[Given] = field(default_factory=list)
+    devices: dict[str, DraftDevice] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class DraftDevice:
+    """A device or a tracker: its address, its name, and its axes with their letters and steps."""
+
+    kind: str
+    address: Placed[str]
+    name: str = ""
+    axes: dict[str, tuple[Placed[str], Placed[float]]] = field(default_factory=dict)
 
 
 _NUMBERS: Final = {
@@ -106,10 +127,28 @@ _VECTORS: Final = {
     "heading": (NUMBER, "the heading"),
     "bevel": (NUMBER, "the bevel"),
 }
-CHOICES: Final = {"tissue": ("static",), "safety": ("sampled", "swept")}
+_DIMENSIONS: Final[dict[Kind, Dimension]] = {
+    "length": LENGTH,
+    "angle": ANGLE,
+    "time": TIME,
+    "force": FORCE,
+    "force per length": FORCE_PER_LENGTH,
+    "angle per time": TURNING,
+    "data": DATA,
+    "ratio": NUMBER,
+}
+CHOICES: Final = {
+    "tissue": ("static",),
+    "safety": ("sampled", "swept"),
+    "device": ("grbl",),
+    "tracker": ("openigtlink",),
+}
 """The words that each property allows, the default first."""
 
-_ONCE: Final = frozenset({"needle", "motion", "roll", "resolution", *_NUMBERS, *_VECTORS, *CHOICES})
+_ONCE: Final = frozenset(
+    {"needle", "motion", "roll", "resolution", "drive", *_NUMBERS, *_VECTORS, *CHOICES, *BY_WORDS}
+)
+_ONCE_IN_DEVICE: Final = frozenset({"insert", "roll"})
 
 
 def resolve(source: Source, reporter: Reporter, folders: Sequence[str | Path] = ()) -> Draft | None:
@@ -193,7 +232,7 @@ class _Resolver:
         elif keyword == "environment" and self._draft is None:
             self._draft = Draft(statement.span, name or "?", has_gaps=True)
             self._statements(statement.body, Scope(scope), "environment")
-        elif keyword in ("needle", "motion"):
+        elif keyword in ("needle", "motion", "drive", "device"):
             self._statements(statement.body, scope, BLOCKS[keyword])
         elif keyword == "for" and name is not None:
             self._round(statement.body, scope, tree.Identifier(statement.span, name), None)
@@ -213,6 +252,8 @@ class _Resolver:
                 self._environment(statement, scope)
             case tree.Section(keyword=keyword, body=body):
                 self._statements(body, scope, keyword)
+            case tree.Device():
+                self._device(statement, scope)
             case tree.Loop():
                 self._loop(statement, scope)
             case _ if self._draft is not None:
@@ -231,14 +272,22 @@ class _Resolver:
                 self._roll(statement, scope, draft)
             case tree.Choice():
                 self._choice(statement, draft)
+            case tree.Parameter():
+                self._parameter(statement, scope, draft)
+            case tree.Axis():
+                self._axis(statement, scope, draft)
+            case tree.Tracker():
+                self._tracker(statement, draft)
             case tree.Resolution():
                 self._resolution(statement, scope, draft)
 
     def _is_repeated(self, statement: tree.Statement) -> bool:
         """Whether a statement that may occur only once is repeated; if so, reports it."""
-        if self._draft is None or statement.keyword not in _ONCE:
+        is_axis = isinstance(statement, tree.Axis)
+        if self._draft is None or statement.keyword not in (_ONCE_IN_DEVICE if is_axis else _ONCE):
             return False
-        first = self._draft.seen.setdefault(statement.keyword, statement.span)
+        key = f"{'axis ' if is_axis else ''}{statement.keyword}"
+        first = self._draft.seen.setdefault(key, statement.span)
         if first is statement.span:
             return False
         self._reporter.report(
@@ -539,17 +588,104 @@ class _Resolver:
 
     def _choice(self, statement: tree.Choice, draft: Draft) -> None:
         """A property that is one of a few words."""
-        word, known = statement.word.text, CHOICES[statement.keyword]
-        if word in known:
-            draft.choices[statement.keyword] = word
-            return
+        if self._is_known(statement.word, statement.keyword):
+            draft.choices[statement.keyword] = statement.word.text
+        else:
+            draft.has_gaps = True
+
+    def _is_known(self, word: tree.Identifier, keyword: str) -> bool:
+        """Whether a word is one of those that a property allows; if not, reports it."""
+        known = CHOICES[keyword]
+        if word.text in known:
+            return True
         self._reporter.report(
             "unknown-choice",
-            statement.word.span,
-            f"there is no {statement.keyword} `{word}`",
-            hint=did_you_mean(word, known) or f"write {' or '.join(f'`{w}`' for w in known)}",
+            word.span,
+            f"there is no {keyword} `{word.text}`",
+            hint=did_you_mean(word.text, known) or f"write {' or '.join(f'`{w}`' for w in known)}",
         )
-        draft.has_gaps = True
+        return False
+
+    # ------------------------------------------------------------------------- driver and devices
+
+    def _parameter(self, statement: tree.Parameter, scope: Scope, draft: Draft) -> None:
+        """A setting of the driver."""
+        parameter = BY_WORDS[statement.keyword]
+        if parameter.kind != "words" and len(statement.values) > 1:
+            self._reporter.report(
+                "unexpected-word",
+                statement.values[1].span,
+                f"`{parameter.words}` has one value",
+                hint=f"write for example `{parameter.example}`",
+            )
+            return
+        value = self._value(parameter, statement, scope)
+        if value is None:
+            return
+        breach = parameter.breach(value)
+        span = statement.values[0].span
+        if breach is not None:
+            self._reporter.report(breach.rule, span, breach.message, hint=breach.hint)
+        else:
+            draft.given.append(Given(parameter, value, span.place))
+
+    def _value(self, parameter: Parameter, statement: tree.Parameter, scope: Scope) -> Value | None:
+        """The value of a setting; None after a mistake."""
+        first, role = statement.values[0], f"`{parameter.words}`"
+        if parameter.kind == "count":
+            return self._evaluator.whole(first, scope, role)
+        if parameter.kind in _DIMENSIONS:
+            return self._evaluator.number(first, scope, _DIMENSIONS[parameter.kind], role)
+        words = [self._word(expression, parameter) for expression in statement.values]
+        if any(word is None for word in words):
+            return None
+        if parameter.kind == "switch":
+            return words[0] == "on"
+        return tuple(word for word in words if word is not None)
+
+    def _word(self, expression: tree.Expression, parameter: Parameter) -> str | None:
+        """A word that a setting allows; None after a mistake."""
+        text = expression.text if isinstance(expression, tree.Name) else expression.span.text
+        if text in parameter.choices:
+            return text
+        self._reporter.report(
+            "unknown-choice",
+            expression.span,
+            f"`{parameter.words}` cannot be `{text}`",
+            hint=did_you_mean(text, parameter.choices)
+            or f"write {' or '.join(f'`{word}`' for word in parameter.choices)}",
+        )
+        return None
+
+    def _device(self, statement: tree.Device, scope: Scope) -> None:
+        """A device with its axes."""
+        draft = self._draft
+        if draft is None or not self._is_known(statement.kind, "device"):
+            return
+        port = Placed(statement.port.text, statement.port.span)
+        draft.devices["device"] = DraftDevice(statement.kind.text, port)
+        self._statements(statement.body, scope, "device")
+
+    def _axis(self, statement: tree.Axis, scope: Scope, draft: Draft) -> None:
+        """An axis of the device."""
+        dimension = STEPS_PER_LENGTH if statement.keyword == "insert" else STEPS_PER_ANGLE
+        role = f"the steps of `{statement.keyword}`"
+        steps = self._evaluator.number(statement.steps, scope, dimension, role)
+        if steps is not None and statement.keyword == "roll":
+            # Dimensions are computed per rad; controllers and people count per degree.
+            steps *= RAD_PER["deg"]
+        letter = Placed(statement.letter.text, statement.letter.span)
+        draft.devices["device"].axes[statement.keyword] = (
+            letter,
+            Placed(steps, statement.steps.span),
+        )
+
+    def _tracker(self, statement: tree.Tracker, draft: Draft) -> None:
+        """A tracker."""
+        if self._is_known(statement.kind, "tracker"):
+            address = Placed(statement.address.text, statement.address.span)
+            name = "" if statement.name is None else statement.name.text
+            draft.devices["tracker"] = DraftDevice(statement.kind.text, address, name)
 
     def _resolution(self, statement: tree.Resolution, scope: Scope, draft: Draft) -> None:
         """The fixed-point scale, as units per mm."""

@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import functools
 import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, cast
 
 from ntagen.cache import cache_folder
 from ntagen.nsl.source import Source, Span
+from ntagen.parameters import BY_WORDS
 
 if TYPE_CHECKING:
     import lark
 
-BlockKind = Literal["file", "environment", "needle", "motion", "for"]
+BlockKind = Literal["file", "environment", "needle", "motion", "for", "drive", "device"]
 """The place of a statement: at the top of a file, or in the braces of another one."""
 
 REGIONS: Final = frozenset({"target", "critical", "detection"})
@@ -31,6 +33,9 @@ _BODY_ITEMS: Final = REGIONS | {
     "needle",
     "motion",
     "for",
+    "drive",
+    "device",
+    "tracker",
 }
 
 ALLOWED: Final[dict[BlockKind, frozenset[str]]] = {
@@ -39,11 +44,17 @@ ALLOWED: Final[dict[BlockKind, frozenset[str]]] = {
     "needle": _NEEDLE_ITEMS,
     "motion": _MOTION_ITEMS,
     "for": REGIONS | {"let", "for"},
+    "drive": frozenset(BY_WORDS),
+    "device": frozenset({"insert", "roll"}),
 }
 """The statements that are allowed at each place."""
 
-KEYWORDS: Final = frozenset().union(*ALLOWED.values())
-"""The words that begin a statement."""
+PHRASES: Final[dict[str, str]] = {"drive": "PARAMETER", "device": "AXIS"}
+"""The braces whose statements begin with words that may be names elsewhere, and the terminal to
+which `tokenise` joins these words."""
+
+KEYWORDS: Final = frozenset().union(*(ALLOWED[kind] for kind in ALLOWED if kind not in PHRASES))
+"""The words that begin a statement, wherever they stand."""
 
 _OTHER_WORDS: Final = frozenset(
     {"sphere", "around", "margin", "by", "at", "most", "least", "times", "apart", "per", "in"}
@@ -56,6 +67,8 @@ BLOCKS: Final[dict[str, BlockKind]] = {
     "needle": "needle",
     "motion": "motion",
     "for": "for",
+    "drive": "drive",
+    "device": "device",
 }
 """The statements that have braces."""
 
@@ -134,7 +147,71 @@ def tokenise(source: Source) -> list[Token | Comment]:
             stray_count += token.type in STRAY
             if stray_count > MAX_STRAY:
                 break
-    return found
+    return list(_joined(found))
+
+
+def _joined(items: Sequence[Token | Comment]) -> Iterator[Token | Comment]:
+    """The items, with the words that begin a statement in `PHRASES` joined to one token."""
+    block: BlockKind | None = None
+    depth = 0
+    phrase: Token | None = None
+    expects_value = False
+    skipped = 0
+    for index, item in enumerate(items):
+        if skipped > 0:
+            skipped -= 1
+        elif not isinstance(item, Token) or block is None or depth == 0:
+            if isinstance(item, Token):
+                block, depth = _head(item, block)
+            yield item
+        elif item.type == "BRACE":
+            depth += 1 if item.text == "{" else -1
+            block = block if depth > 0 else None
+            phrase, expects_value = None, False
+            yield item
+        else:
+            # Where a value must come, a name stands, whatever it is.
+            count = 0 if expects_value else _phrase_at(items, index, block)
+            expects_value = count > 0 or item.type in _BEFORE_VALUES
+            if count > 0:
+                last = items[index + count - 1].span
+                text = " ".join(one.text for one in items[index : index + count])
+                phrase = Token(PHRASES[block], text, item.span.to(last), item.line)
+                skipped = count - 1
+                yield phrase
+            else:
+                yield _as_choice(item, phrase)
+
+
+_BEFORE_VALUES: Final = frozenset({"COMMA", "SIGN", "SCALE", "LPAR"})
+
+
+def _head(token: Token, block: BlockKind | None) -> tuple[BlockKind | None, int]:
+    """The block and its depth after a token that is not in the braces of `PHRASES`."""
+    if token.text in PHRASES:
+        return cast(BlockKind, token.text), 0
+    if block is not None and token.text == "{":
+        return block, 1
+    return (block if token.type in ("NAME", "STRING") else None), 0
+
+
+def _as_choice(token: Token, phrase: Token | None) -> Token:
+    """A token as a name, if it is one of the words that the setting before it can have."""
+    parameter = BY_WORDS.get(phrase.text) if phrase is not None else None
+    if parameter is None or token.text not in parameter.choices:
+        return token
+    return Token("NAME", token.text, token.span, token.line)
+
+
+def _phrase_at(items: Sequence[Token | Comment], index: int, block: BlockKind) -> int:
+    """The number of items from an index that are the words of a statement of a block; else 0."""
+    longest = 0
+    for phrase in ALLOWED[block]:
+        words = phrase.split()
+        found = [item.text for item in items[index : index + len(words)]]
+        if found == words and len(words) > longest:
+            longest = len(words)
+    return longest
 
 
 def begins_statement(token: Token, kind: BlockKind | None) -> bool:
@@ -142,6 +219,8 @@ def begins_statement(token: Token, kind: BlockKind | None) -> bool:
 
     `radius` begins one only in a needle: elsewhere it is a clause of a sphere.
     """
-    if token.type == "QUERY":
+    if token.type in ("QUERY", "PARAMETER", "AXIS"):
         return True
+    if token.type == "NAME":
+        return False  # One of the words that a setting can have.
     return token.text in KEYWORDS and (token.text != "radius" or kind == "needle")

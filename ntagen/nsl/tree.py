@@ -117,7 +117,7 @@ class Around:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A target, critical or detection region."""
+    """A region of any kind."""
 
     span: Span
     keyword: RegionKind
@@ -194,11 +194,52 @@ class Resolution:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
-    """``needle { … }`` or ``motion { … }``; the span is that of the word."""
+class Parameter:
+    """A setting of the driver: ``pull 4 mm``; the keyword is its words."""
 
     span: Span
-    keyword: Literal["needle", "motion"]
+    keyword: str
+    values: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """An axis of a device: ``insert X 80 steps/mm``."""
+
+    span: Span
+    keyword: Literal["insert", "roll"]
+    letter: Identifier
+    steps: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """``device grbl "/dev/ttyACM0" { … }``; the texts are without the quotes."""
+
+    span: Span
+    kind: Identifier
+    port: Identifier
+    body: tuple[Statement, ...]
+    keyword: Literal["device"] = "device"
+
+
+@dataclass(frozen=True, slots=True)
+class Tracker:
+    """``tracker openigtlink "localhost:18944" "Needle"``; the texts are without the quotes."""
+
+    span: Span
+    kind: Identifier
+    address: Identifier
+    name: Identifier | None
+    keyword: Literal["tracker"] = "tracker"
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """``needle { … }``, ``motion { … }`` or ``drive { … }``; the span is that of the word."""
+
+    span: Span
+    keyword: Literal["needle", "motion", "drive"]
     body: tuple[Statement, ...]
 
 
@@ -251,6 +292,10 @@ Statement = (
     | Choice
     | Resolution
     | Section
+    | Parameter
+    | Device
+    | Axis
+    | Tracker
     | Loop
     | Environment
     | Broken

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from ntagen.nsl.tokens import Token
+from ntagen.parameters import BY_WORDS
 
 STRAY_HINTS: Final = {
     ";": "statements need no separator",
@@ -29,6 +30,10 @@ FORMS: Final = {
     "environment": "write `environment NAME { … }`",
     "needle": "write `needle { … }`",
     "motion": "write `motion { … }`",
+    "drive": "write for example `drive { pull 4 mm  push 2 mm }`",
+    "device": 'write for example `device grbl "/dev/ttyACM0" { … }`',
+    "insert": "write for example `insert X 80 steps/mm`",
+    "tracker": 'write for example `tracker openigtlink "localhost:18944" "Needle"`',
     "for": "write for example `for i in 0..7 { … }`",
     "let": "write for example `let depth = 50 mm`",
     "include": 'write for example `include "needle.nsl"`',
@@ -56,12 +61,21 @@ TERMINAL_WORDS: Final = {
     "COMMA": ",",
     "EQUAL": "=",
     "RANGE": "..",
-    "STRING": "a path in quotes",
+    "STRING": "a text in quotes",
     "NAME": "a name",
     "RATIO": "a unit",
 }
 _VALUE_TERMINALS: Final = frozenset({"NUMBER", "NAME", "LPAR", "SIGN"})
 _OPERATORS: Final = frozenset({"SIGN", "SCALE", "RATIO"})
+
+
+def form_of(first: Token) -> str | None:
+    """A hint how a statement is written that begins with this token."""
+    if first.type == "PARAMETER":
+        return f"write for example `{BY_WORDS[first.text].example}`"
+    if first.type == "AXIS" and first.text == "roll":
+        return "write for example `roll A 8.89 steps/deg`"
+    return FORMS.get(first.text)
 
 
 def describe(terminals: set[str]) -> str:

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from ntagen.cli import main
+from ntagen.drive.reading import read_log
+from ntagen.drive.records import Estimated, Relied
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 PAPER = str(EXAMPLES / "paper.nsl")
@@ -46,6 +48,39 @@ def test_drive_says_that_there_is_no_strategy(capsys: pytest.CaptureFixture[str]
     assert summary["depth_mm"] == pytest.approx(5.0)
 
 
+def test_drive_takes_settings_from_file_and_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "task.nsl"
+    block = "drive { noise 0.01 mm  pull 8 mm  push 3 mm  force sensing off }"
+    path.write_text(f"{Path(PAPER).read_text().rstrip().removesuffix('}')} {block} }}")
+    log_path = tmp_path / "run.mcap"
+    arguments = [str(path), "--pull", "6mm", "--true-radius", "33mm", "--true-bevel", "5deg"]
+    assert main(["drive", *arguments, "--settings"]) == 0
+    rows = {
+        line[2:22].strip(): line.split("  ")[-1] for line in capsys.readouterr().out.splitlines()
+    }
+    assert rows["pull"] == "command line"
+    assert rows["push"].strip().startswith(str(path))
+    assert main(["drive", *arguments, "--log", str(log_path)]) == 0
+    assert "not on the force: unknown regions are not felt" in capsys.readouterr().out
+    log = read_log(log_path)
+    assert (log.settings.pull_mm, log.settings.push_mm) == (6.0, 3.0)
+    assert log.settings.margins.clearance_mm > 2.0
+    assert json.loads(log.metadata["origins"])["pull_mm"] == "command line"
+    assert json.loads(log.metadata["true_radius_mm"]) == 33.0
+    assert log.actual.needle.radius_mm == 33.0
+    assert log.scene.needle.radius_mm == 30.0
+    estimates = [record for record in log.records if isinstance(record, Estimated)]
+    assert abs(estimates[-1].radius_mm - 33.0) < abs(estimates[0].radius_mm - 33.0)
+    assert isinstance(log.records[0], Relied)
+    assert main(["replay", str(log_path)]) == 0
+    assert main(["info", str(path), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out.splitlines()[-1])["settings"]
+    assert told["push"]["value"] == 3.0
+    assert told["push"]["origin"].startswith(str(path))
+
+
 def test_drive_ends_at_the_time_limit(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["drive", PAPER, "--timeout", "0.05 min", "--quiet"]) == 6
     out = capsys.readouterr().out
@@ -74,8 +109,13 @@ def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -
         ("unknown ranking criterion 'beauty'", [PAPER, "--rank", "beauty"]),
         ("is not a time", [PAPER, "--timeout", "soon"]),
         ("is not a time", [PAPER, "--timeout", "0"]),
-        ("not a number of 0 or more", [PAPER, "--noise", "-1"]),
-        ("not a number of 0 or more", [PAPER, "--roll-error", "nan"]),
+        ("noise must be at least 0 mm", [PAPER, "--noise", "-1"]),
+        ("'nan' is not an angle; write for example 2deg", [PAPER, "--roll-error", "nan"]),
+        ("'2mm' is not an angle", [PAPER, "--true-bevel", "2mm"]),
+        ("learned radius must be at least 0.01 mm", [PAPER, "--learned-radius", "0mm"]),
+        ("'2.5' is not a whole number", [PAPER, "--deviation-count", "2.5"]),
+        ("'maybe' is not on or off", [PAPER, "--force-sensing", "maybe"]),
+        ("`push`: command line", [PAPER, "--push", "12mm"]),
         ("--seed", [PAPER, "--seed", "-1"]),
         ("it is a folder", [PAPER, "--log", "."]),
         ("would replace", [PAPER, "--log", PAPER]),

@@ -1,0 +1,101 @@
+"""The options of all settings that steer: one for each row of `ntagen.parameters`."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import click
+
+from ntagen.cli.terminal import echo
+from ntagen.parameters import MEASURES, PARAMETERS, Given, Parameter
+
+if TYPE_CHECKING:
+    from ntagen.drive.configure import Configuration
+
+
+class _Value(click.ParamType[Given]):
+    """The value of a setting, with or without its unit."""
+
+    def __init__(self, parameter: Parameter) -> None:
+        self._parameter = parameter
+        self.name = parameter.words
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Given:
+        from ntagen.drive.configure import COMMAND_LINE
+        from ntagen.plan.rank import parse_ranking
+
+        if isinstance(value, Given):
+            return value
+        if self._parameter.field == "ranking":
+            return Given(self._parameter, parse_ranking(str(value)), COMMAND_LINE)
+        try:
+            return Given(self._parameter, self._parameter.parse(str(value)), COMMAND_LINE)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+class _Option(click.Option):
+    """An option whose help shows the default of the setting, which is looked up late."""
+
+    parameter: Parameter
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        from ntagen.drive.configure import Configuration
+
+        record = super().get_help_record(ctx)
+        if record is None:
+            return None
+        default = self.parameter.shown(Configuration().value(self.parameter))
+        return record[0], f"{record[1]}  [default: {default}]"
+
+
+def steering_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """Adds the options; the command gets the values on the command line as `given`."""
+
+    @functools.wraps(command)
+    def with_given(**values: object) -> int | None:
+        found = [values.pop(_name(parameter)) for parameter in PARAMETERS]
+        return command(given=tuple(one for one in found if isinstance(one, Given)), **values)
+
+    decorated: Callable[..., int | None] = with_given
+    for parameter in reversed(PARAMETERS):
+        decorated = _option(parameter)(decorated)
+    return decorated
+
+
+def _option(
+    parameter: Parameter,
+) -> Callable[[Callable[..., int | None]], Callable[..., int | None]]:
+    unit = MEASURES[parameter.kind].unit
+    metavar = {"words": "CRITERION,…", "switch": "on|off"}.get(parameter.kind, unit.upper() or "N")
+
+    class Its(_Option):
+        pass
+
+    Its.parameter = parameter
+    return click.option(
+        parameter.flag,
+        _name(parameter),
+        cls=Its,
+        metavar=metavar,
+        type=_Value(parameter),
+        default=None,
+        help=parameter.help,
+    )
+
+
+def _name(parameter: Parameter) -> str:
+    """The name of the command's parameter."""
+    return f"given_{parameter.field.replace('.', '_')}"
+
+
+def show_settings(configuration: Configuration) -> None:
+    """Prints all settings: words, value, origin."""
+    rows = configuration.rows()
+    widths = [max(len(row[i]) for row in rows) for i in range(2)]
+    for words, value, origin in rows:
+        echo(f"  {words:<{widths[0]}}  {value:<{widths[1]}}  {origin}")

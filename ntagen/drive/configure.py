@@ -1,0 +1,136 @@
+"""The settings of a run, from three sources: defaults, then the file, then the command line.
+
+The command line wins over the file, and the file over the defaults. Each value keeps its origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Final
+
+from ntagen.drive.reliance import with_default_margins
+from ntagen.drive.settings import STEERING, Settings, value_of, with_values
+from ntagen.drive.simulate import settings_for
+from ntagen.errors import InputError
+from ntagen.needle.virtual import Errors
+from ntagen.parameters import NEEDLE, PARAMETERS, Given, Parameter, Value
+from ntagen.scene import Scene
+
+COMMAND_LINE: Final = "command line"
+"""The origin of a value that stands on the command line."""
+
+DEFAULT: Final = "default"
+"""The origin of a value that nobody gave."""
+
+_NO_FORCE: Final = "follows from force sensing off"
+_AS_NEEDLE: Final = "follows from the scene and the virtual needle"
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """The settings of a run and where they come from.
+
+    Attributes:
+        settings: The driver's settings.
+        errors: The errors of the virtual needle.
+        seed: The seed of these errors.
+        origins: The origin of each value that is not a default, by its field.
+    """
+
+    settings: Settings = field(default_factory=Settings)
+    errors: Errors = field(default_factory=Errors)
+    seed: int = 0
+    origins: Mapping[str, str] = field(default_factory=dict)
+
+    def value(self, parameter: Parameter) -> Value | None:
+        """The value of a setting."""
+        part, _, name = parameter.field.partition(".")
+        if part != NEEDLE:
+            value: Value = value_of(self.settings, parameter.field)
+            return value
+        if name == "seed":
+            return self.seed
+        found: Value | None = getattr(self.errors, name)
+        return found
+
+    def origin(self, parameter: Parameter) -> str:
+        """Where the value of a setting comes from."""
+        return self.origins.get(parameter.field, DEFAULT)
+
+    def rows(self) -> list[tuple[str, str, str]]:
+        """All settings: words, value in its usual unit, origin."""
+        return [
+            (parameter.words, parameter.shown(self.value(parameter)), self.origin(parameter))
+            for parameter in PARAMETERS
+        ]
+
+
+def configure(given: Iterable[Given], scene: Scene, known: str = "all") -> Configuration:
+    """The configuration of values that were given; a later one wins over an earlier one.
+
+    Args:
+        given: The values of the file, then those of the command line.
+        scene: The actual scene.
+        known: The critical regions that the driver knows (`ntagen.drive.knowledge.told`).
+
+    Raises:
+        InputError: The driver cannot work with these values together; the message has the origin
+            of each.
+    """
+    chosen = {one.parameter.field: one for one in given}
+    origins = {name: one.origin for name, one in chosen.items()}
+    values = {name: _exact(one) for name, one in chosen.items()}
+    errors = Errors(
+        **{
+            one.name: values[f"{NEEDLE}.{one.name}"]
+            for one in fields(Errors)
+            if f"{NEEDLE}.{one.name}" in values
+        }  # type: ignore[arg-type]
+    )
+    steering = {p.field: values[p.field] for p in STEERING if p.field in values}
+    try:
+        settings = with_values(Settings(), steering)
+        settings = _fitting(settings, errors, scene, known, origins)
+        settings = _with_margins(settings, origins)
+    except InputError as error:
+        said = [f"`{one.parameter.words}`: {one.origin}" for one in chosen.values()]
+        raise InputError("\n".join([str(error), *(f"note: {line}" for line in said)])) from error
+    seed = values.get(f"{NEEDLE}.seed", 0)
+    return Configuration(settings, errors, int(seed) if isinstance(seed, int) else 0, origins)
+
+
+def _exact(given: Given) -> Value:
+    """The value in the type of its field: sizes and counts are whole."""
+    if given.parameter.kind in ("data", "count") and isinstance(given.value, int | float):
+        return round(given.value)
+    return given.value
+
+
+def _fitting(
+    settings: Settings, errors: Errors, scene: Scene, known: str, origins: dict[str, str]
+) -> Settings:
+    """The settings that fit the virtual needle and the scene (`settings_for`).
+
+    Priors that somebody gave stay: a driver with wrong assumptions can be tried.
+    """
+    fitting = settings_for(settings, errors, scene, known)
+    kept = {}
+    for parameter in STEERING:
+        name = parameter.field
+        if value_of(fitting, name) == value_of(settings, name):
+            continue
+        if name.startswith("priors.") and name in origins:
+            kept[name] = value_of(settings, name)
+        else:
+            given = f" (given: {origins[name]})" if name in origins else ""
+            origins[name] = f"{_AS_NEEDLE}{given}"
+    return with_values(fitting, kept)
+
+
+def _with_margins(settings: Settings, origins: dict[str, str]) -> Settings:
+    """The settings with the margins that they need, except those that were given."""
+    safe = with_default_margins(settings, origins)
+    if safe != settings:
+        origins["margins.clearance_mm"] = _NO_FORCE
+    return safe

@@ -1,0 +1,61 @@
+"""What the driver relies on, so that no critical region is touched, and the margin that follows.
+
+A plan avoids the critical regions that are known. The tip follows the plan only as well as the
+driver can tell: it notices a deviation late, and by a noisy measurement. With force sensing, the
+surroundings of a region are felt before the region is touched. Without it, only the distance to the
+region is left: a plan must keep one that covers what the driver notices too late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from typing import Final
+
+from ntagen.drive.settings import Settings
+from ntagen.scene import Scene
+
+_SIGMAS: Final = 3.0
+"""A measured coordinate is within this many standard deviations in 99.7 % of cases."""
+
+
+def clearance_without_force_mm(settings: Settings) -> float:
+    """The distance that a plan keeps from critical regions if the force is not watched, in mm.
+
+    The rule, ours: the sum of the deviation that is allowed, of the way that the needle is pushed
+    before so many measurements in a row have shown it, and of three standard deviations of the
+    noise.
+    """
+    late_mm = settings.deviation_count * settings.spacing_mm
+    return settings.deviation_mm + late_mm + _SIGMAS * settings.priors.noise_mm
+
+
+def with_default_margins(settings: Settings, given: Collection[str] = ()) -> Settings:
+    """The settings with the margins that they need.
+
+    Without force sensing the clearance is `clearance_without_force_mm`, unless somebody gave it.
+
+    Args:
+        settings: The settings.
+        given: The fields that somebody gave.
+    """
+    if settings.force_sensing or "margins.clearance_mm" in given:
+        return settings
+    clearance_mm = max(settings.margins.clearance_mm, clearance_without_force_mm(settings))
+    return replace(settings, margins=replace(settings.margins, clearance_mm=clearance_mm))
+
+
+def relies_on(settings: Settings, scene: Scene) -> str:
+    """What the driver relies on, as a sentence; it stands in the log and at the start of a run."""
+    known = len(scene.criticals)
+    regions = "1 known critical region" if known == 1 else f"{known} known critical regions"
+    position = (
+        f"relies on the position: stops at {settings.deviation_mm:g} mm of deviation in the mean "
+        f"of {settings.deviation_count} or more readings"
+    )
+    if settings.force_sensing:
+        force = f"on the force: stops when it rises by {settings.force_n:g} N"
+    else:
+        force = "not on the force: unknown regions are not felt"
+    map_text = f"on {regions}: plans stay more than {settings.margins.clearance_mm:g} mm away"
+    return "; ".join([position, force, map_text if known else "on no known critical region"])

@@ -1,0 +1,423 @@
+"""The table of all that steers: its words in ``drive { … }``, its option, its unit, its help.
+
+A new setting is one row of `PARAMETERS`, and a field in `ntagen.drive.settings` (or, for the
+virtual needle, in `ntagen.drive.simulate`). From the row follow the language (`ntagen.nsl`: words,
+dimension, diagnostics, layout), the option of ``ntagen drive``, and the list of ``ntagen info``.
+
+Values are in mm, rad, s, N and bytes, wherever they come from.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from ntagen.rules import Breach
+from ntagen.units import BYTES_PER, MM_PER, N_PER, N_PER_MM, RAD_PER, RAD_PER_S, S_PER
+
+Kind = Literal[
+    "length",
+    "angle",
+    "time",
+    "force",
+    "force per length",
+    "angle per time",
+    "data",
+    "ratio",
+    "count",
+    "switch",
+    "words",
+]
+"""What a value is: a quantity, a plain number, a whole number, ``on`` or ``off``, or words."""
+
+Value = float | int | bool | tuple[str, ...]
+"""The value of a setting, in the unit of its field."""
+
+_QUANTITY: Final = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d]*(?:/[a-z]+)?)\s*"
+)
+
+LARGEST: Final = 1e6
+"""The largest value of any setting, in its usual unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """How the values of a kind are written.
+
+    Attributes:
+        noun: What a value is, for messages.
+        unit: The usual unit, in which help and tables show it; empty for a plain number.
+        units: All units, by how much one is of the unit in which values are kept.
+        example: A value as an example.
+    """
+
+    noun: str
+    unit: str
+    units: Mapping[str, float]
+    example: str
+
+
+MEASURES: Final[dict[Kind, Measure]] = {
+    "length": Measure("a length", "mm", MM_PER, "2 mm"),
+    "angle": Measure("an angle", "deg", RAD_PER, "2 deg"),
+    "time": Measure("a time", "s", S_PER, "60 s"),
+    "force": Measure("a force", "N", N_PER, "0.1 N"),
+    "force per length": Measure("a force per length", "N/mm", N_PER_MM, "0.5 N/mm"),
+    "angle per time": Measure("an angle per time", "deg/s", RAD_PER_S, "90 deg/s"),
+    "data": Measure("a size", "MiB", BYTES_PER, "512 MiB"),
+    "ratio": Measure("a plain number", "", {"": 1.0}, "0.05"),
+    "count": Measure("a whole number", "", {"": 1.0}, "3"),
+    "switch": Measure("on or off", "", {}, "off"),
+    "words": Measure("a list of words", "", {}, "clearance, rolls"),
+}
+"""How each kind is written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A setting.
+
+    Attributes:
+        field: Its place in the settings: a field, or part and field with a dot.
+        words: Its words in ``drive { … }``.
+        kind: What its values are.
+        help: What it is, as a sentence.
+        least: The least value, in the unit of the field.
+        is_above: Whether a value must be greater than `least`.
+        option: Its option of ``ntagen drive``; by default made of its words.
+        choices: The words that it can have.
+    """
+
+    field: str
+    words: str
+    kind: Kind
+    help: str
+    least: float = 0.0
+    is_above: bool = False
+    option: str = ""
+    choices: tuple[str, ...] = ()
+
+    @property
+    def flag(self) -> str:
+        """The option on the command line."""
+        return self.option or "--" + self.words.replace(" ", "-")
+
+    @property
+    def example(self) -> str:
+        """How it is written in a file, as an example."""
+        return f"{self.words} {MEASURES[self.kind].example}"
+
+    def breach(self, value: Value) -> Breach | None:
+        """What is wrong with a value in the unit of the field, or None."""
+        if isinstance(value, bool | tuple):
+            return None
+        measure = MEASURES[self.kind]
+        factor = measure.units.get(measure.unit, 1.0)
+        is_low = value < self.least or (self.is_above and value == self.least)
+        if math.isfinite(value) and not is_low and value <= LARGEST * factor:
+            return None
+        bound = "greater than" if self.is_above else "at least"
+        return Breach(
+            "setting-out-of-range",
+            f"`{self.words}` must be {bound} {self.shown(self.least)} and at most "
+            f"{self.shown(LARGEST * factor)}",
+            f"write for example `{self.example}`",
+        )
+
+    def parse(self, text: str) -> Value:
+        """The value of a text on the command line; a number without a unit is in the usual one.
+
+        Raises:
+            ValueError: The text is not such a value; the message says what is wrong.
+        """
+        measure = MEASURES[self.kind]
+        if self.kind == "switch":
+            if text not in ("on", "off"):
+                raise ValueError(f"'{text}' is not on or off")
+            return text == "on"
+        if self.kind == "words":
+            return tuple(word.strip() for word in text.split(","))
+        match = _QUANTITY.fullmatch(text)
+        factor = measure.units.get(match[2] or measure.unit) if match else None
+        if match is None or factor is None:
+            units = ", ".join(unit for unit in measure.units if unit)
+            hint = f"; units are {units}" if units else ""
+            example = measure.example.replace(" ", "")
+            raise ValueError(f"'{text}' is not {measure.noun}; write for example {example}{hint}")
+        value = float(match[1]) * factor
+        breach = self.breach(value)
+        if breach is not None:
+            reason = breach.message.replace("`", "")
+            raise ValueError(f"'{text}' is not {measure.noun} that is allowed: {reason}")
+        if self.kind != "count":
+            return value
+        if value != round(value):
+            raise ValueError(f"'{text}' is not a whole number")
+        return round(value)
+
+    def shown(self, value: Value | None) -> str:
+        """A value as a person writes it, in the usual unit."""
+        measure = MEASURES[self.kind]
+        if value is None:
+            return "as in the scene"
+        if isinstance(value, bool):
+            return "on" if value else "off"
+        if isinstance(value, tuple):
+            return ", ".join(value)
+        number = value / measure.units.get(measure.unit, 1.0)
+        return f"{number:.6g} {measure.unit}".rstrip()
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A value that somebody gave.
+
+    Attributes:
+        parameter: The setting.
+        value: Its value, in the unit of the field.
+        origin: Where it comes from: a place in a file, or the command line.
+    """
+
+    parameter: Parameter
+    value: Value
+    origin: str
+
+
+NEEDLE: Final = "needle"
+"""The part of the settings that only the simulated needle knows."""
+
+PARAMETERS: Final = (
+    Parameter("pull_mm", "pull", "length", "How far the needle is pulled back to readjust."),
+    Parameter(
+        "push_mm", "push", "length", "The push before the next estimate; less than the pull."
+    ),
+    Parameter("initial_push_mm", "initial push", "length", "The length of the first push."),
+    Parameter("spacing_mm", "spacing", "length", "A push is made in pieces of this length.", 0.01),
+    Parameter(
+        "deviation_mm",
+        "deviation",
+        "length",
+        "How far the tip may be off the plan, in the mean of the last measurements.",
+    ),
+    Parameter(
+        "deviation_count",
+        "deviation count",
+        "count",
+        "The least number of measurements whose mean counts.",
+        1,
+    ),
+    Parameter("force_n", "force", "force", "The rise of the force that is an alarm.", 1e-6),
+    Parameter(
+        "force_noise_n",
+        "force noise",
+        "force",
+        "The standard deviation of a measured force.",
+    ),
+    Parameter(
+        "force_rise_n_per_mm",
+        "force rise",
+        "force per length",
+        "The least rise of the force on the way towards a region.",
+        1e-6,
+    ),
+    Parameter(
+        "false_alarm",
+        "false alarm",
+        "ratio",
+        "The probability that noise alone stops a run, for force and deviation each.",
+        1e-9,
+    ),
+    Parameter(
+        "overrun_mm",
+        "overrun",
+        "length",
+        "How far the needle moves on after it was told to stop.",
+    ),
+    Parameter(
+        "force_sensing",
+        "force sensing",
+        "switch",
+        "Whether the force is watched. If it is off, plans keep more clearance.",
+        choices=("on", "off"),
+    ),
+    Parameter(
+        "margins.clearance_mm",
+        "clearance",
+        "length",
+        "A plan stays farther than this from critical regions.",
+    ),
+    Parameter(
+        "margins.detection_mm",
+        "detection clearance",
+        "length",
+        "A plan stays farther than this from detection regions.",
+    ),
+    Parameter(
+        "margins.depth_mm",
+        "depth in target",
+        "length",
+        "A plan ends at least this deep in the last target.",
+    ),
+    Parameter(
+        "sensing_margin_mm",
+        "sensing margin",
+        "length",
+        "The distance from an unknown region at which the force rises.",
+    ),
+    Parameter(
+        "learned_radius_mm",
+        "learned radius",
+        "length",
+        "The radius of a critical region that is learned.",
+        0.01,
+    ),
+    Parameter(
+        "priors.position_mm",
+        "prior position",
+        "length",
+        "Assumed standard deviation of each coordinate of the entry point.",
+        is_above=True,
+    ),
+    Parameter(
+        "priors.heading_rad",
+        "prior heading",
+        "angle",
+        "Assumed standard deviation of the heading at the entry.",
+        is_above=True,
+    ),
+    Parameter(
+        "priors.bevel_rad",
+        "prior bevel",
+        "angle",
+        "Assumed standard deviation of the bevel's angle at the entry.",
+        is_above=True,
+    ),
+    Parameter(
+        "priors.curvature_ratio",
+        "prior curvature",
+        "ratio",
+        "Assumed standard deviation of the curvature, relative to the expected one.",
+        is_above=True,
+    ),
+    Parameter(
+        "priors.roll_rad",
+        "prior roll",
+        "angle",
+        "Assumed standard deviation of the error of each roll.",
+        is_above=True,
+    ),
+    Parameter(
+        "priors.noise_mm",
+        "prior noise",
+        "length",
+        "Assumed standard deviation of each measured coordinate.",
+        is_above=True,
+    ),
+    Parameter(
+        "priors.direction_rad",
+        "prior direction",
+        "angle",
+        "Assumed standard deviation of a measured direction.",
+        is_above=True,
+    ),
+    Parameter(
+        "priors.curvature_drift",
+        "prior curvature drift",
+        "ratio",
+        "Assumed change of the curvature over 10 mm, as a ratio; 0 if it stays the same.",
+    ),
+    Parameter(
+        "priors.turn_drift_rad",
+        "prior turn drift",
+        "angle",
+        "Assumed turn of the bend plane over 10 mm without a roll.",
+    ),
+    Parameter(
+        "priors.lag_rad",
+        "prior lag",
+        "angle",
+        "Assumed further error of each roll at a depth of 100 mm, as friction holds the shaft.",
+    ),
+    Parameter(
+        "ranking",
+        "ranking",
+        "words",
+        "How plans are ranked, the most important criterion first: clearance, rolls, length, "
+        "target.",
+        option="--rank",
+        choices=("clearance", "rolls", "length", "target"),
+    ),
+    Parameter(
+        "roll_rad_per_s",
+        "roll speed",
+        "angle per time",
+        "The speed of rolls, to know how long a plan takes.",
+        1e-3,
+    ),
+    Parameter("max_plans", "max plans", "count", "A synthesis lists at most this many plans.", 1),
+    Parameter(
+        "engine_time_s",
+        "engine time",
+        "time",
+        "A synthesis ends the run if the engine takes longer.",
+        is_above=True,
+    ),
+    Parameter(
+        "engine_memory_bytes",
+        "engine memory",
+        "data",
+        "A synthesis ends the run if the engine's states take more.",
+        1.0,
+    ),
+    Parameter(
+        "timeout_s",
+        "time limit",
+        "time",
+        "Stop the run after this time on the needle's clock.",
+        is_above=True,
+        option="--timeout",
+    ),
+    Parameter(
+        "needle.noise_mm",
+        "noise",
+        "length",
+        "Virtual needle: standard deviation of each measured coordinate.",
+    ),
+    Parameter(
+        "needle.roll_rad",
+        "roll error",
+        "angle",
+        "Virtual needle: standard deviation of the angle of each roll.",
+    ),
+    Parameter(
+        "needle.radius_mm",
+        "true radius",
+        "length",
+        "Virtual needle: the true radius of the motion circle, if the scene's is wrong.",
+        is_above=True,
+    ),
+    Parameter(
+        "needle.bevel_rad",
+        "true bevel",
+        "angle",
+        "Virtual needle: by which angle about the heading the true bevel differs from the scene's.",
+        -math.pi,
+    ),
+    Parameter(
+        "needle.seed",
+        "seed",
+        "count",
+        "Virtual needle: for its noise and roll errors; the same seed gives the same errors.",
+    ),
+)
+"""All settings, in the order in which they are listed."""
+
+BY_WORDS: Final = {parameter.words: parameter for parameter in PARAMETERS}
+"""The settings by their words in a file."""
+
+BY_FIELD: Final = {parameter.field: parameter for parameter in PARAMETERS}
+"""The settings by their fields."""
