@@ -37,7 +37,7 @@ from ntagen.drive.deviation import DeviationMonitor
 from ntagen.drive.device import Device
 from ntagen.drive.first_push import is_free
 from ntagen.drive.force import ForceMonitor, Rise
-from ntagen.drive.knowledge import Knowledge
+from ntagen.drive.knowledge import Knowledge, position_unsure_mm
 from ntagen.drive.records import (
     Ended,
     Journal,
@@ -318,6 +318,7 @@ class Controller:
             self._settings.sensing_margin_mm,
             self._settings.learned_radius_mm,
             self._needle.channels,
+            position_unsure_mm(self._settings),
         )
         for region in self._knowledge.learned:
             if region not in before:

@@ -24,7 +24,7 @@ from ntagen.needle.vectors import add, combine, distance, scale
 from ntagen.scene import Pose, Region, Scene, Vector
 
 _EXPLAINED_MM = 1.0
-"""A contact this near to a known detection region is explained by that region."""
+"""A contact farther than this from a known detection region is never explained by that region."""
 
 _GROWTH_MM = 1.0
 """A contact near a known region makes its shell wider by this length."""
@@ -38,6 +38,11 @@ EXPECTED_RISE_RATIO = 2.0
 
 _OUTSIDE_MM = 0.1
 """A shell in which the tip lies is made smaller until the tip is this far outside."""
+
+
+def position_unsure_mm(settings: Settings) -> float:
+    """How far the tip may be from where it seems to be, when a force is explained, in mm."""
+    return min(_EXPLAINED_MM, _SURELY_KNOWN_MM + settings.priors.noise_mm)
 
 
 def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, ...]:
@@ -129,7 +134,7 @@ class Knowledge:
 
         Only regions that the driver was given count: where a learned one lies is a guess.
         """
-        unsure_mm = min(_EXPLAINED_MM, _SURELY_KNOWN_MM + settings.priors.noise_mm)
+        unsure_mm = position_unsure_mm(settings)
         gain = EXPECTED_RISE_RATIO * settings.force_rise_n_per_mm
         return max(
             (
@@ -156,6 +161,7 @@ class Knowledge:
         margin_mm: float,
         radius_mm: float,
         channels: tuple[Arc, ...] = (),
+        unsure_mm: float = _EXPLAINED_MM,
     ) -> Knowledge:
         """The knowledge after the force rose.
 
@@ -165,9 +171,10 @@ class Knowledge:
             radius_mm: The first radius of an unknown region.
             channels: What was cut before without a rise: the safe region of the paper. No learned
                 region is put over it.
+            unsure_mm: A contact this near to the shell of a known region is explained by it.
         """
         contacts = self.contacts + 1
-        felt = self._felt(tip, margin_mm)
+        felt = self._felt(tip, margin_mm, unsure_mm)
         if felt is not None:
             learned = self._with_wider_shell(felt, tip, margin_mm)
         else:
@@ -176,12 +183,12 @@ class Knowledge:
             learned = self._with_ball(ball, margin_mm, channels)
         return replace(self, learned=learned, contacts=contacts)
 
-    def _felt(self, tip: Pose, margin_mm: float) -> Region | None:
+    def _felt(self, tip: Pose, margin_mm: float, unsure_mm: float) -> Region | None:
         """The a-priori critical region that explains a contact, if there is one."""
         for region in self.a_priori.criticals:
             shells = shells_of(region, self.a_priori.detections + self.learned)
             reach_mm = max((s.radius_mm for s in shells), default=region.radius_mm + margin_mm)
-            if distance(tip.position_mm, region.center_mm) <= reach_mm + _EXPLAINED_MM:
+            if distance(tip.position_mm, region.center_mm) <= reach_mm + unsure_mm:
                 return region
         return None
 

@@ -147,6 +147,6 @@ def test_a_plan_may_leave_a_shell_but_not_lead_deeper_into_it() -> None:
 def test_known_regions_explain_a_rise_up_to_their_surface() -> None:
     knowledge, settings = Knowledge(PAPER), Settings()
     forces = [
-        knowledge.expected_force_n((0.0, -25.0 + away, 0.0), settings) for away in (9.0, 5.5, 3.0)
+        knowledge.expected_force_n((0.0, -25.0 + away, 0.0), settings) for away in (9.0, 5.2, 3.0)
     ]
     assert forces[0] == 0.0 < forces[1] < forces[2]
