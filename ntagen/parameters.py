@@ -343,6 +343,18 @@ PARAMETERS: Final = (
         "Assumed further error of each roll at a depth of 100 mm, as friction holds the shaft.",
     ),
     Parameter(
+        "priors.distortion_mm",
+        "prior distortion",
+        "length",
+        "Assumed further error of each measured coordinate, about the same over 10 mm of a path.",
+    ),
+    Parameter(
+        "compensated_lag_rad",
+        "lag compensation",
+        "angle",
+        "The tip's lag at a depth of 100 mm, by which rolls go too far and come back; 0 for none.",
+    ),
+    Parameter(
         "ranking",
         "ranking",
         "words",
@@ -411,7 +423,7 @@ PARAMETERS: Final = (
         "needle.seed",
         "seed",
         "count",
-        "Virtual needle: for its noise and roll errors; the same seed gives the same errors.",
+        "Simulated needle: for all that is random in it; the same seed gives the same errors.",
     ),
 )
 """All settings, in the order in which they are listed."""

@@ -44,7 +44,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     "--needle",
     default="virtual",
     show_default=True,
-    help="Which needle to steer. The only one until now is virtual: a simulation.",
+    help="Which needle to steer. Both are simulations: virtual bends exactly as planned, phantom "
+    "drifts, lags and is measured as real needles are.",
 )
 @click.option(
     "--known",
@@ -94,6 +95,7 @@ def command(
     Examples:
       ntagen drive examples/paper.nsl --log run.mcap
       ntagen drive examples/paper.nsl --seed 1 --noise 0.1mm --known none
+      ntagen drive examples/paper.nsl --needle phantom --seed 1
       ntagen drive examples/paper.nsl --pull 8mm --true-radius 33mm --force-sensing off
       ntagen drive examples/paper.nsl --settings
 
@@ -105,15 +107,17 @@ def command(
     from ntagen.drive.configure import configure
     from ntagen.nsl import load_task
 
-    _require_virtual(needle)
     if as_json:
         say_idle({"quiet": "--quiet"}, "with --json")
     task = load_task(environment, include=include)
     for warning in task.warnings:
         echo(warning.render(), err=True)
-    configuration = configure((*task.given, *given), task.scene, known)
+    configuration = configure((*task.given, *given), task.scene, known, needle)
     errors = configuration.errors
-    if not (errors.noise_mm or errors.roll_rad):
+    if needle == "phantom":
+        idle = {"given_needle_noise_mm": "--noise", "given_needle_roll_rad": "--roll-error"}
+        say_idle(idle, "on a phantom needle, which has its own errors")
+    elif not (errors.noise_mm or errors.roll_rad):
         say_idle({"given_needle_seed": "--seed"}, "without --noise or --roll-error")
     if only_settings:
         show_settings(configuration)
@@ -168,13 +172,6 @@ def _operator() -> Iterator[_Signalled]:
         yield operator
 
 
-def _require_virtual(needle: str) -> None:
-    from ntagen.errors import InputError
-
-    if needle != "virtual":
-        raise InputError(f"there is no needle '{needle}'\nhint: the only one is `--needle virtual`")
-
-
 def _drive(run: _Run, log: list[Journal], speaks: bool, operator: Operator) -> Result:
     from ntagen.drive.records import Journals
     from ntagen.drive.simulate import simulate, synthesiser_for
@@ -190,6 +187,7 @@ def _drive(run: _Run, log: list[Journal], speaks: bool, operator: Operator) -> R
             Journals(*log, *terminal),
             known=run.known,
             errors=run.configuration.errors,
+            make=run.configuration.needle.make,
             seed=run.configuration.seed,
             listen=operator.listen,
         )
@@ -222,6 +220,7 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
         "true_bevel_rad": errors.bevel_rad,
         "settings": configuration.settings.to_json(),
         "origins": dict(configuration.origins),
+        **configuration.needle.facts(),
     }
     actual = replace(run.scene, needle=errors.true_needle(run.scene.needle))
     attachments = {ACTUAL: scene_to_json(actual).encode()}

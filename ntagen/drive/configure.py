@@ -9,9 +9,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Final
 
+from ntagen.drive.needles import Chosen, choose
 from ntagen.drive.reliance import with_default_margins
 from ntagen.drive.settings import STEERING, Settings, value_of, with_values
-from ntagen.drive.simulate import settings_for
 from ntagen.errors import InputError
 from ntagen.needle.virtual import Errors
 from ntagen.parameters import NEEDLE, PARAMETERS, Given, Parameter, Value
@@ -24,7 +24,7 @@ DEFAULT: Final = "default"
 """The origin of a value that nobody gave."""
 
 _NO_FORCE: Final = "follows from force sensing off"
-_AS_NEEDLE: Final = "follows from the scene and the virtual needle"
+_AS_NEEDLE: Final = "follows from the scene and the needle"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +36,14 @@ class Configuration:
         errors: The errors of the virtual needle.
         seed: The seed of these errors.
         origins: The origin of each value that is not a default, by its field.
+        needle: The simulated needle.
     """
 
     settings: Settings = field(default_factory=Settings)
     errors: Errors = field(default_factory=Errors)
     seed: int = 0
     origins: Mapping[str, str] = field(default_factory=dict)
+    needle: Chosen = field(default_factory=lambda: choose("virtual", Errors()))
 
     def value(self, parameter: Parameter) -> Value | None:
         """The value of a setting."""
@@ -66,17 +68,20 @@ class Configuration:
         ]
 
 
-def configure(given: Iterable[Given], scene: Scene, known: str = "all") -> Configuration:
+def configure(
+    given: Iterable[Given], scene: Scene, known: str = "all", needle: str = "virtual"
+) -> Configuration:
     """The configuration of values that were given; a later one wins over an earlier one.
 
     Args:
         given: The values of the file, then those of the command line.
         scene: The actual scene.
         known: The critical regions that the driver knows (`ntagen.drive.knowledge.told`).
+        needle: The name of the simulated needle (`ntagen.drive.needles`).
 
     Raises:
         InputError: The driver cannot work with these values together; the message has the origin
-            of each.
+            of each. Or there is no needle of this name.
     """
     chosen = {one.parameter.field: one for one in given}
     origins = {name: one.origin for name, one in chosen.items()}
@@ -88,16 +93,22 @@ def configure(given: Iterable[Given], scene: Scene, known: str = "all") -> Confi
             if f"{NEEDLE}.{one.name}" in values
         }  # type: ignore[arg-type]
     )
+    its_needle = choose(needle, errors)
     steering = {p.field: values[p.field] for p in STEERING if p.field in values}
     try:
-        settings = with_values(Settings(), steering)
-        settings = _fitting(settings, errors, scene, known, origins)
+        usual = its_needle.usual(Settings())
+        for p in STEERING:
+            if p.field not in origins and value_of(usual, p.field) != value_of(Settings(), p.field):
+                origins[p.field] = _AS_NEEDLE
+        settings = with_values(usual, steering)
+        settings = _fitting(settings, its_needle, scene, known, origins)
         settings = _with_margins(settings, origins)
     except InputError as error:
         said = [f"`{one.parameter.words}`: {one.origin}" for one in chosen.values()]
         raise InputError("\n".join([str(error), *(f"note: {line}" for line in said)])) from error
     seed = values.get(f"{NEEDLE}.seed", 0)
-    return Configuration(settings, errors, int(seed) if isinstance(seed, int) else 0, origins)
+    whole_seed = int(seed) if isinstance(seed, int) else 0
+    return Configuration(settings, errors, whole_seed, origins, its_needle)
 
 
 def _exact(given: Given) -> Value:
@@ -108,13 +119,13 @@ def _exact(given: Given) -> Value:
 
 
 def _fitting(
-    settings: Settings, errors: Errors, scene: Scene, known: str, origins: dict[str, str]
+    settings: Settings, needle: Chosen, scene: Scene, known: str, origins: dict[str, str]
 ) -> Settings:
-    """The settings that fit the virtual needle and the scene (`settings_for`).
+    """The settings that fit the needle and the scene (`Chosen.fitting`).
 
     Priors that somebody gave stay: a driver with wrong assumptions can be tried.
     """
-    fitting = settings_for(settings, errors, scene, known)
+    fitting = needle.fitting(settings, scene, known)
     kept = {}
     for parameter in STEERING:
         name = parameter.field

@@ -49,6 +49,8 @@ class Settings:
         pull_mm: The length by which the needle is pulled back to readjust. It is fixed, as in the
             paper; the value is ours.
         push_mm: The length of the push before the next estimate; less than `pull_mm`; ours.
+        compensated_lag_rad: The lag of the tip at a depth of 100 mm for which rolls make up
+            (`ntagen.drive.torsion`); 0 for none.
         roll_rad_per_s: The speed of rolls, to know how long a plan takes; ours.
         timeout_s: A run ends after this time (paper, section 4).
         sensing_margin_mm: The expected distance from an unknown region at which the force rises;
@@ -74,6 +76,7 @@ class Settings:
     overrun_mm: float = 0.0
     pull_mm: float = 10.0
     push_mm: float = 2.0
+    compensated_lag_rad: float = 0.0
     roll_rad_per_s: float = math.pi
     timeout_s: float = 120.0
     sensing_margin_mm: float = 3.0

@@ -1,24 +1,67 @@
-"""Runs the driver with the virtual needle, which alone knows the true scene."""
+"""Runs the driver with a simulated needle, which alone knows the true scene."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
+from ntagen.drive.device import Assembly, Device
 from ntagen.drive.force import fitting_spacing_mm
 from ntagen.drive.knowledge import sensing_margin_mm, told
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
 from ntagen.drive.settings import Settings
+from ntagen.drive.torsion import Compensated, Lag
 from ntagen.needle.kinematics import Arc
+from ntagen.needle.phantom import PhantomNeedle
+from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.vectors import distance
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.plan.synthesise import EngineSynthesiser, Synthesis, Synthesiser
-from ntagen.scene import Scene
+from ntagen.scene import Needle, Pose, Scene
 
 _NO_REGION_MM: Final = 1e9
+
+_DRIFT_RATIO: Final = 1.4
+"""The change of a fluctuation over 10 mm, relative to its standard deviation."""
+
+_TURN_MM: Final = 20.0
+"""The drift of the bend plane over 10 mm, as a length at the rate at which it turns."""
+
+
+class Simulated(Device, Protocol):
+    """A simulated needle: a device that knows the truth."""
+
+    @property
+    def true_tip(self) -> Pose:
+        """The true pose of the tip."""
+
+    @property
+    def pierced(self) -> tuple[Arc, ...]:
+        """All arcs that were cut."""
+
+    def true_clearance_mm(self) -> float:
+        """The smallest distance of these arcs to any actual critical region."""
+
+
+Maker = Callable[[Needle, tuple[Obstacle, ...], int], Simulated]
+"""Makes a simulated needle from a true one, the actual critical regions and a seed."""
+
+
+def virtual(errors: Errors) -> Maker:
+    """Virtual needles with these errors."""
+    return lambda needle, obstacles, seed: VirtualNeedle(
+        needle, obstacles, errors, seed, SimulatedClock()
+    )
+
+
+def phantom(parameters: PhantomParameters) -> Maker:
+    """Phantom needles with these parameters."""
+    return lambda needle, obstacles, seed: PhantomNeedle(
+        needle, obstacles, seed, SimulatedClock(), parameters
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +91,11 @@ def simulate(
     *,
     known: str = "all",
     errors: Errors | None = None,
+    make: Maker | None = None,
     seed: int = 0,
     listen: Callable[[], None] = lambda: None,
 ) -> Result:
-    """Drives the virtual needle through the scene.
+    """Drives a simulated needle through the scene.
 
     Args:
         scene: The actual scene; the true needle may differ from its own by `errors`.
@@ -59,7 +103,9 @@ def simulate(
         settings: How to drive.
         journal: Records what happens.
         known: The critical regions that the driver knows (`ntagen.drive.knowledge.told`).
-        errors: The needle's errors; none by default.
+        errors: The needle's errors; none by default. Only the virtual needle has noise and roll
+            errors of this kind.
+        make: Makes another needle than the virtual one.
         seed: The seed of the errors.
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
     """
@@ -72,10 +118,13 @@ def simulate(
     )
     errors = errors or Errors()
     true_needle = errors.true_needle(scene.needle)
-    needle = VirtualNeedle(true_needle, obstacles, errors, seed, SimulatedClock())
+    needle = (make or virtual(errors))(true_needle, obstacles, seed)
+    device: Device = needle
+    if settings.compensated_lag_rad > 0.0:
+        device = Assembly(Compensated(needle, Lag(settings.compensated_lag_rad)), needle)
     witness = _Witness(needle, journal)
     controller = Controller(
-        told(scene, known), needle, synthesise, settings, Journals(journal, witness), listen
+        told(scene, known), device, synthesise, settings, Journals(journal, witness), listen
     )
     ended = controller.run()
     last = scene.targets[-1]
@@ -117,6 +166,36 @@ def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -
     return settings.with_spacing(fitting_spacing_mm(settings, margin_mm, scene.needle.length_mm))
 
 
+def settings_for_phantom(
+    settings: Settings,
+    parameters: PhantomParameters,
+    scene: Scene,
+    known: str,
+) -> Settings:
+    """The settings that fit a phantom needle and the scene, as after a calibration.
+
+    The drifts were chosen on phantom runs, so that predictions 10 and 20 mm ahead err as much as
+    the estimator says (`tests/benchmarks/predictions.py`). If rolls are compensated, the spread of
+    the friction is left of the lag.
+
+    Raises:
+        InputError: No push is short enough to feel a hidden region before it is pierced.
+    """
+    sensing, torsion, shape = parameters.sensing, parameters.torsion, parameters.shape
+    turn_drift_rad = _DRIFT_RATIO * shape.turn_rad.std + _TURN_MM * shape.turn_rad_per_mm
+    spread_rad = torsion.lag_rad * torsion.spread_ratio
+    priors = replace(
+        settings.priors,
+        noise_mm=math.hypot(sensing.noise_mm, sensing.step_mm),
+        distortion_mm=sensing.distortion_mm.std,
+        curvature_drift=_DRIFT_RATIO * shape.curvature.std,
+        turn_drift_rad=turn_drift_rad,
+        lag_rad=math.hypot(spread_rad, torsion.lag_rad - settings.compensated_lag_rad),
+    )
+    calibrated = replace(settings, priors=priors, force_noise_n=sensing.noise_n)
+    return settings_for(calibrated, Errors(), scene, known)
+
+
 def synthesiser_for(
     settings: Settings, listen: Callable[[], None] = lambda: None
 ) -> EngineSynthesiser:
@@ -134,7 +213,7 @@ def synthesiser_for(
 class _Witness:
     """Adds the truth to a journal, at each measurement and at the end."""
 
-    def __init__(self, needle: VirtualNeedle, journal: Journal) -> None:
+    def __init__(self, needle: Simulated, journal: Journal) -> None:
         self._needle = needle
         self._journal = journal
 

@@ -27,8 +27,9 @@ _Array = NDArray[np.float64]
 ENTRY = -1
 """The index of the entry in the tree of channels."""
 
-STRETCH_MM = 10.0
-"""The length of the stretches: shorter than what a fit of the curvature needs (about 20 mm)."""
+STRETCH_MM = 5.0
+"""The length of the stretches. Longer ones predict worse: on phantom runs, the 95 % quantile of the
+error after 10 mm was 1.9 mm with 10 mm, 1.5 mm with 5 mm, and the same with 2.5 mm."""
 
 _NOTHING_MM = 1e-9
 

@@ -8,14 +8,14 @@ channels that were cut (`ntagen.needle.channels`), with a few unknowns:
 * the entry pose (three for the position, three small rotations),
 * the curvature at the entry, as a factor of the expected one,
 * the error of each roll, since a shaft does not turn its tip exactly as it is turned at its base,
-* the changes of curvature and bend plane from one stretch of 10 mm to the next (a random walk), if
+* the changes of curvature and bend plane from one stretch of 5 mm to the next (a random walk), if
   their priors are not 0. So old measurements say less about the present curvature than new ones.
 
 Non-linear least squares finds the unknowns with the greatest posterior density. The noise weighs
 each measurement, and the prior weighs each unknown. Measurements in a channel that the needle has
 left still count: they tell about the entry, the curvature and the rolls.
 
-Cost: `tests/benchmarks/estimates.py` measures it.
+Cost and errors on phantom needles: `tests/benchmarks/predictions.py` measures them.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from ntagen.needle.channels import ENTRY, STRETCH_MM, Channel, Placed, Stretch, place
 from ntagen.needle.circle import CurvaturePrior, fit_circle
+from ntagen.needle.descent import least_squares
 from ntagen.needle.kinematics import Arc, bending_axis, orthonormal, push
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
@@ -42,6 +42,15 @@ _POSE_UNKNOWNS = 7
 
 _LAG_DEPTH_MM = 100.0
 """The depth for which `Priors.lag_rad` is given."""
+
+_DRIFT_LENGTH_MM = 10.0
+"""The length for which drifts are given; over another length, a random walk goes with its root."""
+
+_DISTORTION_LENGTH_MM = 10.0
+"""The length over which `Priors.distortion_mm` is about the same error."""
+
+_STRETCH_RATIO = math.sqrt(STRETCH_MM / _DRIFT_LENGTH_MM)
+"""The drift over one stretch, relative to that over `_DRIFT_LENGTH_MM`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +70,9 @@ class Priors:
         turn_drift_rad: The turn of the bend plane over 10 mm without a roll; 0 for none.
         lag_rad: A further error of each roll at a depth of 100 mm, since friction holds the shaft.
             It grows with the square of the depth (Reed et al., 2009).
+        distortion_mm: A further error of each coordinate of a measured position that is about the
+            same for all measurements on 10 mm of a channel, as of a distorted magnetic field. More
+            measurements do not reduce it.
     """
 
     position_mm: float = 0.2
@@ -73,6 +85,7 @@ class Priors:
     curvature_drift: float = 0.0
     turn_drift_rad: float = 0.0
     lag_rad: float = 0.0
+    distortion_mm: float = 0.0
 
     def roll_std_rad(self, depth_mm: float) -> float:
         """The standard deviation of the error of a roll at a depth."""
@@ -134,7 +147,7 @@ class Estimate:
         slopes = ahead.positions(np.array([length_mm]))[1][0]
         covariance = slopes @ np.array(self.covariance) @ slopes.T
         end = push(tip, self.radius_mm, length_mm)
-        spread_mm2 = curvature**2 * length_mm**5 / (20.0 * STRETCH_MM)
+        spread_mm2 = curvature**2 * length_mm**5 / (20.0 * _DRIFT_LENGTH_MM)
         for drift, direction in (
             (self.curvature_drift, np.array(end.bevel)),
             (self.turn_drift_rad, np.array(bending_axis(end))),
@@ -239,25 +252,18 @@ class Estimator:
         problem = _Problem(self._readings, self._channels, self._priors, stds)
         expected = (self._entry, 1.0 / self._radius_mm)
 
-        # Unknowns are in units of their standard deviations, so that one step size fits all.
-        result = scipy.optimize.least_squares(
-            lambda unknowns: problem.at(unknowns, *expected)[0],
-            start,
-            jac=lambda unknowns: problem.at(unknowns, *expected)[1],
-            method="lm",
-            x_scale=stds,
+        self._solution, residuals, unknowns_covariance = least_squares(
+            lambda unknowns: problem.at(unknowns, *expected), start, stds
         )
-        self._solution = result.x
-        begin, placed = place(self._channels, *expected, result.x)
-        unknowns_covariance = np.linalg.pinv(result.jac.T @ result.jac)
-        path, tip = self._path(result.x, begin, placed)
+        begin, placed = place(self._channels, *expected, self._solution)
+        path, tip = self._path(self._solution, begin, placed)
         to_tip = _slopes_of(tip)
         covariance = to_tip @ unknowns_covariance @ to_tip.T
         return Estimate(
             path=path,
             radius_mm=tip.radius_mm,
             radius_std_mm=float(tip.radius_mm * math.sqrt(covariance[6, 6])),
-            rms_mm=problem.rms_mm(result.fun),
+            rms_mm=problem.rms_mm(residuals),
             covariance=tuple(tuple(float(value) for value in row) for row in covariance),
             curvature_drift=self._priors.curvature_drift,
             turn_drift_rad=self._priors.turn_drift_rad,
@@ -272,7 +278,8 @@ class Estimator:
         """Notes how far a channel was cut; new stretches get their unknowns."""
         if extent_mm <= channel.extent_mm:
             return
-        drift, turn_rad = self._priors.curvature_drift, self._priors.turn_drift_rad
+        drift = _STRETCH_RATIO * self._priors.curvature_drift
+        turn_rad = _STRETCH_RATIO * self._priors.turn_drift_rad
         if drift > 0.0 or turn_rad > 0.0:
             for offset_mm in channel.new_boundaries(extent_mm):
                 channel.stretches.append(
@@ -332,44 +339,38 @@ class _Problem:
         self._channels = channels
         self._priors = priors
         self._stds = stds
-        self._groups: list[tuple[int, int, _Array, _Array]] = []
+        self._groups: list[tuple[int, int, _Array, _Array, _Array]] = []
         self._directed: list[tuple[int, int, float, Measurement]] = []
-        self._last: tuple[bytes, _Array, _Array] | None = None
-        places: dict[tuple[int, int], list[tuple[float, Measurement]]] = {}
-        for reading in readings:
+        places: dict[tuple[int, int], list[tuple[float, float, Measurement]]] = {}
+        noises_mm = _noises_mm(readings, priors)
+        for reading, noise_mm in zip(readings, noises_mm, strict=True):
             number, along_mm = 0, reading.offset_mm
             if reading.channel != ENTRY:
                 channel = channels[reading.channel]
                 number = channel.stretch_at(reading.offset_mm)
                 along_mm -= channel.stretches[number].offset_mm
-            places.setdefault((reading.channel, number), []).append((along_mm, reading.measurement))
+            key = (reading.channel, number)
+            places.setdefault(key, []).append((along_mm, noise_mm, reading.measurement))
             if reading.measurement.heading is not None:
                 self._directed.append((reading.channel, number, along_mm, reading.measurement))
         for (channel_index, number), group in sorted(places.items(), key=lambda item: item[0]):
-            self._groups.append(
-                (
-                    channel_index,
-                    number,
-                    np.array([along_mm for along_mm, _ in group]),
-                    np.array([measurement.position_mm for _, measurement in group]),
-                )
-            )
+            along, noise = (np.array([row[column] for row in group]) for column in (0, 1))
+            positions = np.array([measurement.position_mm for _, _, measurement in group])
+            self._groups.append((channel_index, number, along, positions, noise))
         self._position_count = 3 * len(readings)
 
     def at(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> tuple[_Array, _Array]:
-        """Residuals and derivatives; the last ones are kept, since both are asked for in turn."""
-        key = unknowns.tobytes()
-        if self._last is None or self._last[0] != key:
-            begin, placed = place(self._channels, entry, curvature_per_mm, unknowns)
-            self._last = (key, *self._evaluated(unknowns, begin, placed))
-        return self._last[1], self._last[2]
+        """Residuals and derivatives."""
+        begin, placed = place(self._channels, entry, curvature_per_mm, unknowns)
+        return self._evaluated(unknowns, begin, placed)
 
     def rms_mm(self, residuals: _Array) -> float:
         """Root mean square of the distances between measured and predicted positions."""
         if not self._position_count:
             return 0.0
-        squares = float(np.sum(residuals[: self._position_count] ** 2))
-        return self._priors.noise_mm * math.sqrt(3.0 * squares / self._position_count)
+        noise_mm = np.concatenate([np.repeat(group[-1], 3) for group in self._groups])
+        squares = float(np.sum((noise_mm * residuals[: self._position_count]) ** 2))
+        return math.sqrt(3.0 * squares / self._position_count)
 
     def _evaluated(
         self, unknowns: _Array, begin: Placed, placed: list[list[Placed]]
@@ -378,10 +379,10 @@ class _Problem:
             return begin if channel == ENTRY else placed[channel][number]
 
         residuals, slopes = [], []
-        for channel, number, along_mm, measured in self._groups:
+        for channel, number, along_mm, measured, noise_mm in self._groups:
             expected, moved = part(channel, number).positions(along_mm)
-            residuals.append((measured - expected).ravel() / self._priors.noise_mm)
-            slopes.append(moved.reshape(-1, len(unknowns)) / -self._priors.noise_mm)
+            residuals.append(((measured - expected) / noise_mm[:, None]).ravel())
+            slopes.append((moved / -noise_mm[:, None, None]).reshape(-1, len(unknowns)))
         for channel, number, along, measurement in self._directed:
             pose, rotation = part(channel, number).directions(along)
             seen_and_expected = (
@@ -397,6 +398,30 @@ class _Problem:
         residuals.append(unknowns / self._stds)
         slopes.append(np.diag(1.0 / self._stds))
         return np.concatenate(residuals), np.vstack(slopes)
+
+
+def _noises_mm(readings: list[_Reading], priors: Priors) -> list[float]:
+    """The noise that each measurement counts with.
+
+    `n` measurements with the same error `d` and independent noise `s` tell as much as `n`
+    independent ones with the variance ``s^2 + n d^2``: that of their mean is ``s^2 / n + d^2``.
+    """
+    if priors.distortion_mm <= 0.0:
+        return [priors.noise_mm] * len(readings)
+    channels = {reading.channel for reading in readings}
+    places = {
+        channel: np.sort([r.offset_mm for r in readings if r.channel == channel])
+        for channel in channels
+    }
+    noises_mm = []
+    for reading in readings:
+        end_mm = reading.offset_mm + 0.5 * _DISTORTION_LENGTH_MM
+        ends = np.array([end_mm - _DISTORTION_LENGTH_MM, end_mm])
+        first, last = np.searchsorted(places[reading.channel], ends)
+        noises_mm.append(
+            math.hypot(priors.noise_mm, math.sqrt(last - first) * priors.distortion_mm)
+        )
+    return noises_mm
 
 
 def pose_from_points(

@@ -12,9 +12,11 @@ class Measurement:
     """One reading.
 
     Attributes:
-        time_s: The time of the measurement, on the device's clock.
+        time_s: The time for which the values hold, on the device's clock; a tracker's values may be
+            older than the moment at which they are read.
         position_mm: The measured position of the tip.
-        force_n: The force at the tip, minus that of plain insertion.
+        force_n: The axial force. A sensor at the base measures all of it: friction along the shaft,
+            cutting, and what is near the tip. The virtual needle has the last part only.
         heading: The measured direction of travel, if the sensor reports it.
         bevel: The measured bevel direction, if the sensor reports it.
     """

@@ -1,12 +1,13 @@
 """How often the driver reaches the target, and whether a critical region is ever hit.
 
     python tests/benchmarks/drives.py [--seeds 30] [--noise 0.1 1 2] [--roll-error 1] [--known none]
-        [SCENE.nsl …]
+        [--needle phantom] [SCENE.nsl …]
 
-Each scene is driven with each noise and each seed on the virtual needle, with plans from the
-engine. Printed are the runs that reached the target, those that hit a critical region, how the
-others ended, and the times of whole syntheses (render, load, solve, certify, rank): the median and
-the 99th percentile. Ends with 1 if a region was hit. Default: the paper's scene and the scenarios.
+Each scene is driven with each noise and each seed on the virtual needle (or with each seed on the
+phantom needle, which has its own noise), with plans from the engine. Printed are the runs that
+reached the target, those that hit a critical region, how the others ended, and the times of whole
+syntheses (render, load, solve, certify, rank): the median and the 99th percentile. Ends with 1 if a
+region was hit. Default: the paper's scene and the scenarios.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ntagen.drive.needles import NAMES, choose
 from ntagen.drive.records import Journals
 from ntagen.drive.settings import Settings
-from ntagen.drive.simulate import settings_for, simulate
+from ntagen.drive.simulate import simulate
 from ntagen.needle.virtual import Errors
 from ntagen.nsl import load
 from ntagen.plan.synthesise import EngineSynthesiser, Synthesis
@@ -37,6 +39,7 @@ class Drive:
     """A run that is wanted."""
 
     path: Path
+    needle: str
     known: str
     noise_mm: float
     roll_rad: float
@@ -70,8 +73,8 @@ class _Timed:
 def made(drive: Drive) -> End:
     """Makes a run."""
     scene = load(drive.path)
-    errors = Errors(drive.noise_mm, drive.roll_rad)
-    settings = settings_for(Settings(), errors, scene, drive.known)
+    chosen = choose(drive.needle, Errors(drive.noise_mm, drive.roll_rad))
+    settings = chosen.fitting(chosen.usual(Settings()), scene, drive.known)
     synthesise = _Timed(settings)
     result = simulate(
         scene,
@@ -79,7 +82,7 @@ def made(drive: Drive) -> End:
         settings,
         Journals(),
         known=drive.known,
-        errors=errors,
+        make=chosen.make,
         seed=drive.seed,
     )
     return End(
@@ -100,6 +103,7 @@ def main() -> int:
     parser.add_argument("--noise", type=float, nargs="+", default=[0.1], help="in mm")
     parser.add_argument("--roll-error", type=float, default=0.0, help="in degrees")
     parser.add_argument("--known", default="all")
+    parser.add_argument("--needle", choices=NAMES, default="virtual")
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     asked = parser.parse_args()
     scenes = asked.scenes or [
@@ -111,7 +115,7 @@ def main() -> int:
     with multiprocessing.Pool(asked.workers) as pool:
         for path in scenes:
             for noise_mm in asked.noise:
-                drive = Drive(path, asked.known, noise_mm, roll_rad, 0)
+                drive = Drive(path, asked.needle, asked.known, noise_mm, roll_rad, 0)
                 runs = [replace(drive, seed=seed) for seed in range(1, asked.seeds + 1)]
                 ends = pool.map(made, runs, chunksize=1)
                 reached = sum(

@@ -104,7 +104,7 @@ def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -
     ("says", "arguments"),
     [
         ("nowhere.nsl", ["nowhere.nsl"]),
-        ("no needle 'phantom'", [PAPER, "--needle", "phantom"]),
+        ("no needle 'rubber'", [PAPER, "--needle", "rubber"]),
         ("unknown critical region 'C9'", [PAPER, "--known", "C9"]),
         ("unknown ranking criterion 'beauty'", [PAPER, "--rank", "beauty"]),
         ("is not a time", [PAPER, "--timeout", "soon"]),

@@ -1,0 +1,76 @@
+"""The simulated needles by name, each with its settings and with what a log says about it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Final
+
+from ntagen.drive.settings import Settings
+from ntagen.drive.simulate import Maker, phantom, settings_for, settings_for_phantom, virtual
+from ntagen.errors import InputError
+from ntagen.needle.phantom_parameters import PhantomParameters
+from ntagen.needle.virtual import Errors
+from ntagen.scene import Scene
+
+NAMES: Final = ("virtual", "phantom")
+"""The names of the needles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """A needle that was chosen.
+
+    Attributes:
+        name: Its name.
+        make: Makes it.
+        errors: The errors of the virtual needle.
+        parameters: The parameters of the phantom needle; None for another one.
+    """
+
+    name: str
+    make: Maker
+    errors: Errors
+    parameters: PhantomParameters | None = None
+
+    def usual(self, settings: Settings) -> Settings:
+        """The settings with which this needle is driven if nobody says otherwise."""
+        if self.parameters is None:
+            return settings
+        return replace(settings, compensated_lag_rad=self.parameters.torsion.lag_rad)
+
+    def fitting(self, settings: Settings, scene: Scene, known: str) -> Settings:
+        """The settings that fit this needle and the scene, as after a calibration.
+
+        Raises:
+            InputError: No push is short enough to feel a hidden region before it is pierced.
+        """
+        if self.parameters is None:
+            return settings_for(settings, self.errors, scene, known)
+        return settings_for_phantom(settings, self.parameters, scene, known)
+
+    def facts(self) -> dict[str, Any]:
+        """What a log says about the needle."""
+        facts: dict[str, Any] = {"needle": self.name}
+        if self.parameters is not None:
+            facts["phantom"] = asdict(self.parameters)
+        return facts
+
+
+def choose(name: str, errors: Errors) -> Chosen:
+    """The needle of a name.
+
+    Args:
+        name: One of `NAMES`.
+        errors: The errors of the virtual needle.
+
+    Raises:
+        InputError: There is no needle of this name.
+    """
+    if name not in NAMES:
+        raise InputError(
+            f"there is no needle '{name}'\nhint: choose from {', '.join(sorted(NAMES))}"
+        )
+    if name == "phantom":
+        parameters = PhantomParameters()
+        return Chosen(name, phantom(parameters), errors, parameters)
+    return Chosen(name, virtual(errors), errors)
