@@ -33,9 +33,10 @@ DEFAULT_LENGTH_MM = 200.0
 """The default length of a needle: that of long biopsy needles. The longest path of the paper's
 instance takes 190 mm, so this limit does not change its model."""
 
-_KINDS = ("target", "critical", "detection")
+_KINDS = ("target", "critical", "detection", "unexplored", "safe")
 
-RegionKind = Literal["target", "critical", "detection"]
+RegionKind = Literal["target", "critical", "detection", "unexplored", "safe"]
+"""The kinds of the paper: TR, CR, DR, UR and SR."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +45,10 @@ class Region:
 
     Attributes:
         name: The name in the file, or one that the driver gave (``learned 1``).
-        kind: ``target`` (to be reached), ``critical`` (never to be touched) or ``detection``
-            (the shell in which the needle senses a near critical region; plans avoid it too).
+        kind: ``target`` (to be reached), ``critical`` (never to be touched), ``detection``
+            (the shell in which the needle senses a near critical region; plans avoid it too),
+            ``unexplored`` (nobody knows what is there; plans avoid it) or ``safe`` (nothing
+            critical is there, so none is expected there).
         center_mm: The centre.
         radius_mm: The radius, greater than 0.
         around: For a detection region that was written as ``around C1 margin …``, the name of C1.
@@ -174,6 +177,8 @@ class Scene:
         targets: Target regions in the order in which they are visited.
         criticals: Critical regions, known or learned.
         detections: Detection regions.
+        unexplored: Unexplored regions.
+        safe: Safe regions.
         tissue: How the tissue behaves.
         resolution_per_mm: Fixed-point units in one mm (`_SI_` of the model).
         safety: ``sampled`` checks regions at the ends of model steps as the paper does;
@@ -188,6 +193,8 @@ class Scene:
     targets: tuple[Region, ...]
     criticals: tuple[Region, ...] = ()
     detections: tuple[Region, ...] = ()
+    unexplored: tuple[Region, ...] = ()
+    safe: tuple[Region, ...] = ()
     tissue: Tissue = field(default_factory=Tissue)
     resolution_per_mm: int = 1000
     safety: Literal["sampled", "swept"] = "sampled"
@@ -201,9 +208,8 @@ class Scene:
         )
         if self.safety not in ("sampled", "swept"):
             raise InputError(f"there is no safety `{self.safety}`\nhint: write sampled or swept")
-        for kind, regions in zip(
-            _KINDS, (self.targets, self.criticals, self.detections), strict=True
-        ):
+        kinds = (self.targets, self.criticals, self.detections, self.unexplored, self.safe)
+        for kind, regions in zip(_KINDS, kinds, strict=True):
             for region in regions:
                 if region.kind != kind:
                     raise InputError(
@@ -212,8 +218,13 @@ class Scene:
 
     @property
     def regions(self) -> tuple[Region, ...]:
-        """Targets, critical and detection regions, in this order."""
-        return self.targets + self.criticals + self.detections
+        """Targets, critical, detection, unexplored and safe regions, in this order."""
+        return self.targets + self.avoided + self.safe
+
+    @property
+    def avoided(self) -> tuple[Region, ...]:
+        """The regions that no plan may enter: critical, detection and unexplored ones."""
+        return self.criticals + self.detections + self.unexplored
 
     def with_needle(self, tip: Pose, radius_mm: float, inserted_mm: float = 0.0) -> Scene:
         """The same scene with a new measurement of the tip's pose and the motion circle's radius.
@@ -232,11 +243,13 @@ class Scene:
         return replace(self, targets=tuple(targets))
 
     def with_regions(self, *regions: Region) -> Scene:
-        """The same scene with critical and detection regions added."""
+        """The same scene with regions added that are no targets."""
         return replace(
             self,
             criticals=self.criticals + tuple(r for r in regions if r.kind == "critical"),
             detections=self.detections + tuple(r for r in regions if r.kind == "detection"),
+            unexplored=self.unexplored + tuple(r for r in regions if r.kind == "unexplored"),
+            safe=self.safe + tuple(r for r in regions if r.kind == "safe"),
         )
 
 

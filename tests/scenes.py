@@ -92,6 +92,10 @@ def scenes(draw: st.DrawFn) -> Scene:
         limits=limits,
         targets=tuple(draw(spheres("target", f"T{i}")) for i in range(draw(st.integers(1, 2)))),
         criticals=tuple(draw(spheres("critical", f"C{i}")) for i in range(draw(st.integers(0, 2)))),
+        unexplored=tuple(
+            draw(spheres("unexplored", f"U{i}")) for i in range(draw(st.integers(0, 1)))
+        ),
+        safe=tuple(draw(spheres("safe", f"S{i}")) for i in range(draw(st.integers(0, 1)))),
         detections=tuple(
             draw(spheres("detection", f"D{i}")) for i in range(draw(st.integers(0, 1)))
         ),

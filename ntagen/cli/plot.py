@@ -57,7 +57,7 @@ def command(
     """Draw a scene with its plans, or a run from its log.
 
     The picture shows two projections and a view in space. Targets are green, critical regions red,
-    detection regions dashed orange. The best plan is blue, the others are faint. For a run, the
+    detection regions dashed orange, unexplored ones grey, safe ones dotted. The best plan is blue, the others are faint. For a run, the
     picture also shows the true path, the measurements and what the driver learned.
 
     \b

@@ -36,5 +36,5 @@ def is_free(scene: Scene, length_mm: float, priors: Priors) -> bool:
     reach_mm = start_error_mm(length_mm, needle.radius_mm, priors)
     return all(
         clearance(arcs, needle.tip.position_mm, region).distance_mm > reach_mm
-        for region in scene.criticals + scene.detections
+        for region in scene.avoided
     )

@@ -12,10 +12,17 @@ from ntagen.scene import Scene
 
 VERSION: Final = 1
 
+_LATER_KINDS: Final = ("unexplored", "safe")
+"""Entries that earlier logs do not have; they are written only where there are such regions."""
+
 
 def scene_to_json(scene: Scene) -> str:
     """The scene as a JSON text; floats keep all their digits."""
-    return json.dumps({"version": VERSION, "scene": dataclasses.asdict(scene)}, indent=1)
+    entries = dataclasses.asdict(scene)
+    for kind in _LATER_KINDS:
+        if not entries[kind]:
+            del entries[kind]
+    return json.dumps({"version": VERSION, "scene": entries}, indent=1)
 
 
 def scene_from_json(text: str | bytes) -> Scene:
@@ -31,6 +38,6 @@ def scene_from_json(text: str | bytes) -> Scene:
                 f"the scene of the run has version {document['version']!r}, but this ntagen reads "
                 f"only version {VERSION}"
             )
-        return value_from_json(document["scene"], Scene)
+        return value_from_json({kind: [] for kind in _LATER_KINDS} | document["scene"], Scene)
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"the scene of the run cannot be read: {error!r}") from error

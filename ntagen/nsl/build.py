@@ -16,7 +16,7 @@ from typing import Final, Literal, cast
 from ntagen import hardware, rules
 from ntagen.hardware import Axis, GrblDevice, OpenIGTLinkTracker
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
-from ntagen.nsl.resolve import Draft, DraftDevice, DraftRegion, Placed
+from ntagen.nsl.resolve import Draft, DraftDevice, DraftRegion, Placed, article
 from ntagen.nsl.source import Span
 from ntagen.parameters import Given
 from ntagen.scene import (
@@ -158,6 +158,8 @@ class _Builder:
             targets=_of_kind(spheres, "target"),
             criticals=_of_kind(spheres, "critical"),
             detections=_of_kind(spheres, "detection"),
+            unexplored=_of_kind(spheres, "unexplored"),
+            safe=_of_kind(spheres, "safe"),
             resolution_per_mm=resolution,
             safety=safety,
             queries=tuple(
@@ -412,7 +414,7 @@ class _Builder:
             self._report(
                 "region-not-critical",
                 around.span,
-                f"`{name}` is a {inner.kind} region, not a critical one",
+                f"`{name}` is {article(inner.kind)} {inner.kind} region, not a critical one",
                 hint="detection regions lie around critical regions",
             )
             return None
@@ -423,13 +425,30 @@ class _Builder:
     def _check_regions(self, tip: Pose, spheres: list[_Sphere]) -> None:
         """Checks the positions of regions relative to the tip and to each other."""
         targets = [sphere for sphere in spheres if sphere.region.kind == "target"]
-        others = [sphere for sphere in spheres if sphere.region.kind != "target"]
+        others = [s for s in spheres if s.region.kind not in ("target", "safe")]
         for target in targets:
             self._check_reachable(tip, target)
             for other in others:
                 self._check_overlap(target, other)
         for other in others:
             self._check_start(tip, other)
+        for safe in (sphere for sphere in spheres if sphere.region.kind == "safe"):
+            for other in others:
+                self._check_safe(safe, other)
+
+    def _check_safe(self, safe: _Sphere, other: _Sphere) -> None:
+        """A safe region should not reach into what plans avoid; a shell around it is no matter."""
+        one, two = safe.region, other.region
+        distance = math.dist(one.center_mm, two.center_mm)
+        if two.kind == "detection" or distance >= one.radius_mm + two.radius_mm:
+            return
+        self._report(
+            "safe-overlaps",
+            _place_of(safe),
+            f"the safe region `{one.name}` reaches into the {two.kind} region `{two.name}`",
+            hint=f"move one of the two; plans avoid `{two.name}` all the same",
+            notes=(f"the {two.kind} region is at {_place_of(other).place}",),
+        )
 
     def _check_reachable(self, tip: Pose, target: _Sphere) -> None:
         """A target must not lie behind the tip, and should not contain it."""
@@ -502,7 +521,8 @@ class _Builder:
             speed, radius = needle.speed_mm_per_s, needle.radius_mm
             self._obeys(rules.motion(limits.step_s, speed, radius, resolution, swept=swept), span)
         seen = [sphere for sphere in spheres if self._is_visible(sphere, resolution)]
-        smallest = min(seen, key=lambda s: s.region.radius_mm, default=None)
+        checked = (sphere for sphere in seen if sphere.region.kind != "safe")
+        smallest = min(checked, key=lambda s: s.region.radius_mm, default=None)
         if smallest is not None and advance > 2.0 * smallest.region.radius_mm:
             self._report(
                 "step-too-long",

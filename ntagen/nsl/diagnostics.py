@@ -138,7 +138,12 @@ KINDS: Final = _kinds(
     ("N077", "target-overlaps", "warning", "The needle must not reach the centre of the target."),
     ("N078", "target-behind-needle", "error", "The needle moves along its heading, never back."),
     ("N079", "tip-in-critical", "error", "The needle would start in a critical region."),
-    ("N080", "tip-in-detection", "warning", "Detection counts as critical: there is no plan."),
+    (
+        "N080",
+        "tip-in-detection",
+        "warning",
+        "Plans avoid detection and unexplored regions: there is no plan that starts in one.",
+    ),
     ("N081", "tip-in-target", "warning", "The target is reached before the first move."),
     ("N082", "length-not-positive", "error", "The needle's length must be greater than 0."),
     ("N083", "value-too-small", "error", "At this resolution the value would be rounded to 0."),
@@ -154,6 +159,7 @@ KINDS: Final = _kinds(
     ("N087", "axis-malformed", "error", "An axis has a letter of GRBL, and its steps."),
     ("N088", "axis-missing", "error", "A device has an axis to insert and one to roll."),
     ("N089", "address-malformed", "error", "An address is a host and a port."),
+    ("N090", "safe-overlaps", "warning", "A safe region has nothing critical or unexplored in it."),
 )
 """All kinds of mistakes by name, in the order of their codes."""
 

@@ -526,7 +526,7 @@ class _Resolver:
             self._reporter.report(
                 "around-misused",
                 shape.span,
-                f"a {keyword} region is not written with `around`",
+                f"{article(keyword)} {keyword} region is not written with `around`",
                 hint="give it a sphere, or make it a `detection` region",
             )
             return None
@@ -707,6 +707,11 @@ class _Resolver:
                 )
                 value = None
         draft.resolution = Placed(value, statement.count.span.to(statement.unit.span))
+
+
+def article(word: str) -> str:
+    """The article of a word."""
+    return "an" if word[0] in "aeiou" else "a"
 
 
 def _is_below(path: str, folder: str) -> bool:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 BlockKind = Literal["file", "environment", "needle", "motion", "for", "drive", "device"]
 """The place of a statement: at the top of a file, or in the braces of another one."""
 
-REGIONS: Final = frozenset({"target", "critical", "detection"})
+REGIONS: Final = frozenset({"target", "critical", "detection", "unexplored", "safe"})
 _NEEDLE_ITEMS: Final = frozenset({"tip", "heading", "bevel", "radius", "speed", "length"})
 _MOTION_ITEMS: Final = frozenset({"step", "roll"})
 _BODY_ITEMS: Final = REGIONS | {

@@ -40,6 +40,8 @@ FORMS: Final = {
     "target": "write for example `target T1 sphere (0, -50, 0) mm radius 10 mm`",
     "critical": "write for example `critical C1 sphere (0, -25, 0) mm radius 2 mm`",
     "detection": "write for example `detection D1 around C1 margin 3 mm`",
+    "unexplored": "write for example `unexplored U1 sphere (9, -25, 0) mm radius 3 mm`",
+    "safe": "write for example `safe S1 sphere (0, -9, 0) mm radius 5 mm`",
     "tip": "write for example `tip (0, 0, 0) mm`",
     "heading": "write for example `heading -y` or `heading (0, -1, 0)`",
     "bevel": "write for example `bevel +z` or `bevel (0, 0, 1)`",

@@ -59,7 +59,7 @@ class Certificate:
     """The properties of a plan in exact kinematics.
 
     Attributes:
-        clearances: One per critical and detection region, in the order of the scene.
+        clearances: One per critical, detection and unexplored region, in the order of the scene.
         arrivals: One per target, in the order of the scene.
         end_mm: The position of the tip at the end.
         end_distance_mm: The distance from there to the centre of the last target.
@@ -85,6 +85,11 @@ class Certificate:
         return self._smallest("detection")
 
     @property
+    def unexplored_clearance_mm(self) -> float:
+        """The smallest distance to the surface of any unexplored region; infinite without one."""
+        return self._smallest("unexplored")
+
+    @property
     def target_depth_mm(self) -> float:
         """The least depth that the plan reaches in its targets; negative if it misses one."""
         depths = [a.depth_mm if a.entered_at_mm is not None else -math.inf for a in self.arrivals]
@@ -95,10 +100,10 @@ class Certificate:
     ) -> bool:
         """Whether the plan avoids its regions and reaches its targets, with these margins.
 
-        A path that touches a critical or a detection region does not hold, whatever the margin. The
-        model also gives up a path that is in one of them, at its start too; with `safety sampled`
-        it does not ask at the end of a path that has reached the last target. A certificate asks
-        there too.
+        A path that touches a critical, detection or unexplored region does not hold, whatever the
+        margin. The model also gives up a path that is in one of them, at its start too; with
+        `safety sampled` it does not ask at the end of a path that has reached the last target. A
+        certificate asks there too.
 
         Args:
             clearance_mm: The path is farther than this from every critical region.
@@ -107,7 +112,8 @@ class Certificate:
         """
         free = self.critical_clearance_mm > clearance_mm
         unfelt = self.detection_clearance_mm > detection_mm
-        return free and unfelt and self.target_depth_mm >= depth_mm
+        known = self.unexplored_clearance_mm > 0.0
+        return free and unfelt and known and self.target_depth_mm >= depth_mm
 
     def _smallest(self, kind: RegionKind) -> float:
         return min((c.distance_mm for c in self.clearances if c.kind == kind), default=math.inf)
@@ -120,9 +126,7 @@ def certify(plan: Plan, scene: Scene) -> Certificate:
     end_mm = arcs[-1].end.position_mm if arcs else entry_mm
     last = scene.targets[-1] if scene.targets else None
     return Certificate(
-        clearances=tuple(
-            clearance(arcs, entry_mm, region) for region in scene.criticals + scene.detections
-        ),
+        clearances=tuple(clearance(arcs, entry_mm, region) for region in scene.avoided),
         arrivals=_arrivals(arcs, entry_mm, end_mm, scene.targets),
         end_mm=end_mm,
         end_distance_mm=distance(end_mm, last.center_mm) if last else 0.0,

@@ -36,7 +36,7 @@ def required(margins: Margins) -> str:
     """What a plan must do to hold, on one line."""
     return (
         f"a plan holds if its whole path stays more than {margins.clearance_mm:g} mm away from "
-        "critical regions and out of detection regions, and ends at least "
+        "critical regions and out of detection and unexplored regions, and ends at least "
         f"{margins.depth_mm:g} mm deep in the target"
     )
 
@@ -48,6 +48,8 @@ def judged(certificate: Certificate, margins: Margins) -> str:
     detection_mm = certificate.detection_clearance_mm
     if detection_mm <= margins.detection_mm:
         distances.append(f"{-detection_mm:.2f} mm inside of a detection region")
+    if certificate.unexplored_clearance_mm <= 0.0:
+        distances.append("enters an unexplored region")
     depth_mm = certificate.target_depth_mm
     if not math.isfinite(depth_mm):
         distances.append("misses a target")

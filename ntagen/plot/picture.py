@@ -21,8 +21,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _AXES: Final = "xyz"
-_COLOURS: Final = {"target": "#2a9d4a", "critical": "#c8283c", "detection": "#e8890c"}
-_LABELS: Final = {"target": "target", "critical": "critical", "detection": "detection"}
+_COLOURS: Final = {
+    "target": "#2a9d4a",
+    "critical": "#c8283c",
+    "detection": "#e8890c",
+    "unexplored": "#5b6472",
+    "safe": "#3fa7a0",
+}
+_OUTLINES: Final = {"detection": (0, (4, 2)), "safe": (0, (1, 2))}
+"""The kinds that are drawn as outlines, and their dashes."""
 _NEEDLE: Final = "#1f5fbf"
 _OTHER: Final = "#8a94a6"
 _TRUE: Final = "#0b2545"
@@ -169,12 +176,14 @@ def _back_to_front(regions: Sequence[Region]) -> list[Region]:
 def _face(region: Region, picture: Picture) -> dict[str, Any]:
     """The style of a region's disc."""
     colour = _COLOURS[region.kind]
-    label = _LABELS[region.kind]
+    label: str = region.kind
     style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.2, "zorder": 2}
-    if region.kind == "detection":
-        style |= {"facecolor": "none", "linestyle": (0, (4, 2)), "zorder": 3}
+    if region.kind in _OUTLINES:
+        style |= {"facecolor": "none", "linestyle": _OUTLINES[region.kind], "zorder": 3}
     else:
         style |= {"facecolor": (*_rgb(colour), 0.22)}
+    if region.kind == "unexplored":
+        style |= {"hatch": "...."}
     if region.name in picture.learned:
         label += " (learned)"
         style |= {"hatch": "//////" if region.kind == "critical" else None, "linewidth": 0.9}
@@ -252,7 +261,7 @@ def _draw_sphere(axes: Any, region: Region, order: list[int]) -> None:  # noqa: 
     center = [region.center_mm[i] for i in order]
     surface = [c + region.radius_mm * u for c, u in zip(center, unit, strict=True)]
     colour = _COLOURS[region.kind]
-    if region.kind == "detection":
+    if region.kind in _OUTLINES:
         axes.plot_wireframe(*surface, color=colour, linewidth=0.35, alpha=0.45, linestyle="--")
     else:
         axes.plot_surface(*surface, color=colour, alpha=0.22, linewidth=0, shade=True)

@@ -65,6 +65,8 @@ class ModelValues:
     targets: Spheres
     criticals: Spheres
     detections: Spheres
+    unexplored: Spheres
+    safe: Spheres
     swept: bool
     sweep_margin: int
 
@@ -142,6 +144,8 @@ def model_values(scene: Scene) -> ModelValues:
         targets=writer.spheres(scene.targets),
         criticals=writer.spheres(scene.criticals),
         detections=writer.spheres(scene.detections),
+        unexplored=writer.spheres(scene.unexplored),
+        safe=writer.spheres(scene.safe),
         swept=scene.safety == "swept",
         sweep_margin=_sweep_margin(scale, needle.radius_mm),
     )

@@ -62,6 +62,7 @@ class Instance:
     targets: tuple[Sphere, ...] = (Sphere((0, -50_000, 0), 10_000),)
     criticals: tuple[Sphere, ...] = (Sphere((0, -25_000, 0), 2_000),)
     detections: tuple[Sphere, ...] = (Sphere((0, -25_000, 0), 5_000),)
+    unexplored: tuple[Sphere, ...] = ()
 
     @property
     def max_actions(self) -> int:
@@ -101,6 +102,7 @@ class Instance:
             targets=tuple(sphere(r.center_mm, r.radius_mm) for r in scene.targets),
             criticals=tuple(sphere(r.center_mm, r.radius_mm) for r in scene.criticals),
             detections=tuple(sphere(r.center_mm, r.radius_mm) for r in scene.detections),
+            unexplored=tuple(sphere(r.center_mm, r.radius_mm) for r in scene.unexplored),
         )
 
 
@@ -214,7 +216,8 @@ class Needle:
         self.TR_reachable = self.tip_pos[1] >= target.center[1] - target.radius
         if not self.TR_reachable:
             return End.TR_UNREACHABLE
-        harmful = (*self.instance.criticals, *self.instance.detections)
+        instance = self.instance
+        harmful = (*instance.criticals, *instance.unexplored, *instance.detections)
         self.CR_reached = any(self._touches(sphere) for sphere in harmful)
         return End.UR_REACHED if self.CR_reached else None
 

@@ -79,7 +79,7 @@ def _classified(positions: Array, headings: Array, scene: Scene) -> tuple[Array,
     inside = _inside(positions, target)
     beyond = positions @ axis > np.dot(target.center_mm, axis) + target.radius_mm
     pierced = np.zeros_like(inside)
-    for region in scene.criticals + scene.detections:
+    for region in scene.criticals + scene.detections + scene.unexplored:
         pierced |= _inside(positions, region)
     reached = inside & ~backward
     ended = backward | inside | beyond | pierced

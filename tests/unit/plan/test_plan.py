@@ -121,6 +121,18 @@ def test_a_plan_that_enters_a_detection_region_does_not_hold() -> None:
         assert not certificate.holds(detection_mm=certificate.detection_clearance_mm)
 
 
+def test_a_plan_that_enters_an_unexplored_region_does_not_hold() -> None:
+    target = sphere("T", "target", (0.0, -8.0, 0.0), 3.0)
+    plan = Plan.of([Push(8.0)])
+    for x_mm, holds in ((0.0, False), (9.0, True)):
+        unknown = sphere("U", "unexplored", (x_mm, -4.0, 0.0), 2.0)
+        safe = sphere("S", "safe", (0.0, -4.0, 0.0), 2.0)
+        certificate = certify(plan, scene(unknown, safe, targets=[target]))
+        assert [c.region for c in certificate.clearances] == ["U"]
+        assert (certificate.unexplored_clearance_mm > 0.0) is holds
+        assert certificate.holds() is holds
+
+
 def test_the_words_for_a_ranking_name_its_criteria_in_order() -> None:
     said = ranked_by(("length", "clearance"))
     assert said == "best first: by length, then clearance (up to 5 mm counts)"

@@ -70,6 +70,7 @@ def check_constants(scene: Scene, instance: Instance) -> None:
         ("TR", instance.targets),
         ("CR", instance.criticals),
         ("DR", instance.detections),
+        *((("UR", instance.unexplored),) if instance.unexplored else ()),
     )
     for kind, spheres in kinds:
         assert constant(text, f"{kind}_COUNT") == len(spheres)
@@ -200,3 +201,17 @@ def test_two_different_queries_of_one_name_are_refused() -> None:
     scene = paper(queries=(NamedQuery("ReachFinalTR", "E<> User.End"),))
     with pytest.raises(InputError, match="in every model"):
         render(scene)
+
+
+LEFT = Region("Left", "unexplored", (9.0, -25.0, 0.0), 3.0)
+ENTRY = Region("Entry", "safe", (0.0, -9.0, 0.0), 5.0)
+
+
+def test_unexplored_and_safe_regions_are_in_the_model_only_if_there_are_any() -> None:
+    plain = declaration(PAPER)
+    assert not re.search(r"\b[US]R_(COUNT|center|radius)\b", plain)
+    text = declaration(paper(unexplored=(LEFT,), safe=(ENTRY,)))
+    assert constant(text, "UR_center") == ((9000, -25000, 0),)
+    assert constant(text, "UR_radius") == (3000,)
+    assert constant(text, "SR_center") == ((0, -9000, 0),)
+    assert constant(text, "SR_radius") == (5000,)
