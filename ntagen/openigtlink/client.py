@@ -162,7 +162,12 @@ class Client:
         return time.monotonic()
 
     def pose(
-        self, device: str | None = None, *, after_s: float | None = None, any_age: bool = False
+        self,
+        device: str | None = None,
+        *,
+        after_s: float | None = None,
+        any_age: bool = False,
+        waits: bool = True,
     ) -> Sample[Pose]:
         """The newest sample that says where a device is; waits for it for `Policy.stale_s`.
 
@@ -171,19 +176,25 @@ class Client:
             after_s: The sample must have come after this time on the monotonic clock; by default
                 it must be younger than `Policy.stale_s`.
             any_age: Whether a sample of any age will do, as long as the connection stands.
+            waits: Whether to wait for it; if not, the answer comes at once.
 
         Raises:
             DeviceError: There is no such sample in this time.
         """
-        return self._newest(self._poses, device, -math.inf if any_age else after_s, "position")
+        least_s = -math.inf if any_age else after_s
+        return self._newest(self._poses, device, least_s, "position", waits)
 
     def sensor(
-        self, device: str | None = None, *, after_s: float | None = None, any_age: bool = False
+        self,
+        device: str | None = None,
+        *,
+        after_s: float | None = None,
+        any_age: bool = False,
+        waits: bool = True,
     ) -> Sample[Sensor]:
         """The newest reading of a sensor, as `pose`."""
-        return self._newest(
-            self._sensors, device, -math.inf if any_age else after_s, "sensor reading"
-        )
+        least_s = -math.inf if any_age else after_s
+        return self._newest(self._sensors, device, least_s, "sensor reading", waits)
 
     def status(self, device: str) -> Sample[Status] | None:
         """The newest STATUS of a device, of any age; `None` if there was none."""
@@ -223,9 +234,9 @@ class Client:
         device: str | None,
         after_s: float | None,
         what: str,
+        waits: bool,
     ) -> Sample[Kind]:
-        begin_s = time.monotonic()
-        end_s = begin_s + self._policy.stale_s
+        end_s = time.monotonic() + (self._policy.stale_s if waits else 0.0)
         with self._changed:
             while True:
                 now_s = time.monotonic()

@@ -101,34 +101,47 @@ class LiveTracker:
     def measure_after(self, asked_s: float) -> Measurement:
         """The same with a sample that came after a moment on the client's clock."""
         source = self._source
-        after_s = asked_s + source.latency_s if source.repeats else None
-        sample = self._visible(after_s)
+        return self._measurement(asked_s + source.latency_s if source.repeats else None, True)
+
+    def newest(self) -> Measurement:
+        """The newest measurement that is not stale, at once: for whoever watches a motion.
+
+        Raises:
+            DeviceError: There is none, the tool is hidden, or the sample is impossible.
+        """
+        return self._measurement(None, False)
+
+    def _measurement(self, after_s: float | None, waits: bool) -> Measurement:
+        source = self._source
+        sample = self._visible(after_s, waits)
         tip = tip_of(sample.content, source.mount, sample.device)
-        force_n = self._force_n()
+        force_n = self._force_n(waits)
         age_s = self.client.now_s() - sample.received_s + source.latency_s
         return _in_scene(tip, self._transform, self._now_s() - age_s, force_n)
 
-    def _visible(self, after_s: float | None) -> Sample[Pose]:
+    def _visible(self, after_s: float | None, waits: bool) -> Sample[Pose]:
         """The next sample in which the tool is visible."""
-        end_s = self.client.now_s() + self._source.policy.stale_s
+        source = self._source
+        end_s = self.client.now_s() + source.policy.stale_s
         while True:
             sample = self.client.pose(
-                self._source.device, after_s=after_s, any_age=not self._source.repeats
+                source.device, after_s=after_s, any_age=not source.repeats, waits=waits
             )
             hidden = _hidden(sample)
             if hidden is None:
                 return sample
-            if self.client.now_s() >= end_s or not self._source.repeats:
+            if self.client.now_s() >= end_s or not source.repeats or not waits:
                 raise DeviceError(
                     f"the tracker does not see '{sample.device}': its status is {hidden}"
                 )
             after_s = sample.received_s
 
-    def _force_n(self) -> float:
-        if self._source.force is None:
+    def _force_n(self, waits: bool) -> float:
+        source = self._source
+        if source.force is None:
             return 0.0
-        sample = self.client.sensor(self._source.force, any_age=not self._source.repeats)
-        return _newtons(sample, self._source)
+        sample = self.client.sensor(source.force, any_age=not source.repeats, waits=waits)
+        return _newtons(sample, source)
 
 
 def require_frame(source: Source, transform: Transform) -> None:

@@ -44,16 +44,21 @@ class Playback:
         name: Where they come from, for messages.
         samples: The samples in the frame of the scene, in the order of time.
         now_s: The clock.
+        measures_force: Whether the samples have a force; without it, it is always 0.
 
     Raises:
         InputError: There are no samples, or their times go back.
     """
 
-    measures_force = True
-
     def __init__(
-        self, name: str, samples: Sequence[Measurement], now_s: Callable[[], float]
+        self,
+        name: str,
+        samples: Sequence[Measurement],
+        now_s: Callable[[], float],
+        *,
+        measures_force: bool = True,
     ) -> None:
+        self.measures_force = measures_force
         if not samples:
             raise InputError(f"{name}: there are no measurements in this file")
         self._name = name
@@ -114,8 +119,8 @@ def samples_of_log(path: Path) -> list[Measurement]:
     ]
 
 
-def samples_of_table(path: Path, transform: Transform) -> list[Measurement]:
-    """The measurements in a CSV file, in the frame of the scene.
+def samples_of_table(path: Path, transform: Transform) -> tuple[list[Measurement], bool]:
+    """The measurements in a CSV file, in the frame of the scene, and whether they have a force.
 
     The first line names the columns: ``time_s``; ``x_mm``, ``y_mm``, ``z_mm`` for positions in the
     scene's frame, or ``tracker_x_mm``, … for another one; and, if they were measured, ``force_n``,
@@ -136,7 +141,8 @@ def samples_of_table(path: Path, transform: Transform) -> list[Measurement]:
     if not rows:
         raise InputError(f"{path}: this file is empty")
     table = _Table(path, rows[0][1], transform)
-    return [table.measurement(number, row) for number, row in rows[1:]]
+    samples = [table.measurement(number, row) for number, row in rows[1:]]
+    return samples, "force_n" in rows[0][1]
 
 
 class _Table:

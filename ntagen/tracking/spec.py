@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from ntagen.drive.device import Sensor
 from ntagen.errors import InputError
 from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY, Transform
@@ -86,7 +85,7 @@ def parse_tracker(text: str) -> Tracker:
 @contextlib.contextmanager
 def open_tracker(
     tracker: Tracker, transform: Transform | None, now_s: Callable[[], float]
-) -> Iterator[Sensor]:
+) -> Iterator[LiveTracker | Playback]:
     """The sensor behind a tracker, until the end of the block.
 
     Args:
@@ -109,7 +108,8 @@ def open_tracker(
             with LiveTracker(tracker, transform, now_s) as live:
                 yield live
         case Recording("csv", path):
-            yield Playback(str(path), samples_of_table(path, transform or IDENTITY), now_s)
+            samples, has_force = samples_of_table(path, transform or IDENTITY)
+            yield Playback(str(path), samples, now_s, measures_force=has_force)
         case Recording(_, path):
             if transform is not None and transform != IDENTITY:
                 raise InputError(

@@ -114,6 +114,20 @@ def test_a_server_that_sends_changes_only_is_not_stale(server: Server) -> None:
         assert any(fails(live) for _ in range(1000))
 
 
+def test_the_newest_measurement_comes_at_once_or_not_at_all(server: Server) -> None:
+    with tracker(server, policy=PATIENT) as live:
+        # Waiting for it would take ten seconds.
+        with pytest.raises(DeviceError, match="nothing of use"):
+            live.newest()
+        first = measured(server, live, Packet("N", at(1.0)))
+        assert live.newest().position_mm == live.newest().position_mm == first.position_mm
+        server.send(invisible(TransformStatus="MISSING"))
+        server.send(Packet("Last", at(2.0)))
+        live.client.pose("Last")
+        with pytest.raises(DeviceError, match="several devices: 'Last', 'N'"):
+            live.newest()
+
+
 def test_a_tool_of_five_degrees_of_freedom(server: Server) -> None:
     with tracker(server, device="Tip", mount=Mount("-z")) as live:
         tools = (
@@ -232,6 +246,8 @@ def test_a_tool_that_is_hidden_is_named(server: Server, packet: Packet, match: s
         try:
             with pytest.raises(DeviceError, match=match):
                 live.measure_after(asked_s)
+            with pytest.raises(DeviceError, match=match):
+                live.newest()
         finally:
             stop.set()
             sender.join()

@@ -84,7 +84,7 @@ def test_recordings_that_are_wrong_are_refused() -> None:
 def table(tmp_path: Path, text: str, transform: Transform = IDENTITY) -> list[Measurement]:
     path = tmp_path / "run.csv"
     path.write_text(text)
-    return samples_of_table(path, transform)
+    return samples_of_table(path, transform)[0]
 
 
 def test_a_table_in_the_frame_of_the_scene(tmp_path: Path) -> None:
@@ -145,8 +145,11 @@ def test_wrong_tables_are_refused(
         table(tmp_path, text, transform)
 
 
-def test_a_table_is_opened_as_a_tracker(tmp_path: Path) -> None:
+@pytest.mark.parametrize("has_force", [True, False])
+def test_a_table_is_opened_as_a_tracker(tmp_path: Path, has_force: bool) -> None:
     path = tmp_path / "run.csv"
-    path.write_text("time_s,x_mm,y_mm,z_mm\n3,1,2,3\n")
+    head, row = "time_s,x_mm,y_mm,z_mm", "3,1,2,3"
+    path.write_text(f"{head},force_n\n{row},0\n" if has_force else f"{head}\n{row}\n")
     with open_tracker(Recording("csv", path), None, lambda: 8.0) as sensor:
+        assert sensor.measures_force == has_force
         assert sensor.measure() == Measurement(8.0, (1.0, 2.0, 3.0), 0.0)
