@@ -17,6 +17,7 @@ from ntagen.cli.models import include_option
 from ntagen.cli.signals import TERMINATED, handled
 from ntagen.cli.steering import show_settings, steering_options
 from ntagen.cli.terminal import echo
+from ntagen.cli.tracker import Sense, Tracking, opened, tracker_options, tracking_of
 from ntagen.drive.operator import Operator
 from ntagen.drive.states import State
 from ntagen.files import read_file, require_apart
@@ -47,6 +48,7 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="Which needle to steer. Both are simulations: virtual bends exactly as planned, phantom "
     "drifts, lags and is measured as real needles are.",
 )
+@tracker_options
 @click.option(
     "--known",
     metavar="all|none|NAME,…",
@@ -74,6 +76,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
 def command(
     environment: Path,
     needle: str,
+    tracker: str | None,
+    registration: str | None,
     known: str,
     log_path: Path | None,
     as_json: bool,
@@ -97,6 +101,7 @@ def command(
       ntagen drive examples/paper.nsl --seed 1 --noise 0.1mm --known none
       ntagen drive examples/paper.nsl --needle phantom --seed 1
       ntagen drive examples/paper.nsl --pull 8mm --true-radius 33mm --force-sensing off
+      ntagen drive examples/paper.nsl --tracker openigtlink+sim
       ntagen drive examples/paper.nsl --settings
 
     \b
@@ -122,10 +127,17 @@ def command(
     if only_settings:
         show_settings(configuration)
         return 0
-    run = _Run(environment, task.scene, configuration, known)
+    tracking = tracking_of(tracker, registration)
+    run = _Run(environment, task.scene, configuration, known, tracking)
     speaks = not (as_json or quiet)
-    with _operator() as operator, _log(log_path, run) as log:
-        result = _drive(run, log, speaks, operator)
+    entry, watches_force = task.scene.needle.tip, configuration.settings.force_sensing
+    # A tracker that cannot be reached must not cost an earlier log.
+    with (
+        _operator() as operator,
+        opened(tracking, entry, watches_force=watches_force) as sense,
+        _log(log_path, run) as log,
+    ):
+        result = _drive(run, sense, log, speaks, operator)
     if as_json:
         echo(json.dumps(_summary(result, run, log_path)))
     else:
@@ -137,12 +149,13 @@ def command(
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """What is driven: the file, the true scene, the settings, and the regions that are known."""
+    """What is driven: the file, the true scene, the settings, what is known, what measures."""
 
     environment: Path
     scene: Scene
     configuration: Configuration
     known: str
+    tracking: Tracking
 
 
 class _Signalled(Operator):
@@ -172,7 +185,9 @@ def _operator() -> Iterator[_Signalled]:
         yield operator
 
 
-def _drive(run: _Run, log: list[Journal], speaks: bool, operator: Operator) -> Result:
+def _drive(
+    run: _Run, sense: Sense | None, log: list[Journal], speaks: bool, operator: Operator
+) -> Result:
     from ntagen.drive.records import Journals
     from ntagen.drive.simulate import simulate, synthesiser_for
 
@@ -189,6 +204,7 @@ def _drive(run: _Run, log: list[Journal], speaks: bool, operator: Operator) -> R
             errors=run.configuration.errors,
             make=run.configuration.needle.make,
             seed=run.configuration.seed,
+            sense=sense,
             listen=operator.listen,
         )
 
@@ -214,6 +230,7 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
         "environment": environment.name.encode(errors="replace").decode(),
         "seed": configuration.seed,
         "known": run.known,
+        "tracker": run.tracking.text,
         "noise_mm": errors.noise_mm,
         "roll_error_rad": errors.roll_rad,
         "true_radius_mm": errors.radius_mm,

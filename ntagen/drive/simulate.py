@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
-from ntagen.drive.device import Assembly, Device
+from ntagen.drive.device import Actuator, Assembly, Device, Sensor
 from ntagen.drive.force import fitting_spacing_mm
 from ntagen.drive.knowledge import sensing_margin_mm, told
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
@@ -93,6 +93,7 @@ def simulate(
     errors: Errors | None = None,
     make: Maker | None = None,
     seed: int = 0,
+    sense: Callable[[Device], Sensor] | None = None,
     listen: Callable[[], None] = lambda: None,
 ) -> Result:
     """Drives a simulated needle through the scene.
@@ -107,6 +108,7 @@ def simulate(
             errors of this kind.
         make: Makes another needle than the virtual one.
         seed: The seed of the errors.
+        sense: Gives what measures the needle; by default it measures itself.
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
     """
     obstacles = tuple(
@@ -119,9 +121,11 @@ def simulate(
     errors = errors or Errors()
     true_needle = errors.true_needle(scene.needle)
     needle = (make or virtual(errors))(true_needle, obstacles, seed)
-    device: Device = needle
+    sensor = needle if sense is None else sense(needle)
+    actuator: Actuator = needle
     if settings.compensated_lag_rad > 0.0:
-        device = Assembly(Compensated(needle, Lag(settings.compensated_lag_rad)), needle)
+        actuator = Compensated(needle, Lag(settings.compensated_lag_rad))
+    device = Assembly(actuator, sensor)
     witness = _Witness(needle, journal)
     controller = Controller(
         told(scene, known), device, synthesise, settings, Journals(journal, witness), listen

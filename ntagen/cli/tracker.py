@@ -1,0 +1,131 @@
+"""The options of ``drive`` about trackers, and what measures the needle because of them."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from ntagen.drive.device import Device, Sensor
+    from ntagen.scene import Pose
+    from ntagen.tracking.frames import Transform
+    from ntagen.tracking.spec import Tracker
+
+SIMULATED: Final = "openigtlink+sim"
+"""The tracker that measures a simulated needle through a server of ours on this machine."""
+
+NO_REGISTRATION: Final = "none"
+
+Sense = Callable[["Device"], "Sensor"]
+"""Gives the sensor for a needle, whose clock it takes."""
+
+_Command = Callable[..., Any]
+
+
+def tracker_options(command: _Command) -> _Command:
+    """Adds the options; the command gets them as `tracker` and `registration`."""
+    for option in (
+        click.option(
+            "--registration",
+            metavar="FILE.json|none",
+            help="Where the scene lies for the tracker: a file of `ntagen calibrate`, or none if "
+            "the scene is written in the tracker's frame.",
+        ),
+        click.option(
+            "--tracker",
+            metavar="TRACKER",
+            help="What measures the needle, if not the needle itself: "
+            "openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, csv:FILE, mcap:FILE, or "
+            "openigtlink+sim. docs/tracking.md has the options.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+@dataclass(frozen=True, slots=True)
+class Tracking:
+    """What measures the needle.
+
+    Attributes:
+        text: The words of the user; empty if the needle measures itself.
+        tracker: What they mean; `None` for the needle itself and for `SIMULATED`.
+        transform: The registration, if one was given.
+    """
+
+    text: str = ""
+    tracker: Tracker | None = None
+    transform: Transform | None = None
+
+
+def tracking_of(tracker: str | None, registration: str | None) -> Tracking:
+    """What the words of the options mean.
+
+    Raises:
+        InputError: They have a mistake, or the registration cannot be read.
+    """
+    if tracker is None or tracker == SIMULATED:
+        if registration is not None:
+            raise InputError(
+                "--registration is for a tracker, and there is none that needs it\n"
+                "hint: give --tracker too, or leave it out"
+            )
+        return Tracking(tracker or "")
+    from ntagen.tracking.frames import IDENTITY
+    from ntagen.tracking.spec import parse_tracker
+    from ntagen.tracking.transform_file import read_transform
+
+    found = parse_tracker(tracker)
+    if registration is None:
+        return Tracking(tracker, found)
+    is_none = registration == NO_REGISTRATION
+    return Tracking(tracker, found, IDENTITY if is_none else read_transform(Path(registration)))
+
+
+@contextlib.contextmanager
+def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[Sense | None]:
+    """Connects to the tracker until the end of the block; `None` if the needle measures itself.
+
+    Args:
+        tracking: What measures the needle.
+        entry: Where the needle is at the start.
+        watches_force: Whether the driver relies on a force.
+
+    Raises:
+        InputError: The tracker cannot be used so.
+        DeviceError: It cannot be reached.
+    """
+    if not tracking.text:
+        yield None
+        return
+    with contextlib.ExitStack() as stack:
+        if tracking.tracker is None:
+            from ntagen.tracking.simulated import SimulatedTracker
+
+            yield lambda needle: stack.enter_context(SimulatedTracker(needle, needle.now_s))
+            return
+        from ntagen.tracking.spec import open_tracker
+        from ntagen.tracking.start import StartChecked
+
+        needles: list[Device] = []
+        sensor = stack.enter_context(
+            open_tracker(tracking.tracker, tracking.transform, lambda: needles[0].now_s())
+        )
+        if watches_force and not sensor.measures_force:
+            raise InputError(
+                f"the tracker {tracking.text} measures no force, and the driver watches the force\n"
+                "hint: name a sensor with force=DEVICE, or add --force-sensing off"
+            )
+
+        def sense(needle: Device) -> Sensor:
+            needles.append(needle)
+            return StartChecked(sensor, entry)
+
+        yield sense
