@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -123,3 +124,8 @@ def test_a_log_needs_none(tmp_path: Path) -> None:
         open_tracker(Recording("mcap", tmp_path / "r.mcap"), other, lambda: 0.0),
     ):
         pass
+
+
+def test_the_documentation_has_each_option() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "tracking.md").read_text("utf-8")
+    assert re.findall(r"^\| `([a-z-]+)` \|", text, re.MULTILINE) == list(OPTIONS)
