@@ -83,11 +83,12 @@ picture: $(INSTALLED) ## Draw examples/scene.png, the picture in the README
 	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10
 
 .PHONY: bench
-bench: $(INSTALLED) ## Measure the engine: all plans, a thousand syntheses, reductions, deadlocks, whole state spaces, then code, loading and zones
+bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadlocks, state spaces, code, loading, zones) and trackers
 	$(BIN)/python tests/benchmarks/needle.py
 	$(BIN)/python tests/benchmarks/syntheses.py
 	$(BIN)/python tests/benchmarks/reductions.py
 	$(BIN)/python tests/benchmarks/deadlocks.py
+	$(BIN)/python tests/benchmarks/tracker.py
 	$(BIN)/python tests/benchmarks/race.py
 	$(BIN)/python tests/benchmarks/race.py --threads 2 "fischer 10" "csmacd 11" peterson
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked

@@ -127,7 +127,7 @@ def command(
     if only_settings:
         show_settings(configuration)
         return 0
-    tracking = tracking_of(tracker, registration)
+    tracking = tracking_of(tracker, registration, task.tracker)
     run = _Run(environment, task.scene, configuration, known, tracking)
     speaks = not (as_json or quiet)
     entry, watches_force = task.scene.needle.tip, configuration.settings.force_sensing

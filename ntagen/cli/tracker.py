@@ -14,6 +14,7 @@ from ntagen.errors import InputError
 
 if TYPE_CHECKING:
     from ntagen.drive.device import Device, Sensor
+    from ntagen.hardware import OpenIGTLinkTracker
     from ntagen.scene import Pose
     from ntagen.tracking.frames import Transform
     from ntagen.tracking.spec import Tracker
@@ -65,12 +66,22 @@ class Tracking:
     transform: Transform | None = None
 
 
-def tracking_of(tracker: str | None, registration: str | None) -> Tracking:
+def tracking_of(
+    tracker: str | None, registration: str | None, described: OpenIGTLinkTracker | None = None
+) -> Tracking:
     """What the words of the options mean.
+
+    Args:
+        tracker: The words of --tracker.
+        registration: Those of --registration.
+        described: The tracker in the task. It counts if a registration is given for it: a simulated
+            needle needs none and measures itself.
 
     Raises:
         InputError: They have a mistake, or the registration cannot be read.
     """
+    if tracker is None and described is not None and registration is not None:
+        tracker = _words_for(described)
     if tracker is None or tracker == SIMULATED:
         if registration is not None:
             raise InputError(
@@ -87,6 +98,12 @@ def tracking_of(tracker: str | None, registration: str | None) -> Tracking:
         return Tracking(tracker, found)
     is_none = registration == NO_REGISTRATION
     return Tracking(tracker, found, IDENTITY if is_none else read_transform(Path(registration)))
+
+
+def _words_for(described: OpenIGTLinkTracker) -> str:
+    """The words of --tracker for the tracker in a task."""
+    host = f"[{described.host}]" if ":" in described.host else described.host
+    return f"openigtlink:{host}:{described.port}" + (f":{described.name}" if described.name else "")
 
 
 @contextlib.contextmanager
@@ -111,8 +128,8 @@ def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[
 
             yield lambda needle: stack.enter_context(SimulatedTracker(needle, needle.now_s))
             return
+        from ntagen.tracking.plausible import Plausible
         from ntagen.tracking.spec import open_tracker
-        from ntagen.tracking.start import StartChecked
 
         needles: list[Device] = []
         sensor = stack.enter_context(
@@ -126,6 +143,6 @@ def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[
 
         def sense(needle: Device) -> Sensor:
             needles.append(needle)
-            return StartChecked(sensor, entry)
+            return Plausible(sensor, entry)
 
         yield sense

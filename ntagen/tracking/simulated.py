@@ -38,34 +38,43 @@ class SimulatedTracker:
         needle: What is measured, in the frame of the scene.
         now_s: The clock of the needle.
         reports_pose: Whether its measurements have heading and bevel.
+        policy: How long the client waits.
+
+    Attributes:
+        server: The server between the needle and the client.
     """
 
     def __init__(
-        self, needle: Sensor, now_s: Callable[[], float], *, reports_pose: bool = False
+        self,
+        needle: Sensor,
+        now_s: Callable[[], float],
+        *,
+        reports_pose: bool = False,
+        policy: Policy = _LOOPBACK,
     ) -> None:
         self._needle = needle
-        self._server = Server(_HOST)
+        self.server = Server(_HOST)
         mount = Mount("+z", "+x") if reports_pose else Mount()
-        source = Source(_HOST, self._server.port, NEEDLE, mount, force=FORCE, policy=_LOOPBACK)
+        source = Source(_HOST, self.server.port, NEEDLE, mount, force=FORCE, policy=policy)
         try:
             self._tracker = LiveTracker(source, IDENTITY, now_s)
         except BaseException:
-            self._server.close()
+            self.server.close()
             raise
-        self._server.wait_for_clients(1, _LOOPBACK.connect_s)
+        self.server.wait_for_clients(1, policy.connect_s)
 
     def __enter__(self) -> SimulatedTracker:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._tracker.close()
-        self._server.close()
+        self.server.close()
 
     def measure(self) -> Measurement:
         """Measures the needle, publishes it, and returns what came back."""
         asked_s = self._tracker.client.now_s()
         sent = self._needle.measure()
-        self._server.send(*packets_of(sent))
+        self.server.send(*packets_of(sent))
         # The way takes real time, which must not be mixed with the simulated time of the needle.
         return replace(self._tracker.measure_after(asked_s), time_s=sent.time_s)
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 import socket
 import threading
 from pathlib import Path
@@ -11,12 +13,22 @@ from typing import Any
 import pytest
 
 from ntagen.cli import main
+from ntagen.drive.device import Device
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import Command, Measured, Record
-from ntagen.openigtlink.messages import Columns, Transform
+from ntagen.drive.settings import Settings
+from ntagen.drive.simulate import simulate, synthesiser_for
+from ntagen.drive.states import State
+from ntagen.needle.measurement import Measurement
+from ntagen.nsl import load
+from ntagen.openigtlink.client import Policy
+from ntagen.openigtlink.messages import Columns, Position, Transform
 from ntagen.openigtlink.packets import Packet
 from ntagen.openigtlink.server import Server
-from ntagen.scene import Vector
+from ntagen.plan.synthesise import Synthesis
+from ntagen.scene import Scene, Vector
+from ntagen.tracking.plausible import Plausible
+from ntagen.tracking.simulated import NEEDLE, SimulatedTracker
 
 ROOT = Path(__file__).parents[2]
 PAPER = str(ROOT / "examples" / "paper.nsl")
@@ -201,3 +213,119 @@ def test_a_server_that_sends_something_else_moves_nothing(
         options = ["--tracker", text, "--registration", "none", "--force-sensing", "off"]
         refused(capsys, tmp_path / "new.mcap", 5, match, *options)
         sender.join()
+
+
+# What goes wrong in the middle of a run.
+
+
+class Failing:
+    """A tracker on the network of this machine that goes wrong at one of its measurements."""
+
+    def __init__(self, needle: Device, at: int, fault: str) -> None:
+        self._needle = needle
+        self._left = at
+        self._fault = fault
+        policy = Policy(stale_s=0.3, first_delay_s=0.01)
+        self.tracker = SimulatedTracker(self, needle.now_s, policy=policy)
+        self._send = self.tracker.server.send
+        self.tracker.server.send = self._sent  # type: ignore[method-assign]
+
+    def measure(self) -> Measurement:
+        return self._needle.measure()
+
+    def _sent(self, *packets: Packet) -> None:
+        self._left -= 1
+        if self._left >= 0:
+            self._send(*packets)
+            return
+        force, pose = packets
+        data = bytearray(pose.to_bytes())
+        data[-1] ^= 1
+        mirrored = ((-1.0, 0.0, 0.0), *COLUMNS[1:])
+        match self._fault:
+            case "vanishes":
+                self.tracker.server.close()
+            case "hangs up":
+                self.tracker.server.drop_clients()
+            case "wrong checksums":
+                self.tracker.server.send_bytes(bytes(data))
+            case "no number":
+                self._send(force, Packet(NEEDLE, Position((math.nan, 0.0, 0.0))))
+            case "jump":
+                self._send(force, Packet(NEEDLE, Position((0.0, 300.0, 0.0))))
+            case "mirrored":
+                self._send(force, Packet(NEEDLE, Transform(mirrored)))
+            case "another name":
+                self._send(force, Packet("Stylus", pose.content))
+            case "garbage":
+                self.tracker.server.send_bytes(b"GET / HTTP/1.1\r\n" * 10)
+
+
+FAULTS = {
+    "vanishes": "has closed the connection|is lost|is stale",
+    "hangs up": "has closed the connection|is lost|nothing of use|is stale",
+    "silent": "is stale",
+    "wrong checksums": "is stale",
+    "no number": "not a number",
+    "jump": "jumped by",
+    "mirrored": "it mirrors",
+    "another name": "is stale",
+    "garbage": "this is not OpenIGTLink|has closed|is lost|nothing of use",
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("at", [1, 9, 40])
+def test_a_tracker_that_fails_stops_the_needle(fault: str, at: int) -> None:
+    scene = load(PAPER)
+    settings = Settings()
+    journal = Kept()
+    failing: list[Failing] = []
+
+    def sense(needle: Device) -> Plausible:
+        failing.append(Failing(needle, at, fault))
+        return Plausible(failing[0].tracker, scene.needle.tip)
+
+    try:
+        result = simulate(scene, synthesiser_for(settings), settings, journal, sense=sense)
+    finally:
+        failing[0].tracker.__exit__()
+    assert result.ended.outcome == State.FAULTED.value
+    assert re.search(FAULTS[fault], result.ended.reason), result.ended.reason
+    assert result.clearance_mm > 0.0
+    kinds = [type(record) for record in journal.records]
+    last = len(kinds) - 1 - kinds[::-1].index(Measured)
+    # At most the motion after which nothing was measured, and then the stop.
+    after = [one.kind for one in journal.records[last:] if isinstance(one, Command)]
+    assert after[-1] == "stop"
+    assert len([kind for kind in after if kind != "stop"]) <= 2
+    assert kinds.count(Measured) == at
+
+
+class Kept:
+    """A journal that keeps the records."""
+
+    def __init__(self) -> None:
+        self.records: list[Record] = []
+
+    def record(self, record: Record) -> None:
+        self.records.append(record)
+
+    def started(self, scene: Scene) -> None:
+        pass
+
+    def synthesised(self, number: int, synthesis: Synthesis) -> None:
+        pass
+
+
+def test_a_tracker_in_the_task_counts_where_a_registration_is_given(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    task = tmp_path / "task.nsl"
+    words = f'  tracker openigtlink "127.0.0.1:{port}" "Needle"\n}}\n'
+    task.write_text(Path(PAPER).read_text().rstrip().removesuffix("}") + words)
+    assert main(["drive", str(task), "--quiet"]) == 0
+    assert main(["drive", str(task), "--quiet", "--registration", "none"]) == 5
+    assert f"127.0.0.1:{port}: connection refused" in capsys.readouterr().err

@@ -1,13 +1,14 @@
-"""Whether a tracker and a scene belong together, before anything moves.
+"""Whether a measurement can be true: at the start of a run, and after the one before it.
 
 A registration that is missing, old or of another frame gives positions that look like any others.
-But at the start of a run the needle is at the entry, and points along it: that can be seen.
+But at the start of a run the needle is at the entry, and points along it: that can be seen. Later
+the tip cannot be far from where it was: a position that jumps is of another tool, of a marker that
+was taken for another, or of a tracker that has lost its reference.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Final
 
 from ntagen.drive.device import Sensor
@@ -23,29 +24,56 @@ FARTHEST_MM: Final = 10.0
 WIDEST_DEG: Final = 45.0
 """At the start, the measured directions may differ so much from those of the scene."""
 
+JUMP_MM: Final = 20.0
+"""Measurements may differ by this without any motion: ten times the noise of a bad tracker."""
 
-class StartChecked:
-    """A sensor whose first measurement must be at the entry of the scene.
+FASTEST_MM_PER_S: Final = 50.0
+"""A needle is pulled back at most so fast; ours."""
+
+
+class Plausible:
+    """A sensor whose measurements must be plausible.
 
     Args:
         sensor: The sensor.
-        entry: The pose at which the needle should be.
+        entry: The pose at which the needle is at the start.
     """
 
     def __init__(self, sensor: Sensor, entry: Pose) -> None:
         self._sensor = sensor
-        self._check: Callable[[Measurement], None] = lambda found: require_start(found, entry)
+        self._entry = entry
+        self._last: Measurement | None = None
 
     def measure(self) -> Measurement:
         """Measures the needle.
 
         Raises:
-            DeviceError: There is no reading, or the first one is not at the entry.
+            DeviceError: There is no reading, or it cannot be true.
         """
         found = self._sensor.measure()
-        self._check(found)
-        self._check = lambda _: None
+        if self._last is None:
+            require_start(found, self._entry)
+        else:
+            require_near(found, self._last)
+        self._last = found
         return found
+
+
+def require_near(found: Measurement, last: Measurement) -> None:
+    """Refuses a measurement that is too far from the one before it.
+
+    Raises:
+        DeviceError: No needle moves so fast.
+    """
+    passed_s = max(0.0, found.time_s - last.time_s)
+    allowed_mm = JUMP_MM + FASTEST_MM_PER_S * passed_s
+    moved_mm = distance(found.position_mm, last.position_mm)
+    if not moved_mm <= allowed_mm:
+        raise DeviceError(
+            f"the measured tip jumped by {moved_mm:.1f} mm in {passed_s:.2f} s, to "
+            f"{_words(found.position_mm)} mm; {allowed_mm:.1f} mm is allowed\n"
+            "hint: does the tracker take another tool for the needle, or was its reference moved?"
+        )
 
 
 def require_start(found: Measurement, entry: Pose) -> None:
