@@ -192,7 +192,8 @@ def _drive(
     from ntagen.drive.simulate import simulate, synthesiser_for
 
     settings = run.configuration.settings
-    synthesise = synthesiser_for(settings, operator.listen)
+    # The log has the strategies; nobody else asks for them.
+    synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
     with contextlib.ExitStack() as stack:
         terminal = stack.enter_context(_terminal()) if speaks else []
         return simulate(

@@ -40,6 +40,7 @@ from ntagen.drive.force import ForceMonitor, Rise
 from ntagen.drive.knowledge import Knowledge, position_unsure_mm
 from ntagen.drive.records import (
     Ended,
+    Forgotten,
     Journal,
     Learned,
     Predicted,
@@ -312,7 +313,7 @@ class Controller:
         self._force.forget_rise()
         path = self._needle.glance().path
         began = path.pull(rise.felt_mm - rise.began_mm)
-        before = set(self._knowledge.learned)
+        before = self._knowledge.learned
         self._knowledge = self._knowledge.with_contact(
             orthonormal(began.tip),
             self._settings.sensing_margin_mm,
@@ -323,6 +324,10 @@ class Controller:
         for region in self._knowledge.learned:
             if region not in before:
                 self._note(Learned.of(self._now_s(), region))
+        kept = {(region.kind, region.name) for region in self._knowledge.learned}
+        for region in before:
+            if (region.kind, region.name) not in kept:
+                self._note(Forgotten(self._now_s(), region.name, region.kind))
 
     def _visit(self, position_mm: tuple[float, float, float], *, last_too: bool) -> None:
         """Counts targets that the tip has reached; the last one only with `last_too`."""

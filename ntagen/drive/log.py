@@ -5,7 +5,7 @@ It contains:
 * metadata ``ntagen``: format version, program version, seed, settings and more from the caller;
 * attachments ``scene.json`` (the scene that the driver knew), ``actual.json`` and ``scene.nsl``
   (the true scene and its source), and for each synthesis ``rebuild-0001/scene.json``,
-  ``…/model.xml``, ``…/plans.json``;
+  ``…/model.xml``, ``…/plans.json``, ``…/strategy.json.gz``;
 * one channel ``/ntagen/…`` for each kind of record (`ntagen.drive.messages`), and the channels for
   viewers (`ntagen.drive.viewing`).
 
@@ -19,6 +19,7 @@ to 1 MiB in memory.
 
 from __future__ import annotations
 
+import gzip
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -30,9 +31,16 @@ from mcap_protobuf.schema import register_schema
 
 from ntagen.drive.messages import KINDS, encode, message_class
 from ntagen.drive.records import Ended, Learned, Record, Transition
-from ntagen.drive.scene_json import scene_to_json
+from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.drive.states import ABORTS, Event
-from ntagen.drive.viewing import TOPICS, show_plan, show_record, show_scene
+from ntagen.drive.viewing import (
+    TOPICS,
+    Shaft,
+    show_hidden,
+    show_plan,
+    show_record,
+    show_scene,
+)
 from ntagen.files import GrowingFile
 from ntagen.plan.document import document
 from ntagen.plan.synthesise import Synthesis
@@ -43,6 +51,7 @@ METADATA: Final = "ntagen"
 SCENE: Final = "scene.json"
 ACTUAL: Final = "actual.json"
 SOURCE: Final = "scene.nsl"
+STRATEGY: Final = "strategy.json.gz"
 
 _PLANS_LOGGED: Final = 200
 """At most this many plans of a synthesis are attached, the best first."""
@@ -83,6 +92,8 @@ class Log:
         self._channels = {
             kind: self._channel(topic_of(kind), message_class(kind)) for kind in KINDS
         }
+        self._actual = scene_from_json(attachments[ACTUAL]) if ACTUAL in attachments else None
+        self._shaft: Shaft | None = None
         self._views = {topic: self._channel(topic, kind) for topic, kind in TOPICS.items()}
 
     def __enter__(self) -> Log:
@@ -100,6 +111,10 @@ class Log:
         self._attach(SCENE, scene_to_json(scene).encode())
         for topic, message in show_scene(scene):
             self._show(topic, message)
+        if self._actual is not None:
+            for topic, message in show_hidden(self._actual, scene):
+                self._show(topic, message)
+        self._shaft = Shaft(scene.needle.tip.position_mm)
         self._acknowledge(to_disk=True)
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
@@ -110,6 +125,10 @@ class Log:
         self._attach(f"{folder}/scene.json", scene_to_json(synthesis.scene).encode())
         self._attach(f"{folder}/model.xml", synthesis.model_xml.encode(), "application/xml")
         self._attach(f"{folder}/plans.json", json.dumps(plans).encode())
+        if synthesis.strategy_json:
+            # The strategy of the paper's task is 0.6 MB of JSON, and 10 KB packed.
+            packed = gzip.compress(synthesis.strategy_json.encode(), compresslevel=1, mtime=0)
+            self._attach(f"{folder}/{STRATEGY}", packed, "application/gzip")
         for topic, message in show_plan(synthesis, self._time_ns / 1e9):
             self._show(topic, message)
         self._acknowledge(to_disk=False)
@@ -121,6 +140,9 @@ class Log:
         self._sequence += 1
         for topic, message in show_record(record):
             self._show(topic, message)
+        if self._shaft is not None:
+            for topic, message in self._shaft.show(record):
+                self._show(topic, message)
         is_alarm = isinstance(record, Transition) and record.event in _ALARMS
         self._acknowledge(to_disk=is_alarm or isinstance(record, Learned | Ended))
 

@@ -38,6 +38,7 @@ KINDS: Final[tuple[type[Record], ...]] = (
     records.Ended,
     records.Truth,
     records.Relied,
+    records.Forgotten,
 )
 """All kinds of records, in the order of the file of descriptors."""
 

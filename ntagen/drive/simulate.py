@@ -201,7 +201,10 @@ def settings_for_phantom(
 
 
 def synthesiser_for(
-    settings: Settings, listen: Callable[[], None] = lambda: None
+    settings: Settings,
+    listen: Callable[[], None] = lambda: None,
+    *,
+    keeps_strategy: bool = False,
 ) -> EngineSynthesiser:
     """The synthesiser with the margins, the ranking and the budgets of the settings."""
     return EngineSynthesiser(
@@ -210,6 +213,7 @@ def synthesiser_for(
         max_plans=settings.max_plans,
         timeout_s=settings.engine_time_s,
         memory_bytes=settings.engine_memory_bytes,
+        keeps_strategy=keeps_strategy,
         listen=listen,
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ntagen.drive.records import (
     Ended,
     Estimated,
+    Forgotten,
     Learned,
     Record,
     Relied,
@@ -42,6 +43,8 @@ def _text(record: Record) -> str | None:
                 f"learned: {record.kind} region '{record.name}' at "
                 f"{_point(record.center_mm)} mm, radius {record.radius_mm:.2f} mm"
             )
+        case Forgotten():
+            return f"{record.kind} region '{record.name}' is now part of a larger one"
         case Relied():
             return record.text
         case Visited():

@@ -19,6 +19,7 @@ from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.Pose_pb2 import Pose as PoseMessage
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
+from foxglove_schemas_protobuf.SceneEntityDeletion_pb2 import SceneEntityDeletion
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
@@ -26,6 +27,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from ntagen.drive.records import (
     Ended,
     Estimated,
+    Forgotten,
     Learned,
     Measured,
     Predicted,
@@ -64,6 +66,10 @@ _COLOURS: Final = {
     "safe": (0.25, 0.65, 0.63, 0.15),
 }
 _PLAN_COLOUR: Final = (0.12, 0.37, 0.75, 1.0)
+_SHAFT_COLOUR: Final = (0.04, 0.15, 0.27, 1.0)
+_SHAFT_SPACING_MM: Final = 1.0
+_HIDDEN_ALPHA: Final = 0.15
+"""Regions that the driver does not know are nearly transparent."""
 
 Shown = Iterator[tuple[str, Message]]
 
@@ -77,8 +83,9 @@ def show_scene(scene: Scene) -> Shown:
 
 
 def show_plan(synthesis: Synthesis, time_s: float) -> Shown:
-    """The best plan of a synthesis, as a line and as poses."""
+    """The best plan of a synthesis, as a line and as poses; without one the last plan vanishes."""
     if synthesis.best is None:
+        yield "/scene", _without("plan", time_s)
         return
     poses = sample_poses(synthesis.best.plan.arcs(synthesis.scene.needle), _PLAN_SPACING_MM)
     update = SceneUpdate()
@@ -92,6 +99,70 @@ def show_plan(synthesis: Synthesis, time_s: float) -> Shown:
         message.poses.append(_pose(pose))
     yield "/scene", update
     yield "/needle/plan", message
+
+
+def show_hidden(actual: Scene, told: Scene) -> Shown:
+    """The regions that are there but that the driver does not know; only a simulation has them."""
+    update = SceneUpdate()
+    for region in actual.avoided:
+        if region not in told.regions:
+            _add_ball(
+                update,
+                region.name,
+                region.kind,
+                region.center_mm,
+                region.radius_mm,
+                0.0,
+                prefix="hidden ",
+            )
+    if update.entities:
+        yield "/scene", update
+
+
+class Shaft:
+    """The needle in the tissue as a line through the places where its tip was, from the entry.
+
+    The driver's prediction of a place counts more than the noisy measurement before it. What lies
+    deeper than the tip is dropped, since the needle was pulled back.
+    """
+
+    def __init__(self, entry_mm: Vector) -> None:
+        self._points: list[tuple[float, Vector]] = [(0.0, entry_mm)]
+        self._depth_mm = 0.0
+        self._shown: list[tuple[float, Vector]] = []
+
+    def show(self, record: Record) -> Shown:
+        """The line after a record, if it has changed by about a millimetre."""
+        match record:
+            case Measured():
+                self._depth_mm = record.depth_mm
+                self._points = [p for p in self._points if p[0] <= 0.0 or p[0] < record.depth_mm]
+                if record.depth_mm > 0.0:
+                    self._points.append((record.depth_mm, record.position_mm))
+            case Predicted() | Estimated() if self._depth_mm > 0.0:
+                self._points[-1] = (self._depth_mm, record.position_mm)
+        line = _thinned(self._points, _SHAFT_SPACING_MM)
+        if line == self._shown:
+            return
+        self._shown = line
+        update = SceneUpdate()
+        stamp = _stamp(record.time_s)
+        entity = update.entities.add(id="shaft", frame_id=_FRAME, timestamp=stamp)
+        drawn = entity.lines.add(thickness=4.0, scale_invariant=True, color=_colour(_SHAFT_COLOUR))
+        drawn.pose.orientation.w = 1.0
+        for _, position_mm in line:
+            x, y, z = (c * _M_PER_MM for c in position_mm)
+            drawn.points.add(x=x, y=y, z=z)
+        yield "/scene", update
+
+
+def _thinned(points: list[tuple[float, Vector]], spacing_mm: float) -> list[tuple[float, Vector]]:
+    """Points with depths, at least so far apart."""
+    kept = points[:1]
+    for point in points[1:]:
+        if point[0] - kept[-1][0] >= spacing_mm:
+            kept.append(point)
+    return kept
 
 
 def show_record(record: Record) -> Shown:
@@ -109,6 +180,8 @@ def show_record(record: Record) -> Shown:
                 update, record.name, record.kind, record.center_mm, record.radius_mm, record.time_s
             )
             yield "/scene", update
+        case Forgotten():
+            yield "/scene", _without(_id(record.kind, record.name), record.time_s)
     text = _text(record)
     if text:
         level = Log.WARNING if isinstance(record, Learned) else Log.INFO
@@ -137,14 +210,30 @@ def _add_ball(
     center_mm: Vector,
     radius_mm: float,
     time_s: float,
+    prefix: str = "",
 ) -> None:
-    entity = update.entities.add(id=f"{kind} {name}", frame_id=_FRAME, timestamp=_stamp(time_s))
-    sphere = entity.spheres.add(color=_colour(_COLOURS[kind]))
+    entity = update.entities.add(
+        id=prefix + _id(kind, name), frame_id=_FRAME, timestamp=_stamp(time_s)
+    )
+    colour = (*_COLOURS[kind][:3], _HIDDEN_ALPHA) if prefix else _COLOURS[kind]
+    sphere = entity.spheres.add(color=_colour(colour))
     x, y, z = (c * _M_PER_MM for c in center_mm)
     sphere.pose.position.x, sphere.pose.position.y, sphere.pose.position.z = x, y, z
     sphere.pose.orientation.w = 1.0
     diameter = 2.0 * radius_mm * _M_PER_MM
     sphere.size.x = sphere.size.y = sphere.size.z = diameter
+
+
+def _without(entity: str, time_s: float) -> SceneUpdate:
+    """The message that an entity is no more."""
+    update = SceneUpdate()
+    update.deletions.add(timestamp=_stamp(time_s), type=SceneEntityDeletion.MATCHING_ID, id=entity)
+    return update
+
+
+def _id(kind: str, name: str) -> str:
+    """The id of a region's entity; a later one with the same id takes the place of the former."""
+    return f"{kind} {name}"
 
 
 def _cloud(record: Measured) -> PointCloud:

@@ -53,6 +53,8 @@ class Synthesis:
         seconds: The time that the engine took.
         margins: The margins with which the candidates hold.
         ranking: The criteria by which they are ranked.
+        strategy_json: The strategy of the model, as `ntagen check --strategy` writes it; empty if
+            there is none, or if it was not wanted.
     """
 
     scene: Scene
@@ -62,6 +64,7 @@ class Synthesis:
     seconds: float
     margins: Margins = Margins()
     ranking: tuple[str, ...] = DEFAULT_RANKING
+    strategy_json: str = ""
 
     @property
     def best(self) -> Candidate | None:
@@ -100,6 +103,7 @@ class EngineSynthesiser:
         max_plans: At most this many plans are listed.
         timeout_s: The engine stops after this time.
         memory_bytes: The engine stops when its states take this much.
+        keeps_strategy: Whether a synthesis has the strategy as JSON.
         listen: Is called regularly, and raises `KeyboardInterrupt` to end a synthesis.
     """
 
@@ -108,6 +112,7 @@ class EngineSynthesiser:
     max_plans: int = 100_000
     timeout_s: float | None = 60.0
     memory_bytes: int | None = 2 << 30
+    keeps_strategy: bool = False
     listen: Callable[[], None] = lambda: None
 
     def __call__(self, scene: Scene) -> Synthesis:
@@ -132,13 +137,15 @@ class EngineSynthesiser:
             max_plans=self.max_plans,
             timeout_s=self.timeout_s,
             memory_bytes=self.memory_bytes,
+            strategy=self.keeps_strategy,
             progress=lambda *_: self.listen(),
         )
         if answer.verdict == "error":
             raise ModelError(f"the model of the scene fails: {answer.message}")
         if answer.verdict not in ("satisfied", "not satisfied"):
             raise LimitError(f"no answer from the engine: stopped by {answer.stop}")
-        plans = extract(answer.plans, scene) if answer.verdict == "satisfied" else ()
+        is_won = answer.verdict == "satisfied"
+        plans = extract(answer.plans, scene) if is_won else ()
         return Synthesis(
             scene=scene,
             model_xml=model_xml,
@@ -147,6 +154,7 @@ class EngineSynthesiser:
             seconds=answer.seconds,
             margins=self.margins,
             ranking=self.ranking,
+            strategy_json=(answer.strategy_json() or "") if is_won and self.keeps_strategy else "",
         )
 
     def _heard(self, plans: Iterable[Plan]) -> Iterator[Plan]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from pathlib import Path
 
 import pytest
 
+import ntagen
 from ntagen.cli import main
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import Estimated, Relied
@@ -79,6 +81,18 @@ def test_drive_takes_settings_from_file_and_command_line(
     told = json.loads(capsys.readouterr().out.splitlines()[-1])["settings"]
     assert told["push"]["value"] == 3.0
     assert told["push"]["origin"].startswith(str(path))
+
+
+def test_the_strategy_of_each_synthesis_is_in_the_log(run: Path, tmp_path: Path) -> None:
+    attachments = read_log(run).attachments
+    folders = {name.split("/")[0] for name in attachments if name.startswith("rebuild-")}
+    assert folders
+    for folder in folders:
+        model = ntagen.load(attachments[f"{folder}/model.xml"].decode())
+        path = tmp_path / f"{folder}.json"
+        path.write_bytes(gzip.decompress(attachments[f"{folder}/strategy.json.gz"]))
+        strategy = ntagen.load_strategy(path, model)
+        assert strategy.owner == "controller"
 
 
 def test_drive_ends_at_the_time_limit(capsys: pytest.CaptureFixture[str]) -> None:
