@@ -57,8 +57,9 @@ def command(
     """Draw a scene with its plans, or a run from its log.
 
     The picture shows two projections and a view in space. Targets are green, critical regions red,
-    detection regions dashed orange, unexplored ones grey, safe ones dotted. The best plan is blue, the others are faint. For a run, the
-    picture also shows the true path, the measurements and what the driver learned.
+    detection regions dashed orange, unexplored ones grey, safe ones dotted. The best plan is blue,
+    the others are faint. For a run, the picture also shows the true path, the measurements and what
+    the driver learned.
 
     \b
     Examples:
