@@ -5,8 +5,10 @@ growing delays. It never judges samples: whoever asks for one gets one that came
 that says what happened and which devices were seen.
 
 The age of a sample counts from its receipt by this machine's monotonic clock. The sender's time
-stamp is kept beside it, but its clock may be wrong, and many senders leave it out. Nothing in the
-protocol shows that a silent peer is alive, so that silence is the only sign of a peer that is gone.
+stamp is kept beside it, but its clock may be wrong, and many senders leave it out. It shows one
+thing: the same content with the same stamp is no new sample, but the old one sent again. Nothing in
+the protocol shows that a silent peer is alive, so that silence is the only sign of a peer that is
+gone.
 """
 
 from __future__ import annotations
@@ -103,12 +105,14 @@ class Statistics:
         counts: The messages that were read and skipped, over all connections.
         connections: How often it was connected.
         gaps: How often a device was silent for longer than `Policy.stale_s`.
+        repeats: Samples that were those before them, with the same time stamp: not new.
         rates_hz: The rate of the last samples of each device that says where it is.
     """
 
     counts: Counts
     connections: int
     gaps: int
+    repeats: int
     rates_hz: Mapping[str, float]
 
 
@@ -134,6 +138,7 @@ class Client:
         self._statuses: dict[str, Sample[Status]] = {}
         self._receipts: dict[str, deque[float]] = {}
         self._gaps = 0
+        self._repeats = 0
         self._connections = 0
         self._before = Counts()
         self._counts = Counts()
@@ -211,7 +216,7 @@ class Client:
         with self._changed:
             rates = {name: _rate_hz(times) for name, times in self._receipts.items()}
             counts = self._before + self._counts
-            return Statistics(counts, self._connections, self._gaps, rates)
+            return Statistics(counts, self._connections, self._gaps, self._repeats, rates)
 
     def close(self) -> None:
         """Closes the connection and ends the thread. It may be called twice."""
@@ -380,6 +385,11 @@ class Client:
                 self._refused = not accepted
 
     def _keep_pose(self, sample: Sample[Pose]) -> None:
+        before = self._poses.get(sample.device)
+        if before and sample.stamp_s is not None and _same(before, sample):
+            # A tracker that hangs, behind a server that does not.
+            self._repeats += 1
+            return
         _keep(self._poses, sample)
         times = self._receipts.get(sample.device)
         if times is None:
@@ -401,6 +411,11 @@ def _keep(samples: dict[str, Sample[Kind]], sample: Sample[Kind]) -> None:
     """Puts a sample in the place of the one before it."""
     if sample.device in samples or len(samples) < _NAMES:
         samples[sample.device] = sample
+
+
+def _same(one: Sample[Pose], other: Sample[Pose]) -> bool:
+    """Whether two samples say the same of the same moment."""
+    return (one.stamp_s, one.content) == (other.stamp_s, other.content)
 
 
 def _only(samples: Mapping[str, Sample[Kind]], place: str, what: str) -> Sample[Kind] | None:

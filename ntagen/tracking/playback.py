@@ -9,7 +9,6 @@ moves on after the recording has ended would be steered blindly.
 from __future__ import annotations
 
 import bisect
-import csv
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,7 +21,7 @@ from ntagen.needle.measurement import Measurement
 from ntagen.needle.vectors import dot, unit
 from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY, Transform
-from ntagen.tracking.points import axis_columns, text_of
+from ntagen.tracking.points import axis_columns, rows_of, text_of
 
 HOLD_S: Final = 5.0
 """Within the recording, a sample counts for so long; the samples of a run are as far apart as its
@@ -133,13 +132,7 @@ def samples_of_table(path: Path, transform: Transform) -> tuple[list[Measurement
     Raises:
         InputError: The file has a mistake, or its frame is not that of the transform.
     """
-    rows = [
-        (number, [cell.strip() for cell in row])
-        for number, row in enumerate(csv.reader(text_of(path).splitlines()), start=1)
-        if row and not row[0].startswith("#")
-    ]
-    if not rows:
-        raise InputError(f"{path}: this file is empty")
+    rows = rows_of(path, text_of(path))
     table = _Table(path, rows[0][1], transform)
     samples = [table.measurement(number, row) for number, row in rows[1:]]
     return samples, "force_n" in rows[0][1]

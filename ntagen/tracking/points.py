@@ -138,6 +138,26 @@ def axis_columns(path: Path, head: Sequence[str]) -> dict[str, list[tuple[int, f
     return {frame: [one[axis] for axis in "xyz"] for frame, one in axes.items()}
 
 
+def rows_of(path: Path, text: str) -> list[tuple[int, list[str]]]:
+    """The lines of a CSV table with their numbers; empty lines and comments (#) are left out.
+
+    Raises:
+        InputError: It is no such table, or it is empty.
+    """
+    reader = csv.reader(text.splitlines())
+    try:
+        rows = [
+            (reader.line_num, [cell.strip() for cell in row])
+            for row in reader
+            if row and not row[0].startswith("#")
+        ]
+    except csv.Error as error:
+        raise InputError(f"{path}:{reader.line_num}: this is no CSV: {error}") from None
+    if not rows:
+        raise InputError(f"{path}: this file is empty")
+    return rows
+
+
 def text_of(path: Path) -> str:
     """The text of a file.
 
@@ -172,10 +192,8 @@ def _fcsv(path: Path, text: str, frames: Iterator[str]) -> Points:
                 )
     names = [column.strip() for column in columns.split(",")]
     positions: dict[str, Vector] = {}
-    for number, line in enumerate(lines, start=1):
-        if not line.strip() or line.startswith("#"):
-            continue
-        row = dict(zip(names, next(csv.reader([line])), strict=False))
+    for number, cells in rows_of(path, text):
+        row = dict(zip(names, cells, strict=False))
         place = f"{path}:{number}"
         numbers = [_number(row.get(axis, ""), place, axis) for axis in "xyz"]
         _add(positions, row.get("label") or row.get("id") or "", _scaled(numbers, 1.0), place)
@@ -227,14 +245,8 @@ def _unit_of(path: Path, units: object) -> float:
 
 
 def _csv(path: Path, text: str, frames: Iterator[str]) -> list[Points]:
-    rows = [
-        (number, row)
-        for number, row in enumerate(csv.reader(text.splitlines()), start=1)
-        if row and not row[0].startswith("#")
-    ]
-    if not rows:
-        raise InputError(f"{path}: this file is empty")
-    head = [cell.strip() for cell in rows[0][1]]
+    rows = rows_of(path, text)
+    head = rows[0][1]
     sets = axis_columns(path, head)
     named = next((head.index(word) for word in _NAMES if word in head), None)
     found: dict[str, dict[str, Vector]] = {prefix: {} for prefix in sets}
@@ -242,7 +254,7 @@ def _csv(path: Path, text: str, frames: Iterator[str]) -> list[Points]:
         place = f"{path}:{number}"
         if len(row) != len(head):
             raise InputError(f"{place}: {len(row)} cells, but the first line has {len(head)}")
-        name = row[named].strip() if named is not None else str(count)
+        name = row[named] if named is not None else str(count)
         for prefix, axes in sets.items():
             numbers = [
                 _number(row[column], place, head[column]) * factor for column, factor in axes

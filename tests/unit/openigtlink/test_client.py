@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from random import Random
 
 import pytest
 
@@ -119,6 +120,40 @@ def test_a_stale_sample_is_refused_with_its_age_and_status(server: Server) -> No
             client.pose("N")
         assert "hint:" in str(caught.value)
         assert sample.content == at(1.0)
+
+
+def test_a_server_that_repeats_its_last_sample_is_stale(server: Server) -> None:
+    with connected(server) as client:
+        stop = threading.Event()
+
+        def send_always(*packets: Packet) -> None:
+            while not stop.wait(0.01):
+                server.send(*packets)
+
+        hanging, plain = Packet("Hanging", at(1.0), stamp_s=5.0), Packet("Plain", at(1.0))
+        # A clock that stands still is no sign of that, if the content changes.
+        other = [Packet("Clock", at(x), stamp_s=5.0) for x in (1.0, 2.0)]
+        sender = threading.Thread(target=send_always, args=(hanging, plain, *other))
+        sender.start()
+        try:
+            first = client.pose("Hanging")
+            with pytest.raises(DeviceError, match="'Hanging' is stale"):
+                client.pose("Hanging", after_s=first.received_s)
+            assert client.pose("Plain", after_s=client.now_s())
+            assert client.pose("Clock", after_s=client.now_s())
+            assert client.statistics().repeats > 1
+        finally:
+            stop.set()
+            sender.join()
+
+
+def test_bytes_of_any_kind_never_hang_the_client(server: Server) -> None:
+    random = Random(1)
+    for _ in range(20):
+        with connected(server, Policy(stale_s=0.01, first_delay_s=0.001)) as client:
+            server.send_bytes(random.randbytes(random.randrange(1, 5000)))
+            with pytest.raises(DeviceError):
+                client.pose("N")
 
 
 def test_another_name_is_refused_with_the_names_that_were_seen(server: Server) -> None:

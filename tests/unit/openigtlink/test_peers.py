@@ -7,6 +7,7 @@ processes of their own. All connections stay on this machine.
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -31,6 +32,7 @@ from ntagen.openigtlink.messages import (
 from ntagen.openigtlink.packets import HEADER, Counts, Decoder, Packet
 from ntagen.openigtlink.server import Server
 
+ROOT = Path(__file__).parents[3]
 PEERS = Path(__file__).parent / "peers"
 HEADERS = Path("/usr/include/openigtlink")
 WAIT_S = 20.0
@@ -219,4 +221,56 @@ def test_the_reference_library_reads_our_messages(reference: Path) -> None:
         "TRANSFORM Broken 0.00000000 wrong",
         "OTHER O 0.00000000 unknown",
         "STRING X 0.00000000 over",
+    ]
+
+
+READER = """
+import fcntl, socket, struct, subprocess, sys
+
+# The new network namespace has a loopback interface, which is down: bring it up (see netdevice(7)).
+with socket.socket() as any_socket:
+    request = struct.pack("16sH22x", b"lo", 1 | 64)
+    fcntl.ioctl(any_socket, 0x8914, request)
+
+from ntagen.openigtlink.client import Policy
+from ntagen.tracking.frames import IDENTITY
+from ntagen.tracking.live import LiveTracker, Source
+from ntagen.tracking.mount import Mount
+
+command = [sys.argv[1], "serve", "18944"]
+with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+    print(server.stdout.readline(), end="")
+    policy = Policy(stale_s=10.0, interval_ms=20, frame="Patient", reconnects=False)
+    source = Source("127.0.0.1", 18944, "Tip", Mount("-z"), policy=policy)
+    with LiveTracker(source, IDENTITY, lambda: 0.0) as tracker:
+        found = [tracker.measure() for _ in range(20)]
+    x_mm = [one.position_mm[0] for one in found]
+    print(x_mm == sorted(set(x_mm)), {one.heading for one in found}, {one.bevel for one in found})
+    print(server.stdout.read(), end="")
+print(server.returncode)
+"""
+
+
+@pytest.mark.slow
+def test_our_tracker_asks_the_reference_library_for_tracking_data(reference: Path) -> None:
+    # Its server listens on all interfaces, so it runs where there is no other.
+    alone = ["unshare", "--net", "--map-root-user"]
+    if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False).returncode:
+        pytest.skip("needs a network namespace")
+    command = [*alone, sys.executable, "-c", READER, str(reference)]
+    run = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert run.stderr == ""
+    assert run.stdout.splitlines() == [
+        "ready",
+        "True {(-0.0, -0.0, -1.0)} {None}",
+        "asked 20 Patient",
+        "STP_TDATA",
+        "0",
     ]

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ntagen.errors import InputError
 from ntagen.tracking.frames import LPS, RAS
@@ -127,6 +129,33 @@ def test_points_without_names_are_numbered(tmp_path: Path) -> None:
 def test_wrong_tables_are_refused(tmp_path: Path, text: str, match: str) -> None:
     with pytest.raises(InputError, match=match):
         read(tmp_path, "p.csv", text, "bench")
+
+
+WORDS = st.sampled_from(
+    [
+        *("name,x_mm,y_mm,z_mm\n", "A,1,2,3\n", '"', ",", "\n", "#", "CoordinateSystem = LPS"),
+        *('{"markups": [{"coordinateSystem": "LPS", "controlPoints": [', "]}]}", "{", "}"),
+        *("null", "[", "]", "1e999"),
+    ]
+)
+
+
+@given(st.sampled_from(["p.fcsv", "p.mrk.json", "p.csv"]), st.lists(WORDS | st.text(max_size=9)))
+def test_any_text_gives_points_or_a_message(
+    tmp_path_factory: pytest.TempPathFactory, name: str, words: list[str]
+) -> None:
+    path = tmp_path_factory.getbasetemp() / name
+    path.write_text("".join(words), errors="replace")
+    try:
+        found = read_points(path, iter(["bench"] * 9))
+    except InputError:
+        return
+    assert found
+
+
+def test_a_cell_that_is_too_long_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"p.csv:2: this is no CSV"):
+        read(tmp_path, "p.csv", "name,x_mm,y_mm,z_mm\n" + "A" * 200_000, "bench")
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:

@@ -2,8 +2,9 @@
 //
 //   reference send PORT      connects, sends one message of each type, and closes
 //   reference receive PORT   connects, prints each message as a line, until the stream ends
-//   reference serve PORT N   waits for a client, then sends N transforms at 100 Hz. It listens on all
-//                            interfaces: run it in a network namespace.
+//   reference serve PORT     waits for a client and for its STT_TDATA, answers, and sends TDATA until
+//                            STP_TDATA comes; then it sends a transform, and closes. It listens on
+//                            all interfaces: run it in a network namespace.
 
 #include <cstdio>
 #include <cstdlib>
@@ -203,27 +204,57 @@ static void ReceiveAll(igtl::Socket* socket)
   }
 }
 
+static int Serve(int port)
+{
+  igtl::ServerSocket::Pointer server = igtl::ServerSocket::New();
+  if (server->CreateServer(port) < 0) return 3;
+  std::printf("ready\n");
+  std::fflush(stdout);
+  igtl::ClientSocket::Pointer client = server->WaitForConnection(10000);
+  if (client.IsNull()) return 4;
+  igtl::MessageHeader::Pointer header = igtl::MessageHeader::New();
+  header->InitPack();
+  if (client->Receive(header->GetPackPointer(), header->GetPackSize()) != header->GetPackSize()) return 5;
+  header->Unpack();
+  if (std::strcmp(header->GetDeviceType(), "STT_TDATA") != 0) return 6;
+  igtl::StartTrackingDataMessage::Pointer start = igtl::StartTrackingDataMessage::New();
+  if (!Body(client, header, start)) return 7;
+  std::printf("asked %d %s\n", static_cast<int>(start->GetResolution()), start->GetCoordinateName());
+  std::fflush(stdout);
+
+  igtl::RTSTrackingDataMessage::Pointer reply = igtl::RTSTrackingDataMessage::New();
+  reply->SetStatus(igtl::RTSTrackingDataMessage::STATUS_SUCCESS);
+  Send(client, reply);
+  client->SetReceiveTimeout(start->GetResolution());
+  for (int i = 0; i < 2000; ++i)
+  {
+    igtl::TrackingDataMessage::Pointer tracking = igtl::TrackingDataMessage::New();
+    igtl::TrackingDataElement::Pointer tool = igtl::TrackingDataElement::New();
+    igtl::Matrix4x4 matrix;
+    igtl::IdentityMatrix(matrix);
+    matrix[0][3] = static_cast<float>(i);
+    tool->SetName("Tip");
+    tool->SetType(igtl::TrackingDataElement::TYPE_5D);
+    tool->SetMatrix(matrix);
+    tracking->SetDeviceName("Tracker");
+    tracking->AddTrackingDataElement(tool);
+    Send(client, tracking);
+    header->InitPack();
+    if (client->Receive(header->GetPackPointer(), header->GetPackSize()) != header->GetPackSize()) continue;
+    header->Unpack();
+    std::printf("%s\n", header->GetDeviceType());
+    break;
+  }
+  client->CloseSocket();
+  return 0;
+}
+
 int main(int argc, char** argv)
 {
   if (argc < 3) return 2;
   const std::string mode = argv[1];
   const int port = std::atoi(argv[2]);
-  if (mode == "serve")
-  {
-    igtl::ServerSocket::Pointer server = igtl::ServerSocket::New();
-    if (server->CreateServer(port) < 0) return 3;
-    std::printf("ready\n");
-    std::fflush(stdout);
-    igtl::ClientSocket::Pointer client = server->WaitForConnection(10000);
-    if (client.IsNull()) return 4;
-    for (int i = 0; i < std::atoi(argv[3]); ++i)
-    {
-      Send(client, Transform(static_cast<float>(i), 0));
-      igtl::Sleep(10);
-    }
-    client->CloseSocket();
-    return 0;
-  }
+  if (mode == "serve") return Serve(port);
   igtl::ClientSocket::Pointer socket = igtl::ClientSocket::New();
   if (socket->ConnectToServer("127.0.0.1", port) != 0) return 3;
   if (mode == "send") SendAll(socket);
