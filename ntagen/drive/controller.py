@@ -386,11 +386,12 @@ class Controller:
             back_mm: How far the needle must be pulled back before.
         """
         left_s = self._settings.timeout_s - (self._now_s() - self._started_s)
-        if back_mm > 0.0:
-            # Pulling may be faster than pushing, and never slower.
-            back_mm += 2.0 * self._settings.push_mm
         speed_mm_per_s = synthesis.scene.needle.speed_mm_per_s
-        left_s -= back_mm / speed_mm_per_s
+        if back_mm > 0.0:
+            # Beyond the place, and again up to it, in the open channel.
+            again_mm = self._settings.push_mm
+            left_s -= (back_mm + again_mm) / (self._settings.pull_speed_ratio * speed_mm_per_s)
+            left_s -= again_mm / speed_mm_per_s
         kept = tuple(
             candidate
             for candidate in synthesis.candidates

@@ -19,7 +19,9 @@ from dataclasses import dataclass, replace
 
 from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
+from ntagen.needle.contact import Contact, ball_of
 from ntagen.needle.kinematics import Arc
+from ntagen.needle.path import sample_poses
 from ntagen.needle.vectors import add, combine, distance, scale
 from ntagen.scene import Pose, Region, Scene, Vector
 
@@ -104,12 +106,14 @@ class Knowledge:
         learned: Critical and detection regions from contacts.
         visited: The number of targets that have been reached.
         contacts: The number of contacts.
+        felt: For each learned critical region, its name and its contacts.
     """
 
     a_priori: Scene
     learned: tuple[Region, ...] = ()
     visited: int = 0
     contacts: int = 0
+    felt: tuple[tuple[str, tuple[Contact, ...]], ...] = ()
 
     def scene(self, tip: Pose, radius_mm: float, depth_mm: float = 0.0) -> Scene:
         """The known scene, for a needle with this pose and radius, inserted to this depth.
@@ -178,9 +182,13 @@ class Knowledge:
         if felt is not None:
             learned = self._with_wider_shell(felt, tip, margin_mm)
         else:
+            contact = Contact(tip.position_mm, tip.heading)
             center = combine(1.0, tip.position_mm, margin_mm + radius_mm, tip.heading)
             ball = Region(f"learned {contacts}", "critical", center, radius_mm)
-            learned = self._with_ball(ball, margin_mm, channels)
+            return replace(
+                self._with_ball(_Felt(ball, (contact,)), margin_mm, radius_mm, channels),
+                contacts=contacts,
+            )
         return replace(self, learned=learned, contacts=contacts)
 
     def _felt(self, tip: Pose, margin_mm: float, unsure_mm: float) -> Region | None:
@@ -202,37 +210,92 @@ class Knowledge:
         return (*(region for region in self.learned if region.name != name), shell)
 
     def _with_ball(
-        self, ball: Region, margin_mm: float, channels: tuple[Arc, ...]
-    ) -> tuple[Region, ...]:
+        self, ball: _Felt, margin_mm: float, radius_mm: float, channels: tuple[Arc, ...]
+    ) -> Knowledge:
         """Adds a ball and its shell; balls whose shells overlap become one.
 
-        They stay apart if the ball around them would cover what was cut safely.
+        That one explains the contacts of all and the silence of the channels, if there is such a
+        ball. Else it is the smallest ball around them; if that would cover what was cut safely,
+        they stay apart.
         """
-        balls = [region for region in self.learned if region.kind == "critical"]
-        apart: list[Region] = []
+        contacts = dict(self.felt)
+        balls = [
+            _Felt(region, contacts.get(region.name, ()))
+            for region in self.learned
+            if region.kind == "critical"
+        ]
+        apart: list[_Felt] = []
         pending = [ball]
         while pending:
             current = pending.pop()
-            near = [other for other in balls if _overlap(current, other, margin_mm)]
-            joined = _around([current, *near])
-            if near and not _covers(joined, channels):
-                balls = [other for other in balls if other not in near]
-                pending.append(joined)
-            else:
+            near = [one for one in balls if _overlap(current.region, one.region, margin_mm)]
+            joined = _joined([current, *near], margin_mm, radius_mm, channels) if near else None
+            if joined is None:
                 apart.append(current)
+            else:
+                balls = [one for one in balls if one not in near]
+                pending.append(joined)
         known = [r for r in self.learned if r.kind == "detection" and r.name.endswith(" felt")]
         kept = [*balls, *apart]
+        regions = [one.region for one in kept]
         shells = [
-            Region(f"{b.name} shell", "detection", b.center_mm, b.radius_mm + margin_mm, b.name)
-            for b in kept
+            Region(
+                f"{one.region.name} shell",
+                "detection",
+                one.region.center_mm,
+                one.region.radius_mm + margin_mm + min(_MOST_UNSURE_MM, one.unsure_mm),
+                one.region.name,
+            )
+            for one in kept
         ]
-        return (*kept, *shells, *known)
+        return replace(
+            self,
+            learned=(*regions, *shells, *known),
+            felt=tuple((one.region.name, one.contacts) for one in kept),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Felt:
+    """A learned critical region, its contacts, and how unsure its place is."""
+
+    region: Region
+    contacts: tuple[Contact, ...]
+    unsure_mm: float = 0.0
+
+
+def _joined(
+    balls: Sequence[_Felt], margin_mm: float, radius_mm: float, channels: tuple[Arc, ...]
+) -> _Felt | None:
+    """One ball in the place of several; None if they must stay apart."""
+    contacts = tuple(contact for one in balls for contact in one.contacts)
+    around = _around([one.region for one in balls])
+    quiet = [
+        pose.position_mm
+        for pose in sample_poses(channels, _QUIET_SPACING_MM)
+        if all(distance(pose.position_mm, c.position_mm) > _NEAR_CONTACT_MM for c in contacts)
+    ]
+    found = ball_of(contacts, quiet, margin_mm, radius_mm)
+    if found is not None:
+        region = replace(around, center_mm=found.center_mm, radius_mm=found.radius_mm)
+        return _Felt(region, contacts, found.center_std_mm)
+    return None if _covers(around, channels) else _Felt(around, contacts)
 
 
 def _without(shell: Region, point_mm: Vector) -> Region | None:
     """The part of a shell that does not contain a point, as a ball; None if that is nothing."""
     radius_mm = min(shell.radius_mm, distance(point_mm, shell.center_mm) - _OUTSIDE_MM)
     return replace(shell, radius_mm=radius_mm) if radius_mm > 0.0 else None
+
+
+_QUIET_SPACING_MM = 2.0
+"""Channels are sampled this densely for places that were passed in silence."""
+
+_MOST_UNSURE_MM = 2.0
+"""The shell of a learned region is made wider by its uncertainty, but not by more than this."""
+
+_NEAR_CONTACT_MM = 1.0
+"""Places this near to a contact may already belong to the rise."""
 
 
 def _covers(ball: Region, channels: tuple[Arc, ...]) -> bool:

@@ -51,6 +51,8 @@ class Settings:
         push_mm: The length of the push before the next estimate; less than `pull_mm`; ours.
         compensated_lag_rad: The lag of the tip at a depth of 100 mm for which rolls make up
             (`ntagen.drive.torsion`); 0 for none.
+        pull_speed_ratio: Pulling in the open channel is faster than insertion by this factor, to
+            know how long it takes; ours.
         roll_rad_per_s: The speed of rolls, to know how long a plan takes; ours.
         timeout_s: A run ends after this time (paper, section 4).
         sensing_margin_mm: The expected distance from an unknown region at which the force rises;
@@ -77,6 +79,7 @@ class Settings:
     pull_mm: float = 10.0
     push_mm: float = 2.0
     compensated_lag_rad: float = 0.0
+    pull_speed_ratio: float = 5.0
     roll_rad_per_s: float = math.pi
     timeout_s: float = 120.0
     sensing_margin_mm: float = 3.0

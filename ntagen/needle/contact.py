@@ -1,0 +1,112 @@
+"""Where a region lies that was felt: the ball that explains all contacts, and all silence.
+
+A region is felt at a known distance from its surface. So each contact tells how far its centre is
+from the tip, and each place that the tip passed without a rise tells how far it is at least. One
+contact leaves the direction open: then the region is assumed straight ahead. A second one on
+another side of the same region leaves a circle, a third one two points; the silence of the channels
+excludes most of the rest. The best ball is found by least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import scipy.optimize  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+
+from ntagen.scene import Vector
+
+_Array = NDArray[np.float64]
+
+_FELT_STD_MM: Final = 0.3
+"""How well the distance at a contact is known: a push, and the noise of the force."""
+
+_AHEAD_STD_MM: Final = 4.0
+"""How well a region lies straight ahead."""
+
+_RADIUS_STD_MM: Final = 1.5
+"""How well the radius of a region is guessed."""
+
+_EXPLAINED_MM: Final = 1.0
+"""A ball explains contacts and silence if no distance is wrong by more than this."""
+
+_LEAST_RADIUS_MM: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A place where the force began to rise.
+
+    Attributes:
+        position_mm: The tip.
+        heading: Its direction of travel.
+    """
+
+    position_mm: Vector
+    heading: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Ball:
+    """Where a region is assumed.
+
+    Attributes:
+        center_mm: Its centre.
+        radius_mm: Its radius.
+        center_std_mm: The standard deviation of the centre in the direction that is known worst.
+    """
+
+    center_mm: Vector
+    radius_mm: float
+    center_std_mm: float
+
+
+def ball_of(
+    contacts: Sequence[Contact], quiet: Sequence[Vector], margin_mm: float, radius_mm: float
+) -> Ball | None:
+    """The ball that explains these contacts and the silence of these places; None without one.
+
+    Args:
+        contacts: One or more contacts with the same region.
+        quiet: Places that the tip passed without a rise.
+        margin_mm: The distance from a region's surface at which the force rises.
+        radius_mm: The expected radius.
+    """
+    points = np.array([one.position_mm for one in contacts])
+    headings = np.array([one.heading for one in contacts])
+    silent = np.array(quiet).reshape(-1, 3)
+    ahead = points + (margin_mm + radius_mm) * headings
+
+    def parts(unknowns: _Array) -> tuple[_Array, _Array]:
+        """By how much the distances of contacts and of silent places are wrong."""
+        center, reach_mm = unknowns[:3], unknowns[3] + margin_mm
+        felt = np.linalg.norm(points - center, axis=1) - reach_mm
+        near = np.minimum(0.0, np.linalg.norm(silent - center, axis=1) - reach_mm)
+        return felt, near
+
+    def residuals(unknowns: _Array) -> _Array:
+        felt, near = parts(unknowns)
+        return np.concatenate(
+            [
+                felt / _FELT_STD_MM,
+                near / _FELT_STD_MM,
+                ((unknowns[:3] - ahead) / (_AHEAD_STD_MM * len(contacts) ** 0.5)).ravel(),
+                [(unknowns[3] - radius_mm) / _RADIUS_STD_MM],
+            ]
+        )
+
+    start = np.append(ahead.mean(axis=0), radius_mm)
+    lower = [-np.inf, -np.inf, -np.inf, min(_LEAST_RADIUS_MM, 0.5 * radius_mm)]
+    result = scipy.optimize.least_squares(residuals, start, bounds=(lower, np.inf))
+    found = result.x
+    felt, near = parts(found)
+    worst_mm = max(float(np.max(np.abs(felt))), float(np.max(-near, initial=0.0)))
+    if worst_mm > _EXPLAINED_MM:
+        return None
+    covariance = np.linalg.pinv(result.jac.T @ result.jac)
+    std_mm = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
+    x, y, z, radius = (float(value) for value in found)
+    return Ball((x, y, z), radius, std_mm)
