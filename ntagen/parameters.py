@@ -364,6 +364,13 @@ PARAMETERS: Final = (
         choices=("clearance", "rolls", "length", "target"),
     ),
     Parameter(
+        "pull_speed_ratio",
+        "pull speed ratio",
+        "ratio",
+        "Pulling is faster than insertion by this factor.",
+        0.01,
+    ),
+    Parameter(
         "roll_rad_per_s",
         "roll speed",
         "angle per time",

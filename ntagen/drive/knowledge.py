@@ -8,8 +8,10 @@ contacts into learned regions.
 At a contact the force begins to rise. So the surface of a critical region is one sensing margin
 away. The region lies ahead, because there was no force before. The driver assumes a ball straight
 ahead whose shell just touches the tip; its true size is unknown. If its shell overlaps the shell of
-an earlier ball, no plan can pass between the two, and the smallest ball around both replaces them.
-So learned regions grow with every contact, and the driver cannot try the same path for ever.
+an earlier ball, no plan can pass between the two, and one ball replaces them: the one that explains
+all contacts and the silence of the channels (`ntagen.needle.contact`), else the smallest ball
+around both. The shell of a learned region contains all its contacts, so the driver cannot try the
+same path for ever. No learned region is put over a channel that was cut safely.
 """
 
 from __future__ import annotations
@@ -243,7 +245,7 @@ class Knowledge:
                 f"{one.region.name} shell",
                 "detection",
                 one.region.center_mm,
-                one.region.radius_mm + margin_mm + min(_MOST_UNSURE_MM, one.unsure_mm),
+                one.reach_mm(margin_mm),
                 one.region.name,
             )
             for one in kept
@@ -262,6 +264,12 @@ class _Felt:
     region: Region
     contacts: tuple[Contact, ...]
     unsure_mm: float = 0.0
+
+    def reach_mm(self, margin_mm: float) -> float:
+        """The radius of its shell, which contains all its contacts: none is tried again."""
+        reach_mm = self.region.radius_mm + margin_mm + min(_MOST_UNSURE_MM, self.unsure_mm)
+        center_mm = self.region.center_mm
+        return max([reach_mm, *(distance(one.position_mm, center_mm) for one in self.contacts)])
 
 
 def _joined(
