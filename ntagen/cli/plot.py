@@ -118,5 +118,7 @@ def _of_scene(
     for warning in task.warnings:
         echo(warning.render(), err=True)
     settings = configure(task.given, task.scene).settings
-    synthesise = replace(synthesiser_for(settings), ranking=ranking or settings.ranking)
+    # All plans are listed here, since some are to be shown beside the best one.
+    lister = synthesiser_for(settings).engine
+    synthesise = replace(lister, ranking=ranking or settings.ranking)
     return picture_of_plans(task.scene, synthesise(task.scene) if shown > 0 else None, shown)

@@ -19,6 +19,7 @@ from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.vectors import distance
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
+from ntagen.plan.best_plan import BestPlanSynthesiser
 from ntagen.plan.synthesise import EngineSynthesiser, Synthesis, Synthesiser
 from ntagen.scene import Needle, Pose, Scene
 
@@ -205,16 +206,18 @@ def synthesiser_for(
     listen: Callable[[], None] = lambda: None,
     *,
     keeps_strategy: bool = False,
-) -> EngineSynthesiser:
+) -> BestPlanSynthesiser:
     """The synthesiser with the margins, the ranking and the budgets of the settings."""
-    return EngineSynthesiser(
-        margins=settings.margins,
-        ranking=settings.ranking,
-        max_plans=settings.max_plans,
-        timeout_s=settings.engine_time_s,
-        memory_bytes=settings.engine_memory_bytes,
-        keeps_strategy=keeps_strategy,
-        listen=listen,
+    return BestPlanSynthesiser(
+        EngineSynthesiser(
+            margins=settings.margins,
+            ranking=settings.ranking,
+            max_plans=settings.max_plans,
+            timeout_s=settings.engine_time_s,
+            memory_bytes=settings.engine_memory_bytes,
+            keeps_strategy=keeps_strategy,
+            listen=listen,
+        )
     )
 
 

@@ -72,6 +72,23 @@ class Synthesis:
         return self.candidates[0] if self.candidates else None
 
 
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Plans as the engine lists them.
+
+    Attributes:
+        model_xml: The model that was checked.
+        plans: Its plans.
+        seconds: The time that the engine took.
+        strategy_json: The strategy, if it is kept; empty without one.
+    """
+
+    model_xml: str
+    plans: tuple[Plan, ...]
+    seconds: float
+    strategy_json: str = ""
+
+
 class Synthesiser(Protocol):
     """Anything that can find the plans of a scene."""
 
@@ -119,6 +136,24 @@ class EngineSynthesiser:
         """The plans of a scene.
 
         Raises:
+            InputError, LimitError, ModelError, KeyboardInterrupt: See `listed`.
+        """
+        listing = self.listed(scene)
+        return Synthesis(
+            scene=scene,
+            model_xml=listing.model_xml,
+            found=len(listing.plans),
+            candidates=select(self._heard(listing.plans), scene, self.margins, self.ranking),
+            seconds=listing.seconds,
+            margins=self.margins,
+            ranking=self.ranking,
+            strategy_json=listing.strategy_json,
+        )
+
+    def listed(self, scene: Scene) -> Listing:
+        """The plans of the scene's model, whether they hold or not.
+
+        Raises:
             InputError: The scene does not fit the model's numbers.
             LimitError: The engine stopped at a limit before it had an answer.
             ModelError: The model ran into a run-time error.
@@ -146,16 +181,8 @@ class EngineSynthesiser:
             raise LimitError(f"no answer from the engine: stopped by {answer.stop}")
         is_won = answer.verdict == "satisfied"
         plans = extract(answer.plans, scene) if is_won else ()
-        return Synthesis(
-            scene=scene,
-            model_xml=model_xml,
-            found=len(plans),
-            candidates=select(self._heard(plans), scene, self.margins, self.ranking),
-            seconds=answer.seconds,
-            margins=self.margins,
-            ranking=self.ranking,
-            strategy_json=(answer.strategy_json() or "") if is_won and self.keeps_strategy else "",
-        )
+        strategy_json = (answer.strategy_json() or "") if is_won and self.keeps_strategy else ""
+        return Listing(model_xml, plans, answer.seconds, strategy_json)
 
     def _heard(self, plans: Iterable[Plan]) -> Iterator[Plan]:
         """The plans; calls `listen` before each."""

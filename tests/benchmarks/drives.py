@@ -24,10 +24,10 @@ from pathlib import Path
 from ntagen.drive.needles import NAMES, choose
 from ntagen.drive.records import Journals
 from ntagen.drive.settings import Settings
-from ntagen.drive.simulate import simulate
+from ntagen.drive.simulate import simulate, synthesiser_for
 from ntagen.needle.virtual import Errors
 from ntagen.nsl import load
-from ntagen.plan.synthesise import EngineSynthesiser, Synthesis
+from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
 from ntagen.units import rad_from_deg
 
@@ -60,7 +60,7 @@ class _Timed:
     """A synthesiser that notes its wall times."""
 
     def __init__(self, settings: Settings) -> None:
-        self._inner = EngineSynthesiser(margins=settings.margins, ranking=settings.ranking)
+        self._inner = synthesiser_for(settings)
         self.seconds: list[float] = []
 
     def __call__(self, scene: Scene) -> Synthesis:

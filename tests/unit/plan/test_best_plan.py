@@ -1,0 +1,77 @@
+"""The best plan within a budget, against the list of all plans."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from ntagen.plan.best_plan import BestPlanSynthesiser, sequences
+from ntagen.plan.rank import USEFUL_CLEARANCE_MM
+from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis
+from ntagen.scene import Scene
+from tests.steering import CRITICAL, PAPER, scene, sphere
+
+BESIDE = scene(sphere("C", "critical", (1.0, -24.0, -3.0), 2.0), name="beside")
+THREE_ROLLS = replace(PAPER, limits=replace(PAPER.limits, max_rolls=3))
+BLOCKED = scene(sphere("C", "critical", (0.0, -30.0, 0.0), 26.0), name="blocked")
+
+
+def both(where: Scene) -> tuple[Synthesis, Synthesis]:
+    """The answers within a budget, and by the list of all plans."""
+    engine = EngineSynthesiser()
+    return BestPlanSynthesiser(engine)(where), engine(where)
+
+
+def useful_mm(synthesis: Synthesis) -> float:
+    """The clearance of the best plan, as far as more is useful."""
+    assert synthesis.best is not None
+    return min(USEFUL_CLEARANCE_MM, synthesis.best.certificate.critical_clearance_mm)
+
+
+@pytest.mark.parametrize("where", [PAPER, BESIDE], ids=lambda one: one.name)
+def test_its_best_plan_is_about_as_good_as_the_best_of_all(where: Scene) -> None:
+    within_budget, all_listed = both(where)
+    assert useful_mm(within_budget) >= useful_mm(all_listed) - 0.7
+    assert set(within_budget.candidates) <= set(all_listed.candidates)
+    assert within_budget.found < all_listed.found
+
+
+def test_that_there_is_no_plan_is_said_by_one_question() -> None:
+    within_budget, all_listed = both(BLOCKED)
+    assert within_budget.found == all_listed.found == 0
+    assert within_budget.best is None
+
+
+def test_the_same_scene_has_the_same_answer() -> None:
+    first, second = (BestPlanSynthesiser(EngineSynthesiser())(PAPER) for _ in range(2))
+    assert replace(first, seconds=0.0) == replace(second, seconds=0.0)
+
+
+@dataclass
+class Counted:
+    """An engine that counts how many plans it is asked for."""
+
+    asked: list[int] = field(default_factory=list)
+
+
+def test_many_rolls_are_no_reason_to_list_all_plans(monkeypatch: pytest.MonkeyPatch) -> None:
+    counted = Counted()
+    whole = EngineSynthesiser.listed
+
+    def listed(engine: EngineSynthesiser, where: Scene) -> Listing:
+        counted.asked.append(engine.max_plans)
+        return whole(engine, where)
+
+    monkeypatch.setattr(EngineSynthesiser, "listed", listed)
+    answer = BestPlanSynthesiser(EngineSynthesiser())(THREE_ROLLS)
+    assert answer.best is not None
+    assert set(counted.asked) == {1}
+    assert len(counted.asked) <= 6
+
+
+def test_few_sequences_are_listed() -> None:
+    near = scene(CRITICAL, targets=[sphere("T", "target", (0.0, -20.0, 0.0), 6.0)])
+    assert sequences(near) < sequences(PAPER) < sequences(THREE_ROLLS)
+    within_budget, all_listed = both(near)
+    assert within_budget.candidates == all_listed.candidates
