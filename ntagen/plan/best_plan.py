@@ -64,7 +64,7 @@ class BestPlanSynthesiser:
         """
         if sequences(scene) <= _MOST_LISTED or self.engine.ranking[0] != "clearance":
             return self.engine(scene)
-        first = self.one(scene)
+        first = self.one(scene, keeps_strategy=self.engine.keeps_strategy)
         known = _Known(self, scene, first)
         if first.plans:
             known.raise_clearance()
@@ -84,9 +84,9 @@ class BestPlanSynthesiser:
             strategy_json=first.strategy_json,
         )
 
-    def one(self, scene: Scene) -> Listing:
+    def one(self, scene: Scene, *, keeps_strategy: bool = False) -> Listing:
         """At most one plan of a scene, whether it holds or not."""
-        return replace(self.engine, max_plans=1).listed(scene)
+        return replace(self.engine, max_plans=1, keeps_strategy=keeps_strategy).listed(scene)
 
 
 class _Known:
