@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ntagen.needle.kinematics import bending_axis, push, roll
-from ntagen.needle.vectors import add, rotate
+from ntagen.needle.vectors import add, combine, cross, rotate, scale, subtract
 from ntagen.scene import Pose, Vector
 
 _Array = NDArray[np.float64]
@@ -121,12 +121,12 @@ class Placed:
         chord = along_mm * np.sinc(half / math.pi)
         heading, bevel = np.array(self.start.heading), np.array(self.start.bevel)
         ahead, aside = chord * np.cos(half), chord * np.sin(half)
-        places = np.array(self.start.position_mm) + np.outer(ahead, heading)
-        places -= np.outer(aside, bevel)
+        places = np.array(self.start.position_mm) + ahead[:, None] * heading
+        places -= aside[:, None] * bevel
         # Derivatives of both parts by the curvature's logarithm.
         ahead_growth = along_mm * np.cos(turned) - ahead
         aside_growth = along_mm * np.sin(turned) - aside
-        own = np.outer(ahead_growth, heading) - np.outer(aside_growth, bevel)
+        own = ahead_growth[:, None] * heading - aside_growth[:, None] * bevel
         slopes = _moved(places, self.rotation, self.shift) + own[:, :, None] * self.growth
         return places, slopes
 
@@ -141,10 +141,27 @@ class Placed:
 
     def beyond(self, along_mm: float) -> Placed:
         """What begins after this length: the same curvature, further on."""
-        pose, rotation = self.directions(along_mm)
-        _, slopes = self.positions(np.array([along_mm]))
-        shift = slopes[0] - _cross(rotation, pose.position_mm)
-        return Placed(pose, self.curvature_per_mm, rotation, shift, self.growth)
+        start, curvature = self.start, self.curvature_per_mm
+        turn_rad = curvature * along_mm
+        end = push(start, self.radius_mm, along_mm)
+        # A change of the curvature moves the end by `own`, and turns it about the bending axis.
+        half = 0.5 * turn_rad
+        chord_mm = along_mm * (math.sin(half) / half if half else 1.0)
+        own = combine(
+            along_mm * math.cos(turn_rad) - chord_mm * math.cos(half),
+            start.heading,
+            chord_mm * math.sin(half) - along_mm * math.sin(turn_rad),
+            start.bevel,
+        )
+        turn = scale(turn_rad, bending_axis(start))
+        shift = subtract(own, cross(turn, end.position_mm))
+        return Placed(
+            end,
+            curvature,
+            self.rotation + np.array(turn)[:, None] * self.growth,
+            self.shift + np.array(shift)[:, None] * self.growth,
+            self.growth,
+        )
 
     def rolled(self, angle_rad: float, unknowns: tuple[int, ...]) -> Placed:
         """The same after a roll whose errors are these unknowns."""
@@ -223,19 +240,7 @@ def _turn_about(
 ) -> None:
     """Adds a rotation about an axis through a point to the derivatives by an unknown."""
     rotation[:, unknown] += axis
-    shift[:, unknown] -= np.cross(axis, point_mm)
-
-
-def _cross(rotation: _Array, point_mm: Vector) -> _Array:
-    """The vector product of each column with a point."""
-    x, y, z = point_mm
-    return np.stack(
-        [
-            rotation[1] * z - rotation[2] * y,
-            rotation[2] * x - rotation[0] * z,
-            rotation[0] * y - rotation[1] * x,
-        ]
-    )
+    shift[:, unknown] -= cross(axis, point_mm)
 
 
 def _moved(places: _Array, rotation: _Array, shift: _Array) -> _Array:

@@ -408,20 +408,17 @@ def _noises_mm(readings: list[_Reading], priors: Priors) -> list[float]:
     """
     if priors.distortion_mm <= 0.0:
         return [priors.noise_mm] * len(readings)
-    channels = {reading.channel for reading in readings}
-    places = {
-        channel: np.sort([r.offset_mm for r in readings if r.channel == channel])
-        for channel in channels
-    }
-    noises_mm = []
-    for reading in readings:
-        end_mm = reading.offset_mm + 0.5 * _DISTORTION_LENGTH_MM
-        ends = np.array([end_mm - _DISTORTION_LENGTH_MM, end_mm])
-        first, last = np.searchsorted(places[reading.channel], ends)
-        noises_mm.append(
-            math.hypot(priors.noise_mm, math.sqrt(last - first) * priors.distortion_mm)
-        )
-    return noises_mm
+    channels = np.array([reading.channel for reading in readings])
+    offsets_mm = np.array([reading.offset_mm for reading in readings])
+    noises_mm = np.empty(len(readings))
+    for channel in set(channels.tolist()):
+        here = channels == channel
+        places = np.sort(offsets_mm[here])
+        ends = offsets_mm[here] + 0.5 * _DISTORTION_LENGTH_MM
+        near = np.searchsorted(places, ends)
+        near -= np.searchsorted(places, ends - _DISTORTION_LENGTH_MM)
+        noises_mm[here] = np.sqrt(priors.noise_mm**2 + near * priors.distortion_mm**2)
+    return [float(noise_mm) for noise_mm in noises_mm]
 
 
 def pose_from_points(
