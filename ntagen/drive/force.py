@@ -44,6 +44,13 @@ _LEAST_SPACING_MM: Final = 0.05
 """Pushes are not made shorter than this: no stepper is asked for less."""
 
 
+_OPEN_STDS: Final = 6.0
+"""A reading this far below the line is that of an open channel, not of noise."""
+
+_OPEN_BEYOND_MM: Final = 0.5
+"""A channel may seem to be open this much longer than it is, by late readings and lengths."""
+
+
 @dataclass(frozen=True, slots=True)
 class Rise:
     """A rise of the force.
@@ -154,13 +161,18 @@ class ForceMonitor:
         self._before = copy(self._line)
         self._sum = 0.0
         self._began_mm = 0.0
+        self._deepest_mm = 0.0
 
     def expected_n(self, depth_mm: float) -> float:
         """The force of plain insertion at a depth."""
         return self._line.at(depth_mm)[0]
 
     def note(self, depth_mm: float, force_n: float, allowed_n: float = 0.0) -> Rise | None:
-        """Takes a reading in new tissue; returns the rise if it is now sure.
+        """Takes a reading of a push; returns the rise if it is now sure.
+
+        A push after a pull may follow the old channel, where nothing is cut and the force is
+        smaller. Such readings tell nothing about plain insertion: if they counted, the force of
+        cutting at the end of the old channel would seem to be a rise.
 
         Args:
             depth_mm: The insertion depth.
@@ -173,7 +185,10 @@ class ForceMonitor:
         self._sum = max(0.0, self._sum + above_n / std_n - self._test.slack)
         if self._sum > self._test.bound:
             return Rise(self._began_mm, depth_mm, above_n)
-        if allowed_n <= 0.0:
+        was_here = depth_mm <= self._deepest_mm + _OPEN_BEYOND_MM
+        self._deepest_mm = max(self._deepest_mm, depth_mm)
+        is_open = was_here and above_n < -_OPEN_STDS * std_n
+        if allowed_n <= 0.0 and not is_open:
             self._line.learn(depth_mm, force_n)
         if self._sum == 0.0:
             self._began_mm = depth_mm

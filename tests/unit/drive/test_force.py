@@ -75,6 +75,28 @@ def test_a_rise_that_is_allowed_is_no_alarm_and_teaches_nothing() -> None:
     assert monitor.note(15.0, 1.0) is not None
 
 
+def test_cutting_after_an_old_channel_is_no_rise() -> None:
+    """20 mm of cutting, 10 mm back, then the open channel to 20 mm, and cutting again."""
+    forces = readings(3, 0.02)
+    cutting_n = 0.8
+    monitor = ForceMonitor(SETTINGS, LENGTH_MM)
+    depths = np.arange(0.0, 20.0, SETTINGS.spacing_mm)
+    for depth_mm, force_n in zip(depths, forces, strict=False):
+        assert monitor.note(depth_mm, float(force_n) + cutting_n) is None
+    for depth_mm in np.arange(10.0, 40.0, SETTINGS.spacing_mm):
+        force_n = float(forces[round(depth_mm / SETTINGS.spacing_mm)])
+        force_n += 0.0 if depth_mm < 20.0 else cutting_n
+        assert monitor.note(depth_mm, force_n) is None
+    assert monitor.note(40.0, float(forces[160]) + cutting_n + 1.0) is not None, "a real rise"
+
+
+def test_softer_tissue_is_learned_where_the_needle_has_not_been() -> None:
+    monitor = ForceMonitor(SETTINGS, LENGTH_MM)
+    for depth_mm in np.arange(0.0, 60.0, SETTINGS.spacing_mm):
+        assert monitor.note(depth_mm, 1.0 if depth_mm < 10.0 else 0.2) is None
+    assert monitor.expected_n(60.0) < 0.4
+
+
 def test_thin_margins_need_short_pushes_and_too_thin_ones_are_refused() -> None:
     settings = Settings()
     assert fitting_spacing_mm(settings, 3.0, LENGTH_MM) == settings.spacing_mm
