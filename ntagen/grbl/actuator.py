@@ -1,0 +1,328 @@
+"""A needle that a GRBL controller moves: one small motion at a time, watched until it is over.
+
+Each motion is a jog, which the controller forgets when it is stopped. While it runs, its status is
+asked for and compared with what was commanded: the direction, the way, the time, and that no other
+axis moves. What steppers lose on the way no controller knows: that shows in the measured position.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from ntagen.errors import DeviceError
+from ntagen.grbl.axes import Axes, Motor, motor
+from ntagen.grbl.identity import Identity, identify, position_of, require_ready
+from ntagen.grbl.link import Link, RefusedError, Watch
+from ntagen.grbl.port import Port
+from ntagen.grbl.protocol import HOLD, JOG_CANCEL, RESET, Activity, Status
+from ntagen.units import deg_from_rad
+
+POLL_S: Final = 0.1
+"""How often the status is asked for in motion: GRBL recommends 5 to 10 times a second."""
+
+STOP_BYTES: Final = HOLD + JOG_CANCEL
+
+_SOONEST_POLL_S: Final = 0.02
+_BEGIN_S: Final = 0.3
+"""A motion that has not begun after this time does not begin."""
+
+_STALL_S: Final = 0.5
+"""An axis that moves and has the same position after this time is stuck."""
+
+_STOP_S: Final = 3.0
+"""A machine that has not come to rest after this time does not stop."""
+
+_UNKNOWN_COMMAND: Final = 3
+
+
+class StoppedError(DeviceError):
+    """A motion was stopped from outside before it was over."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Goal:
+    """A motion: the axis, its speed, and the positions of all axes at its start and its end."""
+
+    motor: Motor
+    speed: float
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+
+    @property
+    def way(self) -> float:
+        return self.end[self.motor.index] - self.start[self.motor.index]
+
+
+class GrblActuator:
+    """Moves a needle by a GRBL controller; a `ntagen.drive.device.Actuator`.
+
+    Args:
+        port: The wire to the controller. `close` gives it back.
+        axes: Which axis does what.
+        watch: Is called every few milliseconds while the needle moves. What it raises ends the
+            motion: the needle is stopped first, then the error goes on to the caller.
+
+    Raises:
+        DeviceError: The controller does not answer as a GRBL that is ready to move.
+    """
+
+    def __init__(self, port: Port, axes: Axes, watch: Watch = lambda: None) -> None:
+        self.watch = watch
+        self._link = Link(port)
+        self._axes = axes
+        self.identity: Identity = identify(self._link)
+        self._insert = motor(
+            self._link,
+            self.identity,
+            axes.insert,
+            "mm",
+            max(axes.push_mm_per_s, axes.pull_mm_per_s),
+        )
+        self._roll = motor(self._link, self.identity, axes.roll, "deg", axes.roll_deg_per_s)
+        # Where the axes must stand: rounded steps must not add up over many motions.
+        self._expected = position_of(self.identity.status)
+        self._stops = 0
+        self._jogs = True
+
+    def now_s(self) -> float:
+        """The time on the port's clock, in seconds."""
+        return self._link.now_s()
+
+    @property
+    def position(self) -> tuple[float, ...]:
+        """Where the axes stand by the controller's count, in mm and degrees."""
+        return self._expected
+
+    def push(self, length_mm: float) -> None:
+        """Inserts the needle by a length.
+
+        Raises:
+            DeviceError: The motion is impossible, was stopped, or failed.
+        """
+        self._require(length_mm >= 0.0, "push", length_mm)
+        self._move(self._insert, length_mm, self._axes.push_mm_per_s, self._axes.max_mm)
+
+    def pull(self, length_mm: float) -> None:
+        """Pulls the needle back by a length.
+
+        Raises:
+            DeviceError: The motion is impossible, was stopped, or failed.
+        """
+        self._require(length_mm >= 0.0, "pull", length_mm)
+        self._move(self._insert, -length_mm, self._axes.pull_mm_per_s, self._axes.max_mm)
+
+    def roll(self, angle_rad: float) -> None:
+        """Turns the shaft, right-handed about the heading.
+
+        Raises:
+            DeviceError: The motion is impossible, was stopped, or failed.
+        """
+        self._require(True, "roll", angle_rad)
+        angle_deg = deg_from_rad(angle_rad)
+        self._move(self._roll, angle_deg, self._axes.roll_deg_per_s, self._axes.max_deg)
+
+    def stop(self) -> None:
+        """Stops the needle where it is, and waits until it stands.
+
+        The bytes that stop it are written at once, from any thread, whatever else goes on. A motion
+        that another thread waits for ends there with `StoppedError`.
+
+        Raises:
+            DeviceError: The machine does not say that it stands. It was reset then, if possible.
+        """
+        self._stops += 1
+        self._link.realtime(STOP_BYTES)
+        if not self._link.turn.acquire(timeout=_STOP_S):
+            raise self._not_standing("another thread does not let go of the controller")
+        try:
+            self._confirm()
+        finally:
+            self._link.turn.release()
+
+    def close(self) -> None:
+        """Gives the port back. A motion that runs is not stopped by this."""
+        self._link.close()
+
+    # Stopping.
+
+    def _confirm(self) -> None:
+        """Waits until two reports say that the axes stand at one place."""
+        end_s = self.now_s() + _STOP_S
+        last: tuple[float, ...] | None = None
+        while self.now_s() < end_s:
+            try:
+                status = self._link.look()
+                self._link.pause(_SOONEST_POLL_S)
+            except DeviceError as error:
+                raise self._not_standing(str(error)) from None
+            if status.stands and position_of(status) == last:
+                self._rest(status)
+                return
+            last = position_of(status) if status.stands else None
+        raise self._not_standing("it still moves")
+
+    def _rest(self, status: Status) -> None:
+        """Notes where the machine stands, and lets it forget what it has not done.
+
+        Without that, a press on its resume button would move the needle on. A reset of a machine
+        that stands keeps its position.
+        """
+        self._expected = position_of(status)
+        if status.activity is Activity.ALARM and self._link.failure is None:
+            self._link.fail(f"{self._link.name}: the controller is locked by an alarm")
+        if status.activity in (Activity.HOLD, Activity.DOOR):
+            if self._link.failure is None:
+                self._link.reset()
+            else:
+                self._link.realtime(RESET)
+
+    def _not_standing(self, reason: str) -> DeviceError:
+        """The last resort: a reset stops the steppers at once, and may lose their position."""
+        try:
+            self._link.realtime(RESET)
+        except DeviceError as error:
+            reason = str(error)
+        return self._link.fail(
+            f"{self._link.name}: the controller does not confirm that the needle stands: {reason}\n"
+            "hint: stop it by its hardware switch"
+        )
+
+    # Moving.
+
+    def _require(self, possible: bool, command: str, value: float) -> None:
+        if not possible or not math.isfinite(value):
+            raise DeviceError(f"the device refuses to {command} by {value}")
+
+    def _move(self, motor: Motor, length: float, speed: float, longest: float) -> None:
+        """Moves an axis in pieces, each no longer than the longest one."""
+        stops = self._stops
+        count = max(1, math.ceil(abs(length) / longest - 1e-9))
+        with self._link.turn:
+            for _ in range(count):
+                self._piece(motor, motor.axis.sign * length / count, speed, stops)
+
+    def _piece(self, motor: Motor, way: float, speed: float, stops: int) -> None:
+        def watch() -> None:
+            if self._stops != stops:
+                raise StoppedError(f"{self._link.name}: the motion was stopped")
+            self.watch()
+
+        goal = self._plan(motor, way, speed)
+        if abs(goal.way) < motor.tolerance / 2.0:
+            return
+        try:
+            self._begin(goal, watch)
+            self._follow(goal, watch)
+        except StoppedError:
+            # Who stopped it waits until it stands.
+            raise
+        except BaseException as error:
+            self._stop_for(error)
+            raise
+
+    def _plan(self, motor: Motor, way: float, speed: float) -> _Goal:
+        """The motion from where the axes stand, if they stand where they were left.
+
+        Raises:
+            DeviceError: They do not, or the end is outside of the limits.
+        """
+        self._link.require_whole()
+        start = position_of(require_ready(self._link, self._link.status()))
+        for m in (self._insert, self._roll):
+            if abs(start[m.index] - self._expected[m.index]) > m.tolerance:
+                raise self._link.fail(
+                    f"{self._link.name}: the axis {m.axis.letter} stands at {start[m.index]:.3f} "
+                    f"{m.unit}, but was left at {self._expected[m.index]:.3f}\n"
+                    "hint: something else has moved it; measure where the needle is"
+                )
+        end = list(self._expected)
+        end[motor.index] += way
+        if not motor.axis.low <= end[motor.index] <= motor.axis.high:
+            raise DeviceError(
+                f"{self._link.name}: {end[motor.index]:.3f} {motor.unit} is outside of the travel "
+                f"of the axis {motor.axis.letter}, {motor.axis.low:g} to {motor.axis.high:g}"
+            )
+        return _Goal(motor, speed, start, tuple(end))
+
+    def _begin(self, goal: _Goal, watch: Watch) -> None:
+        """Sends the motion, once."""
+        word = f"{goal.motor.axis.letter}{goal.way:.4f} F{goal.speed * 60.0:.3f}"
+        if self._jogs:
+            try:
+                watch()
+                self._link.command(f"$J=G91 G21 {word}", watch=watch)
+                return
+            except RefusedError as error:
+                if error.code != _UNKNOWN_COMMAND:
+                    raise
+                self._jogs = False
+        watch()
+        self._link.command(f"G91 G21 G1 {word}", watch=watch)
+
+    def _follow(self, goal: _Goal, watch: Watch) -> None:
+        """Watches a motion until the axis stands at its end."""
+        began_s = changed_s = self.now_s()
+        seconds = goal.motor.seconds(goal.way, goal.speed)
+        latest_s = began_s + 1.5 * seconds + 1.0
+        last = goal.start[goal.motor.index]
+        while True:
+            status = self._link.status(watch)
+            now_s, here = self.now_s(), position_of(status)[goal.motor.index]
+            self._require_on_way(goal, status)
+            if here != last:
+                last, changed_s = here, now_s
+            if status.activity is Activity.IDLE:
+                if abs(here - goal.end[goal.motor.index]) <= goal.motor.tolerance:
+                    self._expected = goal.end
+                    return
+                if here != goal.start[goal.motor.index] or now_s > began_s + _BEGIN_S:
+                    raise self._wrong(goal, status, "ended too early")
+            elif now_s > changed_s + _STALL_S:
+                raise self._wrong(goal, status, "is stuck")
+            elif now_s > latest_s:
+                raise self._wrong(goal, status, "is too slow")
+            left_s = began_s + seconds - now_s
+            self._link.pause(max(_SOONEST_POLL_S, min(POLL_S, left_s)), watch)
+
+    def _require_on_way(self, goal: _Goal, status: Status) -> None:
+        """Compares a report with the motion.
+
+        Raises:
+            DeviceError: Another axis moves, the direction is wrong, or the end was passed.
+        """
+        if status.activity not in (Activity.IDLE, Activity.RUN, Activity.JOG):
+            raise self._wrong(goal, status, "was interrupted")
+        position = position_of(status)
+        for other in (self._insert, self._roll):
+            if other is goal.motor:
+                continue
+            if abs(position[other.index] - goal.end[other.index]) > other.tolerance:
+                raise self._wrong(goal, status, f"also moves the axis {other.axis.letter}")
+        done = position[goal.motor.index] - goal.start[goal.motor.index]
+        along = math.copysign(done, done * goal.way) if done else 0.0
+        if along < -goal.motor.tolerance:
+            raise self._wrong(goal, status, "goes into the wrong direction")
+        if along > abs(goal.way) + goal.motor.tolerance:
+            raise self._wrong(goal, status, "went too far")
+
+    def _wrong(self, goal: _Goal, status: Status, what: str) -> DeviceError:
+        """The error about a motion; nothing is moved after it."""
+        m = goal.motor
+        here = position_of(status)[m.index]
+        return self._link.fail(
+            f"{self._link.name}: the motion of the axis {m.axis.letter} from "
+            f"{goal.start[m.index]:.3f} to {goal.end[m.index]:.3f} {m.unit} {what}: it is at "
+            f"{here:.3f} {m.unit}, state {status}\n"
+            "hint: check motor, driver, limit switches and load; measure where the needle is"
+        )
+
+    def _stop_for(self, error: BaseException) -> None:
+        """Stops the needle because of an error, which goes on to the caller."""
+        try:
+            self.stop()
+        except DeviceError as failure:
+            if isinstance(error, DeviceError):
+                raise DeviceError(f"{error}\n{failure}") from None
+            raise

@@ -1,0 +1,341 @@
+"""The conversation with a controller: one line at a time, and real-time bytes at any time.
+
+Rules that are kept here and nowhere else:
+
+* Whoever talks to the controller holds the link, so one thread owns the port. A line is sent when
+  the line before it was acknowledged; so no motion is sent while another one is unanswered.
+* Real-time bytes (`!`, `?`, 0x85, 0x18) pass by all that: they are written at once, by any thread,
+  without a lock.
+* After anything that is not as it should be, the link moves nothing any more: a broken connection,
+  silence, noise, an alarm, or a reset that nobody asked for. It never unlocks an alarm by itself.
+* grblHAL goes on refusing G-code after an error until it gets an empty line; so every refused line
+  is followed by one.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Final
+
+from ntagen.errors import DeviceError
+from ntagen.grbl.port import Port
+from ntagen.grbl.protocol import (
+    MAX_LINE_BYTES,
+    MAX_REPLY_BYTES,
+    RESET,
+    STATUS,
+    Alarm,
+    Banner,
+    Ok,
+    ProtocolError,
+    Refusal,
+    Reply,
+    Status,
+    parse,
+)
+
+ANSWER_S: Final = 3.0
+"""A controller that has not answered a line after this time is taken for dead."""
+
+STATUS_S: Final = 0.5
+"""The same for a status report: three in a row may be missing."""
+
+MISSING_REPORTS: Final = 3
+
+_SLICE_S: Final = 0.005
+"""How long a read waits at most before `watch` is asked again."""
+
+_START_S: Final = 3.0
+"""An Arduino resets when its port is opened, and its boot loader waits up to two seconds."""
+
+_MARKS: Final = ("!", "~", "?")
+
+Watch = Callable[[], None]
+
+
+class RefusedError(DeviceError):
+    """The controller refused a line; the link still works. `code` is the number of the error."""
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class Link:
+    """A conversation with a controller.
+
+    Args:
+        port: The wire.
+    """
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self._buffer = bytearray()
+        self._replies: list[Reply] = []
+        self._failure: str | None = None
+        self._turn = threading.RLock()
+        self._expects_banner = False
+
+    @property
+    def name(self) -> str:
+        """The port's name."""
+        return self._port.name
+
+    @property
+    def failure(self) -> str | None:
+        """Why nothing is moved any more; `None` while all is well."""
+        return self._failure
+
+    @property
+    def turn(self) -> threading.RLock:
+        """Held by the thread that talks to the controller."""
+        return self._turn
+
+    def now_s(self) -> float:
+        """The time on the port's clock."""
+        return self._port.now_s()
+
+    def close(self) -> None:
+        """Gives the port back."""
+        self._port.close()
+
+    def realtime(self, data: bytes) -> None:
+        """Writes real-time bytes now: without a lock, from any thread, whatever happened before.
+
+        Raises:
+            DeviceError: The port is gone.
+        """
+        self._port.write(data)
+
+    def command(
+        self, line: str, timeout_s: float = ANSWER_S, watch: Watch | None = None
+    ) -> list[Reply]:
+        """Sends a line and waits until it is acknowledged.
+
+        Args:
+            line: The line, without its end.
+            timeout_s: How long to wait.
+            watch: Is called again and again while this waits; it may raise to end it.
+
+        Returns:
+            What the controller said before it acknowledged the line.
+
+        Raises:
+            RefusedError: The controller refused the line; it works on.
+            DeviceError: The controller does not work, and moves nothing any more.
+        """
+        data = line.encode("ascii") + b"\n"
+        if len(data) > MAX_LINE_BYTES or any(mark in line for mark in _MARKS):
+            raise ValueError(f"no line for a controller: {line!r}")
+        with self._turn:
+            self.require_whole()
+            self._drain()
+            self._write(data)
+            said = self._until((Ok, Refusal), timeout_s, f"'{line}'", watch)
+            answer = said.pop()
+            if isinstance(answer, Refusal):
+                self._unlatch()
+                message = f"{self.name}: the controller refused '{line}': {answer}"
+                raise RefusedError(message, answer.code)
+            return said
+
+    def status(self, watch: Watch | None = None) -> Status:
+        """Asks for a status report.
+
+        Raises:
+            DeviceError: The controller does not answer, or says that something is wrong.
+        """
+        with self._turn:
+            self.require_whole()
+            return self._ask(watch)
+
+    def pause(self, seconds: float, watch: Watch = lambda: None) -> None:
+        """Lets time pass, and looks at what the controller says meanwhile.
+
+        Raises:
+            DeviceError: It says that something is wrong; after a failure that is not looked at.
+        """
+        with self._turn:
+            end_s = self.now_s() + seconds
+            while (left_s := end_s - self.now_s()) > 0.0:
+                watch()
+                self._next(min(left_s, _SLICE_S), forgiving=self._failure is not None)
+
+    def look(self) -> Status:
+        """Asks for a status report, also after a failure: to see whether the axes stand.
+
+        Raises:
+            DeviceError: The controller does not answer.
+        """
+        with self._turn:
+            failure, self._failure = self._failure, None
+            try:
+                return self._ask(None, forgiving=True)
+            finally:
+                self._failure = failure or self._failure
+
+    def reset(self, timeout_s: float = _START_S) -> Banner:
+        """Resets the controller and waits until it has started again.
+
+        Raises:
+            DeviceError: It does not start, or is locked by an alarm.
+        """
+        with self._turn:
+            self.require_whole()
+            self._drain()
+            self._expects_banner = True
+            try:
+                self._write(RESET)
+                banner = self._until((Banner,), timeout_s, "a reset", None).pop()
+            finally:
+                self._expects_banner = False
+            assert isinstance(banner, Banner)  # noqa: S101  _until returns only such
+            return banner
+
+    def start(self, timeout_s: float = _START_S) -> Status:
+        """Waits until a controller that may be starting gives its first status report.
+
+        Raises:
+            DeviceError: Nothing answers, or what answers is no GRBL.
+        """
+        with self._turn:
+            end_s = self.now_s() + timeout_s
+            self._expects_banner = True
+            try:
+                while self.now_s() < end_s:
+                    self._write(STATUS)
+                    pause_s = min(self.now_s() + 0.25, end_s)
+                    while (left_s := pause_s - self.now_s()) > 0.0:
+                        for reply in self._pump(left_s):
+                            if isinstance(reply, Status):
+                                return self._settled(reply)
+            except ProtocolError as error:
+                raise self.fail(str(error)) from None
+            finally:
+                self._expects_banner = False
+        raise self.fail(
+            f"{self.name}: nothing answers\n"
+            "hint: check power and cable, that this is the controller's port, and its baud rate"
+        )
+
+    def require_whole(self) -> None:
+        """Raises what is wrong, if anything is.
+
+        Raises:
+            DeviceError: The controller has failed before.
+        """
+        if self._failure is not None:
+            raise DeviceError(self._failure)
+
+    def fail(self, message: str) -> DeviceError:
+        """Notes that nothing may be moved any more; returns the error to raise."""
+        if self._failure is None:
+            self._failure = message
+        return DeviceError(message)
+
+    # What comes in.
+
+    def _settled(self, first: Status) -> Status:
+        """The last report once a controller that has just started is silent."""
+        status = first
+        quiet_s = self.now_s() + 0.1
+        while (left_s := quiet_s - self.now_s()) > 0.0:
+            for reply in self._pump(left_s):
+                if isinstance(reply, Status):
+                    status = reply
+        return status
+
+    def _ask(self, watch: Watch | None, *, forgiving: bool = False) -> Status:
+        for _ in range(MISSING_REPORTS):
+            self._write(STATUS)
+            end_s = self.now_s() + STATUS_S
+            while (left_s := end_s - self.now_s()) > 0.0:
+                if watch is not None:
+                    watch()
+                for reply in self._next(min(left_s, _SLICE_S), forgiving=forgiving):
+                    if isinstance(reply, Status):
+                        return reply
+        raise self.fail(
+            f"{self.name}: the controller gives no status report\n"
+            "hint: stop it by its hardware switch; check cable and power"
+        )
+
+    def _until(
+        self, kinds: tuple[type, ...], timeout_s: float, what: str, watch: Watch | None
+    ) -> list[Reply]:
+        """All replies up to the first one of some kinds."""
+        said: list[Reply] = []
+        end_s = self.now_s() + timeout_s
+        while (left_s := end_s - self.now_s()) > 0.0:
+            if watch is not None:
+                watch()
+            replies = self._next(min(left_s, _SLICE_S if watch else left_s))
+            for index, reply in enumerate(replies):
+                said.append(reply)
+                if isinstance(reply, kinds):
+                    self._replies = replies[index + 1 :] + self._replies
+                    return said
+        raise self.fail(
+            f"{self.name}: the controller did not answer {what} within {timeout_s:g} s\n"
+            "hint: check cable and power; measure where the needle is before you go on"
+        )
+
+    def _next(self, timeout_s: float, *, forgiving: bool = False) -> list[Reply]:
+        """The next replies; alarms, resets and noise are failures."""
+        kept, self._replies = self._replies, []
+        try:
+            replies = kept or self._pump(timeout_s)
+        except ProtocolError as error:
+            if forgiving:
+                return []
+            raise self.fail(f"{self.name}: {error}") from None
+        if not forgiving:
+            for reply in replies:
+                self._require_peace(reply)
+        return replies
+
+    def _require_peace(self, reply: Reply) -> None:
+        """Raises on what a controller says when something has gone wrong."""
+        if isinstance(reply, Alarm):
+            raise self.fail(
+                f"{self.name}: {reply}\n"
+                "hint: find the cause, measure where the needle is, then unlock the controller "
+                "yourself with $X"
+            )
+        if isinstance(reply, Banner) and not self._expects_banner:
+            raise self.fail(
+                f"{self.name}: the controller was reset, so its position is not known any more\n"
+                "hint: check power and reset button; measure where the needle is before you go on"
+            )
+
+    def _drain(self) -> None:
+        """Looks at what came while nobody asked."""
+        while replies := self._next(0.0):
+            del replies
+
+    def _pump(self, timeout_s: float) -> list[Reply]:
+        """Reads once; the replies that are complete now."""
+        try:
+            data = self._port.read(timeout_s)
+        except DeviceError as error:
+            raise self.fail(str(error)) from None
+        self._buffer += data
+        *lines, rest = self._buffer.split(b"\n")
+        self._buffer = rest
+        if len(rest) > MAX_REPLY_BYTES:
+            lines.append(bytearray(rest))
+            self._buffer = bytearray()
+        replies = [parse(bytes(line)) for line in lines]
+        return [reply for reply in replies if reply is not None]
+
+    def _write(self, data: bytes) -> None:
+        try:
+            self._port.write(data)
+        except DeviceError as error:
+            raise self.fail(str(error)) from None
+
+    def _unlatch(self) -> None:
+        """Lets grblHAL take G-code again after a refused line."""
+        self._write(b"\n")
+        self._until((Ok, Refusal), ANSWER_S, "an empty line", None)

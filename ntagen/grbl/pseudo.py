@@ -1,0 +1,94 @@
+"""An emulated controller on a pseudo-terminal: to the other side it is a serial port."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pty
+import select
+import threading
+import time
+import tty
+from types import TracebackType
+from typing import Final, Self
+
+from ntagen.grbl.emulator import Emulator
+
+_LONGEST_WAIT_S: Final = 0.01
+"""Motion is told to the plant at least so often."""
+
+_READ_BYTES: Final = 4096
+
+
+class PseudoTerminal:
+    """Runs an emulator in a thread of its own, in real time or faster.
+
+    Args:
+        emulator: The controller; it should be switched on. Other threads use it under `lock` only.
+        speed: How many seconds pass on its clock in one second.
+    """
+
+    def __init__(self, emulator: Emulator, speed: float = 1.0) -> None:
+        self.lock = threading.Lock()
+        self._emulator = emulator
+        self._speed = speed
+        self._controller, self._client = pty.openpty()
+        tty.setraw(self._client)
+        os.set_blocking(self._controller, False)
+        self.name = os.ttyname(self._client)
+        self._wake_read, self._wake_write = os.pipe()
+        self._thread = threading.Thread(target=self._run, name="grbl emulator", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.hang_up()
+        for number in (self._wake_read, self._wake_write):
+            os.close(number)
+
+    def hang_up(self) -> None:
+        """Closes the terminal, as when the cable is pulled: the other side gets an error."""
+        if self._thread.is_alive():
+            os.write(self._wake_write, b"x")
+            self._thread.join()
+        for number in (self._controller, self._client):
+            with contextlib.suppress(OSError):
+                os.close(number)
+        self._controller = self._client = -1
+
+    def _run(self) -> None:
+        began_s, offset_s = time.monotonic(), self._emulator.now_s
+        while True:
+            ready, _, _ = select.select(
+                [self._controller, self._wake_read], [], [], self._wait_s(began_s, offset_s)
+            )
+            if self._wake_read in ready:
+                return
+            try:
+                data = os.read(self._controller, _READ_BYTES) if ready else b""
+                self._turn(data, offset_s + (time.monotonic() - began_s) * self._speed)
+            except OSError:
+                return
+
+    def _wait_s(self, began_s: float, offset_s: float) -> float:
+        """How long nothing will happen."""
+        with self.lock:
+            due_s = (self._emulator.next_event_s() - offset_s) / self._speed
+        return min(_LONGEST_WAIT_S, max(0.0, due_s - (time.monotonic() - began_s)))
+
+    def _turn(self, data: bytes, time_s: float) -> None:
+        with self.lock:
+            self._emulator.advance(max(time_s, self._emulator.now_s))
+            self._emulator.feed(data)
+            answer = self._emulator.take()
+        if answer:
+            # Nobody reads: a real controller's answers are lost then, too.
+            with contextlib.suppress(BlockingIOError):
+                os.write(self._controller, answer)

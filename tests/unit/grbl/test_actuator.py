@@ -1,0 +1,270 @@
+"""The driver of a GRBL controller against the emulator, on a simulated clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import pytest
+
+from ntagen.errors import DeviceError
+from ntagen.grbl.actuator import GrblActuator, StoppedError
+from ntagen.grbl.axes import Axes, Axis
+from ntagen.grbl.dialects import GRBL_11H, GRBLHAL, Dialect
+from ntagen.grbl.emulator import Emulator
+from ntagen.grbl.memory import Memory
+from ntagen.grbl.simulated import SimulatedPort
+
+AXES = {
+    GRBL_11H.name: Axes(insert=Axis("X"), roll=Axis("Y", sign=-1), roll_deg_per_s=90.0),
+    GRBLHAL.name: Axes(insert=Axis("X"), roll=Axis("A", sign=-1), roll_deg_per_s=90.0),
+}
+SETTINGS = {
+    **dict.fromkeys((110, 111, 112, 113), 6000.0),
+    **dict.fromkeys((120, 121, 122, 123), 200.0),
+}
+BOTH = pytest.mark.parametrize("dialect", [GRBL_11H, GRBLHAL], ids=lambda d: d.name)
+
+
+class Sum:
+    """A plant that adds up what it is told."""
+
+    def __init__(self) -> None:
+        self.sums: dict[str, float] = {}
+
+    def move(self, steps: Mapping[str, float], seconds: float) -> None:
+        for axis, step in steps.items():
+            self.sums[axis] = self.sums.get(axis, 0.0) + step
+
+
+class Bench:
+    """A driver and the controller that it drives."""
+
+    def __init__(self, dialect: Dialect, axes: Axes | None = None, **settings: float) -> None:
+        changes = SETTINGS | {int(name[1:]): value for name, value in settings.items()}
+        changes = {n: v for n, v in changes.items() if n in dialect.settings}
+        self.plant = Sum()
+        self.emulator = Emulator(dialect, self.plant, Memory(dialect, changes))
+        self.emulator.power_on()
+        self.port = SimulatedPort(self.emulator)
+        self.axes = axes or AXES[dialect.name]
+
+    def connect(self, watch: Callable[[], None] = lambda: None) -> GrblActuator:
+        return GrblActuator(self.port, self.axes, watch)
+
+    def let_go(self, line: str, seconds: float) -> None:
+        self.emulator.feed(line.encode("latin-1"))
+        self.emulator.advance(self.emulator.now_s + seconds)
+
+
+class At:
+    """A watch that does something once, after some time."""
+
+    def __init__(self, bench: Bench, seconds: float, action: Callable[[], None]) -> None:
+        self._bench = bench
+        self._due_s = bench.emulator.now_s + seconds
+        self._action: Callable[[], None] | None = action
+
+    def __call__(self) -> None:
+        if self._action is not None and self._bench.emulator.now_s >= self._due_s:
+            action, self._action = self._action, None
+            action()
+
+
+@BOTH
+def test_the_needle_is_pushed_rolled_and_pulled(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+    start_s = actuator.now_s()
+    actuator.push(2.0)
+    assert actuator.now_s() - start_s == pytest.approx(2.0, abs=0.2)
+    actuator.roll(math.pi)
+    actuator.push(12.3456)
+    actuator.pull(4.0)
+    actuator.push(0.0)
+    roll = AXES[dialect.name].roll.letter
+    assert bench.plant.sums == {"X": pytest.approx(10.3456, abs=0.005), roll: pytest.approx(-180.0)}
+
+
+@BOTH
+def test_rounded_steps_do_not_add_up(dialect: Dialect) -> None:
+    bench = Bench(dialect, _100=7.0)
+    actuator = bench.connect()
+    for _ in range(50):
+        actuator.push(0.5)
+    assert bench.plant.sums["X"] == pytest.approx(25.0, abs=1.0 / 7.0)
+
+
+@BOTH
+def test_a_stop_ends_the_motion_and_another_motion_may_follow(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+    actuator.watch = At(bench, 1.0, actuator.stop)
+    with pytest.raises(StoppedError):
+        actuator.push(5.0)
+    overrun_mm = 1.0 * dialect.lead_s + 1.0 / (2 * 200.0)
+    assert bench.plant.sums["X"] == pytest.approx(1.0 + overrun_mm, abs=0.03)
+    actuator.stop()
+    actuator.stop()
+    stopped_mm = bench.plant.sums["X"]
+    actuator.push(1.0)
+    assert bench.plant.sums["X"] == pytest.approx(stopped_mm + 1.0, abs=0.005)
+
+
+@BOTH
+def test_what_the_watch_raises_stops_the_needle_first(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+
+    def interrupt() -> None:
+        raise KeyboardInterrupt("the operator")
+
+    actuator.watch = At(bench, 1.0, interrupt)
+    with pytest.raises(KeyboardInterrupt, match="the operator"):
+        actuator.push(5.0)
+    stopped_mm = bench.plant.sums["X"]
+    assert stopped_mm == pytest.approx(1.06, abs=0.03)
+    bench.emulator.advance(bench.emulator.now_s + 10.0)
+    assert bench.plant.sums["X"] == stopped_mm
+
+
+def freeze(bench: Bench) -> None:
+    bench.emulator.faults.pace = 0.0
+
+
+def slow_down(bench: Bench) -> None:
+    bench.emulator.faults.pace = 0.3
+
+
+def be_silent(bench: Bench) -> None:
+    bench.emulator.faults.is_silent = True
+
+
+def make_noise(bench: Bench) -> None:
+    bench.emulator.send(b"\xff\x00\x91~|\n")
+
+
+def send_endless_noise(bench: Bench) -> None:
+    bench.emulator.send(b"U" * 2000)
+
+
+FAULTS: dict[str, tuple[Callable[[Bench], None], str]] = {
+    "frozen": (freeze, "is stuck"),
+    "slow": (slow_down, "is too slow"),
+    "silent": (be_silent, "no status report"),
+    "noise": (make_noise, "no reply of GRBL"),
+    "endless noise": (send_endless_noise, "no reply of GRBL"),
+    "alarm": (lambda b: b.emulator.raise_alarm(1), r"ALARM:1 \(a limit switch was hit\)"),
+    "reset": (lambda b: b.let_go("\x18", 0.0), r"ALARM:3|was reset"),
+    "power cut": (lambda b: b.emulator.power_on(), "the controller was reset"),
+    "cable pulled": (lambda b: b.port.break_off(), "connection to the controller is broken"),
+    "hold button": (lambda b: b.let_go("!", 0.0), "ended too early|was interrupted|did not answer"),
+    "door": (lambda b: b.let_go("\x84", 0.0), "was interrupted|did not answer"),
+}
+
+
+@BOTH
+@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("seconds", [0.0, 0.013, 1.0])
+def test_after_a_fault_nothing_moves_any_more(dialect: Dialect, name: str, seconds: float) -> None:
+    fault, words = FAULTS[name]
+    bench = Bench(dialect)
+    actuator = bench.connect()
+    actuator.push(1.0)
+    actuator.watch = At(bench, seconds, lambda: fault(bench))
+    with pytest.raises(DeviceError, match=words) as raised:
+        actuator.push(5.0)
+    assert "hint:" in str(raised.value)
+    bench.emulator.faults.is_silent = False
+    bench.emulator.faults.pace = 1.0
+    bench.emulator.advance(bench.emulator.now_s + 10.0)
+    moved_mm = bench.plant.sums["X"]
+    assert moved_mm < 6.0 if name != "cable pulled" else moved_mm <= 6.001
+    for move in (actuator.push, actuator.pull, actuator.roll):
+        with pytest.raises(DeviceError):
+            move(1.0)
+    bench.let_go("~", 10.0)
+    assert bench.plant.sums["X"] == moved_mm
+
+
+@BOTH
+def test_an_axis_that_was_moved_by_something_else_is_noticed(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+    bench.let_go("$J=G91X1F600\n", 2.0)
+    with pytest.raises(DeviceError, match=r"was left at 0\.000"):
+        actuator.push(1.0)
+
+
+@BOTH
+def test_a_restart_finds_a_machine_that_is_not_ready(dialect: Dialect) -> None:
+    for line, words in (
+        ("$J=G91X20F60\n", "moving already"),
+        ("!", "in the state Hold:0"),
+        ("G1X20F60\n", "moving already"),
+    ):
+        bench = Bench(dialect)
+        bench.let_go(line, 1.0)
+        with pytest.raises(DeviceError, match=words):
+            bench.connect()
+    bench = Bench(dialect)
+    bench.emulator.raise_alarm(3)
+    with pytest.raises(DeviceError, match=r"locked by an alarm(.|\n)*\$X"):
+        bench.connect()
+
+
+@BOTH
+def test_a_restart_after_an_unfinished_error_works(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    bench.let_go("G99\nG1X", 1.0)
+    bench.let_go("\n", 1.0)
+    bench.connect().push(1.0)
+    assert bench.plant.sums["X"] == pytest.approx(1.0)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("axes", "settings", "words"),
+    [
+        (Axes(roll=Axis("C")), {}, "no axis C"),
+        (Axes(insert=Axis("X", steps_per_unit=80.0), roll=Axis("Y")), {}, "makes 250 steps per mm"),
+        (Axes(roll=Axis("Y"), roll_deg_per_s=120.0), {}, "100 deg/s at most"),
+        (Axes(roll=Axis("Y")), {"_13": 1.0}, "reports inches"),
+    ],
+)
+def test_a_device_that_is_not_as_described_is_refused(
+    dialect: Dialect, axes: Axes, settings: dict[str, float], words: str
+) -> None:
+    with pytest.raises(DeviceError, match=words):
+        Bench(dialect, axes, **settings).connect()
+
+
+def test_the_travel_is_kept() -> None:
+    bench = Bench(GRBLHAL, Axes(insert=Axis("X", low=-1.0, high=10.0)))
+    actuator = bench.connect()
+    actuator.push(9.0)
+    with pytest.raises(DeviceError, match="outside of the travel"):
+        actuator.push(2.0)
+    actuator.pull(10.0)
+    assert bench.plant.sums["X"] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
+def test_impossible_motions_are_refused(value: float) -> None:
+    bench = Bench(GRBLHAL)
+    actuator = bench.connect()
+    with pytest.raises(DeviceError, match="refuses to push"):
+        actuator.push(value)
+    with pytest.raises(DeviceError, match="refuses to pull"):
+        actuator.pull(value)
+    assert bench.plant.sums == {}
+
+
+def test_a_refused_line_leaves_the_link_whole() -> None:
+    bench = Bench(GRBLHAL, _22=1.0, _20=1.0, _130=50.0)
+    bench.let_go("$X\n", 0.1)
+    actuator = bench.connect()
+    with pytest.raises(DeviceError, match=r"error:15 \(the jog would leave the travel"):
+        actuator.push(1.0)
+    actuator.pull(1.0)
+    assert bench.plant.sums["X"] == pytest.approx(-1.0)
