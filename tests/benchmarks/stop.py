@@ -1,0 +1,135 @@
+"""How long a decision to stop takes to become a byte on the wire, and how far the needle goes on.
+
+    python tests/benchmarks/stop.py [--stops 1000] [--busy 2]
+
+A driver pushes a needle by an emulated GRBL controller on a pseudo-terminal. Another thread decides
+to stop at random moments of the motion and calls `GrblActuator.stop`. Noted are the times from the
+decision until the stop byte has gone into the terminal, and until it can be read at the other end
+(by an own process, which answers nothing itself). First the machine is as it is, then
+``--busy`` processes keep it busy. The bar: p99 at most 20 ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import multiprocessing
+import os
+import pty
+import random
+import select
+import statistics
+import threading
+import time
+import tty
+from multiprocessing.connection import Connection
+
+from ntagen.grbl.actuator import GrblActuator, StoppedError
+from ntagen.grbl.axes import Axes, Axis
+from ntagen.grbl.dialects import GRBLHAL
+from ntagen.grbl.emulator import Emulator
+from ntagen.grbl.memory import Memory
+from ntagen.grbl.port import SerialPort
+from ntagen.grbl.protocol import HOLD
+
+BAR_MS = 20.0
+
+
+class _NotingPort(SerialPort):
+    """Notes when the last stop byte was written."""
+
+    stop_written_s = 0.0
+
+    def write(self, data: bytes) -> None:
+        super().write(data)
+        if data.startswith(HOLD):
+            self.stop_written_s = time.monotonic()
+
+
+def _controller(results: Connection, names: Connection) -> None:
+    """An emulated controller in a process of its own; notes when each stop byte arrives."""
+    emulator = Emulator(GRBLHAL, memory=Memory(GRBLHAL, {110: 6000.0, 111: 6000.0, 120: 200.0}))
+    emulator.power_on()
+    here, there = pty.openpty()
+    tty.setraw(there)
+    names.send(os.ttyname(there))
+    began_s = time.monotonic()
+    while True:
+        due_s = emulator.next_event_s() - (time.monotonic() - began_s)
+        ready, _, _ = select.select([here, results], [], [], max(0.0, min(0.01, due_s)))
+        if results in ready:
+            return
+        data = os.read(here, 4096) if here in ready else b""
+        if HOLD in data:
+            results.send(time.monotonic())
+        emulator.advance(time.monotonic() - began_s)
+        emulator.feed(data)
+        os.write(here, emulator.take())
+
+
+def _spin() -> None:
+    while True:
+        math.sqrt(2.0)
+
+
+def _measure(stops: int, busy: int) -> None:
+    load = [multiprocessing.Process(target=_spin, daemon=True) for _ in range(busy)]
+    results, far_results = multiprocessing.Pipe()
+    names, far_names = multiprocessing.Pipe()
+    controller = multiprocessing.Process(
+        target=_controller, args=(far_results, far_names), daemon=True
+    )
+    for process in (controller, *load):
+        process.start()
+    port = _NotingPort(names.recv())
+    actuator = GrblActuator(port, Axes(insert=Axis("X"), roll=Axis("Y")))
+    draw = random.Random(1)
+    written, arrived, confirmed = [], [], []
+    for _ in range(stops):
+        push = threading.Thread(target=_push, args=(actuator,))
+        push.start()
+        time.sleep(draw.uniform(0.02, 0.12))
+        decided_s = time.monotonic()
+        actuator.stop()
+        confirmed.append(time.monotonic() - decided_s)
+        push.join()
+        written.append(port.stop_written_s - decided_s)
+        arrived.append(results.recv() - decided_s)
+    results.send(None)
+    for process in (controller, *load):
+        process.terminate()
+        process.join()
+    actuator.close()
+    print(f"{stops} stops, {busy} busy processes, {os.cpu_count()} processors")
+    _tell("decision to stop byte written", written)
+    _tell("decision to stop byte readable", arrived)
+    _tell("decision to standing confirmed", confirmed, bar_ms=None)
+
+
+def _push(actuator: GrblActuator) -> None:
+    try:
+        actuator.push(5.0)
+    except StoppedError:
+        return
+    raise SystemExit("a motion was not stopped")
+
+
+def _tell(what: str, seconds: list[float], bar_ms: float | None = BAR_MS) -> None:
+    ms = sorted(1000.0 * s for s in seconds)
+    p99 = ms[math.ceil(0.99 * len(ms)) - 1]
+    verdict = "" if bar_ms is None else f"   p99 / bar = {p99 / bar_ms:.2f}"
+    print(f"  {what}: p50 {statistics.median(ms):.2f}  p99 {p99:.2f}  max {ms[-1]:.2f} ms{verdict}")
+
+
+def main() -> None:
+    """Measures twice and prints."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--stops", type=int, default=1000)
+    parser.add_argument("--busy", type=int, default=2)
+    options = parser.parse_args()
+    for busy in (0, options.busy):
+        _measure(options.stops, busy)
+
+
+if __name__ == "__main__":
+    main()
