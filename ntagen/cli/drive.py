@@ -23,7 +23,7 @@ from ntagen.drive.states import State
 from ntagen.files import read_file, require_apart
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from types import FrameType
 
     from ntagen.drive.configure import Configuration
@@ -195,7 +195,7 @@ def _drive(
     # The log has the strategies; nobody else asks for them.
     synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
     with contextlib.ExitStack() as stack:
-        terminal = stack.enter_context(_terminal()) if speaks else []
+        terminal = stack.enter_context(_terminal(settings.ranking)) if speaks else []
         return simulate(
             run.scene,
             synthesise,
@@ -261,7 +261,12 @@ def _version() -> str:
 class _Lines:
     """Prints the run line by line; on a terminal also what happens at the moment."""
 
-    def __init__(self, status: Any = None) -> None:  # noqa: ANN401  rich is imported late
+    def __init__(
+        self,
+        ranking: Sequence[str],
+        status: Any = None,  # noqa: ANN401  rich is imported late
+    ) -> None:
+        self._ranking = ranking
         self._status = status
 
     def record(self, record: Record) -> None:
@@ -283,10 +288,13 @@ class _Lines:
             )
 
     def started(self, scene: Scene) -> None:
-        """Prints what is steered, and what the driver knows."""
+        """Prints what is steered, what the driver knows, and how it chooses."""
+        from ntagen.plan.wording import ranked_by
+
         echo(
             f"{scene.name}: {len(scene.targets)} target(s), "
-            f"{len(scene.criticals)} critical region(s) known"
+            f"{len(scene.criticals)} critical region(s) known; plans "
+            f"{ranked_by(self._ranking)}"
         )
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
@@ -294,17 +302,17 @@ class _Lines:
 
 
 @contextlib.contextmanager
-def _terminal() -> Iterator[list[Journal]]:
+def _terminal(ranking: Sequence[str]) -> Iterator[list[Journal]]:
     """The journal that prints; only a terminal gets a status line that moves."""
     import sys
 
     if not sys.stdout.isatty():
-        yield [_Lines()]
+        yield [_Lines(ranking)]
         return
     from rich.console import Console
 
     with Console().status("arm") as status:
-        yield [_Lines(status)]
+        yield [_Lines(ranking, status)]
 
 
 def _summary(result: Result, run: _Run, log_path: Path | None) -> dict[str, Any]:

@@ -16,7 +16,8 @@ from typing import Final, Literal, cast
 from ntagen import hardware, rules
 from ntagen.hardware import Axis, GrblDevice, OpenIGTLinkTracker
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
-from ntagen.nsl.resolve import Draft, DraftDevice, DraftRegion, Placed, article
+from ntagen.nsl.draft import Draft, DraftDevice, DraftRegion, Placed
+from ntagen.nsl.resolve import article
 from ntagen.nsl.source import Span
 from ntagen.parameters import Given
 from ntagen.scene import (

@@ -212,8 +212,13 @@ def _cells(items: Sequence[Token | Comment]) -> Iterator[str]:
         elif previous is not None and not is_prefix:
             cell += _space(previous, item)
         cell += _text(item)
+        is_letter = previous is items[0] and isinstance(previous, Token) and previous.type == "AXIS"
         is_prefix = _is_prefix(last_token, item)
         previous = item
+        if is_letter:
+            # The letter of an axis is no operand: a sign after it belongs to the steps.
+            last_token = None
+            continue
         last_token = item if isinstance(item, Token) else last_token
     yield cell
 

@@ -11,37 +11,29 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, Generic, TypeVar
+from typing import Final
 
 from ntagen.nsl import tree
-from ntagen.nsl.diagnostics import Reporter, did_you_mean
+from ntagen.nsl.diagnostics import Reporter
+from ntagen.nsl.draft import Draft, DraftRegion, Placed
+from ntagen.nsl.driving import CHOICES, DriverResolver, is_choice
 from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Evaluator, Scope
 from ntagen.nsl.parser import MAX_DEPTH, parse
 from ntagen.nsl.quantity import (
     ANGLE,
-    DATA,
-    FORCE,
-    FORCE_PER_LENGTH,
     LENGTH,
     NUMBER,
     SPEED,
-    STEPS_PER_ANGLE,
-    STEPS_PER_LENGTH,
     TIME,
-    TURNING,
-    Dimension,
     Quantity,
     is_unit,
     scalar,
 )
 from ntagen.nsl.reading import read_source
-from ntagen.nsl.source import Source, Span
+from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import ALLOWED, BLOCKS, BlockKind
-from ntagen.parameters import BY_WORDS, Given, Kind, Parameter, Value
-from ntagen.scene import RegionKind, Vector
-from ntagen.units import RAD_PER
+from ntagen.parameters import BY_WORDS
 
 MAX_ROUNDS: Final = 10_000
 """All loops of an environment together make at most this many rounds."""
@@ -55,67 +47,6 @@ MAX_REGIONS: Final = 10_000
 MAX_TARGETS: Final = 100
 """An environment has at most this many targets."""
 
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class Placed(Generic[T]):
-    """A value and its place in the file; None is a value with a mistake."""
-
-    value: T | None
-    span: Span
-
-
-@dataclass(frozen=True, slots=True)
-class DraftRegion:
-    """A region: a sphere, or a margin around another region."""
-
-    kind: RegionKind
-    name: str
-    name_span: Span
-    center: Placed[Vector] | None
-    radius: Placed[float]
-    around: Placed[str] | None = None
-
-    @property
-    def margin(self) -> Placed[float]:
-        """The margin of a region that lies around another; it is stored as the radius."""
-        return self.radius
-
-
-@dataclass
-class Draft:
-    """An environment as a file describes it."""
-
-    span: Span
-    name: str
-    seen: dict[str, Span] = field(default_factory=dict)
-    vectors: dict[str, Placed[Vector]] = field(default_factory=dict)
-    numbers: dict[str, Placed[float]] = field(default_factory=dict)
-    angles: list[Placed[float]] = field(default_factory=list)
-    max_rolls: Placed[int] | None = None
-    roll_distance: Placed[float] | None = None
-    choices: dict[str, str] = field(default_factory=dict)
-    resolution: Placed[float] | None = None
-    regions: dict[str, DraftRegion] = field(default_factory=dict)
-    target_count: int = 0
-    broken_names: set[str] = field(default_factory=set)
-    queries: dict[str, Placed[str]] = field(default_factory=dict)
-    has_gaps: bool = False
-    given: list[Given] = field(default_factory=list)
-    devices: dict[str, DraftDevice] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class DraftDevice:
-    """A device or a tracker: its address, its name, and its axes with their letters and steps."""
-
-    kind: str
-    address: Placed[str]
-    name: str = ""
-    axes: dict[str, tuple[Placed[str], Placed[float]]] = field(default_factory=dict)
-
-
 _NUMBERS: Final = {
     "radius": (LENGTH, "the radius of the motion circle"),
     "speed": (SPEED, "the insertion speed"),
@@ -127,24 +58,6 @@ _VECTORS: Final = {
     "heading": (NUMBER, "the heading"),
     "bevel": (NUMBER, "the bevel"),
 }
-_DIMENSIONS: Final[dict[Kind, Dimension]] = {
-    "length": LENGTH,
-    "angle": ANGLE,
-    "time": TIME,
-    "force": FORCE,
-    "force per length": FORCE_PER_LENGTH,
-    "angle per time": TURNING,
-    "data": DATA,
-    "ratio": NUMBER,
-}
-CHOICES: Final = {
-    "tissue": ("static",),
-    "safety": ("sampled", "swept"),
-    "device": ("grbl",),
-    "tracker": ("openigtlink",),
-}
-"""The words that each property allows, the default first."""
-
 _ONCE: Final = frozenset(
     {"needle", "motion", "roll", "resolution", "drive", *_NUMBERS, *_VECTORS, *CHOICES, *BY_WORDS}
 )
@@ -169,6 +82,7 @@ class _Resolver:
         self._reporter = reporter
         self._folders = [os.path.realpath(folder) for folder in folders]
         self._evaluator = Evaluator(reporter)
+        self._driver = DriverResolver(reporter, self._evaluator)
         self._draft: Draft | None = None
         self._open_files: list[str] = []
         self._included: set[str] = set()
@@ -253,7 +167,8 @@ class _Resolver:
             case tree.Section(keyword=keyword, body=body):
                 self._statements(body, scope, keyword)
             case tree.Device():
-                self._device(statement, scope)
+                if self._draft is not None and self._driver.device(statement, self._draft):
+                    self._statements(statement.body, scope, "device")
             case tree.Loop():
                 self._loop(statement, scope)
             case _ if self._draft is not None:
@@ -273,11 +188,11 @@ class _Resolver:
             case tree.Choice():
                 self._choice(statement, draft)
             case tree.Parameter():
-                self._parameter(statement, scope, draft)
+                self._driver.parameter(statement, scope, draft)
             case tree.Axis():
-                self._axis(statement, scope, draft)
+                self._driver.axis(statement, scope, draft)
             case tree.Tracker():
-                self._tracker(statement, draft)
+                self._driver.tracker(statement, draft)
             case tree.Resolution():
                 self._resolution(statement, scope, draft)
 
@@ -588,104 +503,10 @@ class _Resolver:
 
     def _choice(self, statement: tree.Choice, draft: Draft) -> None:
         """A property that is one of a few words."""
-        if self._is_known(statement.word, statement.keyword):
+        if is_choice(statement.word, statement.keyword, self._reporter):
             draft.choices[statement.keyword] = statement.word.text
         else:
             draft.has_gaps = True
-
-    def _is_known(self, word: tree.Identifier, keyword: str) -> bool:
-        """Whether a word is one of those that a property allows; if not, reports it."""
-        known = CHOICES[keyword]
-        if word.text in known:
-            return True
-        self._reporter.report(
-            "unknown-choice",
-            word.span,
-            f"there is no {keyword} `{word.text}`",
-            hint=did_you_mean(word.text, known) or f"write {' or '.join(f'`{w}`' for w in known)}",
-        )
-        return False
-
-    # ------------------------------------------------------------------------- driver and devices
-
-    def _parameter(self, statement: tree.Parameter, scope: Scope, draft: Draft) -> None:
-        """A setting of the driver."""
-        parameter = BY_WORDS[statement.keyword]
-        if parameter.kind != "words" and len(statement.values) > 1:
-            self._reporter.report(
-                "unexpected-word",
-                statement.values[1].span,
-                f"`{parameter.words}` has one value",
-                hint=f"write for example `{parameter.example}`",
-            )
-            return
-        value = self._value(parameter, statement, scope)
-        if value is None:
-            return
-        breach = parameter.breach(value)
-        span = statement.values[0].span
-        if breach is not None:
-            self._reporter.report(breach.rule, span, breach.message, hint=breach.hint)
-        else:
-            draft.given.append(Given(parameter, value, span.place))
-
-    def _value(self, parameter: Parameter, statement: tree.Parameter, scope: Scope) -> Value | None:
-        """The value of a setting; None after a mistake."""
-        first, role = statement.values[0], f"`{parameter.words}`"
-        if parameter.kind == "count":
-            return self._evaluator.whole(first, scope, role)
-        if parameter.kind in _DIMENSIONS:
-            return self._evaluator.number(first, scope, _DIMENSIONS[parameter.kind], role)
-        words = [self._word(expression, parameter) for expression in statement.values]
-        if any(word is None for word in words):
-            return None
-        if parameter.kind == "switch":
-            return words[0] == "on"
-        return tuple(word for word in words if word is not None)
-
-    def _word(self, expression: tree.Expression, parameter: Parameter) -> str | None:
-        """A word that a setting allows; None after a mistake."""
-        text = expression.text if isinstance(expression, tree.Name) else expression.span.text
-        if text in parameter.choices:
-            return text
-        self._reporter.report(
-            "unknown-choice",
-            expression.span,
-            f"`{parameter.words}` cannot be `{text}`",
-            hint=did_you_mean(text, parameter.choices)
-            or f"write {' or '.join(f'`{word}`' for word in parameter.choices)}",
-        )
-        return None
-
-    def _device(self, statement: tree.Device, scope: Scope) -> None:
-        """A device with its axes."""
-        draft = self._draft
-        if draft is None or not self._is_known(statement.kind, "device"):
-            return
-        port = Placed(statement.port.text, statement.port.span)
-        draft.devices["device"] = DraftDevice(statement.kind.text, port)
-        self._statements(statement.body, scope, "device")
-
-    def _axis(self, statement: tree.Axis, scope: Scope, draft: Draft) -> None:
-        """An axis of the device."""
-        dimension = STEPS_PER_LENGTH if statement.keyword == "insert" else STEPS_PER_ANGLE
-        role = f"the steps of `{statement.keyword}`"
-        steps = self._evaluator.number(statement.steps, scope, dimension, role)
-        if steps is not None and statement.keyword == "roll":
-            # Dimensions are computed per rad; controllers and people count per degree.
-            steps *= RAD_PER["deg"]
-        letter = Placed(statement.letter.text, statement.letter.span)
-        draft.devices["device"].axes[statement.keyword] = (
-            letter,
-            Placed(steps, statement.steps.span),
-        )
-
-    def _tracker(self, statement: tree.Tracker, draft: Draft) -> None:
-        """A tracker."""
-        if self._is_known(statement.kind, "tracker"):
-            address = Placed(statement.address.text, statement.address.span)
-            name = "" if statement.name is None else statement.name.text
-            draft.devices["tracker"] = DraftDevice(statement.kind.text, address, name)
 
     def _resolution(self, statement: tree.Resolution, scope: Scope, draft: Draft) -> None:
         """The fixed-point scale, as units per mm."""

@@ -14,7 +14,7 @@ from ntagen.needle.path import sample_poses
 from ntagen.plan.actions import Plan
 from ntagen.plan.document import plan_from_json
 from ntagen.plan.synthesise import Synthesis
-from ntagen.plan.wording import clearance_of, counted
+from ntagen.plan.wording import clearance_of, counted, ranked_by
 from ntagen.plot.picture import Curve, Picture
 from ntagen.scene import Needle, Scene, Vector
 
@@ -34,6 +34,7 @@ def picture_of_plans(scene: Scene, synthesis: Synthesis | None, shown: int) -> P
     if candidates:
         clearance = clearance_of(candidates[0].certificate)
         caption += f"; best: {candidates[0].plan}{clearance and f', {clearance}'}"
+        caption += f"\n{ranked_by(synthesis.ranking)}" if synthesis is not None else ""
     return Picture(
         scene=scene,
         best=curve(plans[0], scene.needle) if plans else (),

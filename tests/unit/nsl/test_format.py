@@ -35,6 +35,30 @@ def test_words_and_clauses_are_spaced() -> None:
     check_layout("query  A  =A[]  x  ", "query A = A[]  x\n")
 
 
+def test_settings_and_axes_are_laid_out_like_other_statements() -> None:
+    check_layout(
+        "drive{depth in\ntarget 0.3 mm force rise 1 N /mm"
+        " ranking length,rolls prior roll -( 1 )deg}",
+        "drive {\n"
+        "  depth in target 0.3 mm  force rise 1 N/mm  ranking length, rolls  prior roll -(1) deg\n"
+        "}\n",
+    )
+    check_layout(
+        'device grbl "p"{insert X-80 steps/ mm\nroll A 8 - 1 steps/deg}'
+        'tracker openigtlink "h:1""n"',
+        'device grbl "p" {\n'
+        "  insert X -80 steps/mm\n"
+        "  roll A 8 - 1 steps/deg\n"
+        "}\n"
+        'tracker openigtlink "h:1" "n"\n',
+    )
+
+
+def test_words_of_settings_are_names_elsewhere() -> None:
+    check_layout("let depth=1 let pull=2\n", "let depth = 1  let pull = 2\n")
+    check_layout("drive { pull pull*2 push 1 mm }", "drive {\n  pull pull * 2  push 1 mm\n}\n")
+
+
 def test_braces_get_their_own_lines() -> None:
     check_layout(
         "environment e{needle{radius 30 mm speed 1 mm/s}"

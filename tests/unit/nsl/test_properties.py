@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from ntagen import nsl
 from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import RESERVED, tokenise
+from ntagen.parameters import BY_WORDS
 from ntagen.scene import Scene
 
 TESTS = Path(__file__).parents[2]
@@ -28,6 +29,13 @@ SIGNS = "{ } ( ) [ ] , = + - * / .. \" // /* */ # ; ~ ' \\ \n \r\n \t \0 é 0 1 
 NAMES = "mm s deg mm/s rad x y z pi sin sqrt C1 T1 Ring i 0..7 static swept sampled"
 VOCABULARY = [
     *sorted(RESERVED),
+    *sorted(BY_WORDS),
+    *sorted({word for words in BY_WORDS for word in words.split()}),
+    "drive { pull 4 mm }",
+    'device grbl "p" { insert X 80 steps/mm',
+    "80 steps/mm",
+    "0.5 N/mm",
+    "off",
     *SIGNS.split(" "),
     *NAMES.split(),
     "\n",
@@ -56,6 +64,26 @@ def words(text: str) -> list[tuple[str, str]]:
         (getattr(item, "type", "COMMENT"), "".join(item.text.split()))
         for item in tokenise(Source("<text>", text))
     ]
+
+
+SETTINGS = st.lists(st.sampled_from(sorted(BY_WORDS)), min_size=1, max_size=12, unique=True)
+BLANKS = st.sampled_from([" ", "\n", "  ", " /* comment */ ", " // comment\n"])
+
+
+@given(SETTINGS, st.data())
+@settings(deadline=None, max_examples=100)
+def test_settings_keep_their_values_in_the_layout(chosen: list[str], data: st.DataObject) -> None:
+    body = "".join(data.draw(BLANKS) + BY_WORDS[words].example for words in chosen)
+    text = (
+        "environment e { needle { radius 30 mm speed 1 mm/s }"
+        f" target T sphere (0, -50, 0) mm radius 10 mm drive {{{body}{data.draw(BLANKS)}}} }}"
+    )
+    given_before = nsl.loads_task(text).given
+    assert [one.parameter.words for one in given_before] == chosen
+    formatted = nsl.format_text(text)
+    assert nsl.format_text(formatted) == formatted
+    after = nsl.loads_task(formatted).given
+    assert [(g.parameter, g.value) for g in after] == [(g.parameter, g.value) for g in given_before]
 
 
 def check_layout(text: str) -> None:
@@ -107,6 +135,9 @@ def test_any_words_are_answered(chosen: list[str], separator: str) -> None:
     text = separator.join(chosen)
     outcome(text)
     outcome(f"environment e {{ needle {{ {text} }} motion {{ {text} }} {text} }}")
+    driven = f'environment e {{ drive {{ {text} }} device grbl "p" {{ {text} }} {text} }}'
+    outcome(driven)
+    check_layout(driven)
     check_layout(text)
 
 

@@ -1,0 +1,73 @@
+"""The draft of an environment: the values in a file, each with its place.
+
+A value with a mistake is None, and the mistake is reported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from ntagen.nsl.source import Span
+from ntagen.parameters import Given
+from ntagen.scene import RegionKind, Vector
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Placed(Generic[T]):
+    """A value and its place in the file; None is a value with a mistake."""
+
+    value: T | None
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class DraftRegion:
+    """A region: a sphere, or a margin around another region."""
+
+    kind: RegionKind
+    name: str
+    name_span: Span
+    center: Placed[Vector] | None
+    radius: Placed[float]
+    around: Placed[str] | None = None
+
+    @property
+    def margin(self) -> Placed[float]:
+        """The margin of a region that lies around another; it is stored as the radius."""
+        return self.radius
+
+
+@dataclass
+class Draft:
+    """An environment as a file describes it."""
+
+    span: Span
+    name: str
+    seen: dict[str, Span] = field(default_factory=dict)
+    vectors: dict[str, Placed[Vector]] = field(default_factory=dict)
+    numbers: dict[str, Placed[float]] = field(default_factory=dict)
+    angles: list[Placed[float]] = field(default_factory=list)
+    max_rolls: Placed[int] | None = None
+    roll_distance: Placed[float] | None = None
+    choices: dict[str, str] = field(default_factory=dict)
+    resolution: Placed[float] | None = None
+    regions: dict[str, DraftRegion] = field(default_factory=dict)
+    target_count: int = 0
+    broken_names: set[str] = field(default_factory=set)
+    queries: dict[str, Placed[str]] = field(default_factory=dict)
+    has_gaps: bool = False
+    given: list[Given] = field(default_factory=list)
+    devices: dict[str, DraftDevice] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class DraftDevice:
+    """A device or a tracker: its address, its name, and its axes with their letters and steps."""
+
+    kind: str
+    address: Placed[str]
+    name: str = ""
+    axes: dict[str, tuple[Placed[str], Placed[float]]] = field(default_factory=dict)
