@@ -57,5 +57,7 @@ def relies_on(settings: Settings, scene: Scene) -> str:
         force = f"on the force: stops when it rises by {settings.force_n:g} N"
     else:
         force = "not on the force: unknown regions are not felt"
-    map_text = f"on {regions}: plans stay more than {settings.margins.clearance_mm:g} mm away"
+    margin_mm = settings.margins.clearance_mm
+    kept = f"plans stay more than {margin_mm:g} mm away" if margin_mm else "plans do not touch it"
+    map_text = f"on {regions}: {kept if known == 1 else kept.replace('touch it', 'touch them')}"
     return "; ".join([position, force, map_text if known else "on no known critical region"])
