@@ -115,7 +115,7 @@ def command(
 
     \b
     Examples:
-      ntagen calibrate points.csv --scene examples/paper.nsl -o registration.json
+      ntagen calibrate examples/calibration.csv --scene examples/paper.nsl -o registration.json
       ntagen calibrate measured.csv image.fcsv --frame tracker --to LPS -o registration.json
     """  # noqa: D301  click wants the control character
     from ntagen.tracking.registration import register

@@ -126,6 +126,15 @@ def test_wrong_options_are_refused(
     assert said.out == ""
 
 
+def test_the_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    examples = ROOT / "examples"
+    arguments = [str(examples / "calibration.csv"), "--scene", str(examples / "paper.nsl")]
+    assert main(["calibrate", *arguments, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["warnings"] == []
+    assert all(one["tre_mm"] < 1.0 for one in document["tre"])
+
+
 def test_one_set_alone_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "p.csv"
     path.write_text(table("a_x_mm,a_y_mm,a_z_mm", PLACES))
