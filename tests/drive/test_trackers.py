@@ -10,7 +10,9 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from ntagen.cli import main
 from ntagen.drive.device import Device
@@ -20,13 +22,17 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import simulate, synthesiser_for
 from ntagen.drive.states import State
 from ntagen.needle.measurement import Measurement
+from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.nsl import load
 from ntagen.openigtlink.client import Policy
-from ntagen.openigtlink.messages import Columns, Position, Transform
+from ntagen.openigtlink.messages import Columns, Freedom, Position, Tool, TrackingData, Transform
 from ntagen.openigtlink.packets import Packet
 from ntagen.openigtlink.server import Server
 from ntagen.plan.synthesise import Synthesis
-from ntagen.scene import Scene, Vector
+from ntagen.scene import Needle, Scene, Vector
+from ntagen.tracking import frames
+from ntagen.tracking.live import LiveTracker, Source
+from ntagen.tracking.mount import Mount
 from ntagen.tracking.plausible import Plausible
 from ntagen.tracking.simulated import NEEDLE, SimulatedTracker
 
@@ -213,6 +219,81 @@ def test_a_server_that_sends_something_else_moves_nothing(
         options = ["--tracker", text, "--registration", "none", "--force-sensing", "off"]
         refused(capsys, tmp_path / "new.mcap", 5, match, *options)
         sender.join()
+
+
+# A whole path: tool, tracker's frame, network, registration.
+
+
+class Bench:
+    """A tracker of five degrees of freedom on a bench, which sees a tool behind the needle's tip.
+
+    The tool's z axis points backwards. Its roll about the needle is chance, as for such trackers.
+    """
+
+    TIP_MM = (0.0, 0.0, -120.0)
+
+    def __init__(self, needle: Device, transform: frames.Transform) -> None:
+        self._needle = needle
+        self._server = Server()
+        self._inverse = np.array(transform.rotation).T
+        self._shift = np.array(transform.translation_mm)
+        self._random = np.random.default_rng(4)
+        mount = Mount("-z", tip_mm=self.TIP_MM)
+        source = Source("127.0.0.1", self._server.port, "Needle", mount, policy=Policy(stale_s=9.0))
+        self._tracker = LiveTracker(source, transform, needle.now_s)
+        assert self._server.wait_for_clients(1, 20.0)
+
+    def measure(self) -> Measurement:
+        found = self._needle.measure()
+        assert found.heading is not None
+        z = -self._inverse @ found.heading
+        across = self._random.normal(size=3)
+        x = across - (across @ z) * z
+        x /= np.linalg.norm(x)
+        origin = self._inverse @ (np.array(found.position_mm) - self._shift) - self.TIP_MM[2] * z
+        x, y, z, origin = (tuple(map(float, one)) for one in (x, np.cross(z, x), z, origin))
+        asked_s = self._tracker.client.now_s()
+        tool = Tool("Needle", Freedom.HEADING, (x, y, z, origin))
+        self._server.send(Packet("Tracker", TrackingData((tool,))))
+        return self._tracker.measure_after(asked_s)
+
+    def close(self) -> None:
+        self._tracker.close()
+        self._server.close()
+
+
+def test_a_tool_behind_the_tip_in_another_frame_steers_as_the_needle_itself() -> None:
+    scene = load(PAPER)
+    settings = Settings()
+    turn = Rotation.from_euler("xyz", [0.4, -1.1, 2.5]).as_matrix()
+    x, y, z = (tuple(map(float, row)) for row in turn)
+    transform = frames.Transform("bench", "scene", (x, y, z), (300.0, -45.0, 812.0))
+    benches: list[Bench] = []
+
+    def sense(needle: Device) -> Plausible:
+        benches.append(Bench(needle, transform))
+        return Plausible(benches[0], scene.needle.tip)
+
+    def make(needle: Needle, obstacles: tuple[Obstacle, ...], seed: int) -> VirtualNeedle:
+        return VirtualNeedle(needle, obstacles, Errors(), seed, SimulatedClock(), reports_pose=True)
+
+    journals = Kept(), Kept()
+    synthesise = synthesiser_for(settings)
+    direct = simulate(scene, synthesise, settings, journals[0], make=make)
+    try:
+        tracked = simulate(scene, synthesise, settings, journals[1], make=make, sense=sense)
+    finally:
+        benches[0].close()
+    assert tracked.ended.outcome == direct.ended.outcome == State.TARGET_REACHED.value
+    commands = [[r for r in one.records if isinstance(r, Command)] for one in journals]
+    assert len(commands[0]) == len(commands[1])
+    for one, other in zip(*commands, strict=True):
+        assert (one.kind, one.value) == (other.kind, pytest.approx(other.value, abs=1e-3))
+    seen = [[r for r in one.records if isinstance(r, Measured)] for one in journals]
+    for one, other in zip(*seen, strict=True):
+        assert math.dist(one.position_mm, other.position_mm) < 1e-3
+        assert math.dist(one.heading, other.heading) < 1e-5
+        assert other.bevel == ()
 
 
 # What goes wrong in the middle of a run.
