@@ -38,6 +38,7 @@ COMMANDS: Final = {
     "plot": "Draw a scene, its plans or a run.",
     "drive": "Steer a needle to the target and log the run.",
     "calibrate": "Find where the scene lies for a tracker, from pairs of points.",
+    "device": "Try a device before it drives a needle.",
     "replay": "Repeat the decisions of a logged run and compare them.",
     "fmt": "Format environment files.",
 }

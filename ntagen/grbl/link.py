@@ -136,7 +136,10 @@ class Link:
             answer = said.pop()
             if isinstance(answer, Refusal):
                 self._unlatch()
-                message = f"{self.name}: the controller refused '{line}': {answer}"
+                message = (
+                    f"{self.name}: the controller refused '{line}': {answer}\n"
+                    "hint: `ntagen device check` shows its settings and limits"
+                )
                 raise RefusedError(message, answer.code)
             return said
 
@@ -211,7 +214,7 @@ class Link:
                             if isinstance(reply, Status):
                                 return self._settled(reply)
             except ProtocolError as error:
-                raise self.fail(str(error)) from None
+                raise self.fail(f"{self.name}: {error}") from None
             finally:
                 self._expects_banner = False
         raise self.fail(

@@ -1,0 +1,137 @@
+"""`ntagen device`: tries a device before it drives a needle."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from ntagen.cli.terminal import echo
+from ntagen.errors import DeviceError, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ntagen.grbl.check import Findings
+    from ntagen.grbl.port import Port
+
+_MOST_MM: Final = 10.0
+
+
+@click.group("device")
+def command() -> None:
+    """Try a device before it drives a needle."""
+
+
+@command.command(
+    "check", epilog="Exit codes: 0 it is ready, 2 the command line is wrong, 5 it is not ready."
+)
+@click.argument("device", metavar="grbl:PORT|grbl+sim")
+@click.option("--baud", "baud_rate", default=115_200, show_default=True, help="The port's speed.")
+@click.option(
+    "--move",
+    "length_mm",
+    metavar="MM",
+    type=click.FloatRange(min=0.0, max=_MOST_MM, min_open=True),
+    help=f"Also move an axis by this length, at most {_MOST_MM:g} mm, and back, after you agree.",
+)
+@click.option("--axis", default="X", show_default=True, help="The axis for --move.")
+@click.option("--yes", is_flag=True, help="Agree to --move beforehand.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+def check(
+    device: str, baud_rate: int, length_mm: float | None, axis: str, yes: bool, as_json: bool
+) -> int:
+    """Look at a device and print what it is.
+
+    The device is asked for its firmware, settings, limits and status. Nothing is moved, and no
+    setting is changed. `grbl+sim` is an emulated controller on a pseudo-terminal.
+
+    \b
+    Examples:
+      ntagen device check grbl:/dev/ttyACM0
+      ntagen device check grbl+sim --move 2
+    """  # noqa: D301  click wants the control character
+    from ntagen.grbl.check import inspect
+
+    with _port(device, baud_rate) as port:
+        findings = inspect(port)
+        if not as_json:
+            _tell(device, findings)
+        moved = length_mm is not None and _agreed(length_mm, axis, yes=yes)
+        if moved and length_mm is not None:
+            _move(port, axis, length_mm)
+    if as_json:
+        echo(json.dumps(asdict(findings) | {"moved_mm": length_mm if moved else 0.0}))
+    elif moved:
+        echo(f"moved {axis} by {length_mm:g} mm and back")
+    else:
+        echo("nothing was moved")
+    if not findings.stands:
+        raise DeviceError(f"{device}: the machine moves\nhint: stop what commands it")
+    return 0
+
+
+@contextlib.contextmanager
+def _port(device: str, baud_rate: int) -> Iterator[Port]:
+    """The port of a device, as long as it is needed."""
+    from ntagen.grbl.port import SerialPort
+
+    kind, _, name = device.partition(":")
+    with contextlib.ExitStack() as stack:
+        if device == "grbl+sim":
+            from ntagen.grbl.dialects import GRBLHAL
+            from ntagen.grbl.emulator import Emulator
+            from ntagen.grbl.pseudo import PseudoTerminal
+
+            emulator = Emulator(GRBLHAL)
+            emulator.power_on()
+            name = stack.enter_context(PseudoTerminal(emulator)).name
+        elif kind != "grbl" or not name:
+            raise InputError(
+                f"there is no device '{device}'\n"
+                "hint: write grbl:PORT, for example grbl:/dev/ttyACM0, or grbl+sim"
+            )
+        port = SerialPort(name, baud_rate)
+        stack.callback(port.close)
+        yield port
+
+
+def _agreed(length_mm: float, axis: str, *, yes: bool) -> bool:
+    """Whether the user wants the motion."""
+    return yes or click.confirm(
+        f"Move {axis} by {length_mm:g} mm and back? Take the needle out of the tissue first.",
+        err=True,
+    )
+
+
+def _move(port: Port, axis: str, length_mm: float) -> None:
+    """Moves an axis forth and back, watched as in a drive."""
+    from ntagen.grbl.actuator import GrblActuator
+    from ntagen.grbl.axes import Axes, Axis
+
+    other = next(letter for letter in "YX" if letter != axis)
+    axes = Axes(insert=Axis(axis), roll=Axis(other), pull_mm_per_s=1.0, roll_deg_per_s=1.0)
+    actuator = GrblActuator(port, axes)
+    actuator.push(length_mm)
+    actuator.pull(length_mm)
+
+
+def _tell(device: str, found: Findings) -> None:
+    echo(f"{device}: {found.firmware} {found.version}, state {found.state}")
+    for axis in found.axes:
+        echo(
+            f"  {axis.letter} at {axis.position:.3f}: {axis.steps_per_unit:g} steps per mm or "
+            f"degree, at most {axis.speed:.4g} per s and {axis.acceleration:g} per s², "
+            f"travel {axis.travel:g}"
+        )
+    for name, is_on in (
+        ("soft limits", found.soft_limits),
+        ("hard limits", found.hard_limits),
+        ("homing", found.homing),
+    ):
+        echo(f"  {name}: {'on' if is_on else 'off'}")
+    for note in found.notes:
+        echo(f"  note: {note}")
