@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import math
 import signal
@@ -328,6 +329,7 @@ def _summary(result: Result, run: _Run, log_path: Path | None) -> dict[str, Any]
         "depth_mm": ended.depth_mm,
         "adjustments": ended.adjustments,
         "syntheses": ended.syntheses,
+        "each_synthesis": [dataclasses.asdict(one) for one in result.syntheses],
         "true_clearance_mm": clearance_mm if math.isfinite(clearance_mm) else None,
         "true_target_distance_mm": result.target_distance_mm,
         "seed": run.configuration.seed,

@@ -375,7 +375,7 @@ class Controller:
         )
         # If the run ended during the synthesis, the synthesis does not count.
         self._syntheses = number
-        self._note(Timed(self._now_s(), number, synthesis.seconds))
+        self._note(Timed(self._now_s(), number, synthesis.seconds, synthesis.loop_seconds))
         return synthesis
 
     def _in_time(self, synthesis: Synthesis, back_mm: float) -> Synthesis:

@@ -111,12 +111,19 @@ class Synthesised(Record):
 
 @dataclass(frozen=True, slots=True)
 class Timed(Record):
-    """The computer's time for a synthesis; simulated time stands still during it."""
+    """The computer's time for a synthesis; simulated time stands still during it.
+
+    Attributes:
+        number: The number of the synthesis.
+        seconds: The engine's time.
+        loop_seconds: The time of all: rendering, loading, solving, certifying and ranking.
+    """
 
     decided: ClassVar[bool] = False
 
     number: int
     seconds: float
+    loop_seconds: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,6 +66,23 @@ def phantom(parameters: PhantomParameters) -> Maker:
 
 
 @dataclass(frozen=True, slots=True)
+class Made:
+    """A synthesis that was made.
+
+    Attributes:
+        found: The number of plans that were found.
+        hold: The number of those that hold in exact kinematics and fit into the time left.
+        engine_seconds: The engine's time.
+        loop_seconds: The time of the whole synthesis.
+    """
+
+    found: int
+    hold: int
+    engine_seconds: float
+    loop_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
 class Result:
     """The end of a simulated run, and the truth about it.
 
@@ -76,12 +93,14 @@ class Result:
         target_distance_mm: The distance of the true tip to the surface of the last target; negative
             inside.
         pierced: All arcs that were really cut.
+        syntheses: Every synthesis, in order.
     """
 
     ended: Ended
     clearance_mm: float
     target_distance_mm: float
     pierced: tuple[Arc, ...]
+    syntheses: tuple[Made, ...]
 
 
 def simulate(
@@ -139,6 +158,7 @@ def simulate(
         clearance_mm=needle.true_clearance_mm(),
         target_distance_mm=distance(tip_mm, last.center_mm) - last.radius_mm,
         pierced=needle.pierced,
+        syntheses=tuple(witness.syntheses),
     )
 
 
@@ -222,11 +242,12 @@ def synthesiser_for(
 
 
 class _Witness:
-    """Adds the truth to a journal, at each measurement and at the end."""
+    """Adds the truth to a journal, at each measurement and at the end; counts syntheses."""
 
     def __init__(self, needle: Simulated, journal: Journal) -> None:
         self._needle = needle
         self._journal = journal
+        self.syntheses: list[Made] = []
 
     def record(self, record: Record) -> None:
         if isinstance(record, Measured | Ended):
@@ -239,4 +260,12 @@ class _Witness:
         """Does nothing: the truth is added to measurements only."""
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """Does nothing: the truth is added to measurements only."""
+        """Notes what was found, and how long that took."""
+        self.syntheses.append(
+            Made(
+                found=synthesis.found,
+                hold=len(synthesis.candidates),
+                engine_seconds=synthesis.seconds,
+                loop_seconds=synthesis.loop_seconds,
+            )
+        )

@@ -51,6 +51,8 @@ class Synthesis:
         found: The number of plans of the model.
         candidates: The plans that hold in exact kinematics, best first.
         seconds: The time that the engine took.
+        loop_seconds: The time of the whole synthesis: rendering, loading, solving, certifying and
+            ranking.
         margins: The margins with which the candidates hold.
         ranking: The criteria by which they are ranked.
         strategy_json: The strategy of the model, as `ntagen check --strategy` writes it; empty if
@@ -62,6 +64,7 @@ class Synthesis:
     found: int
     candidates: tuple[Candidate, ...]
     seconds: float
+    loop_seconds: float = 0.0
     margins: Margins = Margins()
     ranking: tuple[str, ...] = DEFAULT_RANKING
     strategy_json: str = ""

@@ -112,6 +112,11 @@ def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -
     assert summary["outcome"] == "target reached"
     assert summary["true_clearance_mm"] > 0.0
     assert (summary["seed"], summary["known"]) == (3, "none")
+    each = summary["each_synthesis"]
+    assert len(each) == summary["syntheses"]
+    for one in each:
+        assert one["hold"] <= one["found"]
+        assert 0.0 < one["engine_seconds"] < one["loop_seconds"]
 
 
 @pytest.mark.parametrize(
