@@ -371,6 +371,7 @@ class Controller:
                 plan=str(best.plan) if best else "",
                 clearance_mm=min(clearance_mm, _NO_REGION_MM),
                 model_sha256=hashlib.sha256(synthesis.model_xml.encode()).hexdigest(),
+                partial=not synthesis.is_complete,
             )
         )
         # If the run ended during the synthesis, the synthesis does not count.

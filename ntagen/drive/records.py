@@ -92,12 +92,13 @@ class Synthesised(Record):
         number: The number of the synthesis in the run, from 1.
         depth_mm: The depth at which the plans start; it is less than the tip's depth if the driver
             looks for a place behind the tip.
-        found: The number of plans of the model.
+        found: The number of plans that were found.
         accepted: The number of plans that hold in exact kinematics and fit into the time left.
         plan: The best of them in words; empty if there is none.
         clearance_mm: Its distance to critical regions; -1 if there is no plan, 1e9 if there is no
             region.
         model_sha256: The digest of the model that was checked.
+        partial: Whether the model may have more plans than those found: earlier logs list all.
     """
 
     number: int
@@ -107,6 +108,7 @@ class Synthesised(Record):
     plan: str
     clearance_mm: float
     model_sha256: str
+    partial: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,7 +72,7 @@ def _transition(record: Transition) -> str | None:
 
 def _synthesis(record: Synthesised) -> str:
     place = f"synthesis {record.number} from {record.depth_mm:.2f} mm deep"
-    count = counted(record.found, record.accepted)
+    count = counted(record.found, record.accepted, is_complete=not record.partial)
     if not record.plan:
         return f"{place}: {count}"
     far = record.clearance_mm > _FAR_MM

@@ -88,6 +88,8 @@ class BestPlanSynthesiser:
             margins=self.engine.margins,
             ranking=self.engine.ranking,
             strategy_json=first.strategy_json,
+            # Without any plan nothing is left out.
+            is_complete=not first.plans,
         )
 
     def one(self, scene: Scene, *, keeps_strategy: bool = False) -> Listing:
@@ -196,5 +198,8 @@ def _stricter(scene: Scene, by_mm: float, depth_mm: float) -> Scene:
         ),
         detections=tuple(
             replace(region, radius_mm=region.radius_mm + shells_mm) for region in scene.detections
+        ),
+        unexplored=tuple(
+            replace(region, radius_mm=region.radius_mm + shells_mm) for region in scene.unexplored
         ),
     )

@@ -48,7 +48,7 @@ class Synthesis:
     Attributes:
         scene: The scene.
         model_xml: The model that was checked; empty if the plans have another origin.
-        found: The number of plans of the model.
+        found: The number of plans of the model; if it is not complete, of those that were found.
         candidates: The plans that hold in exact kinematics, best first.
         seconds: The time that the engine took.
         loop_seconds: The time of the whole synthesis: rendering, loading, solving, certifying and
@@ -57,6 +57,7 @@ class Synthesis:
         ranking: The criteria by which they are ranked.
         strategy_json: The strategy of the model, as `ntagen check --strategy` writes it; empty if
             there is none, or if it was not wanted.
+        is_complete: Whether all plans of the model were listed, not only the best one looked for.
     """
 
     scene: Scene
@@ -68,6 +69,7 @@ class Synthesis:
     margins: Margins = Margins()
     ranking: tuple[str, ...] = DEFAULT_RANKING
     strategy_json: str = ""
+    is_complete: bool = True
 
     @property
     def best(self) -> Candidate | None:

@@ -19,12 +19,17 @@ _CRITERIA: Final = {
 """The criteria of a ranking in words."""
 
 
-def counted(found: int, hold: int) -> str:
-    """How many plans the model has, and how many of them hold in exact kinematics."""
+def counted(found: int, hold: int, *, is_complete: bool = True) -> str:
+    """How many plans were found, and how many of them hold in exact kinematics.
+
+    If not all plans of the model were listed, the words say so: the number is not that of the
+    model.
+    """
     plans = "1 plan" if found == 1 else f"{found} plans"
     if found == 0:
         return "no plan found"
-    return f"{plans} found, {hold} {'holds' if hold == 1 else 'hold'} in exact kinematics"
+    what = "found" if is_complete else "looked at"
+    return f"{plans} {what}, {hold} {'holds' if hold == 1 else 'hold'} in exact kinematics"
 
 
 def ranked_by(ranking: Sequence[str]) -> str:

@@ -30,7 +30,11 @@ def picture_of_plans(scene: Scene, synthesis: Synthesis | None, shown: int) -> P
     """
     candidates = () if synthesis is None else synthesis.candidates
     plans = [candidate.plan for candidate in candidates[:shown]]
-    caption = "" if synthesis is None else counted(synthesis.found, len(candidates))
+    caption = (
+        ""
+        if synthesis is None
+        else counted(synthesis.found, len(candidates), is_complete=synthesis.is_complete)
+    )
     if candidates:
         clearance = clearance_of(candidates[0].certificate)
         caption += f"; best: {candidates[0].plan}{clearance and f', {clearance}'}"

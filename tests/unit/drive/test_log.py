@@ -43,6 +43,13 @@ ROOT = Path(__file__).parents[3]
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 
+SCALARS = {
+    float: numbers,
+    int: st.integers(0, 10**9),
+    bool: st.booleans(),
+    str: st.text(max_size=9),
+}
+
 
 @st.composite
 def records(draw: st.DrawFn) -> Record:
@@ -54,9 +61,7 @@ def records(draw: st.DrawFn) -> Record:
         if get_args(hint):
             values[field] = tuple(draw(numbers) for _ in range(3))
         else:
-            values[field] = draw(
-                {float: numbers, int: st.integers(0, 10**9), str: st.text(max_size=9)}[hint]
-            )
+            values[field] = draw(SCALARS[hint])
     return kind(**values)
 
 

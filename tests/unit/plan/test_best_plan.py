@@ -35,6 +35,7 @@ def test_its_best_plan_is_about_as_good_as_the_best_of_all(where: Scene) -> None
     assert useful_mm(within_budget) >= useful_mm(all_listed) - 0.7
     assert set(within_budget.candidates) <= set(all_listed.candidates)
     assert within_budget.found < all_listed.found
+    assert (within_budget.is_complete, all_listed.is_complete) == (False, True)
 
 
 def test_that_there_is_no_plan_is_said_by_one_question() -> None:

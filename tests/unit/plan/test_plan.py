@@ -19,7 +19,7 @@ from ntagen.plan.document import document, plan_from_json, plan_to_json
 from ntagen.plan.extract import extract
 from ntagen.plan.rank import CRITERIA, Candidate, parse_ranking, rank
 from ntagen.plan.synthesise import Margins
-from ntagen.plan.wording import ranked_by
+from ntagen.plan.wording import counted, ranked_by
 from ntagen.scene import Scene
 from tests.oracles import planner
 from tests.steering import CRITICAL, PAPER, TARGET, scene, sphere
@@ -131,6 +131,12 @@ def test_a_plan_that_enters_an_unexplored_region_does_not_hold() -> None:
         assert [c.region for c in certificate.clearances] == ["U"]
         assert (certificate.unexplored_clearance_mm > 0.0) is holds
         assert certificate.holds() is holds
+
+
+def test_a_number_that_is_not_that_of_the_model_is_not_called_found() -> None:
+    assert counted(129, 101) == "129 plans found, 101 hold in exact kinematics"
+    assert counted(3, 1, is_complete=False) == "3 plans looked at, 1 holds in exact kinematics"
+    assert counted(0, 0) == "no plan found"
 
 
 def test_the_words_for_a_ranking_name_its_criteria_in_order() -> None:
