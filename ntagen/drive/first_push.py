@@ -30,7 +30,7 @@ def start_error_mm(length_mm: float, radius_mm: float, priors: Priors) -> float:
 
 
 def is_free(scene: Scene, length_mm: float, priors: Priors) -> bool:
-    """Whether a push of this length keeps out of all critical and detection regions."""
+    """Whether a push of this length keeps out of all critical, detection and unexplored regions."""
     needle = scene.needle
     arcs = (Arc(needle.tip, needle.radius_mm, length_mm),)
     reach_mm = start_error_mm(length_mm, needle.radius_mm, priors)

@@ -11,7 +11,7 @@ ahead whose shell just touches the tip; its true size is unknown. If its shell o
 an earlier ball, no plan can pass between the two, and one ball replaces them: the one that explains
 all contacts and the silence of the channels (`ntagen.needle.contact`), else the smallest ball
 around both. The shell of a learned region contains all its contacts, so the driver cannot try the
-same path for ever. No learned region is put over a channel that was cut safely.
+same path for ever. No learned region is put over a channel that was cut safely, or a safe region.
 """
 
 from __future__ import annotations
@@ -238,7 +238,7 @@ class Knowledge:
                 balls = [one for one in balls if one not in near]
                 pending.append(joined)
         known = [r for r in self.learned if r.kind == "detection" and r.name.endswith(" felt")]
-        kept = [*balls, *apart]
+        kept = [one.clear_of(self.a_priori.safe) for one in (*balls, *apart)]
         regions = [one.region for one in kept]
         shells = [
             Region(
@@ -264,6 +264,17 @@ class _Felt:
     region: Region
     contacts: tuple[Contact, ...]
     unsure_mm: float = 0.0
+
+    def clear_of(self, safe: Sequence[Region]) -> _Felt:
+        """The same, so small that it reaches into no safe region."""
+        radius_mm = min(
+            [
+                self.region.radius_mm,
+                *(distance(self.region.center_mm, one.center_mm) - one.radius_mm for one in safe),
+            ]
+        )
+        region = replace(self.region, radius_mm=max(_LEAST_RADIUS_MM, radius_mm))
+        return replace(self, region=region)
 
     def reach_mm(self, margin_mm: float) -> float:
         """The radius of its shell, which contains all its contacts: none is tried again."""
@@ -298,6 +309,9 @@ def _without(shell: Region, point_mm: Vector) -> Region | None:
 
 _QUIET_SPACING_MM = 2.0
 """Channels are sampled this densely for places that were passed in silence."""
+
+_LEAST_RADIUS_MM = 0.1
+"""A learned region is at least this large, also if it was felt at a safe one."""
 
 _MOST_UNSURE_MM = 2.0
 """The shell of a learned region is made wider by its uncertainty, but not by more than this."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -140,3 +141,12 @@ def test_known_regions_explain_a_rise_up_to_their_surface() -> None:
         knowledge.expected_force_n((0.0, -25.0 + away, 0.0), settings) for away in (9.0, 5.2, 3.0)
     ]
     assert forces[0] == 0.0 < forces[1] < forces[2]
+
+
+def test_a_learned_region_does_not_reach_into_a_safe_one() -> None:
+    tip = pose_at(0.0, -10.0, 0.0)
+    safe = sphere("S", "safe", (3.0, -15.0, 0.0), 2.0)
+    knowledge = Knowledge(replace(scene(), safe=(safe,))).with_contact(tip, 3.0, 2.0)
+    ball, shell = knowledge.learned
+    assert ball.radius_mm == pytest.approx(1.0)
+    assert distance(tip.position_mm, shell.center_mm) <= shell.radius_mm + 1e-9
