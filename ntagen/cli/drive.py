@@ -46,8 +46,9 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     "--needle",
     default="virtual",
     show_default=True,
-    help="Which needle to steer. Both are simulations: virtual bends exactly as planned, phantom "
-    "drifts, lags and is measured as real needles are.",
+    help="Which needle to steer. All are simulations: virtual bends exactly as planned, phantom "
+    "drifts, lags and is measured as real needles are, and grbl+sim is a phantom behind an "
+    "emulated stepper controller.",
 )
 @tracker_options
 @click.option(
@@ -120,7 +121,7 @@ def command(
         echo(warning.render(), err=True)
     configuration = configure((*task.given, *given), task.scene, known, needle)
     errors = configuration.errors
-    if needle == "phantom":
+    if configuration.needle.parameters is not None:
         idle = {"given_needle_noise_mm": "--noise", "given_needle_roll_rad": "--roll-error"}
         say_idle(idle, "on a phantom needle, which has its own errors")
     elif not (errors.noise_mm or errors.roll_rad):

@@ -7,13 +7,14 @@ from typing import Any, Final
 
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import Maker, phantom, settings_for, settings_for_phantom, virtual
+from ntagen.drive.stepped import stepped
 from ntagen.errors import InputError
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.virtual import Errors
 from ntagen.scene import Scene
 
-NAMES: Final = ("virtual", "phantom")
-"""The names of the needles."""
+NAMES: Final = ("virtual", "phantom", "grbl+sim")
+"""The names of the needles; the last is a phantom behind an emulated stepper controller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,8 @@ def choose(name: str, errors: Errors) -> Chosen:
         raise InputError(
             f"there is no needle '{name}'\nhint: choose from {', '.join(sorted(NAMES))}"
         )
-    if name == "phantom":
+    if name != "virtual":
         parameters = PhantomParameters()
-        return Chosen(name, phantom(parameters), errors, parameters)
+        make = phantom(parameters)
+        return Chosen(name, make if name == "phantom" else stepped(make), errors, parameters)
     return Chosen(name, virtual(errors), errors)

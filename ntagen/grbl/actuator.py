@@ -209,7 +209,7 @@ class GrblActuator:
                 raise StoppedError(f"{self._link.name}: the motion was stopped")
             self.watch()
 
-        goal = self._plan(motor, way, speed)
+        goal = self._plan(motor, way, speed, watch)
         if abs(goal.way) < motor.tolerance / 2.0:
             return
         try:
@@ -222,14 +222,24 @@ class GrblActuator:
             self._stop_for(error)
             raise
 
-    def _plan(self, motor: Motor, way: float, speed: float) -> _Goal:
+    def _status(self, watch: Watch) -> Status:
+        """A status report that is not yet about a stop by another thread.
+
+        The stop is counted before its bytes are written, so a hold that it causes is never taken
+        for a fault.
+        """
+        status = self._link.status(watch)
+        watch()
+        return status
+
+    def _plan(self, motor: Motor, way: float, speed: float, watch: Watch) -> _Goal:
         """The motion from where the axes stand, if they stand where they were left.
 
         Raises:
             DeviceError: They do not, or the end is outside of the limits.
         """
         self._link.require_whole()
-        start = position_of(require_ready(self._link, self._link.status()))
+        start = position_of(require_ready(self._link, self._status(watch)))
         for m in (self._insert, self._roll):
             if abs(start[m.index] - self._expected[m.index]) > m.tolerance:
                 raise self._link.fail(
@@ -268,7 +278,7 @@ class GrblActuator:
         latest_s = began_s + 1.5 * seconds + 1.0
         last = goal.start[goal.motor.index]
         while True:
-            status = self._link.status(watch)
+            status = self._status(watch)
             now_s, here = self.now_s(), position_of(status)[goal.motor.index]
             self._require_on_way(goal, status)
             if here != last:

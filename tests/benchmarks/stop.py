@@ -86,13 +86,16 @@ def _measure(stops: int, busy: int) -> None:
     draw = random.Random(1)
     written, arrived, confirmed = [], [], []
     for _ in range(stops):
-        push = threading.Thread(target=_push, args=(actuator,))
+        failures: list[Exception] = []
+        push = threading.Thread(target=_push, args=(actuator, failures))
         push.start()
         time.sleep(draw.uniform(0.02, 0.12))
         decided_s = time.monotonic()
         actuator.stop()
         confirmed.append(time.monotonic() - decided_s)
         push.join()
+        if failures:
+            raise failures[0]
         written.append(port.stop_written_s - decided_s)
         arrived.append(results.recv() - decided_s)
     results.send(None)
@@ -106,12 +109,16 @@ def _measure(stops: int, busy: int) -> None:
     _tell("decision to standing confirmed", confirmed, bar_ms=None)
 
 
-def _push(actuator: GrblActuator) -> None:
+def _push(actuator: GrblActuator, failures: list[Exception]) -> None:
+    """Pushes until somebody stops it; notes any other end."""
     try:
         actuator.push(5.0)
     except StoppedError:
         return
-    raise SystemExit("a motion was not stopped")
+    except Exception as error:
+        failures.append(error)
+    else:
+        failures.append(RuntimeError("a motion was not stopped"))
 
 
 def _tell(what: str, seconds: list[float], bar_ms: float | None = BAR_MS) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import pytest
 
 from ntagen.errors import DeviceError
-from ntagen.grbl.actuator import GrblActuator, StoppedError
+from ntagen.grbl.actuator import STOP_BYTES, GrblActuator, StoppedError
 from ntagen.grbl.axes import Axes, Axis
 from ntagen.grbl.dialects import GRBL_11H, GRBLHAL, Dialect
 from ntagen.grbl.emulator import Emulator
@@ -112,6 +113,52 @@ def test_a_stop_ends_the_motion_and_another_motion_may_follow(dialect: Dialect) 
 
 
 @BOTH
+@pytest.mark.parametrize("seconds", [0.0, 0.001, 0.003, 0.006, 0.01, 0.05, 2.0, 3.99, 4.05])
+def test_a_stop_at_any_moment_is_no_fault(dialect: Dialect, seconds: float) -> None:
+    bench = Bench(dialect, replace(AXES[dialect.name], max_mm=2.0))
+    actuator = bench.connect()
+    actuator.watch = At(bench, seconds, actuator.stop)
+    with pytest.raises(StoppedError):
+        actuator.push(6.0)
+    stopped_mm = bench.plant.sums.get("X", 0.0)
+    actuator.push(1.0)
+    assert bench.plant.sums["X"] == pytest.approx(stopped_mm + 1.0, abs=0.005)
+
+
+class Interrupted(SimulatedPort):
+    """A port at which another thread's stop comes just before a chosen read."""
+
+    def __init__(self, emulator: Emulator) -> None:
+        super().__init__(emulator)
+        self._emulator = emulator
+        self.actuator: GrblActuator | None = None
+        self.reads_left = 0
+
+    def read(self, timeout_s: float) -> bytes:
+        self.reads_left -= 1
+        if self.reads_left == 0 and self.actuator is not None:
+            # What `stop` does until it waits for its turn to talk.
+            self.actuator._stops += 1
+            self._emulator.feed(STOP_BYTES)
+        return super().read(timeout_s)
+
+
+@BOTH
+@pytest.mark.parametrize("count", [*range(1, 12), 20, 50, 200])
+def test_a_stop_of_another_thread_before_any_read_is_no_fault(dialect: Dialect, count: int) -> None:
+    bench = Bench(dialect)
+    port = Interrupted(bench.emulator)
+    actuator = port.actuator = GrblActuator(port, bench.axes)
+    port.reads_left = count
+    with pytest.raises(StoppedError):
+        actuator.push(5.0)
+    actuator.stop()
+    stopped_mm = bench.plant.sums.get("X", 0.0)
+    actuator.push(1.0)
+    assert bench.plant.sums["X"] == pytest.approx(stopped_mm + 1.0, abs=0.005)
+
+
+@BOTH
 def test_what_the_watch_raises_stops_the_needle_first(dialect: Dialect) -> None:
     bench = Bench(dialect)
     actuator = bench.connect()
@@ -158,8 +205,8 @@ FAULTS: dict[str, tuple[Callable[[Bench], None], str]] = {
     "reset": (lambda b: b.let_go("\x18", 0.0), r"ALARM:3|was reset"),
     "power cut": (lambda b: b.emulator.power_on(), "the controller was reset"),
     "cable pulled": (lambda b: b.port.break_off(), "connection to the controller is broken"),
-    "hold button": (lambda b: b.let_go("!", 0.0), "ended too early|was interrupted|did not answer"),
-    "door": (lambda b: b.let_go("\x84", 0.0), "was interrupted|did not answer"),
+    "hold button": (lambda b: b.let_go("!", 0.0), "ended too early|was interrupted|not idle"),
+    "door": (lambda b: b.let_go("\x84", 0.0), "was interrupted|not idle"),
 }
 
 
