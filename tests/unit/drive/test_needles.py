@@ -64,5 +64,5 @@ def test_the_log_says_which_needle_it_was() -> None:
 
 
 def test_another_name_is_refused_with_the_names_that_there_are() -> None:
-    with pytest.raises(InputError, match="choose from phantom, virtual"):
+    with pytest.raises(InputError, match=r"choose from grbl\+sim, phantom, virtual"):
         configure([], OPEN, needle="real")
