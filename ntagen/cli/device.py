@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from ntagen.cli.effects import say_idle
 from ntagen.cli.terminal import echo
+from ntagen.cli.tracker import look_at
 from ntagen.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
@@ -19,6 +21,10 @@ if TYPE_CHECKING:
     from ntagen.grbl.port import Port
 
 _MOST_MM: Final = 10.0
+_STEPPERS_ONLY: Final = {
+    **{"baud_rate": "--baud", "length_mm": "--move", "axis": "--axis"},
+    "yes": "--yes",
+}
 
 
 @click.group("device")
@@ -29,7 +35,7 @@ def command() -> None:
 @command.command(
     "check", epilog="Exit codes: 0 it is ready, 2 the command line is wrong, 5 it is not ready."
 )
-@click.argument("device", metavar="grbl:PORT|grbl+sim")
+@click.argument("device", metavar="grbl:PORT|grbl+sim|openigtlink:HOST:PORT")
 @click.option("--baud", "baud_rate", default=115_200, show_default=True, help="The port's speed.")
 @click.option(
     "--move",
@@ -39,23 +45,46 @@ def command() -> None:
     help=f"Also move an axis by this length, at most {_MOST_MM:g} mm, and back, after you agree.",
 )
 @click.option("--axis", default="X", show_default=True, help="The axis for --move.")
+@click.option(
+    "--listen",
+    "listen_s",
+    metavar="SECONDS",
+    default=2.0,
+    show_default=True,
+    type=click.FloatRange(min=0.0, max=3600.0, min_open=True),
+    help="Listen to a tracker for so long.",
+)
 @click.option("--yes", is_flag=True, help="Agree to --move beforehand.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def check(
-    device: str, baud_rate: int, length_mm: float | None, axis: str, yes: bool, as_json: bool
+    device: str,
+    baud_rate: int,
+    length_mm: float | None,
+    axis: str,
+    listen_s: float,
+    yes: bool,
+    as_json: bool,
 ) -> int:
     """Look at a device and print what it is.
 
     The device is asked for its firmware, settings, limits and status. Nothing is moved, and no
     setting is changed. `grbl+sim` is an emulated controller on a pseudo-terminal.
 
+    Of a tracker, openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, the devices that it sends are
+    printed, with their rates and positions.
+
     \b
     Examples:
       ntagen device check grbl:/dev/ttyACM0
       ntagen device check grbl+sim --move 2
+      ntagen device check openigtlink:localhost:18944
     """  # noqa: D301  click wants the control character
     from ntagen.grbl.check import inspect
 
+    if device.startswith("openigtlink:"):
+        say_idle(_STEPPERS_ONLY, "with a tracker")
+        return look_at(device, listen_s, as_json=as_json)
+    say_idle({"listen_s": "--listen"}, "without a tracker")
     with _port(device, baud_rate) as port:
         findings = inspect(port)
         if not as_json:
@@ -92,7 +121,8 @@ def _port(device: str, baud_rate: int) -> Iterator[Port]:
         elif kind != "grbl" or not name:
             raise InputError(
                 f"there is no device '{device}'\n"
-                "hint: write grbl:PORT, for example grbl:/dev/ttyACM0, or grbl+sim"
+                "hint: write grbl:PORT, for example grbl:/dev/ttyACM0, or grbl+sim, or "
+                "openigtlink:HOST:PORT"
             )
         port = SerialPort(name, baud_rate)
         stack.callback(port.close)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.errors import InputError
+from ntagen.cli.terminal import echo
+from ntagen.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
     from ntagen.drive.device import Device, Sensor
     from ntagen.hardware import OpenIGTLinkTracker
     from ntagen.scene import Pose
     from ntagen.tracking.frames import Transform
+    from ntagen.tracking.look import Look
     from ntagen.tracking.spec import Tracker
 
 SIMULATED: Final = "openigtlink+sim"
@@ -146,3 +149,46 @@ def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[
             return Plausible(sensor, entry)
 
         yield sense
+
+
+def look_at(text: str, seconds: float, *, as_json: bool) -> int:
+    """Prints what an OpenIGTLink server sends; returns the exit code.
+
+    Raises:
+        InputError: The words have a mistake.
+        DeviceError: There is no server, or nothing of use comes from it.
+    """
+    from ntagen.tracking.live import Source
+    from ntagen.tracking.look import look
+    from ntagen.tracking.spec import parse_tracker
+
+    source = parse_tracker(text)
+    if not isinstance(source, Source):
+        raise InputError(f"{text} is a file\nhint: only openigtlink:HOST:PORT can be listened to")
+    found = look(source, seconds)
+    if as_json:
+        echo(json.dumps(asdict(found)))
+    else:
+        _tell(text, seconds, found)
+    problems = [one.problem for one in found.devices if one.problem]
+    if problems:
+        raise DeviceError("\n".join(problems))
+    return 0
+
+
+def _tell(text: str, seconds: float, found: Look) -> None:
+    echo(f"{text}: {len(found.devices)} device(s) in {seconds:g} s")
+    for one in found.devices:
+        place = ", ".join(f"{number:.2f}" for number in one.position_mm)
+        stamp = "" if one.has_stamp else ", without time stamps"
+        echo(f"  {one.name}: {one.kind}, {one.rate_hz:.1f} per s{stamp}; at ({place}) mm")
+    for name, words in found.sensors:
+        echo(f"  sensor {name}: {words}")
+    for name, words in found.statuses:
+        echo(f"  status of {name}: {words}")
+    counts = found.counts
+    if counts.skipped:
+        echo(
+            f"  skipped: {counts.unknown} messages of other types, {counts.wrong_crc} with a wrong "
+            f"checksum, {counts.malformed} that were malformed"
+        )

@@ -98,6 +98,15 @@ class Sample(Generic[Kind]):
 
 
 @dataclass(frozen=True, slots=True)
+class Held:
+    """The newest samples of a connection, by the names of the devices."""
+
+    poses: Mapping[str, Sample[Pose]]
+    sensors: Mapping[str, Sample[Sensor]]
+    statuses: Mapping[str, Sample[Status]]
+
+
+@dataclass(frozen=True, slots=True)
 class Statistics:
     """What a client has seen until now.
 
@@ -205,6 +214,15 @@ class Client:
         """The newest STATUS of a device, of any age; `None` if there was none."""
         with self._changed:
             return self._statuses.get(device)
+
+    def held(self) -> Held:
+        """All newest samples, of any age."""
+        with self._changed:
+            return Held(dict(self._poses), dict(self._sensors), dict(self._statuses))
+
+    def listen(self, seconds: float) -> None:
+        """Waits, while samples come."""
+        self._closing.wait(seconds)
 
     def devices(self) -> tuple[str, ...]:
         """The names of the devices that said where they are, sorted."""

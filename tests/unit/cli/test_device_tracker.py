@@ -1,0 +1,120 @@
+"""`ntagen device check` with a tracker: what it prints, and when it says that it is not ready."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from ntagen.cli import main
+from ntagen.openigtlink.messages import (
+    NEWTON,
+    Columns,
+    Freedom,
+    Position,
+    Sensor,
+    Status,
+    Tool,
+    TrackingData,
+    Transform,
+)
+from ntagen.openigtlink.packets import HEADER, Packet
+from ntagen.openigtlink.server import Server
+
+PLAIN: Columns = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0))
+MIRRORED: Columns = ((-1.0, 0.0, 0.0), *PLAIN[1:])
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    """A server that sends the same again and again."""
+    tools = (Tool("Tip", Freedom.HEADING, PLAIN),)
+    messages = (
+        Packet("Needle", Transform(PLAIN), stamp_s=5.0),
+        Packet("Mirror", Transform(MIRRORED)),
+        Packet("Point", Position((4.0, 5.0, 6.0))),
+        Packet("Tracker", TrackingData(tools)),
+        Packet("Force", Sensor((250.0,), 0xB << 60 | NEWTON)),
+        Packet("Tracker", Status(13)),
+    )
+    stop = threading.Event()
+    with Server() as server:
+
+        def send_always() -> None:
+            while not stop.wait(0.01):
+                server.send(*messages)
+                server.send_bytes(HEADER.pack(1, b"IMAGE", b"I", 0, 3, 0) + b"abc")
+
+        sender = threading.Thread(target=send_always)
+        sender.start()
+        yield server
+        stop.set()
+        sender.join()
+
+
+def check(server: Server, *options: str, words: str = "") -> int:
+    device = f"openigtlink:127.0.0.1:{server.port}{words}"
+    return main(["device", "check", device, "--listen", "0.3", *options])
+
+
+def test_all_devices_are_told(server: Server, capsys: pytest.CaptureFixture[str]) -> None:
+    assert check(server, words=":Needle") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].endswith(":Needle: 4 device(s) in 0.3 s")
+    assert [line.partition(",")[0] for line in lines[1:5]] == [
+        "  Mirror: TRANSFORM",
+        "  Needle: TRANSFORM",
+        "  Point: POSITION",
+        "  Tip: TDATA",
+    ]
+    assert "without time stamps; at (4.00, 5.00, 6.00) mm" in lines[3]
+    assert "without time stamps" not in lines[2]
+    assert "without the roll" in lines[4]
+    assert lines[5:7] == ["  sensor Force: 0.25 N", "  status of Tracker: device not ready"]
+    assert lines[7].startswith("  skipped: ")
+
+
+def test_json_is_one_object(server: Server, capsys: pytest.CaptureFixture[str]) -> None:
+    assert check(server, "--json", words=":Tip") == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [one["name"] for one in document["devices"]] == ["Mirror", "Needle", "Point", "Tip"]
+    assert document["devices"][3]["rate_hz"] > 1.0
+    assert document["counts"]["unknown"] > 0
+
+
+@pytest.mark.parametrize(
+    ("words", "match"),
+    [
+        (":Mirror", "'Mirror' is not a rotation: it mirrors"),
+        (":Tip,bevel=+x", "five degrees of freedom of 'Tip'"),
+        (":Point,tip=0/0/1", "no orientation of 'Point'"),
+        (":Other", "it sends 'Mirror', 'Needle', 'Point', 'Tip'"),
+    ],
+)
+def test_a_device_that_cannot_steer_is_not_ready(
+    server: Server, capsys: pytest.CaptureFixture[str], words: str, match: str
+) -> None:
+    assert check(server, words=words) == 5
+    assert match in capsys.readouterr().err
+
+
+def test_servers_that_say_nothing_or_are_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    with Server() as silent:
+        assert check(silent) == 5
+        assert "has sent nothing of use" in capsys.readouterr().err
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    assert main(["device", "check", f"openigtlink:127.0.0.1:{port}"]) == 5
+    assert "connection refused" in capsys.readouterr().err
+    assert main(["device", "check", "openigtlink:nowhere"]) == 2
+    assert "host and port are missing" in capsys.readouterr().err
+
+
+def test_options_of_steppers_are_named_as_idle(
+    server: Server, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert check(server, "--move", "2", words=":Needle") == 0
+    assert "--move has no effect with a tracker" in capsys.readouterr().err
