@@ -29,7 +29,13 @@ _STEPPERS_ONLY: Final = {
 
 @click.group("device")
 def command() -> None:
-    """Try a device before it drives a needle."""
+    """Try a device before it drives a needle.
+
+    \b
+    Examples:
+      ntagen device check grbl:/dev/ttyACM0
+      ntagen device check openigtlink:localhost:18944
+    """  # noqa: D301  click wants the control character
 
 
 @command.command(
