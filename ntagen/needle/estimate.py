@@ -8,8 +8,9 @@ channels that were cut (`ntagen.needle.channels`), with a few unknowns:
 * the entry pose (three for the position, three small rotations),
 * the curvature at the entry, as a factor of the expected one,
 * the error of each roll, since a shaft does not turn its tip exactly as it is turned at its base,
-* the changes of curvature and bend plane from one stretch of 5 mm to the next (a random walk), if
-  their priors are not 0. So old measurements say less about the present curvature than new ones.
+* the changes of curvature and bend plane from one stretch of 5 mm to the next, if their priors
+  are not 0: the turn of the bend plane is a random walk, and a change of the curvature fades over
+  10 mm. So old measurements say less about the present curvature than new ones.
 
 Non-linear least squares finds the unknowns with the greatest posterior density. The noise weighs
 each measurement, and the prior weighs each unknown. Measurements in a channel that the needle has
@@ -26,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.needle.channels import ENTRY, STRETCH_MM, Channel, Placed, Stretch, place
+from ntagen.needle.channels import ENTRY, MEMORY_MM, STRETCH_MM, Channel, Placed, Stretch, place
 from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.descent import least_squares
 from ntagen.needle.kinematics import Arc, bending_axis, orthonormal, push
@@ -48,6 +49,15 @@ _DRIFT_LENGTH_MM = 10.0
 
 _DISTORTION_LENGTH_MM = 10.0
 """The length over which `Priors.distortion_mm` is about the same error."""
+
+_AHEAD_MM = 30.0
+"""Predictions are made for about this length: the usual one of a plan's rest."""
+
+_STAYING_RATIO = 2.0 * (
+    MEMORY_MM / _AHEAD_MM - (MEMORY_MM / _AHEAD_MM) ** 2 * (1.0 - math.exp(-_AHEAD_MM / MEMORY_MM))
+)
+"""The part of a change of curvature that would have the same effect on the position after
+`_AHEAD_MM` if it did not fade: the mean of exp(-u / memory), weighted with the length left."""
 
 _STRETCH_RATIO = math.sqrt(STRETCH_MM / _DRIFT_LENGTH_MM)
 """The drift over one stretch, relative to that over `_DRIFT_LENGTH_MM`."""
@@ -98,11 +108,12 @@ class Estimate:
 
     Attributes:
         path: The estimated channel in which the needle lies now; its end is the tip.
-        radius_mm: The radius of the motion circle at the tip.
+        radius_mm: The expected radius of the motion circle over the next 30 mm: of the present
+            change of the curvature, only a part stays. Without drift it is that of the whole path.
         radius_std_mm: Its standard deviation.
         rms_mm: Root mean square of the distances between measured and estimated positions.
         covariance: Of the tip, in seven rows: position (x, y, z in mm), rotation vector (about x,
-            y, z in rad), logarithm of the curvature.
+            y, z in rad), logarithm of the expected curvature.
         curvature_drift: `Priors.curvature_drift`, for predictions.
         turn_drift_rad: `Priors.turn_drift_rad`, for predictions.
     """
@@ -131,7 +142,8 @@ class Estimate:
 
         A drift that begins ``u`` mm before the end of the push displaces the end by ``k u^2 / 2``
         times its size, to the side or out of the plane. For a random walk of variance ``q`` per mm
-        over ``s`` mm this gives the variance ``k^2 q s^5 / 20``.
+        over ``s`` mm this gives the variance ``k^2 q s^5 / 20``. The curvature's changes fade, so
+        for them this is a little too much.
 
         Args:
             length_mm: The length of the push, at least 0.
@@ -256,7 +268,8 @@ class Estimator:
             lambda unknowns: problem.at(unknowns, *expected), start, stds
         )
         begin, placed = place(self._channels, *expected, self._solution)
-        path, tip = self._path(self._solution, begin, placed)
+        path, present = self._path(self._solution, begin, placed)
+        tip = present.faded(_STAYING_RATIO, begin)
         to_tip = _slopes_of(tip)
         covariance = to_tip @ unknowns_covariance @ to_tip.T
         return Estimate(
