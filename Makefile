@@ -93,6 +93,12 @@ bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadloc
 	$(BIN)/python tests/benchmarks/race.py --threads 2 "fischer 10" "csmacd 11" peterson
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
+.PHONY: bench-needle
+bench-needle: $(INSTALLED) ## Measure the phantom needle against real ones, what the estimator predicts of it, and how its drives end
+	$(BIN)/python tests/benchmarks/phantom.py
+	$(BIN)/python tests/benchmarks/predictions.py
+	$(BIN)/python tests/benchmarks/drives.py --needle phantom --seeds 20
+
 .PHONY: bench-limits
 bench-limits: $(INSTALLED) ## Measure whether the time and memory limits hold: 20 models with up to 250 clocks
 	$(BIN)/python tests/benchmarks/limits.py

@@ -34,6 +34,8 @@ from ntagen.needle.kinematics import Arc, bending_axis, orthonormal, push
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.path import Stretch as PathStretch
+from ntagen.needle.priors import Priors as Priors
+from ntagen.needle.residuals import Problem, Reading
 from ntagen.scene import Pose
 
 _Array = NDArray[np.float64]
@@ -41,14 +43,8 @@ _Array = NDArray[np.float64]
 _POSE_UNKNOWNS = 7
 """Position (3), rotations (3) and curvature (1) come before all other unknowns."""
 
-_LAG_DEPTH_MM = 100.0
-"""The depth for which `Priors.lag_rad` is given."""
-
 _DRIFT_LENGTH_MM = 10.0
 """The length for which drifts are given; over another length, a random walk goes with its root."""
-
-_DISTORTION_LENGTH_MM = 10.0
-"""The length over which `Priors.distortion_mm` is about the same error."""
 
 _AHEAD_MM = 30.0
 """Predictions are made for about this length: the usual one of a plan's rest."""
@@ -61,45 +57,6 @@ _STAYING_RATIO = 2.0 * (
 
 _STRETCH_RATIO = math.sqrt(STRETCH_MM / _DRIFT_LENGTH_MM)
 """The drift over one stretch, relative to that over `_DRIFT_LENGTH_MM`."""
-
-
-@dataclass(frozen=True, slots=True)
-class Priors:
-    """Standard deviations that are assumed before anything is measured.
-
-    Attributes:
-        position_mm: Each coordinate of the entry point.
-        heading_rad: The entry's heading, about either transverse axis.
-        bevel_rad: The bevel's angle about the shaft at the entry.
-        curvature_ratio: The curvature, relative to the expected one.
-        roll_rad: The error of each roll.
-        noise_mm: Each coordinate of a measured position.
-        direction_rad: A measured direction, if the sensor reports directions.
-        curvature_drift: The change of the curvature over 10 mm, as a ratio; 0 for a curvature
-            that stays the same.
-        turn_drift_rad: The turn of the bend plane over 10 mm without a roll; 0 for none.
-        lag_rad: A further error of each roll at a depth of 100 mm, since friction holds the shaft.
-            It grows with the square of the depth (Reed et al., 2009).
-        distortion_mm: A further error of each coordinate of a measured position that is about the
-            same for all measurements on 10 mm of a channel, as of a distorted magnetic field. More
-            measurements do not reduce it.
-    """
-
-    position_mm: float = 0.2
-    heading_rad: float = math.radians(1.0)
-    bevel_rad: float = math.radians(2.0)
-    curvature_ratio: float = 0.05
-    roll_rad: float = math.radians(1.0)
-    noise_mm: float = 0.1
-    direction_rad: float = math.radians(1.0)
-    curvature_drift: float = 0.0
-    turn_drift_rad: float = 0.0
-    lag_rad: float = 0.0
-    distortion_mm: float = 0.0
-
-    def roll_std_rad(self, depth_mm: float) -> float:
-        """The standard deviation of the error of a roll at a depth."""
-        return math.hypot(self.roll_rad, self.lag_rad * (depth_mm / _LAG_DEPTH_MM) ** 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,13 +138,6 @@ class Estimate:
         return math.sqrt(max(0.0, float(largest)))
 
 
-@dataclass(slots=True)
-class _Reading:
-    channel: int
-    offset_mm: float
-    measurement: Measurement
-
-
 class Estimator:
     """Collects commands and measurements; gives an estimate at any time.
 
@@ -205,7 +155,7 @@ class Estimator:
         self._inserted: list[tuple[int, float]] = []
         self._pending_rad = 0.0
         self._pending_rolls: tuple[int, ...] = ()
-        self._readings: list[_Reading] = []
+        self._readings: list[Reading] = []
         self._solution = np.zeros(_POSE_UNKNOWNS)
         self._stds = [priors.position_mm] * 3
         self._stds += [priors.bevel_rad, priors.heading_rad, priors.heading_rad]
@@ -254,14 +204,14 @@ class Estimator:
     def measure(self, measurement: Measurement) -> None:
         """Notes a measurement at the present place."""
         channel, inserted_mm = self._inserted[-1] if self._inserted else (ENTRY, 0.0)
-        self._readings.append(_Reading(channel, inserted_mm, measurement))
+        self._readings.append(Reading(channel, inserted_mm, measurement))
 
     def estimate(self) -> Estimate:
         """The best estimate from everything noted so far; deterministic."""
         stds = np.array(self._stds)
         start = np.zeros(len(stds))
         start[: len(self._solution)] = self._solution
-        problem = _Problem(self._readings, self._channels, self._priors, stds)
+        problem = Problem(self._readings, self._channels, self._priors, stds)
         expected = (self._entry, 1.0 / self._radius_mm)
 
         self._solution, residuals, unknowns_covariance = least_squares(
@@ -337,101 +287,6 @@ def _slopes_of(tip: Placed) -> _Array:
     """The derivatives of position, rotation vector and curvature at the tip by the unknowns."""
     slopes = tip.positions(np.zeros(1))[1][0]
     return np.vstack([slopes, tip.rotation, tip.growth])
-
-
-class _Problem:
-    """The least-squares problem: residuals in standard deviations, and their derivatives."""
-
-    def __init__(
-        self,
-        readings: list[_Reading],
-        channels: list[Channel],
-        priors: Priors,
-        stds: _Array,
-    ) -> None:
-        self._channels = channels
-        self._priors = priors
-        self._stds = stds
-        self._groups: list[tuple[int, int, _Array, _Array, _Array]] = []
-        self._directed: list[tuple[int, int, float, Measurement]] = []
-        places: dict[tuple[int, int], list[tuple[float, float, Measurement]]] = {}
-        noises_mm = _noises_mm(readings, priors)
-        for reading, noise_mm in zip(readings, noises_mm, strict=True):
-            number, along_mm = 0, reading.offset_mm
-            if reading.channel != ENTRY:
-                channel = channels[reading.channel]
-                number = channel.stretch_at(reading.offset_mm)
-                along_mm -= channel.stretches[number].offset_mm
-            key = (reading.channel, number)
-            places.setdefault(key, []).append((along_mm, noise_mm, reading.measurement))
-            if reading.measurement.heading is not None:
-                self._directed.append((reading.channel, number, along_mm, reading.measurement))
-        for (channel_index, number), group in sorted(places.items(), key=lambda item: item[0]):
-            along, noise = (np.array([row[column] for row in group]) for column in (0, 1))
-            positions = np.array([measurement.position_mm for _, _, measurement in group])
-            self._groups.append((channel_index, number, along, positions, noise))
-        self._position_count = 3 * len(readings)
-
-    def at(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> tuple[_Array, _Array]:
-        """Residuals and derivatives."""
-        begin, placed = place(self._channels, entry, curvature_per_mm, unknowns)
-        return self._evaluated(unknowns, begin, placed)
-
-    def rms_mm(self, residuals: _Array) -> float:
-        """Root mean square of the distances between measured and predicted positions."""
-        if not self._position_count:
-            return 0.0
-        noise_mm = np.concatenate([np.repeat(group[-1], 3) for group in self._groups])
-        squares = float(np.sum((noise_mm * residuals[: self._position_count]) ** 2))
-        return math.sqrt(3.0 * squares / self._position_count)
-
-    def _evaluated(
-        self, unknowns: _Array, begin: Placed, placed: list[list[Placed]]
-    ) -> tuple[_Array, _Array]:
-        def part(channel: int, number: int) -> Placed:
-            return begin if channel == ENTRY else placed[channel][number]
-
-        residuals, slopes = [], []
-        for channel, number, along_mm, measured, noise_mm in self._groups:
-            expected, moved = part(channel, number).positions(along_mm)
-            residuals.append(((measured - expected) / noise_mm[:, None]).ravel())
-            slopes.append((moved / -noise_mm[:, None, None]).reshape(-1, len(unknowns)))
-        for channel, number, along, measurement in self._directed:
-            pose, rotation = part(channel, number).directions(along)
-            seen_and_expected = (
-                (measurement.heading, pose.heading),
-                (measurement.bevel, pose.bevel),
-            )
-            for seen, direction in seen_and_expected:
-                if seen is not None:
-                    difference = np.array(seen) - np.array(direction)
-                    residuals.append(difference / self._priors.direction_rad)
-                    turned = np.cross(rotation.T, direction).T
-                    slopes.append(turned / -self._priors.direction_rad)
-        residuals.append(unknowns / self._stds)
-        slopes.append(np.diag(1.0 / self._stds))
-        return np.concatenate(residuals), np.vstack(slopes)
-
-
-def _noises_mm(readings: list[_Reading], priors: Priors) -> list[float]:
-    """The noise that each measurement counts with.
-
-    `n` measurements with the same error `d` and independent noise `s` tell as much as `n`
-    independent ones with the variance ``s^2 + n d^2``: that of their mean is ``s^2 / n + d^2``.
-    """
-    if priors.distortion_mm <= 0.0:
-        return [priors.noise_mm] * len(readings)
-    channels = np.array([reading.channel for reading in readings])
-    offsets_mm = np.array([reading.offset_mm for reading in readings])
-    noises_mm = np.empty(len(readings))
-    for channel in set(channels.tolist()):
-        here = channels == channel
-        places = np.sort(offsets_mm[here])
-        ends = offsets_mm[here] + 0.5 * _DISTORTION_LENGTH_MM
-        near = np.searchsorted(places, ends)
-        near -= np.searchsorted(places, ends - _DISTORTION_LENGTH_MM)
-        noises_mm[here] = np.sqrt(priors.noise_mm**2 + near * priors.distortion_mm**2)
-    return [float(noise_mm) for noise_mm in noises_mm]
 
 
 def pose_from_points(
