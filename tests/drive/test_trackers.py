@@ -123,6 +123,20 @@ def test_a_simulated_tracker_on_the_network_leads_to_the_same_end(
     assert type(first[-1]) is type(second[-1])
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("needle", ["phantom", "grbl+sim"])
+def test_other_needles_are_measured_by_the_network_too(tmp_path: Path, needle: str) -> None:
+    runs = []
+    for name, options in (("direct", []), ("network", ["--tracker", "openigtlink+sim"])):
+        path = tmp_path / f"{name}.mcap"
+        words = ["drive", PAPER, "--needle", needle, "--seed", "3", "--log", str(path), "--quiet"]
+        assert main([*words, *options]) == 0
+        runs.append([one for one in read_log(path).records if isinstance(one, Command)])
+    assert len(runs[0]) == len(runs[1])
+    for one, other in zip(*runs, strict=True):
+        assert (one.kind, one.value) == (other.kind, pytest.approx(other.value, abs=1e-2))
+
+
 def refused(
     capsys: pytest.CaptureFixture[str], log: Path, code: int, match: str, *options: str
 ) -> None:
