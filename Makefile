@@ -99,6 +99,11 @@ bench-needle: $(INSTALLED) ## Measure the phantom needle against real ones, what
 	$(BIN)/python tests/benchmarks/predictions.py
 	$(BIN)/python tests/benchmarks/drives.py --needle phantom --seeds 20
 
+.PHONY: bench-devices
+bench-devices: $(INSTALLED) ## Measure how fast a stop is on the wire, and whether runs end well with faults of a stepper controller
+	$(BIN)/python tests/benchmarks/stop.py
+	$(BIN)/python tests/benchmarks/faults.py
+
 .PHONY: bench-limits
 bench-limits: $(INSTALLED) ## Measure whether the time and memory limits hold: 20 models with up to 250 clocks
 	$(BIN)/python tests/benchmarks/limits.py

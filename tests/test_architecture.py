@@ -49,7 +49,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
-    "grbl": {"errors", "units"},
+    "grbl": {"errors", "hardware", "units"},
     "drive": BASE | {"files", "needle", "nsl", "plan", "render", "checker", "grbl"},
     "openigtlink": {"errors"},
     "tracking": BASE | {"files", "needle", "drive", "openigtlink"},

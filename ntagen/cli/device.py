@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -17,6 +18,7 @@ from ntagen.errors import DeviceError, InputError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from ntagen.grbl.axes import Axes
     from ntagen.grbl.check import Findings
     from ntagen.grbl.port import Port
 
@@ -41,7 +43,7 @@ def command() -> None:
 @command.command(
     "check", epilog="Exit codes: 0 it is ready, 2 the command line is wrong, 5 it is not ready."
 )
-@click.argument("device", metavar="grbl:PORT|grbl+sim|openigtlink:HOST:PORT")
+@click.argument("device", metavar="grbl:PORT|grbl+sim|TASK.nsl|openigtlink:HOST:PORT")
 @click.option("--baud", "baud_rate", default=115_200, show_default=True, help="The port's speed.")
 @click.option(
     "--move",
@@ -74,7 +76,8 @@ def check(
     """Look at a device and print what it is.
 
     The device is asked for its firmware, settings, limits and status. Nothing is moved, and no
-    setting is changed. `grbl+sim` is an emulated controller on a pseudo-terminal.
+    setting is changed. `grbl+sim` is an emulated controller on a pseudo-terminal. Of a task, the
+    device that it describes is looked at, and its axes are compared with the description.
 
     Of a tracker, openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, the devices that it sends are
     printed, with their rates and positions.
@@ -82,6 +85,7 @@ def check(
     \b
     Examples:
       ntagen device check grbl:/dev/ttyACM0
+      ntagen device check task.nsl
       ntagen device check grbl+sim --move 2
       ntagen device check openigtlink:localhost:18944
     """  # noqa: D301  click wants the control character
@@ -91,8 +95,11 @@ def check(
         say_idle(_STEPPERS_ONLY, "with a tracker")
         return look_at(device, listen_s, as_json=as_json)
     say_idle({"listen_s": "--listen"}, "without a tracker")
+    axes = None
+    if device.endswith(".nsl"):
+        device, axes = _described(Path(device))
     with _port(device, baud_rate) as port:
-        findings = inspect(port)
+        findings = inspect(port, axes)
         if not as_json:
             _tell(device, findings)
         moved = length_mm is not None and _agreed(length_mm, axis, yes=yes)
@@ -107,6 +114,22 @@ def check(
     if not findings.stands:
         raise DeviceError(f"{device}: the machine moves\nhint: stop what commands it")
     return 0
+
+
+def _described(path: Path) -> tuple[str, Axes]:
+    """The device that a task describes, and its axes."""
+    from ntagen.grbl.axes import axes_of
+    from ntagen.nsl import load_task
+
+    task = load_task(path)
+    if task.device is None:
+        raise InputError(
+            f"{path}: the task describes no device\n"
+            'hint: write for example device grbl "/dev/ttyACM0" '
+            "{ insert X 80 steps/mm  roll A 8.89 steps/deg }"
+        )
+    axes = axes_of(task.device, task.scene.needle.speed_mm_per_s)
+    return f"grbl:{task.device.port}", axes
 
 
 @contextlib.contextmanager

@@ -113,7 +113,8 @@ class Stepped:
             pull_mm_per_s=pull_mm_per_s,
             roll_deg_per_s=roll_deg_per_s,
         )
-        self.actuator = GrblActuator(SimulatedPort(self.emulator), axes)
+        self.port = SimulatedPort(self.emulator)
+        self.actuator = GrblActuator(self.port, axes)
 
     def now_s(self) -> float:
         """Seconds on the controller's clock."""

@@ -31,6 +31,10 @@ _BEGIN_S: Final = 0.3
 _STALL_S: Final = 0.5
 """An axis that moves and has the same position after this time is stuck."""
 
+_LATE_RATIO: Final = 1.25
+_LATE_S: Final = 0.5
+"""A motion that takes longer than this ratio of its time and these seconds is too slow."""
+
 _STOP_S: Final = 3.0
 """A machine that has not come to rest after this time does not stop."""
 
@@ -275,7 +279,7 @@ class GrblActuator:
         """Watches a motion until the axis stands at its end."""
         began_s = changed_s = self.now_s()
         seconds = goal.motor.seconds(goal.way, goal.speed)
-        latest_s = began_s + 1.5 * seconds + 1.0
+        latest_s = began_s + _LATE_RATIO * seconds + _LATE_S
         last = goal.start[goal.motor.index]
         while True:
             status = self._status(watch)

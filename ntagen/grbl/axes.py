@@ -9,6 +9,7 @@ from typing import Final
 from ntagen.errors import InputError
 from ntagen.grbl.identity import Identity, no_axis
 from ntagen.grbl.link import Link
+from ntagen.hardware import GrblDevice
 
 _STEPS: Final = 100
 _SPEEDS: Final = 110
@@ -72,6 +73,23 @@ class Axes:
                 raise InputError(f"'{axis.letter}' with the sign {axis.sign} is no axis of GRBL")
         if self.insert.letter == self.roll.letter:
             raise InputError(f"the axis {self.roll.letter} cannot both insert and roll the needle")
+
+
+def axes_of(device: GrblDevice, push_mm_per_s: float) -> Axes:
+    """The axes as a task describes them; pulls are as fast as pushes.
+
+    Args:
+        device: The device in the task; an axis with negative steps turns the other way round.
+        push_mm_per_s: The speed of insertion.
+
+    Raises:
+        InputError: The axes are impossible.
+    """
+    insert, roll = (
+        Axis(axis.letter, 1 if axis.steps_per_unit > 0.0 else -1, abs(axis.steps_per_unit))
+        for axis in (device.insert, device.roll)
+    )
+    return Axes(insert, roll, push_mm_per_s=push_mm_per_s, pull_mm_per_s=push_mm_per_s)
 
 
 @dataclass(frozen=True, slots=True)

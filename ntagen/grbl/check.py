@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from ntagen.grbl.axes import Axes, motor
 from ntagen.grbl.identity import Identity, identify, position_of
 from ntagen.grbl.link import Link
 from ntagen.grbl.port import Port
@@ -56,14 +57,21 @@ class Findings:
     notes: tuple[str, ...]
 
 
-def inspect(port: Port) -> Findings:
+def inspect(port: Port, axes: Axes | None = None) -> Findings:
     """Asks a controller who it is and what it does; nothing is moved, and no setting changes.
 
+    Args:
+        port: The wire to it.
+        axes: What its axes should be, if that is known.
+
     Raises:
-        DeviceError: Nothing answers, or what answers is no GRBL that is ready.
+        DeviceError: Nothing answers, what answers is no GRBL that is ready, or its axes are others.
     """
     link = Link(port)
     identity = identify(link)
+    if axes is not None:
+        motor(link, identity, axes.insert, "mm", max(axes.push_mm_per_s, axes.pull_mm_per_s))
+        motor(link, identity, axes.roll, "deg", axes.roll_deg_per_s)
     link.pause(_WATCH_S)
     status = link.status()
     stands = status.stands and position_of(status) == position_of(identity.status)

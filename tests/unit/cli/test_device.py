@@ -22,6 +22,8 @@ from ntagen.grbl.port import Port, SerialPort
 from ntagen.grbl.pseudo import PseudoTerminal
 from ntagen.grbl.simulated import SimulatedPort
 
+EXAMPLE = Path(__file__).parents[3] / "examples" / "paper.nsl"
+
 
 def check_refused(capsys: pytest.CaptureFixture[str], code: int, says: str, *words: str) -> None:
     assert main(["device", "check", *words]) == code
@@ -54,6 +56,25 @@ def test_a_device_moves_only_when_that_is_agreed(capsys: pytest.CaptureFixture[s
         assert main(["device", "check", device, "--move", "1"]) != 0
         assert main(["device", "check", device, "--move", "1", "--axis", "A", "--yes"]) == 5
     assert "no axis A" in capsys.readouterr().err
+
+
+def test_the_device_of_a_task_is_compared_with_its_description(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def write(device: str) -> str:
+        path = tmp_path / "task.nsl"
+        path.write_text(f"{EXAMPLE.read_text().rstrip().removesuffix('}')} {device} }}")
+        return str(path)
+
+    emulator = Emulator(GRBLHAL, memory=Memory(GRBLHAL, {100: 80.0, 103: 8.889, 113: 6000.0}))
+    emulator.power_on()
+    with PseudoTerminal(emulator, speed=5.0) as terminal:
+        for steps, code in ((80, 0), (-80, 0), (160, 5)):
+            axes = f"insert X {steps} steps/mm  roll A 8.89 steps/deg"
+            task = write(f'device grbl "{terminal.name}" {{ {axes} }}')
+            assert main(["device", "check", task]) == code
+    assert "makes 80 steps per mm, but 160 are expected" in capsys.readouterr().err
+    check_refused(capsys, 2, "the task describes no device", write(""))
 
 
 @pytest.fixture
