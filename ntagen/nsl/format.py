@@ -26,6 +26,7 @@ from ntagen.nsl.tokens import (
     Comment,
     Token,
     begins_statement,
+    keyword_of,
     tokenise,
 )
 
@@ -129,7 +130,7 @@ class _Layout:
             self._end_statement()
             if token.line > self._end_line or not self._can_continue():
                 self._open_line(token)
-            self._keyword = token.text.split()[0]
+            self._keyword = keyword_of(token)
             self._statement.append(token)
         else:
             self._statement.append(token)

@@ -41,6 +41,7 @@ from ntagen.nsl.tokens import (
     Token,
     begins_statement,
     grammar,
+    keyword_of,
     tokenise,
 )
 from ntagen.nsl.wording import STRAY_HINTS, TERMINAL_WORDS, describe, form_of, quoted, visible
@@ -314,7 +315,7 @@ class _Parser:
     def _parse_words(self, words: Sequence[Token]) -> tree.Statement:
         """The tree of one statement without its braces."""
         span = words[0].span.to(words[-1].span)
-        broken = tree.Broken(span, words[0].text.split()[0], _declared_name(words))
+        broken = tree.Broken(span, keyword_of(words[0]), _declared_name(words))
         if words[0].type == "QUERY":
             return self._query(words) or tree.Broken(span, "query")
         is_known = words[0].text in KEYWORDS or words[0].type in PHRASES.values()

@@ -214,6 +214,11 @@ def _phrase_at(items: Sequence[Token | Comment], index: int, block: BlockKind) -
     return longest
 
 
+def keyword_of(token: Token) -> str:
+    """The keyword of a statement that begins with this token; settings have all their words."""
+    return token.text if token.type in PHRASES.values() else token.text.split()[0]
+
+
 def begins_statement(token: Token, kind: BlockKind | None) -> bool:
     """Whether a token begins a statement in a block; None is any block but a needle.
 

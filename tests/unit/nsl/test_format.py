@@ -54,6 +54,13 @@ def test_settings_and_axes_are_laid_out_like_other_statements() -> None:
     )
 
 
+def test_a_setting_whose_first_word_is_a_kind_of_regions_is_no_region() -> None:
+    check_layout(
+        "drive {\ndetection clearance 1 mm\ndetection clearance 2 mm pull 1 mm\n}",
+        "drive {\n  detection clearance 1 mm\n  detection clearance 2 mm  pull 1 mm\n}\n",
+    )
+
+
 def test_words_of_settings_are_names_elsewhere() -> None:
     check_layout("let depth=1 let pull=2\n", "let depth = 1  let pull = 2\n")
     check_layout("drive { pull pull*2 push 1 mm }", "drive {\n  pull pull * 2  push 1 mm\n}\n")
