@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from ntagen import nsl
@@ -82,6 +82,7 @@ def test_file_and_command_line_read_the_same_value(
     else:
         low = max(parameter.least, 1e-3) / measure.units[unit]
         number = data.draw(st.floats(low, low + 100.0)) if parameter.least >= 0.0 else 0.1
+    assume(parameter.breach(number * measure.units[unit]) is None)
     text = f"{number!r} {unit}".rstrip()
     (read,) = in_file(f"{parameter.words} {text}")
     assert parameter.parse(text) == read.value
