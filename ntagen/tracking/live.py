@@ -9,8 +9,9 @@ from typing import Final
 
 from ntagen.errors import DeviceError, InputError
 from ntagen.needle.measurement import Measurement
-from ntagen.openigtlink.client import Client, Policy, Pose, Sample
+from ntagen.openigtlink.client import Client
 from ntagen.openigtlink.messages import Sensor as Readings
+from ntagen.openigtlink.samples import Policy, Pose, Sample
 from ntagen.tracking.frames import ANATOMICAL, LPS, Transform
 from ntagen.tracking.mount import Mount, Tip, tip_of
 

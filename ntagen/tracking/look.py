@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ntagen.errors import DeviceError
-from ntagen.openigtlink.client import Client, Pose, Sample
+from ntagen.openigtlink.client import Client
 from ntagen.openigtlink.messages import Freedom, Position, Sensor, Tool
 from ntagen.openigtlink.packets import Counts
+from ntagen.openigtlink.samples import Pose, Sample
 from ntagen.scene import Vector
 from ntagen.tracking.live import Source
 from ntagen.tracking.mount import tip_of

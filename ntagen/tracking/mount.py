@@ -14,8 +14,8 @@ from typing import Final
 
 from ntagen.errors import DeviceError
 from ntagen.needle.vectors import add, combine, cross, dot, norm, scale, unit
-from ntagen.openigtlink.client import Pose
 from ntagen.openigtlink.messages import Columns, Freedom, Position, Tool, Transform
+from ntagen.openigtlink.samples import Pose
 from ntagen.scene import Vector
 
 AXES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")

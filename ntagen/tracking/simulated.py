@@ -13,10 +13,10 @@ from typing import Final
 from ntagen.drive.device import Sensor
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.vectors import cross, dot, norm, scale, subtract, unit
-from ntagen.openigtlink.client import Policy
 from ntagen.openigtlink.messages import NEWTON, Content, Position, Transform
 from ntagen.openigtlink.messages import Sensor as Readings
 from ntagen.openigtlink.packets import Packet
+from ntagen.openigtlink.samples import Policy
 from ntagen.openigtlink.server import Server
 from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY

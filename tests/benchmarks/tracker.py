@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 
-from ntagen.openigtlink.client import Policy
+from ntagen.openigtlink.samples import Policy
 from ntagen.tracking.frames import IDENTITY
 from ntagen.tracking.live import LiveTracker, Source
 

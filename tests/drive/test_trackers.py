@@ -24,9 +24,9 @@ from ntagen.drive.states import State
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.nsl import load
-from ntagen.openigtlink.client import Policy
 from ntagen.openigtlink.messages import Columns, Freedom, Position, Tool, TrackingData, Transform
 from ntagen.openigtlink.packets import Packet
+from ntagen.openigtlink.samples import Policy
 from ntagen.openigtlink.server import Server
 from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Needle, Scene, Vector

@@ -11,7 +11,7 @@ from random import Random
 import pytest
 
 from ntagen.errors import DeviceError
-from ntagen.openigtlink.client import Client, Policy, Statistics
+from ntagen.openigtlink.client import Client
 from ntagen.openigtlink.messages import (
     Freedom,
     Position,
@@ -26,6 +26,7 @@ from ntagen.openigtlink.messages import (
     Transform,
 )
 from ntagen.openigtlink.packets import HEADER, Counts, Packet
+from ntagen.openigtlink.samples import Policy, Statistics
 from ntagen.openigtlink.server import Server
 
 WAIT_S = 10.0

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from ntagen.openigtlink.client import Client, Policy
+from ntagen.openigtlink.client import Client
 from ntagen.openigtlink.messages import (
     NEWTON,
     STATUS_NAMES,
@@ -30,6 +30,7 @@ from ntagen.openigtlink.messages import (
     Transform,
 )
 from ntagen.openigtlink.packets import HEADER, Counts, Decoder, Packet
+from ntagen.openigtlink.samples import Policy
 from ntagen.openigtlink.server import Server
 
 ROOT = Path(__file__).parents[3]
@@ -232,7 +233,7 @@ with socket.socket() as any_socket:
     request = struct.pack("16sH22x", b"lo", 1 | 64)
     fcntl.ioctl(any_socket, 0x8914, request)
 
-from ntagen.openigtlink.client import Policy
+from ntagen.openigtlink.samples import Policy
 from ntagen.tracking.frames import IDENTITY
 from ntagen.tracking.live import LiveTracker, Source
 from ntagen.tracking.mount import Mount

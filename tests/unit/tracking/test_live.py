@@ -13,7 +13,6 @@ import pytest
 
 from ntagen.errors import DeviceError, InputError
 from ntagen.needle.measurement import Measurement
-from ntagen.openigtlink.client import Policy
 from ntagen.openigtlink.messages import (
     NEWTON,
     Content,
@@ -25,6 +24,7 @@ from ntagen.openigtlink.messages import (
     Transform,
 )
 from ntagen.openigtlink.packets import Packet
+from ntagen.openigtlink.samples import Policy
 from ntagen.openigtlink.server import Server
 from ntagen.tracking import frames
 from ntagen.tracking.frames import IDENTITY

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ntagen.errors import InputError
-from ntagen.openigtlink.client import Policy
+from ntagen.openigtlink.samples import Policy
 from ntagen.tracking.frames import IDENTITY
 from ntagen.tracking.live import Source
 from ntagen.tracking.mount import Mount
