@@ -76,6 +76,7 @@ class Link:
         self._failure: str | None = None
         self._turn = threading.RLock()
         self._expects_banner = False
+        self._noise: ProtocolError | None = None
 
     @property
     def name(self) -> str:
@@ -204,19 +205,15 @@ class Link:
         """
         with self._turn:
             end_s = self.now_s() + timeout_s
-            self._expects_banner = True
-            try:
-                while self.now_s() < end_s:
-                    self._write(STATUS)
-                    pause_s = min(self.now_s() + 0.25, end_s)
-                    while (left_s := pause_s - self.now_s()) > 0.0:
-                        for reply in self._pump(left_s):
-                            if isinstance(reply, Status):
-                                return self._settled(reply)
-            except ProtocolError as error:
-                raise self.fail(f"{self.name}: {error}") from None
-            finally:
-                self._expects_banner = False
+            while self.now_s() < end_s:
+                self._write(STATUS)
+                pause_s = min(self.now_s() + 0.25, end_s)
+                while (left_s := pause_s - self.now_s()) > 0.0:
+                    for reply in self._starting(left_s):
+                        if isinstance(reply, Status):
+                            return self._settled(reply)
+        if self._noise is not None:
+            raise self.fail(f"{self.name}: {self._noise}")
         raise self.fail(
             f"{self.name}: nothing answers\n"
             "hint: check power and cable, that this is the controller's port, and its baud rate"
@@ -244,12 +241,25 @@ class Link:
         status = first
         quiet_s = self.now_s() + 0.1
         while (left_s := quiet_s - self.now_s()) > 0.0:
-            for reply in self._pump(left_s):
+            for reply in self._starting(left_s):
                 if isinstance(reply, Status):
                     status = reply
         return status
 
+    def _starting(self, timeout_s: float) -> list[Reply]:
+        """Reads once from a controller that may be starting.
+
+        Noise is no fault yet: a line may have begun before the port was opened.
+        """
+        try:
+            return self._pump(timeout_s)
+        except ProtocolError as error:
+            self._noise = error
+            return []
+
     def _ask(self, watch: Watch | None, *, forgiving: bool = False) -> Status:
+        # A report that was late must not be taken for the answer.
+        self._next(0.0, forgiving=forgiving)
         for _ in range(MISSING_REPORTS):
             self._write(STATUS)
             end_s = self.now_s() + STATUS_S

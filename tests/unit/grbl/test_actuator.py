@@ -270,6 +270,26 @@ def test_a_restart_after_an_unfinished_error_works(dialect: Dialect) -> None:
 
 
 @BOTH
+def test_noise_while_a_controller_starts_is_no_fault(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    bench.emulator.send(b"\xfe\x00os:0.000|FS:0,0>\r\n")
+    bench.connect().push(1.0)
+    assert bench.plant.sums["X"] == pytest.approx(1.0)
+
+
+@BOTH
+def test_late_reports_are_not_taken_for_new_ones(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+    for _ in range(3):
+        bench.let_go("???", 0.01)
+        actuator.push(0.5)
+    actuator.watch = At(bench, 0.7, lambda: bench.let_go("?????", 0.0))
+    actuator.push(2.0)
+    assert bench.plant.sums["X"] == pytest.approx(3.5)
+
+
+@BOTH
 @pytest.mark.parametrize(
     ("axes", "settings", "words"),
     [
