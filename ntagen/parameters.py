@@ -198,6 +198,14 @@ PARAMETERS: Final = (
     Parameter("initial_push_mm", "initial push", "length", "The length of the first push."),
     Parameter("spacing_mm", "spacing", "length", "A push is made in pieces of this length.", 0.01),
     Parameter(
+        "review_mm",
+        "review",
+        "length",
+        "After this much insertion, the rest of the plan is certified again for the newest "
+        "estimate.",
+        1e-3,
+    ),
+    Parameter(
         "deviation_mm",
         "deviation",
         "length",

@@ -29,6 +29,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
@@ -62,6 +63,7 @@ from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Plan, Push, Roll
+from ntagen.plan.certify import certify
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Pose, Scene
 
@@ -115,7 +117,8 @@ class Controller:
         self._force = ForceMonitor(settings, scene.needle.length_mm)
         self._deviation = DeviationMonitor(settings, scene.needle.length_mm)
         self._rise: Rise | None = None
-        self._moves: Iterator[tuple[Push | Roll, Pose]] = iter(())
+        self._moves: deque[tuple[Push | Roll, Pose]] = deque()
+        self._reviewed_mm = 0.0
         self._predicted: Pose = scene.needle.tip
         self._lack = _Lack()
         self._retreat_mm: float | None = None
@@ -205,7 +208,7 @@ class Controller:
             return Event.FIRST_STRATEGY if is_first else Event.STRATEGY_FOUND
         if is_first and not self._lack.held and self._first_push_is_free():
             push = Push(self._settings.initial_push_mm)
-            self._moves = _moves(self._here(), (push,), self._settings.spacing_mm)
+            self._follow(self._here(), Plan.of([push]))
             return Event.PUSH_IS_FREE
         return self._look_back()
 
@@ -227,7 +230,8 @@ class Controller:
     def _initial_push(self) -> Event:
         """Makes the first moves of the plan, or the free push if there is none."""
         goal_mm = self._settings.initial_push_mm
-        for action, _ in self._moves:
+        while self._moves:
+            action, _ = self._moves.popleft()
             self._require_time()
             if not self._act(action):
                 continue
@@ -240,10 +244,9 @@ class Controller:
         return Event.PUSHED
 
     def _execute(self) -> Event:
-        move = next(self._moves, None)
-        if move is None:
+        if not self._moves:
             return Event.PLAN_DONE
-        action, self._predicted = move
+        action, self._predicted = self._moves.popleft()
         self._act(action)
         return Event.ACTED
 
@@ -263,7 +266,31 @@ class Controller:
         if self._feels(measurement):
             return Event.FORCE
         self._visit(measurement.position_mm, last_too=False)
-        return Event.DEVIATION if is_off else Event.AS_PREDICTED
+        if is_off:
+            return Event.DEVIATION
+        return Event.AS_PREDICTED if self._holds_still() else Event.PLAN_FAILS
+
+    def _holds_still(self) -> bool:
+        """Whether the rest of the plan holds, also for the newest estimate when it is due.
+
+        If it does, the tip is expected where the newest estimate says.
+        """
+        depth_mm = self._needle.depth_mm
+        if depth_mm - self._reviewed_mm < self._settings.review_mm - _SMALL_MM or not self._moves:
+            return True
+        self._reviewed_mm = depth_mm
+        estimate = self._needle.glance()
+        scene = self._knowledge.scene(estimate.tip, estimate.radius_mm, depth_mm)
+        rest = Plan.of(action for action, _ in self._moves)
+        if not self._settings.margins.allow(certify(rest, scene)):
+            return False
+        self._follow(scene, rest)
+        return True
+
+    def _follow(self, scene: Scene, plan: Plan) -> None:
+        """Makes this the plan to follow, from the pose in the scene."""
+        self._moves = deque(_moves(scene, plan.actions, self._settings.spacing_mm))
+        self._deviation.begin()
 
     def _stop(self) -> Event:
         self._needle.stop()
@@ -410,8 +437,8 @@ class Controller:
         best = synthesis.best
         if best is None:
             raise AssertionError("a synthesis without a plan was adopted")
-        self._moves = _moves(synthesis.scene, best.plan.actions, self._settings.spacing_mm)
-        self._deviation.begin()
+        self._follow(synthesis.scene, best.plan)
+        self._reviewed_mm = self._needle.depth_mm
 
     def _estimate(self) -> Estimate:
         if self._needle.estimate is None:

@@ -31,6 +31,9 @@ class Settings:
             runs need 5.1 s for it and its fit, at 1 mm/s.
         spacing_mm: A push is made in pieces of this length, with a measurement after each. Ours:
             small compared with a detection margin of 2 to 3 mm.
+        review_mm: After this much insertion, the rest of the plan is certified again, for the
+            newest estimate; ours. Insertions without a look at the needle were at most 10 mm in
+            Stanford's experiments.
         deviation_mm: The tip may be off the plan by this much, in the mean of the last
             measurements (`ntagen.drive.deviation`). Ours; the authors tried 0 to 10 mm.
         deviation_count: The least number of measurements whose mean counts, so that one bad
@@ -68,6 +71,7 @@ class Settings:
 
     initial_push_mm: float = 5.0
     spacing_mm: float = 0.25
+    review_mm: float = 5.0
     deviation_mm: float = 1.5
     deviation_count: int = 3
     force_sensing: bool = True

@@ -10,6 +10,9 @@
                         │            │ from farther back             ▼
                         └── push ◀── pull back ◀─────────────────── stop
 
+From `monitor` the way leads back to `estimate` too, when the rest of the plan no longer holds for
+the newest estimate: then a new plan is made where the needle is.
+
 The initial push belongs to a plan: the first synthesis is made before anything moves. Only if it
 finds no plan, and the push is proven to be free of known regions, it is made without one: what it
 tells about the needle may give a plan.
@@ -69,6 +72,7 @@ class Event(Enum):
     PLAN_DONE = "plan done"
     AS_PREDICTED = "as predicted"
     DEVIATION = "deviation"
+    PLAN_FAILS = "the plan no longer holds"
     FORCE = "force"
     STOPPED = "stopped"
     PULLED = "pulled"
@@ -116,6 +120,7 @@ _WORKFLOW: Final = {
     (State.MONITOR, Event.AS_PREDICTED): State.EXECUTE,
     (State.MONITOR, Event.DEVIATION): State.STOP,
     (State.MONITOR, Event.FORCE): State.STOP,
+    (State.MONITOR, Event.PLAN_FAILS): State.ESTIMATE,
     (State.STOP, Event.STOPPED): State.PULL_BACK,
     (State.PULL_BACK, Event.PULLED): State.PUSH,
     (State.PUSH, Event.PUSHED): State.ESTIMATE,

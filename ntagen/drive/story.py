@@ -60,6 +60,8 @@ def _transition(record: Transition) -> str | None:
             return "the force rises: stop"
         case Event.DEVIATION.value:
             return "the tip deviates from the plan: stop"
+        case Event.PLAN_FAILS.value:
+            return "the rest of the plan no longer holds"
         case Event.PLAN_DONE.value:
             return "the plan is done"
     match record.following:
