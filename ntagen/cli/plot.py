@@ -119,6 +119,6 @@ def _of_scene(
         echo(warning.render(), err=True)
     settings = configure(task.given, task.scene).settings
     # All plans are listed here, since some are to be shown beside the best one.
-    lister = synthesiser_for(settings).engine
+    lister = synthesiser_for(settings).inner.engine
     synthesise = replace(lister, ranking=ranking or settings.ranking)
     return picture_of_plans(task.scene, synthesise(task.scene) if shown > 0 else None, shown)

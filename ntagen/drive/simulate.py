@@ -13,6 +13,7 @@ from ntagen.drive.force import fitting_spacing_mm
 from ntagen.drive.knowledge import sensing_margin_mm, told
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
 from ntagen.drive.settings import Settings
+from ntagen.drive.timing import TimedSynthesiser
 from ntagen.drive.torsion import Compensated, Lag
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.phantom import PhantomNeedle
@@ -226,19 +227,18 @@ def synthesiser_for(
     listen: Callable[[], None] = lambda: None,
     *,
     keeps_strategy: bool = False,
-) -> BestPlanSynthesiser:
+) -> TimedSynthesiser:
     """The synthesiser with the margins, the ranking and the budgets of the settings."""
-    return BestPlanSynthesiser(
-        EngineSynthesiser(
-            margins=settings.margins,
-            ranking=settings.ranking,
-            max_plans=settings.max_plans,
-            timeout_s=settings.engine_time_s,
-            memory_bytes=settings.engine_memory_bytes,
-            keeps_strategy=keeps_strategy,
-            listen=listen,
-        )
+    engine = EngineSynthesiser(
+        margins=settings.margins,
+        ranking=settings.ranking,
+        max_plans=settings.max_plans,
+        timeout_s=settings.engine_time_s,
+        memory_bytes=settings.engine_memory_bytes,
+        keeps_strategy=keeps_strategy,
+        listen=listen,
     )
+    return TimedSynthesiser(BestPlanSynthesiser(engine))
 
 
 class _Witness:

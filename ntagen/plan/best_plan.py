@@ -18,7 +18,6 @@ Cost: about 15 ms for a question about the paper's needle.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -63,11 +62,6 @@ class BestPlanSynthesiser:
         Raises:
             InputError, LimitError, ModelError, KeyboardInterrupt: See `EngineSynthesiser`.
         """
-        start_s = time.perf_counter()
-        synthesis = self._within_budget(scene)
-        return replace(synthesis, loop_seconds=time.perf_counter() - start_s)
-
-    def _within_budget(self, scene: Scene) -> Synthesis:
         if sequences(scene) <= _MOST_LISTED or self.engine.ranking[0] != "clearance":
             return self.engine(scene)
         first = self.one(scene, keeps_strategy=self.engine.keeps_strategy)
