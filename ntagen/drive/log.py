@@ -126,7 +126,7 @@ class Log:
         self._attach(f"{folder}/model.xml", synthesis.model_xml.encode(), "application/xml")
         self._attach(f"{folder}/plans.json", json.dumps(plans).encode())
         if synthesis.strategy_json:
-            # The strategy of the paper's task is 0.6 MB of JSON, and 10 KB packed.
+            # The strategy of the paper's task is 0.6 MB of JSON, and 40 KB packed.
             packed = gzip.compress(synthesis.strategy_json.encode(), compresslevel=1, mtime=0)
             self._attach(f"{folder}/{STRATEGY}", packed, "application/gzip")
         for topic, message in show_plan(synthesis, self._time_ns / 1e9):

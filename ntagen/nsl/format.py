@@ -180,8 +180,7 @@ class _Layout:
             return
         line = self._lines[-1]
         cells = list(_cells(self._statement))
-        # Settings of the driver can begin with the word of a region: `detection clearance`.
-        is_region = self._keyword in REGIONS and self._block() != "drive"
+        is_region = self._keyword in REGIONS
         if is_region and not line.cells:
             line.is_region = True
         elif is_region:
