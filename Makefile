@@ -94,9 +94,10 @@ bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadloc
 	source $(RUST) && cd checker && NTAGEN=../$(BIN)/ntagen cargo bench --locked
 
 .PHONY: bench-needle
-bench-needle: $(INSTALLED) ## Measure the phantom needle against real ones, what the estimator predicts of it, and how its drives end
+bench-needle: $(INSTALLED) ## Measure the phantom needle against real ones, what the estimator predicts, and how drives of both needles end
 	$(BIN)/python tests/benchmarks/phantom.py
 	$(BIN)/python tests/benchmarks/predictions.py
+	$(BIN)/python tests/benchmarks/drives.py --noise 0.1 1 2
 	$(BIN)/python tests/benchmarks/drives.py --needle phantom --seeds 20
 
 .PHONY: bench-devices
