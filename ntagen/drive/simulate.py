@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -229,6 +230,9 @@ def synthesiser_for(
     keeps_strategy: bool = False,
 ) -> TimedSynthesiser:
     """The synthesiser with the margins, the ranking and the budgets of the settings."""
+    # What the first synthesis needs is loaded before the needle waits for it.
+    importlib.import_module("ntagen.checker")
+    importlib.import_module("ntagen.render")
     engine = EngineSynthesiser(
         margins=settings.margins,
         ranking=settings.ranking,
