@@ -179,14 +179,11 @@ def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -
         roll_rad=max(settings.priors.roll_rad, errors.roll_rad),
         noise_mm=max(settings.priors.noise_mm, errors.noise_mm),
     )
-    margin_mm = min(
-        (
-            sensing_margin_mm(region, scene.detections, settings.sensing_margin_mm)
-            for region in scene.criticals
-        ),
-        default=settings.sensing_margin_mm,
+    otherwise_mm = settings.sensing_margin_mm
+    margins_mm = (
+        sensing_margin_mm(region, scene.detections, otherwise_mm) for region in scene.criticals
     )
-    margin_mm = min(margin_mm, settings.sensing_margin_mm)
+    margin_mm = min([otherwise_mm, *margins_mm])
     settings = replace(settings, priors=priors, sensing_margin_mm=margin_mm)
     if known == "all" or not settings.force_sensing:
         return settings

@@ -54,7 +54,6 @@ class Steering:
         self._cut_mm = 0.0
         self._left: tuple[Arc, ...] = ()
         self.path = Path(needle.tip)
-        self.measurement: Measurement | None = None
         self.estimate: Estimate | None = None
 
     @property
@@ -125,7 +124,6 @@ class Steering:
         """
         measurement = self._device.measure()
         _require_finite(measurement)
-        self.measurement = measurement
         self._estimator.measure(measurement)
         self._journal.record(
             Measured(

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ntagen.errors import DeviceError
 from ntagen.needle.kinematics import Arc, push, roll
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.phantom_parameters import PhantomParameters
@@ -29,7 +28,13 @@ from ntagen.needle.phantom_sensor import PhantomSensor, Seen
 from ntagen.needle.phantom_tissue import CELL_MM, Tissue
 from ntagen.needle.sweep import Sweep
 from ntagen.needle.vectors import add, combine, cross, distance, scale
-from ntagen.needle.virtual import PULL_SPEED_RATIO, ROLL_RAD_PER_S, Obstacle, SimulatedClock
+from ntagen.needle.virtual import (
+    PULL_SPEED_RATIO,
+    ROLL_RAD_PER_S,
+    Obstacle,
+    SimulatedClock,
+    require_possible,
+)
 from ntagen.scene import Needle, Pose, Vector
 
 _NOTHING_MM = 1e-9
@@ -132,7 +137,7 @@ class PhantomNeedle:
         Raises:
             DeviceError: The length is negative or not finite.
         """
-        _require(length_mm >= 0.0, "push", length_mm)
+        require_possible(length_mm >= 0.0, "push", length_mm)
         self._direction = 1.0
         left_mm = length_mm
         while left_mm > _NOTHING_MM:
@@ -147,7 +152,7 @@ class PhantomNeedle:
         Raises:
             DeviceError: The angle is not finite.
         """
-        _require(math.isfinite(angle_rad), "roll", angle_rad)
+        require_possible(math.isfinite(angle_rad), "roll", angle_rad)
         self._base_rad += angle_rad
         self._slip()
         self._clock.advance(abs(angle_rad) / ROLL_RAD_PER_S)
@@ -159,7 +164,7 @@ class PhantomNeedle:
         Raises:
             DeviceError: The length is negative or not finite.
         """
-        _require(length_mm >= 0.0, "pull", length_mm)
+        require_possible(length_mm >= 0.0, "pull", length_mm)
         if length_mm <= 0.0:
             return
         self._direction = -1.0
@@ -361,16 +366,6 @@ class PhantomNeedle:
             return friction_n
         # An old channel is open: there is nothing to cut.
         cutting_n = 0.0 if self._ahead else self._tissue.cutting_n(self._depth_mm)
-        near = (self._depth_in_margin_mm(o, position_mm) for o in self._obstacles)
+        near = (o.depth_in_margin_mm(position_mm) for o in self._obstacles)
         rise_n = self._parameters.forces.region_n_per_mm * max(near, default=0.0)
         return friction_n + cutting_n + rise_n
-
-    @staticmethod
-    def _depth_in_margin_mm(obstacle: Obstacle, point_mm: Vector) -> float:
-        surface_mm = distance(point_mm, obstacle.region.center_mm) - obstacle.region.radius_mm
-        return max(0.0, obstacle.margin_mm - surface_mm)
-
-
-def _require(possible: bool, command: str, value: float) -> None:
-    if not possible or not math.isfinite(value):
-        raise DeviceError(f"the needle refuses to {command} by {value}")

@@ -58,8 +58,12 @@ class Obstacle:
 
     def force_n(self, point_mm: Vector) -> float:
         """The force on a tip at a point."""
+        return FORCE_N_PER_MM * self.depth_in_margin_mm(point_mm)
+
+    def depth_in_margin_mm(self, point_mm: Vector) -> float:
+        """How deep a point lies in the margin; 0 outside."""
         surface_mm = distance(point_mm, self.region.center_mm) - self.region.radius_mm
-        return FORCE_N_PER_MM * max(0.0, self.margin_mm - surface_mm)
+        return max(0.0, self.margin_mm - surface_mm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +133,7 @@ class VirtualNeedle:
         Raises:
             DeviceError: The length is negative or not finite.
         """
-        _require(length_mm >= 0.0, "push", length_mm)
+        require_possible(length_mm >= 0.0, "push", length_mm)
         self._path = self._path.push(self._needle.radius_mm, length_mm)
         self._clock.advance(length_mm / self._needle.speed_mm_per_s)
 
@@ -139,7 +143,7 @@ class VirtualNeedle:
         Raises:
             DeviceError: The angle is not finite.
         """
-        _require(math.isfinite(angle_rad), "roll", angle_rad)
+        require_possible(math.isfinite(angle_rad), "roll", angle_rad)
         error_rad = self._roll_errors.normal(0.0, self._errors.roll_rad)
         self._path = self._path.roll(angle_rad + float(error_rad))
         self._clock.advance(abs(angle_rad) / ROLL_RAD_PER_S)
@@ -150,7 +154,7 @@ class VirtualNeedle:
         Raises:
             DeviceError: The length is negative or not finite.
         """
-        _require(length_mm >= 0.0, "pull", length_mm)
+        require_possible(length_mm >= 0.0, "pull", length_mm)
         self._left += self._path.arcs
         self._path = self._path.pull(length_mm)
         self._clock.advance(length_mm / (PULL_SPEED_RATIO * self._needle.speed_mm_per_s))
@@ -198,6 +202,11 @@ class VirtualNeedle:
         )
 
 
-def _require(possible: bool, command: str, value: float) -> None:
+def require_possible(possible: bool, command: str, value: float) -> None:
+    """Refuses a command to a simulated needle that is impossible or not finite.
+
+    Raises:
+        DeviceError: It is.
+    """
     if not possible or not math.isfinite(value):
         raise DeviceError(f"the needle refuses to {command} by {value}")
