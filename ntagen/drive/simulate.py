@@ -37,6 +37,9 @@ _TURN_MM: Final = 20.0
 class Simulated(Device, Protocol):
     """A simulated needle: a device that knows the truth."""
 
+    def roll_on(self, angle_rad: float) -> None:
+        """Goes on with the last roll: no error is added."""
+
     @property
     def true_tip(self) -> Pose:
         """The true pose of the tip."""

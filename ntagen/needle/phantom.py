@@ -158,6 +158,14 @@ class PhantomNeedle:
         self._clock.advance(abs(angle_rad) / ROLL_RAD_PER_S)
         self._show()
 
+    def roll_on(self, angle_rad: float) -> None:
+        """Goes on with the last roll: the same as another one, since rolls of the base are exact.
+
+        Raises:
+            DeviceError: The angle is not finite.
+        """
+        self.roll(angle_rad)
+
     def pull(self, length_mm: float) -> None:
         """Moves the tip back along its channel, at most to the entry.
 

@@ -144,9 +144,16 @@ class VirtualNeedle:
             DeviceError: The angle is not finite.
         """
         require_possible(math.isfinite(angle_rad), "roll", angle_rad)
-        error_rad = self._roll_errors.normal(0.0, self._errors.roll_rad)
-        self._path = self._path.roll(angle_rad + float(error_rad))
-        self._clock.advance(abs(angle_rad) / ROLL_RAD_PER_S)
+        self._turn(angle_rad, float(self._roll_errors.normal(0.0, self._errors.roll_rad)))
+
+    def roll_on(self, angle_rad: float) -> None:
+        """Goes on with the last roll: there is no further error.
+
+        Raises:
+            DeviceError: The angle is not finite.
+        """
+        require_possible(math.isfinite(angle_rad), "roll", angle_rad)
+        self._turn(angle_rad, 0.0)
 
     def pull(self, length_mm: float) -> None:
         """Moves the tip back along its channel, at most to the entry.
@@ -155,8 +162,9 @@ class VirtualNeedle:
             DeviceError: The length is negative or not finite.
         """
         require_possible(length_mm >= 0.0, "pull", length_mm)
-        self._left += self._path.arcs
-        self._path = self._path.pull(length_mm)
+        before, self._path = self._path.arcs, self._path.pull(length_mm)
+        # The arc in which the tip is now was left in part: all of it was cut.
+        self._left += before[max(0, len(self._path.arcs) - 1) :]
         self._clock.advance(length_mm / (PULL_SPEED_RATIO * self._needle.speed_mm_per_s))
 
     def stop(self) -> None:
@@ -200,6 +208,10 @@ class VirtualNeedle:
             ),
             default=math.inf,
         )
+
+    def _turn(self, angle_rad: float, error_rad: float) -> None:
+        self._path = self._path.roll(angle_rad + error_rad)
+        self._clock.advance(abs(angle_rad) / ROLL_RAD_PER_S)
 
 
 def require_possible(possible: bool, command: str, value: float) -> None:

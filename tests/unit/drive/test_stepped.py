@@ -9,10 +9,12 @@ from pathlib import Path
 import pytest
 
 from ntagen.drive.configure import configure
+from ntagen.drive.plant import NeedlePlant, simulated_axes
 from ntagen.drive.records import Command, Ended, Record
 from ntagen.drive.simulate import Maker, Result, Simulated, simulate, synthesiser_for
 from ntagen.drive.states import State
-from ntagen.drive.stepped import NeedlePlant, Stepped
+from ntagen.drive.stepped import Stepped
+from ntagen.grbl.axes import Axes, Axis
 from ntagen.grbl.emulator import Emulator
 from ntagen.needle.virtual import Obstacle
 from ntagen.nsl import load
@@ -112,13 +114,16 @@ class Moves:
     def roll(self, angle_rad: float) -> None:
         self.moves.append(("roll", angle_rad))
 
+    def roll_on(self, angle_rad: float) -> None:
+        self.moves.append(("roll on", angle_rad))
+
     def pull(self, length_mm: float) -> None:
         self.moves.append(("pull", length_mm))
 
 
 def test_pieces_of_a_motion_are_one_motion_of_the_needle() -> None:
     needle = Moves()
-    plant = NeedlePlant(needle)
+    plant = NeedlePlant(needle, simulated_axes(1.0))
     for axis, step in (("X", 0.5), ("X", 0.5), ("A", 90.0), ("A", -90.0), ("X", -0.25), ("X", 0.0)):
         plant.move({axis: step}, 0.01)
     plant.settle()
@@ -129,3 +134,30 @@ def test_pieces_of_a_motion_are_one_motion_of_the_needle() -> None:
         ("roll", pytest.approx(-math.pi / 2)),
         ("pull", 0.25),
     ]
+
+
+def test_a_roll_that_is_seen_on_its_way_is_one_roll() -> None:
+    needle = Moves()
+    plant = NeedlePlant(needle, simulated_axes(1.0))
+    for step in (45.0, 45.0, -90.0, -90.0):
+        plant.move({"A": step}, 0.01)
+        plant.settle()
+    plant.move({"X": 1.0}, 0.01)
+    plant.move({"A": -90.0}, 0.01)
+    plant.settle()
+    kinds = [kind for kind, _ in needle.moves]
+    assert kinds == ["roll", "roll on", "roll", "roll on", "push", "roll"]
+    plant.finish()
+    plant.move({"A": -90.0}, 0.01)
+    plant.settle()
+    assert needle.moves[-1][0] == "roll"
+
+
+def test_an_axis_that_turns_the_other_way_round_moves_the_needle_the_right_way() -> None:
+    axes = Axes(Axis("Y", -1), Axis("Z", -1))
+    needle = Moves()
+    plant = NeedlePlant(needle, axes)
+    for axis, step in (("Y", -2.0), ("Z", -180.0), ("Y", 1.0), ("X", 7.0)):
+        plant.move({axis: step}, 0.01)
+    plant.settle()
+    assert needle.moves == [("push", 2.0), ("roll", pytest.approx(math.pi)), ("pull", 1.0)]

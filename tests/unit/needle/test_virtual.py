@@ -44,6 +44,32 @@ def test_the_true_clearance_counts_channels_that_were_left() -> None:
     assert len(needle.pierced) == 1
 
 
+def test_a_pull_in_pieces_is_the_same_pull() -> None:
+    whole, pieces = virtual(), virtual()
+    for needle in (whole, pieces):
+        needle.push(9.0)
+        needle.roll(1.0)
+        needle.push(3.0)
+    whole.pull(5.0)
+    for _ in range(500):
+        pieces.pull(0.01)
+    assert pieces.true_tip.position_mm == pytest.approx(whole.true_tip.position_mm, abs=1e-9)
+    assert pieces.true_clearance_mm() == pytest.approx(whole.true_clearance_mm(), abs=1e-9)
+    # Looking at it while it moves must not make every later look slower.
+    assert len(pieces.pierced) < 600
+
+
+def test_a_roll_that_goes_on_has_one_error() -> None:
+    errors = Errors(roll_rad=0.1)
+    whole, pieces = virtual(errors), virtual(errors)
+    whole.roll(1.0)
+    pieces.roll(0.25)
+    for _ in range(3):
+        pieces.roll_on(0.25)
+    assert pieces.true_tip.bevel == pytest.approx(whole.true_tip.bevel, abs=1e-12)
+    assert pieces.now_s() == pytest.approx(whole.now_s())
+
+
 def test_motions_take_simulated_time() -> None:
     needle = virtual()
     needle.push(6.0)
