@@ -10,6 +10,8 @@
     └── DeviceError            5: a device or sensor failed or gave a wrong answer
 
 Every message is one or more complete lines for the user: what is wrong, where, and how to fix it.
+
+`Halted` is none of these: it ends a motion, and the run goes on.
 """
 
 from __future__ import annotations
@@ -52,3 +54,17 @@ class DeviceError(NtagenError):
     """A device or sensor failed, did not answer, or gave a wrong answer."""
 
     exit_code: ClassVar[int] = 5
+
+
+class Halted(Exception):  # noqa: N818  it reports an event, not an error
+    """A motion was ended early because of what was seen during it; the needle stands.
+
+    Who watches a motion raises it. The device stops, sets `part`, and raises it again.
+
+    Attributes:
+        part: How much of the motion was made, from 0 to 1.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.part = 0.0

@@ -220,6 +220,13 @@ PARAMETERS: Final = (
     ),
     Parameter("force_n", "force", "force", "The rise of the force that is an alarm.", 1e-6),
     Parameter(
+        "halt_force_n",
+        "halt force",
+        "force",
+        "While the needle moves, the force may be this much more than expected.",
+        1e-6,
+    ),
+    Parameter(
         "force_noise_n",
         "force noise",
         "force",

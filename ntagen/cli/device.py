@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.steppers import axes_for, described
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import look_at
 from ntagen.errors import DeviceError, InputError
@@ -118,18 +119,13 @@ def check(
 
 def _described(path: Path) -> tuple[str, Axes]:
     """The device that a task describes, and its axes."""
-    from ntagen.grbl.axes import axes_of
+    from ntagen.drive.configure import configure
     from ntagen.nsl import load_task
 
     task = load_task(path)
-    if task.device is None:
-        raise InputError(
-            f"{path}: the task describes no device\n"
-            'hint: write for example device grbl "/dev/ttyACM0" '
-            "{ insert X 80 steps/mm  roll A 8.89 steps/deg }"
-        )
-    axes = axes_of(task.device, task.scene.needle.speed_mm_per_s)
-    return f"grbl:{task.device.port}", axes
+    device = described(task, path)
+    settings = configure(task.given, task.scene, needle="grbl").settings
+    return f"grbl:{device.port}", axes_for(device, task.scene.needle, settings)
 
 
 @contextlib.contextmanager

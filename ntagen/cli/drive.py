@@ -3,36 +3,44 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
-import math
-import signal
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from ntagen.cli.effects import say_idle
 from ntagen.cli.models import include_option
-from ntagen.cli.signals import TERMINATED, handled
+from ntagen.cli.operator import SignalledOperator, signalled_operator
+from ntagen.cli.report import lines, report, summary
+from ntagen.cli.signals import TERMINATED
 from ntagen.cli.steering import show_settings, steering_options
 from ntagen.cli.terminal import echo
-from ntagen.cli.tracker import Sense, Tracking, opened, tracker_options, tracking_of
-from ntagen.drive.operator import Operator
+from ntagen.cli.tracker import Sense, Tracking, opened, opened_live, tracker_options, tracking_of
 from ntagen.drive.states import State
 from ntagen.files import read_file, require_apart
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from types import FrameType
+    from collections.abc import Callable, Iterator
 
     from ntagen.drive.configure import Configuration
-    from ntagen.drive.records import Journal, Record
-    from ntagen.drive.simulate import Result
+    from ntagen.drive.device import LiveSensor, WatchedActuator
+    from ntagen.drive.outcome import Driven
+    from ntagen.drive.records import Journal
+    from ntagen.nsl import Task
     from ntagen.parameters import Given
-    from ntagen.plan.synthesise import Synthesis
+    from ntagen.plan.synthesise import Synthesiser
     from ntagen.scene import Scene
+
+_SIMULATIONS_ONLY: Final = {
+    "given_needle_seed": "--seed",
+    "given_needle_noise_mm": "--noise",
+    "given_needle_roll_rad": "--roll-error",
+    "given_needle_radius_mm": "--true-radius",
+    "given_needle_bevel_rad": "--true-bevel",
+}
 
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
@@ -46,9 +54,22 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     "--needle",
     default="virtual",
     show_default=True,
-    help="Which needle to steer. All are simulations: virtual bends exactly as planned, phantom "
+    help="Which needle to steer. Three are simulations: virtual bends exactly as planned, phantom "
     "drifts, lags and is measured as real needles are, and grbl+sim is a phantom behind an "
-    "emulated stepper controller.",
+    "emulated stepper controller. grbl:PORT is a real needle behind a controller with the axes "
+    "that the task describes; grbl alone takes the port from the task, too.",
+)
+@click.option(
+    "--baud",
+    "baud_rate",
+    default=115_200,
+    show_default=True,
+    help="The speed of the port of a real needle.",
+)
+@click.option(
+    "--confirm",
+    is_flag=True,
+    help="Ask before each plan that is followed, and before the needle is pulled back for one.",
 )
 @tracker_options
 @click.option(
@@ -78,6 +99,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
 def command(
     environment: Path,
     needle: str,
+    baud_rate: int,
+    confirm: bool,
     tracker: str | None,
     registration: str | None,
     known: str,
@@ -104,6 +127,8 @@ def command(
       ntagen drive examples/paper.nsl --needle phantom --seed 1
       ntagen drive examples/paper.nsl --pull 8mm --true-radius 33mm --force-sensing off
       ntagen drive examples/paper.nsl --tracker openigtlink+sim
+      ntagen drive task.nsl --needle grbl:/dev/ttyACM0 --confirm --log run.mcap \\
+        --tracker openigtlink:localhost:18944:Needle --registration registration.json
       ntagen drive examples/paper.nsl --settings
 
     \b
@@ -120,96 +145,162 @@ def command(
     for warning in task.warnings:
         echo(warning.render(), err=True)
     configuration = configure((*task.given, *given), task.scene, known, needle)
-    errors = configuration.errors
-    if configuration.needle.parameters is not None:
-        idle = {"given_needle_noise_mm": "--noise", "given_needle_roll_rad": "--roll-error"}
-        say_idle(idle, "on a phantom needle, which has its own errors")
-    elif not (errors.noise_mm or errors.roll_rad):
-        say_idle({"given_needle_seed": "--seed"}, "without --noise or --roll-error")
+    is_real = configuration.needle.is_real
+    _say_idle(configuration)
     if only_settings:
         show_settings(configuration)
         return 0
-    tracking = tracking_of(tracker, registration, task.tracker)
-    run = _Run(environment, task.scene, configuration, known, tracking)
-    speaks = not (as_json or quiet)
+    tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
+    run = _Run(environment, task, configuration, known, tracking)
+    terminal = _Terminal(speaks=not (as_json or quiet), confirms=confirm)
     entry, watches_force = task.scene.needle.tip, configuration.settings.force_sensing
-    # A tracker that cannot be reached must not cost an earlier log.
-    with (
-        _operator() as operator,
-        opened(tracking, entry, watches_force=watches_force) as sense,
-        _log(log_path, run) as log,
-    ):
-        result = _drive(run, sense, log, speaks, operator)
+    # A tracker or a port that cannot be reached must not cost an earlier log.
+    with signalled_operator() as operator, contextlib.ExitStack() as stack:
+        if is_real:
+            setup = stack.enter_context(_real_needle(run, needle, baud_rate))
+            log = stack.enter_context(_log(log_path, run))
+            result = _drive_real(run, setup, log, terminal, operator)
+        else:
+            sense = stack.enter_context(opened(tracking, entry, watches_force=watches_force))
+            log = stack.enter_context(_log(log_path, run))
+            result = _drive(run, sense, log, terminal, operator)
     if as_json:
-        echo(json.dumps(_summary(result, run, log_path)))
+        echo(json.dumps(summary(result, configuration, known, log_path)))
     else:
-        _report(result, task.scene, log_path, short=quiet)
+        report(result, task.scene, log_path, short=quiet)
     if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
         return TERMINATED
     return _exit_code(result.ended.outcome)
 
 
+def _say_idle(configuration: Configuration) -> None:
+    """Tells which options have no effect on this needle."""
+    needle, errors = configuration.needle, configuration.errors
+    if needle.is_real:
+        say_idle(_SIMULATIONS_ONLY, "with a real needle")
+        return
+    say_idle({"baud_rate": "--baud"}, "with a simulated needle")
+    if needle.parameters is not None:
+        idle = {"given_needle_noise_mm": "--noise", "given_needle_roll_rad": "--roll-error"}
+        say_idle(idle, "on a phantom needle, which has its own errors")
+    elif not (errors.noise_mm or errors.roll_rad):
+        say_idle({"given_needle_seed": "--seed"}, "without --noise or --roll-error")
+
+
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """What is driven: the file, the true scene, the settings, what is known, what measures."""
+    """What is driven: the file, its task, the settings, what is known, what measures."""
 
     environment: Path
-    scene: Scene
+    task: Task
     configuration: Configuration
     known: str
     tracking: Tracking
 
+    @property
+    def scene(self) -> Scene:
+        """The true scene."""
+        return self.task.scene
 
-class _Signalled(Operator):
-    """An operator who speaks by signals."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.was_terminated = False
+@dataclass(frozen=True, slots=True)
+class _Terminal:
+    """What the terminal is used for: to tell the run, and to ask the operator."""
 
-    def interrupt(self, _number: int, _frame: FrameType | None) -> None:
-        """Ctrl-C: the first one ends the run in an orderly way, the second one at once."""
-        if self.wants_end:
-            raise KeyboardInterrupt
-        self.end("interrupted by the operator")
-
-    def terminate(self, _number: int, _frame: FrameType | None) -> None:
-        """SIGTERM: ends the run in an orderly way."""
-        self.was_terminated = True
-        self.end("ended by the system (SIGTERM)")
+    speaks: bool
+    confirms: bool
 
 
 @contextlib.contextmanager
-def _operator() -> Iterator[_Signalled]:
-    """The operator, who gets the signals until the end of the block."""
-    operator = _Signalled()
-    with handled({signal.SIGINT: operator.interrupt, signal.SIGTERM: operator.terminate}):
-        yield operator
+def _real_needle(
+    run: _Run, needle: str, baud_rate: int
+) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
+    """What moves a real needle, and what measures it."""
+    from ntagen.cli.steppers import described, opened_steppers
+
+    settings, scene = run.configuration.settings, run.scene
+    device = described(run.task, run.environment)
+    _, _, port = needle.partition(":")
+    with (
+        opened_steppers(port, baud_rate, device, scene.needle, settings) as actuator,
+        opened_live(
+            run.tracking,
+            scene.needle.tip,
+            actuator.now_s,
+            watches_force=settings.force_sensing,
+        ) as sensor,
+    ):
+        yield actuator, sensor
+
+
+def _drive_real(
+    run: _Run,
+    setup: tuple[WatchedActuator, LiveSensor],
+    log: list[Journal],
+    terminal: _Terminal,
+    operator: SignalledOperator,
+) -> Driven:
+    from ntagen.drive.real import drive
+
+    with _around(run, log, terminal, operator) as (synthesise, journal, agree):
+        return drive(
+            run.scene,
+            *setup,
+            synthesise,
+            run.configuration.settings,
+            journal,
+            known=run.known,
+            listen=operator.listen,
+            agree=agree,
+        )
 
 
 def _drive(
-    run: _Run, sense: Sense | None, log: list[Journal], speaks: bool, operator: Operator
-) -> Result:
-    from ntagen.drive.records import Journals
-    from ntagen.drive.simulate import simulate, synthesiser_for
+    run: _Run,
+    sense: Sense | None,
+    log: list[Journal],
+    terminal: _Terminal,
+    operator: SignalledOperator,
+) -> Driven:
+    from ntagen.drive.simulate import simulate
 
-    settings = run.configuration.settings
-    # The log has the strategies; nobody else asks for them.
-    synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
-    with contextlib.ExitStack() as stack:
-        terminal = stack.enter_context(_terminal(settings.ranking)) if speaks else []
+    with _around(run, log, terminal, operator) as (synthesise, journal, agree):
         return simulate(
             run.scene,
             synthesise,
-            settings,
-            Journals(*log, *terminal),
+            run.configuration.settings,
+            journal,
             known=run.known,
             errors=run.configuration.errors,
             make=run.configuration.needle.make,
             seed=run.configuration.seed,
             sense=sense,
             listen=operator.listen,
+            agree=agree,
         )
+
+
+@contextlib.contextmanager
+def _around(
+    run: _Run, log: list[Journal], terminal: _Terminal, operator: SignalledOperator
+) -> Iterator[tuple[Synthesiser, Journal, Callable[[str], None]]]:
+    """What a run needs besides the needle: what finds plans, what records, and who agrees."""
+    from ntagen.drive.records import Journals
+    from ntagen.drive.simulate import synthesiser_for
+
+    settings = run.configuration.settings
+    # The log has the strategies; nobody else asks for them.
+    synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
+    agree = operator.agree if terminal.confirms else _agrees
+    if not terminal.speaks:
+        yield synthesise, Journals(*log), agree
+        return
+    with lines(settings.ranking, moves=not terminal.confirms) as shown:
+        yield synthesise, Journals(*log, shown), agree
+
+
+def _agrees(_: str) -> None:
+    """Agrees to all: nobody is asked."""
 
 
 @contextlib.contextmanager
@@ -230,20 +321,25 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
     require_apart({"--log": path}, {"environment": environment})
     metadata = {
         "program": f"ntagen {_version()}",
+        "started_at": datetime.now(tz=UTC).isoformat(timespec="milliseconds"),
         "environment": environment.name.encode(errors="replace").decode(),
-        "seed": configuration.seed,
         "known": run.known,
         "tracker": run.tracking.text,
-        "noise_mm": errors.noise_mm,
-        "roll_error_rad": errors.roll_rad,
-        "true_radius_mm": errors.radius_mm,
-        "true_bevel_rad": errors.bevel_rad,
         "settings": configuration.settings.to_json(),
         "origins": dict(configuration.origins),
         **configuration.needle.facts(),
     }
-    actual = replace(run.scene, needle=errors.true_needle(run.scene.needle))
-    attachments = {ACTUAL: scene_to_json(actual).encode()}
+    attachments = {}
+    if not configuration.needle.is_real:
+        metadata |= {
+            "seed": configuration.seed,
+            "noise_mm": errors.noise_mm,
+            "roll_error_rad": errors.roll_rad,
+            "true_radius_mm": errors.radius_mm,
+            "true_bevel_rad": errors.bevel_rad,
+        }
+        actual = replace(run.scene, needle=errors.true_needle(run.scene.needle))
+        attachments[ACTUAL] = scene_to_json(actual).encode()
     # A pipe can be read only once.
     if environment.is_file():
         attachments[SOURCE] = read_file(environment, MAX_SOURCE_BYTES)
@@ -258,105 +354,6 @@ def _version() -> str:
         return version("ntagen")
     except PackageNotFoundError:
         return "(not installed)"
-
-
-class _Lines:
-    """Prints the run line by line; on a terminal also what happens at the moment."""
-
-    def __init__(
-        self,
-        ranking: Sequence[str],
-        status: Any = None,  # noqa: ANN401  rich is imported late
-    ) -> None:
-        self._ranking = ranking
-        self._status = status
-
-    def record(self, record: Record) -> None:
-        """Prints the line of a record, if it has one, and refreshes the status."""
-        from ntagen.drive.records import Measured, Transition
-        from ntagen.drive.story import tell
-
-        line = tell(record)
-        if line is not None:
-            echo(line)
-        if self._status is None:
-            return
-        if isinstance(record, Transition):
-            self._status.update(record.following)
-        elif isinstance(record, Measured):
-            self._status.update(
-                f"{record.time_s:7.2f} s  {record.depth_mm:6.2f} mm deep, "
-                f"force {record.force_n:.2f} N"
-            )
-
-    def started(self, scene: Scene) -> None:
-        """Prints what is steered, what the driver knows, and how it chooses."""
-        from ntagen.plan.wording import ranked_by
-
-        echo(
-            f"{scene.name}: {len(scene.targets)} target(s), "
-            f"{len(scene.criticals)} critical region(s) known; plans "
-            f"{ranked_by(self._ranking)}"
-        )
-
-    def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """Does nothing: the record of the synthesis has the line."""
-
-
-@contextlib.contextmanager
-def _terminal(ranking: Sequence[str]) -> Iterator[list[Journal]]:
-    """The journal that prints; only a terminal gets a status line that moves."""
-    import sys
-
-    if not sys.stdout.isatty():
-        yield [_Lines(ranking)]
-        return
-    from rich.console import Console
-
-    with Console().status("arm") as status:
-        yield [_Lines(ranking, status)]
-
-
-def _summary(result: Result, run: _Run, log_path: Path | None) -> dict[str, Any]:
-    from ntagen.units import deg_from_rad
-
-    ended = result.ended
-    errors = run.configuration.errors
-    clearance_mm = result.clearance_mm
-    return {
-        "outcome": ended.outcome,
-        "reason": ended.reason,
-        "time_s": ended.time_s,
-        "depth_mm": ended.depth_mm,
-        "adjustments": ended.adjustments,
-        "syntheses": ended.syntheses,
-        "each_synthesis": [dataclasses.asdict(one) for one in result.syntheses],
-        "true_clearance_mm": clearance_mm if math.isfinite(clearance_mm) else None,
-        "true_target_distance_mm": result.target_distance_mm,
-        "seed": run.configuration.seed,
-        "noise_mm": errors.noise_mm,
-        "roll_error_deg": deg_from_rad(errors.roll_rad),
-        "known": run.known,
-        "log": None if log_path is None else str(log_path),
-    }
-
-
-def _report(result: Result, scene: Scene, log_path: Path | None, *, short: bool) -> None:
-    ended = result.ended
-    if short:
-        echo(f"{ended.outcome}: {ended.reason}")
-        return
-    clearance_mm, target_mm = result.clearance_mm, result.target_distance_mm
-    where = "inside" if target_mm <= 0.0 else "outside of"
-    echo(f"in truth, the tip is {abs(target_mm):.2f} mm {where} {scene.targets[-1].name}", nl=False)
-    if math.isfinite(clearance_mm):
-        echo(f", and the needle's path is {clearance_mm:.2f} mm or more from critical regions")
-    else:
-        echo("")
-    count = f"{ended.syntheses} syntheses, {ended.adjustments} adjustments"
-    echo(f"{count}, {ended.time_s:.1f} s, {ended.depth_mm:.1f} mm deep")
-    if log_path is not None:
-        echo(f"wrote {log_path}")
 
 
 def _exit_code(outcome: str) -> int:

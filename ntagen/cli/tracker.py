@@ -15,7 +15,7 @@ from ntagen.cli.terminal import echo
 from ntagen.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
-    from ntagen.drive.device import Device, Sensor
+    from ntagen.drive.device import Device, LiveSensor, Sensor
     from ntagen.hardware import OpenIGTLinkTracker
     from ntagen.scene import Pose
     from ntagen.tracking.frames import Transform
@@ -70,20 +70,30 @@ class Tracking:
 
 
 def tracking_of(
-    tracker: str | None, registration: str | None, described: OpenIGTLinkTracker | None = None
+    tracker: str | None,
+    registration: str | None,
+    described: OpenIGTLinkTracker | None = None,
+    *,
+    is_real: bool = False,
 ) -> Tracking:
     """What the words of the options mean.
 
     Args:
         tracker: The words of --tracker.
         registration: Those of --registration.
-        described: The tracker in the task. It counts if a registration is given for it: a simulated
-            needle needs none and measures itself.
+        described: The tracker in the task. It counts for a real needle, or if a registration is
+            given for it: a simulated needle needs none and measures itself.
+        is_real: Whether the needle is a real one.
 
     Raises:
         InputError: They have a mistake, or the registration cannot be read.
     """
-    if tracker is None and described is not None and registration is not None:
+    if is_real and tracker == SIMULATED:
+        raise InputError(
+            f"{SIMULATED} measures simulated needles only\n"
+            "hint: give --tracker openigtlink:HOST:PORT:DEVICE"
+        )
+    if tracker is None and described is not None and (is_real or registration is not None):
         tracker = _words_for(described)
     if tracker is None or tracker == SIMULATED:
         if registration is not None:
@@ -138,17 +148,56 @@ def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[
         sensor = stack.enter_context(
             open_tracker(tracking.tracker, tracking.transform, lambda: needles[0].now_s())
         )
-        if watches_force and not sensor.measures_force:
-            raise InputError(
-                f"the tracker {tracking.text} measures no force, and the driver watches the force\n"
-                "hint: name a sensor with force=DEVICE, or add --force-sensing off"
-            )
+        _require_force(tracking, sensor.measures_force, watches_force)
 
         def sense(needle: Device) -> Sensor:
             needles.append(needle)
             return Plausible(sensor, entry)
 
         yield sense
+
+
+@contextlib.contextmanager
+def opened_live(
+    tracking: Tracking, entry: Pose, now_s: Callable[[], float], *, watches_force: bool
+) -> Iterator[LiveSensor]:
+    """Connects to the tracker of a real needle until the end of the block.
+
+    Args:
+        tracking: What measures the needle.
+        entry: Where the needle is at the start.
+        now_s: The clock of the actuator.
+        watches_force: Whether the driver relies on a force.
+
+    Raises:
+        InputError: The tracker cannot be used so.
+        DeviceError: It cannot be reached.
+    """
+    from ntagen.tracking.live import LiveTracker
+    from ntagen.tracking.plausible import LivePlausible
+    from ntagen.tracking.spec import open_tracker
+
+    if tracking.tracker is None:
+        raise InputError(
+            "nothing measures the needle\n"
+            "hint: give --tracker openigtlink:HOST:PORT:DEVICE, or let the task describe a tracker"
+        )
+    with open_tracker(tracking.tracker, tracking.transform, now_s) as sensor:
+        if not isinstance(sensor, LiveTracker):
+            raise InputError(
+                f"{tracking.text} is a recording, and a real needle must be seen while it moves\n"
+                "hint: give --tracker openigtlink:HOST:PORT:DEVICE"
+            )
+        _require_force(tracking, sensor.measures_force, watches_force)
+        yield LivePlausible(sensor, entry)
+
+
+def _require_force(tracking: Tracking, measures_force: bool, watches_force: bool) -> None:
+    if watches_force and not measures_force:
+        raise InputError(
+            f"the tracker {tracking.text} measures no force, and the driver watches the force\n"
+            "hint: name a sensor with force=DEVICE, or add --force-sensing off"
+        )
 
 
 def look_at(text: str, seconds: float, *, as_json: bool) -> int:

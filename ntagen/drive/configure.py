@@ -36,7 +36,7 @@ class Configuration:
         errors: The errors of the virtual needle.
         seed: The seed of these errors.
         origins: The origin of each value that is not a default, by its field.
-        needle: The simulated needle.
+        needle: The needle.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -77,7 +77,7 @@ def configure(
         given: The values of the file, then those of the command line.
         scene: The actual scene.
         known: The critical regions that the driver knows (`ntagen.drive.knowledge.told`).
-        needle: The name of the simulated needle (`ntagen.drive.needles`).
+        needle: The name of the needle (`ntagen.drive.needles`).
 
     Raises:
         InputError: The driver cannot work with these values together; the message has the origin
@@ -96,7 +96,7 @@ def configure(
     its_needle = choose(needle, errors)
     steering = {p.field: values[p.field] for p in STEERING if p.field in values}
     try:
-        usual = its_needle.usual(Settings())
+        usual = its_needle.usual(Settings(), scene)
         for p in STEERING:
             if p.field not in origins and value_of(usual, p.field) != value_of(Settings(), p.field):
                 origins[p.field] = _AS_NEEDLE

@@ -17,6 +17,9 @@ If there is no plan, the driver does not pull back at once. It first looks for a
 tip, on the known channel, from which there is a strategy. If there is none back to the entry, the
 run ends where it is.
 
+A push may be ended early while it goes on (`ntagen.drive.supervisor`). Then the driver measures,
+and plans from where the needle is; at the second time in a row it pulls back.
+
 The first push belongs to a plan from the entry. If there is none, the push is made only if no known
 region is near it for any start error (`ntagen.drive.first_push`).
 
@@ -56,6 +59,7 @@ from ntagen.drive.reliance import relies_on
 from ntagen.drive.settings import Settings
 from ntagen.drive.states import ENDS, Event, State, next_state
 from ntagen.drive.steering import Steering
+from ntagen.drive.supervisor import Guard, Supervisor
 from ntagen.errors import DeviceError, LimitError
 from ntagen.needle.estimate import Estimate
 from ntagen.needle.kinematics import orthonormal
@@ -97,6 +101,9 @@ class Controller:
         settings: How to drive.
         journal: Records what happens.
         listen: Raises `KeyboardInterrupt`, with the reason, if somebody wants the run to end.
+        supervisor: What watches the needle while it moves.
+        agree: Is told each time what the driver wants to do next; raises `KeyboardInterrupt` if
+            the operator does not want that.
     """
 
     def __init__(
@@ -107,11 +114,15 @@ class Controller:
         settings: Settings,
         journal: Journal,
         listen: Callable[[], None] = lambda: None,
+        supervisor: Supervisor | None = None,
+        agree: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._synthesise = synthesise
         self._settings = settings
         self._journal = journal
         self._listen = listen
+        self._supervisor = supervisor or Supervisor()
+        self._agree = agree
         self._knowledge = Knowledge(scene)
         self._needle = Steering(scene.needle, device, settings, journal, listen)
         self._force = ForceMonitor(settings, scene.needle.length_mm)
@@ -120,6 +131,8 @@ class Controller:
         self._moves: deque[tuple[Push | Roll, Pose]] = deque()
         self._reviewed_mm = 0.0
         self._predicted: Pose = scene.needle.tip
+        self._is_short = False
+        self._short_in_row = 0
         self._lack = _Lack()
         self._retreat_mm: float | None = None
         self._adjustments = 0
@@ -208,6 +221,7 @@ class Controller:
             return Event.FIRST_STRATEGY if is_first else Event.STRATEGY_FOUND
         if is_first and not self._lack.held and self._first_push_is_free():
             push = Push(self._settings.initial_push_mm)
+            self._agree(f"push {push.length_mm:g} mm to see how the needle bends")
             self._follow(self._here(), Plan.of([push]))
             return Event.PUSH_IS_FREE
         return self._look_back()
@@ -221,7 +235,9 @@ class Controller:
             self._require_time()
             depth_mm = max(0.0, depth_mm - stride_mm)
             behind = path.pull(path.depth_mm - depth_mm)
-            if self._ask(_unrolled(behind), depth_mm).best is not None:
+            best = self._ask(_unrolled(behind), depth_mm).best
+            if best is not None:
+                self._agree(f"pull back to a depth of {depth_mm:.1f} mm, for the plan {best.plan}")
                 self._retreat_mm = depth_mm
                 return Event.STRATEGY_BEHIND
         event, self._reason = self._lack.event()
@@ -230,10 +246,11 @@ class Controller:
     def _initial_push(self) -> Event:
         """Makes the first moves of the plan, or the free push if there is none."""
         goal_mm = self._settings.initial_push_mm
-        while self._moves:
-            action, _ = self._moves.popleft()
+        while self._moves and not self._is_short:
+            action, self._predicted = self._moves.popleft()
             self._require_time()
-            if not self._act(action):
+            self._act(action)
+            if isinstance(action, Roll):
                 continue
             measurement = self._needle.measure()
             if self._feels(measurement):
@@ -266,8 +283,10 @@ class Controller:
         if self._feels(measurement):
             return Event.FORCE
         self._visit(measurement.position_mm, last_too=False)
-        if is_off:
+        if is_off or (self._is_short and self._short_in_row > 1):
             return Event.DEVIATION
+        if self._is_short:
+            return Event.PLAN_FAILS
         return Event.AS_PREDICTED if self._holds_still() else Event.PLAN_FAILS
 
     def _holds_still(self) -> bool:
@@ -319,9 +338,12 @@ class Controller:
         length_mm = goal_mm - self._needle.depth_mm
         for piece_mm in _pieces(length_mm, self._settings.spacing_mm):
             self._require_time()
-            self._needle.push(piece_mm)
+            start = self._needle.path
+            self._push(piece_mm, start.push(self._estimate().radius_mm, piece_mm).tip)
             if self._feels(self._needle.measure()):
                 return Event.FORCE
+            if self._is_short:
+                break
         return Event.PUSHED
 
     # Knowledge.
@@ -437,6 +459,7 @@ class Controller:
         best = synthesis.best
         if best is None:
             raise AssertionError("a synthesis without a plan was adopted")
+        self._agree(f"follow the plan {best.plan}")
         self._follow(synthesis.scene, best.plan)
         self._reviewed_mm = self._needle.depth_mm
 
@@ -445,13 +468,25 @@ class Controller:
             raise AssertionError("the estimate comes before this")
         return self._needle.estimate
 
-    def _act(self, action: Push | Roll) -> bool:
-        """Makes a move; returns whether it cuts."""
+    def _act(self, action: Push | Roll) -> None:
+        """Makes a move, at whose end the tip is predicted."""
         if isinstance(action, Roll):
+            self._is_short = False
             self._needle.roll(action.angle_rad)
-            return False
-        self._needle.push(action.length_mm)
-        return True
+        else:
+            self._push(action.length_mm, self._predicted)
+
+    def _push(self, length_mm: float, predicted: Pose) -> None:
+        """Pushes under guard; counts how often in a row a push was ended early."""
+        settings, depth_mm = self._settings, self._needle.depth_mm
+        end_mm = predicted.position_mm
+        a_priori = self._knowledge.a_priori
+        expected_n = self._force.expected_n(depth_mm + length_mm)
+        expected_n += self._knowledge.expected_force_n(end_mm, settings)
+        way = (self._needle.path.tip.position_mm, end_mm)
+        with self._supervisor.guarding(Guard.of(settings, way, a_priori.criticals, expected_n)):
+            self._is_short = not self._needle.push(length_mm)
+        self._short_in_row = self._short_in_row + 1 if self._is_short else 0
 
     def _halt(self) -> None:
         """Stops the needle at the end of a run, whatever the reason."""

@@ -4,14 +4,27 @@ A device executes one command at a time and returns when the motion is over. It 
 if it cannot execute a command, if it does not answer, or if a sensor gives no reading; the driver
 then stops it. Lengths are in mm, angles in rad, times in seconds on the device's own clock, which
 never goes back.
+
+A device whose motions take real time is watched during them: it calls its `watch` at least every
+`WATCH_S`. What that raises ends the motion: the device stops first, then raises it again.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
+from ntagen.errors import DeviceError
+from ntagen.errors import Halted as Halted  # Users of the protocol need it.
 from ntagen.needle.measurement import Measurement
+
+Watch = Callable[[], None]
+"""Looks at the needle while it moves; raises to end the motion."""
+
+WATCH_S: Final = 0.01
+"""A device that moves calls its watch at least so often."""
 
 
 class Sensor(Protocol):
@@ -36,6 +49,7 @@ class Actuator(Protocol):
 
         Raises:
             DeviceError: The motion is impossible or failed.
+            Halted: Who watched it ended it early.
         """
 
     def roll(self, angle_rad: float) -> None:
@@ -54,6 +68,32 @@ class Actuator(Protocol):
 
     def stop(self) -> None:
         """Stops the needle where it is: the safe state. It must work at any time, also twice."""
+
+
+class WatchedActuator(Actuator, Protocol):
+    """What moves a needle in real time.
+
+    Attributes:
+        watch: Is called at least every `WATCH_S` while the needle moves. If it raises, the needle
+            is stopped, and the exception goes on to the caller; a `Halted` gets its `part`.
+    """
+
+    watch: Watch
+
+
+class LiveSensor(Sensor, Protocol):
+    """A sensor that can also be looked at while the needle moves."""
+
+    @property
+    def measures_force(self) -> bool:
+        """Whether measurements have a force; without it, the force is always 0."""
+
+    def newest(self) -> Measurement:
+        """The newest measurement, at once: it never waits.
+
+        Raises:
+            DeviceError: There is none, or none that is new enough.
+        """
 
 
 class Device(Actuator, Sensor, Protocol):
@@ -95,3 +135,14 @@ class Assembly:
     def measure(self) -> Measurement:
         """See `Sensor.measure`."""
         return self.sensor.measure()
+
+
+def require_finite(measurement: Measurement) -> None:
+    """Refuses a measurement with something that is not a number.
+
+    Raises:
+        DeviceError: There is one.
+    """
+    numbers = (*measurement.position_mm, measurement.force_n, measurement.time_s)
+    if not all(math.isfinite(number) for number in numbers):
+        raise DeviceError(f"the sensor reported {measurement}: not a number")

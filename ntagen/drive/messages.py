@@ -39,6 +39,7 @@ KINDS: Final[tuple[type[Record], ...]] = (
     records.Truth,
     records.Relied,
     records.Forgotten,
+    records.CutShort,
 )
 """All kinds of records, in the order of the file of descriptors."""
 

@@ -1,10 +1,11 @@
-"""The simulated needles by name, each with its settings and with what a log says about it."""
+"""The needles by name, each with its settings and with what a log says about it."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
+from ntagen.drive.real import overrun_mm
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import Maker, phantom, settings_for, settings_for_phantom, virtual
 from ntagen.drive.stepped import stepped
@@ -14,7 +15,10 @@ from ntagen.needle.virtual import Errors
 from ntagen.scene import Scene
 
 NAMES: Final = ("virtual", "phantom", "grbl+sim")
-"""The names of the needles; the last is a phantom behind an emulated stepper controller."""
+"""The simulated needles; the last is a phantom behind an emulated stepper controller."""
+
+REAL: Final = "grbl"
+"""A needle behind a GRBL controller: `grbl:PORT`, or `grbl` for the port in the task."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,18 +27,25 @@ class Chosen:
 
     Attributes:
         name: Its name.
-        make: Makes it.
+        make: Makes it; None for a real needle.
         errors: The errors of the virtual needle.
         parameters: The parameters of the phantom needle; None for another one.
     """
 
     name: str
-    make: Maker
+    make: Maker | None
     errors: Errors
     parameters: PhantomParameters | None = None
 
-    def usual(self, settings: Settings) -> Settings:
+    @property
+    def is_real(self) -> bool:
+        """Whether it is no simulation."""
+        return self.make is None
+
+    def usual(self, settings: Settings, scene: Scene) -> Settings:
         """The settings with which this needle is driven if nobody says otherwise."""
+        if self.is_real:
+            return replace(settings, overrun_mm=overrun_mm(scene.needle.speed_mm_per_s))
         if self.parameters is None:
             return settings
         return replace(settings, compensated_lag_rad=self.parameters.torsion.lag_rad)
@@ -61,15 +72,18 @@ def choose(name: str, errors: Errors) -> Chosen:
     """The needle of a name.
 
     Args:
-        name: One of `NAMES`.
+        name: One of `NAMES`, or a real needle (`REAL`).
         errors: The errors of the virtual needle.
 
     Raises:
         InputError: There is no needle of this name.
     """
+    kind, _, _ = name.partition(":")
+    if kind == REAL:
+        return Chosen(name, None, errors)
     if name not in NAMES:
         raise InputError(
-            f"there is no needle '{name}'\nhint: choose from {', '.join(sorted(NAMES))}"
+            f"there is no needle '{name}'\nhint: choose from {', '.join(sorted(NAMES))}, grbl:PORT"
         )
     if name != "virtual":
         parameters = PhantomParameters()

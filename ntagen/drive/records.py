@@ -200,6 +200,21 @@ class Relied(Record):
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class CutShort(Record):
+    """A push was ended early by what was seen during it (`ntagen.drive.supervisor`).
+
+    Attributes:
+        made_mm: How far the needle got.
+        reason: Why it was ended, in words.
+    """
+
+    decided: ClassVar[bool] = False
+
+    made_mm: float
+    reason: str
+
+
 class Journal(Protocol):
     """Anything that records a run: the log, the terminal, a replay."""
 

@@ -18,9 +18,9 @@ from typing import Final
 
 from ntagen.drive.controller import Controller
 from ntagen.drive.reading import RunLog
-from ntagen.drive.records import Ended, Measured, Record, Transition, Truth
+from ntagen.drive.records import CutShort, Ended, Measured, Record, Transition, Truth
 from ntagen.drive.states import Event
-from ntagen.errors import DeviceError, LimitError
+from ntagen.errors import DeviceError, Halted, LimitError
 from ntagen.needle.measurement import Measurement
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Scene, Vector
@@ -76,7 +76,15 @@ def replay(log: RunLog, synthesise: Synthesiser) -> Comparison:
         LimitError: The engine reached a limit that it did not reach in the run.
     """
     stage = _Stage(record for record in log.records if not isinstance(record, Truth))
-    controller = Controller(log.scene, stage, synthesise, log.settings, stage, stage.listen)
+    controller = Controller(
+        log.scene,
+        stage,
+        synthesise,
+        log.settings,
+        stage,
+        stage.listen,
+        agree=lambda _: stage.listen(),
+    )
     try:
         controller.run()
     except _LogOver:
@@ -108,8 +116,13 @@ class _Stage:
         return following.time_s if following else 0.0
 
     def push(self, length_mm: float) -> None:
-        """Does nothing: the command was compared as a record."""
+        """Repeats how the push ended; the command was compared as a record."""
         self._repeat_failure()
+        logged = self.next_logged
+        if isinstance(logged, CutShort):
+            halted = Halted(logged.reason)
+            halted.part = min(1.0, logged.made_mm / length_mm)
+            raise halted
 
     def roll(self, angle_rad: float) -> None:
         """Does nothing: the device does not move."""

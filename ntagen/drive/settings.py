@@ -42,6 +42,9 @@ class Settings:
             only, and plans keep more distance from them (`ntagen.drive.reliance`).
         force_n: The rise of the force that must be felt (`ntagen.drive.force`). The authors used
             rises of 0.1 to 0.2 in an unknown unit.
+        halt_force_n: A push is ended at once when the force is this much more than what is expected
+            (`ntagen.drive.supervisor`). Friction in motion is more than friction at rest, so this
+            is more than `force_n`; ours.
         force_noise_n: The standard deviation of a measured force; ours.
         force_rise_n_per_mm: The least rise of the force on the way towards a region, once it rises;
             ours.
@@ -76,6 +79,7 @@ class Settings:
     deviation_count: int = 3
     force_sensing: bool = True
     force_n: float = 0.1
+    halt_force_n: float = 1.0
     force_noise_n: float = 0.01
     force_rise_n_per_mm: float = 0.5
     false_alarm: float = 0.001

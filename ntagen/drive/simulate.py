@@ -12,6 +12,7 @@ from ntagen.drive.controller import Controller
 from ntagen.drive.device import Actuator, Assembly, Device, Sensor
 from ntagen.drive.force import fitting_spacing_mm
 from ntagen.drive.knowledge import sensing_margin_mm, told
+from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
 from ntagen.drive.settings import Settings
 from ntagen.drive.timing import TimedSynthesiser
@@ -71,41 +72,20 @@ def phantom(parameters: PhantomParameters) -> Maker:
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
-    """A synthesis that was made.
-
-    Attributes:
-        found: The number of plans that were found.
-        hold: The number of those that hold in exact kinematics and fit into the time left.
-        engine_seconds: The engine's time.
-        loop_seconds: The time of the whole synthesis.
-    """
-
-    found: int
-    hold: int
-    engine_seconds: float
-    loop_seconds: float
-
-
-@dataclass(frozen=True, slots=True)
-class Result:
+class Result(Driven):
     """The end of a simulated run, and the truth about it.
 
     Attributes:
-        ended: The driver's own last record.
         clearance_mm: The smallest distance of the needle's path to any actual critical region;
             infinite without one, negative if one was pierced.
         target_distance_mm: The distance of the true tip to the surface of the last target; negative
             inside.
         pierced: All arcs that were really cut.
-        syntheses: Every synthesis, in order.
     """
 
-    ended: Ended
     clearance_mm: float
     target_distance_mm: float
     pierced: tuple[Arc, ...]
-    syntheses: tuple[Made, ...]
 
 
 def simulate(
@@ -120,6 +100,7 @@ def simulate(
     seed: int = 0,
     sense: Callable[[Device], Sensor] | None = None,
     listen: Callable[[], None] = lambda: None,
+    agree: Callable[[str], None] = lambda _: None,
 ) -> Result:
     """Drives a simulated needle through the scene.
 
@@ -135,6 +116,7 @@ def simulate(
         seed: The seed of the errors.
         sense: Gives what measures the needle; by default it measures itself.
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
+        agree: As in `Controller`.
     """
     obstacles = tuple(
         Obstacle(
@@ -152,8 +134,15 @@ def simulate(
         actuator = Compensated(needle, Lag(settings.compensated_lag_rad))
     device = Assembly(actuator, sensor)
     witness = _Witness(needle, journal)
+    counter = SynthesisCounter()
     controller = Controller(
-        told(scene, known), device, synthesise, settings, Journals(journal, witness), listen
+        told(scene, known),
+        device,
+        synthesise,
+        settings,
+        Journals(journal, witness, counter),
+        listen,
+        agree=agree,
     )
     ended = controller.run()
     last = scene.targets[-1]
@@ -163,7 +152,7 @@ def simulate(
         clearance_mm=needle.true_clearance_mm(),
         target_distance_mm=distance(tip_mm, last.center_mm) - last.radius_mm,
         pierced=needle.pierced,
-        syntheses=tuple(witness.syntheses),
+        syntheses=tuple(counter.syntheses),
     )
 
 
@@ -246,12 +235,11 @@ def synthesiser_for(
 
 
 class _Witness:
-    """Adds the truth to a journal, at each measurement and at the end; counts syntheses."""
+    """Adds the truth to a journal, at each measurement and at the end."""
 
     def __init__(self, needle: Simulated, journal: Journal) -> None:
         self._needle = needle
         self._journal = journal
-        self.syntheses: list[Made] = []
 
     def record(self, record: Record) -> None:
         if isinstance(record, Measured | Ended):
@@ -264,12 +252,4 @@ class _Witness:
         """Does nothing: the truth is added to measurements only."""
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """Notes what was found, and how long that took."""
-        self.syntheses.append(
-            Made(
-                found=synthesis.found,
-                hold=len(synthesis.candidates),
-                engine_seconds=synthesis.seconds,
-                loop_seconds=synthesis.loop_seconds,
-            )
-        )
+        """Does nothing: the truth is added to measurements only."""

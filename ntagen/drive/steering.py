@@ -1,8 +1,8 @@
 """The needle in the driver's hands: every command and every reading goes through here.
 
-A command reaches the journal first, then the estimator and the path, then the device. So nothing
-moves that the log does not tell. A motion counts as made when it is commanded: nobody knows how far
-the needle got if a motion failed.
+A command reaches the journal first, then the device, then the estimator and the path. So nothing
+moves that the log does not tell. A motion that failed counts as made: nobody knows how far the
+needle got. A push that was ended early counts as far as it got.
 
 Invariant: `Steering.path` is the channel in which the needle lies, by the last estimate and by all
 commands after it.
@@ -14,10 +14,9 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from ntagen.drive.device import Device
-from ntagen.drive.records import Command, Estimated, Journal, Measured
+from ntagen.drive.device import Device, Halted, require_finite
+from ntagen.drive.records import Command, CutShort, Estimated, Journal, Measured
 from ntagen.drive.settings import Settings
-from ntagen.errors import DeviceError
 from ntagen.needle.estimate import Estimate, Estimator
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
@@ -70,13 +69,21 @@ class Steering:
         """The time on the device's clock."""
         return self._device.now_s()
 
-    def push(self, length_mm: float) -> None:
-        """Inserts the needle."""
+    def push(self, length_mm: float) -> bool:
+        """Inserts the needle; returns whether it went all the way (`Halted`)."""
         self._command("push", length_mm)
-        self._estimator.push(length_mm)
-        self.path = self.path.push(self._radius_mm, length_mm)
-        self._cut_mm = max(self._cut_mm, self.path.depth_mm)
-        self._device.push(length_mm)
+        made_mm = length_mm
+        try:
+            self._device.push(length_mm)
+        except Halted as halted:
+            made_mm *= halted.part
+            self._journal.record(CutShort(self.now_s(), made_mm, str(halted)))
+            return False
+        finally:
+            self._estimator.push(made_mm)
+            self.path = self.path.push(self._radius_mm, made_mm)
+            self._cut_mm = max(self._cut_mm, self.path.depth_mm)
+        return True
 
     def roll(self, angle_rad: float) -> None:
         """Turns the needle: the next push leaves the old channel, if it lies in one."""
@@ -123,7 +130,7 @@ class Steering:
             DeviceError: There is no reading, or it is not a number.
         """
         measurement = self._device.measure()
-        _require_finite(measurement)
+        require_finite(measurement)
         self._estimator.measure(measurement)
         self._journal.record(
             Measured(
@@ -174,9 +181,3 @@ class Steering:
         """Records a motion that begins now, unless somebody wants the run to end."""
         self._listen()
         self._journal.record(Command(self.now_s(), kind, value))
-
-
-def _require_finite(measurement: Measurement) -> None:
-    numbers = (*measurement.position_mm, measurement.force_n, measurement.time_s)
-    if not all(math.isfinite(number) for number in numbers):
-        raise DeviceError(f"the sensor reported {measurement}: not a number")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ntagen.drive.records import (
+    CutShort,
     Ended,
     Estimated,
     Forgotten,
@@ -45,6 +46,8 @@ def _text(record: Record) -> str | None:
             )
         case Forgotten():
             return f"{record.kind} region '{record.name}' is now part of a larger one"
+        case CutShort():
+            return f"{record.reason}: stop after {record.made_mm:.2f} mm of the push"
         case Relied():
             return record.text
         case Visited():

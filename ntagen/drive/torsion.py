@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ntagen.drive.device import Actuator
+from ntagen.drive.device import Actuator, Halted
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,11 @@ class Compensated:
 
     def push(self, length_mm: float) -> None:
         """See `Actuator.push`."""
-        self._actuator.push(length_mm)
+        try:
+            self._actuator.push(length_mm)
+        except Halted as halted:
+            self._depth_mm += halted.part * length_mm
+            raise
         self._depth_mm += length_mm
 
     def roll(self, angle_rad: float) -> None:

@@ -25,6 +25,7 @@ from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from ntagen.drive.records import (
+    CutShort,
     Ended,
     Estimated,
     Forgotten,
@@ -194,6 +195,8 @@ def _text(record: Record) -> str:
             return f"{record.state}: {record.event} -> {record.following}"
         case Learned():
             return f"learned {record.kind} region '{record.name}'"
+        case CutShort():
+            return f"{record.reason}: the push ended after {record.made_mm:.2f} mm"
         case Relied():
             return record.text
         case Visited():

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from ntagen.errors import DeviceError
+from ntagen.errors import DeviceError, Halted
 from ntagen.grbl.axes import Axes, Motor, motor
 from ntagen.grbl.identity import Identity, identify, position_of, require_ready
 from ntagen.grbl.link import Link, RefusedError, Watch
@@ -66,7 +66,8 @@ class GrblActuator:
         port: The wire to the controller. `close` gives it back.
         axes: Which axis does what.
         watch: Is called every few milliseconds while the needle moves. What it raises ends the
-            motion: the needle is stopped first, then the error goes on to the caller.
+            motion: the needle is stopped first, then the error goes on to the caller. A `Halted`
+            gets the part of the motion that was made.
 
     Raises:
         DeviceError: The controller does not answer as a GRBL that is ready to move.
@@ -95,6 +96,11 @@ class GrblActuator:
         return self._link.now_s()
 
     @property
+    def ramp_mm_per_s2(self) -> float:
+        """The acceleration with which a push is stopped."""
+        return self._insert.acceleration
+
+    @property
     def position(self) -> tuple[float, ...]:
         """Where the axes stand by the controller's count, in mm and degrees."""
         return self._expected
@@ -104,6 +110,7 @@ class GrblActuator:
 
         Raises:
             DeviceError: The motion is impossible, was stopped, or failed.
+            Halted: Who watched it ended it early.
         """
         self._require(length_mm >= 0.0, "push", length_mm)
         self._move(self._insert, length_mm, self._axes.push_mm_per_s, self._axes.max_mm)
@@ -203,9 +210,16 @@ class GrblActuator:
         """Moves an axis in pieces, each no longer than the longest one."""
         stops = self._stops
         count = max(1, math.ceil(abs(length) / longest - 1e-9))
+        way = motor.axis.sign * length
         with self._link.turn:
-            for _ in range(count):
-                self._piece(motor, motor.axis.sign * length / count, speed, stops)
+            start = self._expected[motor.index]
+            try:
+                for _ in range(count):
+                    self._piece(motor, way / count, speed, stops)
+            except Halted as halted:
+                made = (self._expected[motor.index] - start) / way
+                halted.part = max(0.0, min(1.0, made))
+                raise
 
     def _piece(self, motor: Motor, way: float, speed: float, stops: int) -> None:
         def watch() -> None:

@@ -75,12 +75,16 @@ class Axes:
             raise InputError(f"the axis {self.roll.letter} cannot both insert and roll the needle")
 
 
-def axes_of(device: GrblDevice, push_mm_per_s: float) -> Axes:
-    """The axes as a task describes them; pulls are as fast as pushes.
+def axes_of(
+    device: GrblDevice, push_mm_per_s: float, pull_mm_per_s: float, roll_deg_per_s: float
+) -> Axes:
+    """The axes as a task describes them, with their speeds.
 
     Args:
         device: The device in the task; an axis with negative steps turns the other way round.
         push_mm_per_s: The speed of insertion.
+        pull_mm_per_s: The speed of pulling.
+        roll_deg_per_s: The speed of rolling.
 
     Raises:
         InputError: The axes are impossible.
@@ -89,7 +93,7 @@ def axes_of(device: GrblDevice, push_mm_per_s: float) -> Axes:
         Axis(axis.letter, 1 if axis.steps_per_unit > 0.0 else -1, abs(axis.steps_per_unit))
         for axis in (device.insert, device.roll)
     )
-    return Axes(insert, roll, push_mm_per_s=push_mm_per_s, pull_mm_per_s=push_mm_per_s)
+    return Axes(insert, roll, push_mm_per_s, pull_mm_per_s, roll_deg_per_s)
 
 
 @dataclass(frozen=True, slots=True)

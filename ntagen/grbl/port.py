@@ -63,6 +63,7 @@ class SerialPort:
 
     def __init__(self, name: str, baud_rate: int = BAUD_RATE) -> None:
         self._name = name
+        self._opened_s = time.monotonic()
         try:
             self._serial = serial.serial_for_url(
                 name,
@@ -80,8 +81,8 @@ class SerialPort:
         return self._name
 
     def now_s(self) -> float:
-        """The clock of the computer."""
-        return time.monotonic()
+        """Seconds since the port was opened, on the monotonic clock of the computer."""
+        return time.monotonic() - self._opened_s
 
     def read(self, timeout_s: float) -> bytes:
         """See `Port.read`."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ntagen.drive.device import Sensor
+from ntagen.drive.device import LiveSensor, Sensor
 from ntagen.errors import DeviceError
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.vectors import distance, dot
@@ -50,13 +50,41 @@ class Plausible:
         Raises:
             DeviceError: There is no reading, or it cannot be true.
         """
-        found = self._sensor.measure()
+        return self._require(self._sensor.measure())
+
+    def _require(self, found: Measurement) -> Measurement:
         if self._last is None:
             require_start(found, self._entry)
         else:
             require_near(found, self._last)
         self._last = found
         return found
+
+
+class LivePlausible(Plausible):
+    """The same for a sensor that is looked at while the needle moves.
+
+    Args:
+        sensor: The sensor.
+        entry: The pose at which the needle is at the start.
+    """
+
+    def __init__(self, sensor: LiveSensor, entry: Pose) -> None:
+        super().__init__(sensor, entry)
+        self._live = sensor
+
+    @property
+    def measures_force(self) -> bool:
+        """See `LiveSensor.measures_force`."""
+        return self._live.measures_force
+
+    def newest(self) -> Measurement:
+        """The newest measurement, at once.
+
+        Raises:
+            DeviceError: There is none, or it cannot be true.
+        """
+        return self._require(self._live.newest())
 
 
 def require_near(found: Measurement, last: Measurement) -> None:

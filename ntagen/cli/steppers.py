@@ -1,0 +1,80 @@
+"""Opens the steppers of a real needle, as the command line and the task describe them."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING
+
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from ntagen.drive.device import WatchedActuator
+    from ntagen.drive.settings import Settings
+    from ntagen.grbl.axes import Axes
+    from ntagen.hardware import GrblDevice
+    from ntagen.nsl import Task
+    from ntagen.scene import Needle
+
+
+def described(task: Task, path: Path) -> GrblDevice:
+    """The device that a task describes.
+
+    Raises:
+        InputError: It describes none.
+    """
+    if task.device is None:
+        raise InputError(
+            f"{path}: the task describes no device\n"
+            'hint: write for example device grbl "/dev/ttyACM0" '
+            "{ insert X 80 steps/mm  roll A 8.89 steps/deg }"
+        )
+    return task.device
+
+
+def axes_for(device: GrblDevice, needle: Needle, settings: Settings) -> Axes:
+    """The axes of a device, at the speeds of the needle and of the settings.
+
+    Raises:
+        InputError: The axes are impossible.
+    """
+    from ntagen.grbl.axes import axes_of
+    from ntagen.units import deg_from_rad
+
+    return axes_of(
+        device,
+        push_mm_per_s=needle.speed_mm_per_s,
+        pull_mm_per_s=settings.pull_speed_ratio * needle.speed_mm_per_s,
+        roll_deg_per_s=deg_from_rad(settings.roll_rad_per_s),
+    )
+
+
+@contextlib.contextmanager
+def opened_steppers(
+    port: str, baud_rate: int, device: GrblDevice, needle: Needle, settings: Settings
+) -> Iterator[WatchedActuator]:
+    """Connects to the controller that moves the needle, until the end of the block.
+
+    Args:
+        port: The port; empty for that of the device.
+        baud_rate: The port's speed.
+        device: The device in the task.
+        needle: The needle.
+        settings: How to drive.
+
+    Raises:
+        InputError: Axes, speeds or settings do not fit the controller.
+        DeviceError: It is not ready to move.
+    """
+    from ntagen.drive.real import overrun_mm, require_overrun
+    from ntagen.grbl.actuator import GrblActuator
+    from ntagen.grbl.port import SerialPort
+
+    axes = axes_for(device, needle, settings)
+    with contextlib.closing(SerialPort(port or device.port, baud_rate)) as wire:
+        actuator = GrblActuator(wire, axes)
+        needs_mm = overrun_mm(needle.speed_mm_per_s, actuator.ramp_mm_per_s2)
+        require_overrun(settings, needs_mm)
+        yield actuator

@@ -1,0 +1,67 @@
+"""What a run gives to its caller, besides its records: the end, and how long its syntheses took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ntagen.drive.records import Ended, Record
+from ntagen.plan.synthesise import Synthesis
+from ntagen.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A synthesis that was made.
+
+    Attributes:
+        found: The number of plans that were found.
+        hold: The number of those that hold in exact kinematics and fit into the time left.
+        engine_seconds: The engine's time.
+        loop_seconds: The time of the whole synthesis.
+    """
+
+    found: int
+    hold: int
+    engine_seconds: float
+    loop_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """The end of a run.
+
+    Attributes:
+        ended: The driver's own last record.
+        syntheses: Every synthesis, in order.
+    """
+
+    ended: Ended
+    syntheses: tuple[Made, ...]
+
+
+class SynthesisCounter:
+    """A journal that notes every synthesis.
+
+    Attributes:
+        syntheses: What was noted.
+    """
+
+    def __init__(self) -> None:
+        self.syntheses: list[Made] = []
+
+    def record(self, record: Record) -> None:
+        """Does nothing: only syntheses are noted."""
+
+    def started(self, scene: Scene) -> None:
+        """Does nothing: only syntheses are noted."""
+
+    def synthesised(self, number: int, synthesis: Synthesis) -> None:
+        """Notes what was found, and how long that took."""
+        self.syntheses.append(
+            Made(
+                found=synthesis.found,
+                hold=len(synthesis.candidates),
+                engine_seconds=synthesis.seconds,
+                loop_seconds=synthesis.loop_seconds,
+            )
+        )

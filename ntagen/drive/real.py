@@ -1,0 +1,96 @@
+"""Runs the driver with a real needle: a device that takes real time, and a tracker that sees it.
+
+Nobody knows the truth of such a run. What a simulation says about a run (`ntagen.drive.simulate`)
+is therefore missing here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from ntagen.drive.controller import Controller
+from ntagen.drive.device import Actuator, Assembly, LiveSensor, WatchedActuator
+from ntagen.drive.knowledge import told
+from ntagen.drive.outcome import Driven, SynthesisCounter
+from ntagen.drive.records import Journal, Journals
+from ntagen.drive.settings import Settings
+from ntagen.drive.supervisor import Supervisor
+from ntagen.drive.torsion import Compensated, Lag
+from ntagen.errors import InputError
+from ntagen.plan.synthesise import Synthesiser
+from ntagen.scene import Scene
+
+_REACTION_S: Final = 0.07
+"""From a sample to the stop byte at most 20 ms; and GRBL has computed 50 ms of motion ahead."""
+
+_SLOWEST_RAMP_MM_PER_S2: Final = 10.0
+"""The acceleration that GRBL has if nobody sets another one."""
+
+
+def overrun_mm(
+    speed_mm_per_s: float, acceleration_mm_per_s2: float = _SLOWEST_RAMP_MM_PER_S2
+) -> float:
+    """How far a needle goes on after it was seen that it must stop: reaction, then v²/2a."""
+    v = speed_mm_per_s
+    return v * _REACTION_S + v * v / (2.0 * acceleration_mm_per_s2)
+
+
+def require_overrun(settings: Settings, needs_mm: float) -> None:
+    """Refuses settings that count on a shorter overrun than the device has.
+
+    Raises:
+        InputError: They do.
+    """
+    if settings.overrun_mm < needs_mm:
+        raise InputError(
+            f"the needle goes on for {needs_mm:.2f} mm after a stop, and the settings count on "
+            f"{settings.overrun_mm:g} mm\n"
+            f"hint: give --overrun {needs_mm + 0.005:.2f}mm, push more slowly, or let the "
+            "controller brake harder"
+        )
+
+
+def drive(
+    scene: Scene,
+    actuator: WatchedActuator,
+    sensor: LiveSensor,
+    synthesise: Synthesiser,
+    settings: Settings,
+    journal: Journal,
+    *,
+    known: str = "all",
+    listen: Callable[[], None] = lambda: None,
+    agree: Callable[[str], None] = lambda _: None,
+) -> Driven:
+    """Drives a real needle through the scene.
+
+    Args:
+        scene: The scene.
+        actuator: What moves the needle.
+        sensor: What measures it, also while it moves.
+        synthesise: Finds plans.
+        settings: How to drive.
+        journal: Records what happens.
+        known: The critical regions that the driver knows (`ntagen.drive.knowledge.told`).
+        listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
+        agree: As in `Controller`.
+    """
+    supervisor = Supervisor(sensor, listen)
+    actuator.watch = supervisor.watch
+    mover: Actuator = actuator
+    if settings.compensated_lag_rad > 0.0:
+        mover = Compensated(actuator, Lag(settings.compensated_lag_rad))
+    counter = SynthesisCounter()
+    controller = Controller(
+        told(scene, known),
+        Assembly(mover, sensor),
+        synthesise,
+        settings,
+        Journals(journal, counter),
+        listen,
+        supervisor,
+        agree,
+    )
+    ended = controller.run()
+    return Driven(ended, tuple(counter.syntheses))
