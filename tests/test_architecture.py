@@ -92,7 +92,7 @@ ONLY_IN: dict[str, set[str]] = {
     "asyncio": {"drive"},
     "threading": {"drive", "grbl", "cli", "openigtlink"},
     "time": {"drive", "grbl", "cli", "openigtlink"},
-    "datetime": {"drive"},
+    "datetime": {"drive", "cli"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
     "random": {"needle", "drive", "checker.runs", "checker.play"},
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
@@ -19,6 +20,9 @@ NAMES: Final = ("virtual", "phantom", "grbl+sim")
 
 REAL: Final = "grbl"
 """A needle behind a GRBL controller: `grbl:PORT`, or `grbl` for the port in the task."""
+
+_REAL_ROLL_RAD_PER_S: Final = 0.5 * math.pi
+"""A real needle is rolled at half the speed of simulated ones; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +49,8 @@ class Chosen:
     def usual(self, settings: Settings, scene: Scene) -> Settings:
         """The settings with which this needle is driven if nobody says otherwise."""
         if self.is_real:
-            return replace(settings, overrun_mm=overrun_mm(scene.needle.speed_mm_per_s))
+            way_mm = overrun_mm(scene.needle.speed_mm_per_s)
+            return replace(settings, overrun_mm=way_mm, roll_rad_per_s=_REAL_ROLL_RAD_PER_S)
         if self.parameters is None:
             return settings
         return replace(settings, compensated_lag_rad=self.parameters.torsion.lag_rad)

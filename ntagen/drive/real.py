@@ -21,6 +21,8 @@ from ntagen.errors import InputError
 from ntagen.plan.synthesise import Synthesiser
 from ntagen.scene import Scene
 
+_SMALL_MM: Final = 1e-9
+
 _REACTION_S: Final = 0.07
 """From a sample to the stop byte at most 20 ms; and GRBL has computed 50 ms of motion ahead."""
 
@@ -42,7 +44,7 @@ def require_overrun(settings: Settings, needs_mm: float) -> None:
     Raises:
         InputError: They do.
     """
-    if settings.overrun_mm < needs_mm:
+    if settings.overrun_mm < needs_mm - _SMALL_MM:
         raise InputError(
             f"the needle goes on for {needs_mm:.2f} mm after a stop, and the settings count on "
             f"{settings.overrun_mm:g} mm\n"
