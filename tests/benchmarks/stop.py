@@ -1,12 +1,17 @@
-"""How long a decision to stop takes to become a byte on the wire, and how far the needle goes on.
+"""How long a decision to stop, or a sample that demands it, takes to become a byte on the wire.
 
     python tests/benchmarks/stop.py [--stops 1000] [--busy 2]
 
 A driver pushes a needle by an emulated GRBL controller on a pseudo-terminal. Another thread decides
 to stop at random moments of the motion and calls `GrblActuator.stop`. Noted are the times from the
 decision until the stop byte has gone into the terminal, and until it can be read at the other end
-(by an own process, which answers nothing itself). First the machine is as it is, then
-``--busy`` processes keep it busy. The bar: p99 at most 20 ms.
+(by an own process, which answers nothing itself).
+
+Then a tracker in a process of its own sends 40 samples a second through OpenIGTLink, and at random
+moments of a push one with a force that the guard of the push forbids. Noted is the time from the
+sending of that sample until the supervisor's stop byte has gone into the terminal.
+
+First the machine is as it is, then ``--busy`` processes keep it busy. The bar: p99 at most 20 ms.
 """
 
 from __future__ import annotations
@@ -24,6 +29,8 @@ import time
 import tty
 from multiprocessing.connection import Connection
 
+from ntagen.drive.supervisor import Guard, Supervisor
+from ntagen.errors import Halted
 from ntagen.grbl.actuator import GrblActuator, StoppedError
 from ntagen.grbl.axes import Axes, Axis
 from ntagen.grbl.dialects import GRBLHAL
@@ -31,8 +38,14 @@ from ntagen.grbl.emulator import Emulator
 from ntagen.grbl.memory import Memory
 from ntagen.grbl.port import SerialPort
 from ntagen.grbl.protocol import HOLD
+from ntagen.needle.measurement import Measurement
+from ntagen.openigtlink.server import Server
+from ntagen.tracking.frames import IDENTITY
+from ntagen.tracking.live import LiveTracker, Source
+from ntagen.tracking.simulated import FORCE, NEEDLE, packets_of
 
 BAR_MS = 20.0
+RATE_HZ = 40.0
 
 
 class _NotingPort(SerialPort):
@@ -98,6 +111,7 @@ def _measure(stops: int, busy: int) -> None:
             raise failures[0]
         written.append(port.stop_written_s - decided_s)
         arrived.append(results.recv() - decided_s)
+    seen = _supervised(actuator, port, results, stops, draw)
     results.send(None)
     for process in (controller, *load):
         process.terminate()
@@ -107,6 +121,57 @@ def _measure(stops: int, busy: int) -> None:
     _tell("decision to stop byte written", written)
     _tell("decision to stop byte readable", arrived)
     _tell("decision to standing confirmed", confirmed, bar_ms=None)
+    _tell("sample sent to stop byte written", seen)
+
+
+def _tracker(orders: Connection) -> None:
+    """Sends samples; after an order to hurt, and its delay, one with too much force."""
+    with Server("127.0.0.1") as server:
+        orders.send(server.port)
+        force_n, due_s = 0.0, math.inf
+        while True:
+            if orders.poll(0.0):
+                order = orders.recv()
+                if order is None:
+                    return
+                force_n, due_s = 0.0, time.monotonic() + order
+            wait_s = min(1.0 / RATE_HZ, max(0.0, due_s - time.monotonic()))
+            time.sleep(wait_s)
+            if time.monotonic() >= due_s:
+                force_n, due_s = 9.0, math.inf
+                orders.send(time.monotonic())
+            server.send(*packets_of(Measurement(0.0, (0.0, 0.0, 0.0), force_n)))
+
+
+def _supervised(
+    actuator: GrblActuator, port: _NotingPort, results: Connection, stops: int, draw: random.Random
+) -> list[float]:
+    """The times from samples that demand a stop until the stop byte is written."""
+    orders, far_orders = multiprocessing.Pipe()
+    tracker = multiprocessing.Process(target=_tracker, args=(far_orders,), daemon=True)
+    tracker.start()
+    source = Source("127.0.0.1", orders.recv(), NEEDLE, force=FORCE)
+    guard = Guard((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0, 5.0, (), 1.0)
+    seconds = []
+    with LiveTracker(source, IDENTITY, actuator.now_s) as sensor:
+        supervisor = Supervisor(sensor)
+        actuator.watch = supervisor.watch
+        for _ in range(stops):
+            orders.send(draw.uniform(0.1, 0.2))
+            while sensor.measure().force_n > 0.0:
+                pass
+            try:
+                with supervisor.guarding(guard):
+                    actuator.push(5.0)
+            except Halted:
+                seconds.append(port.stop_written_s - orders.recv())
+                while results.poll(0.2):
+                    results.recv()
+            else:
+                raise RuntimeError("a motion was not stopped")
+    orders.send(None)
+    tracker.join()
+    return seconds
 
 
 def _push(actuator: GrblActuator, failures: list[Exception]) -> None:
