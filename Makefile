@@ -30,10 +30,10 @@ demo: $(INSTALLED) ## Run the main job on the paper's environment; results in de
 	$(BIN)/ntagen compile examples/paper.nsl -o demo
 	$(BIN)/ntagen check examples/paper.nsl --plans demo/plans.json
 	$(BIN)/ntagen plot examples/paper.nsl -o demo/scene.png --plans 10
-	$(BIN)/ntagen drive examples/paper.nsl --log demo/run.mcap
+	$(BIN)/ntagen drive examples/paper.nsl --needle grbl+sim --seed 1 --log demo/run.mcap
 	@printf '%s\n' '' \
 	  'What happened: the environment was turned into a UPPAAL model. Both queries of the paper were checked on it.' \
-	  'All plans were ranked. A virtual needle was steered to the target, with measuring and planning in turns.' \
+	  'All plans were ranked. A phantom needle was steered to the target through an emulated stepper controller.' \
 	  'Where to look:' \
 	  '  demo/paper.xml   the model; UPPAAL opens it, with the queries in its verifier' \
 	  '  demo/plans.json  all plans with their clearance from the critical regions, best first' \
