@@ -52,6 +52,8 @@ class Steering:
         self._radius_mm = needle.radius_mm
         self._cut_mm = 0.0
         self._left: tuple[Arc, ...] = ()
+        # Whether the channel is longer than it was at the last pull.
+        self._has_grown = False
         self.path = Path(needle.tip)
         self.estimate: Estimate | None = None
 
@@ -83,6 +85,7 @@ class Steering:
             self._estimator.push(made_mm)
             self.path = self.path.push(self._radius_mm, made_mm)
             self._cut_mm = max(self._cut_mm, self.path.depth_mm)
+            self._has_grown = True
         return True
 
     def roll(self, angle_rad: float) -> None:
@@ -103,7 +106,9 @@ class Steering:
 
     def pull(self, length_mm: float) -> None:
         """Pulls the needle back along its channel."""
-        self._left += self.path.arcs
+        if self._has_grown:
+            self._left += self.path.arcs
+            self._has_grown = False
         self._command("pull", length_mm)
         self._estimator.pull(length_mm)
         self.path = self.path.pull(length_mm)
