@@ -53,10 +53,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "drive": BASE | {"files", "needle", "nsl", "plan", "render", "checker", "grbl"},
     "openigtlink": {"errors"},
     "tracking": BASE | {"files", "needle", "drive", "openigtlink"},
+    "lab": BASE | {"needle", "grbl", "drive", "openigtlink", "tracking"},
     "plot": BASE | {"files", "needle", "plan", "drive"},
     "cli": BASE
     | {"files", "needle", "nsl", "plan", "render", "loading", "explanations"}
-    | {"grbl", "drive", "plot", "tracking"}
+    | {"grbl", "drive", "lab", "plot", "tracking"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "__main__": {"cli"},
 }
@@ -65,7 +66,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 The face of the engine is split by module; ``checker`` alone is what it shows to the other rooms.
 """
 
-NEEDLE = {"rules", "scene", "nsl", "render", "needle", "plan", "drive", "plot", "tracking"}
+NEEDLE = {"rules", "scene", "nsl", "render", "needle", "plan", "drive", "plot", "tracking", "lab"}
 """The rooms that are about needles; the face of the engine serves any model."""
 
 SPLIT = {"checker"}
@@ -90,8 +91,8 @@ ONLY_IN: dict[str, set[str]] = {
     "selectors": {"openigtlink"},
     "select": {"drive", "grbl"},
     "asyncio": {"drive"},
-    "threading": {"drive", "grbl", "cli", "openigtlink"},
-    "time": {"drive", "grbl", "cli", "openigtlink"},
+    "threading": {"drive", "grbl", "cli", "lab", "openigtlink"},
+    "time": {"drive", "grbl", "cli", "lab", "openigtlink"},
     "datetime": {"drive", "cli"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
     "random": {"needle", "drive", "checker.runs", "checker.play"},

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.lab import command as simulate
 from ntagen.cli.steppers import axes_for, described
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import look_at
@@ -38,7 +39,11 @@ def command() -> None:
     Examples:
       ntagen device check grbl:/dev/ttyACM0
       ntagen device check openigtlink:localhost:18944
+      ntagen device simulate examples/stepper.nsl
     """  # noqa: D301  click wants the control character
+
+
+command.add_command(simulate)
 
 
 @command.command(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import click
 
 from ntagen.cli.terminal import echo
-from ntagen.parameters import MEASURES, PARAMETERS, Given, Parameter
+from ntagen.parameters import MEASURES, NEEDLE, PARAMETERS, Given, Parameter
 
 if TYPE_CHECKING:
     from ntagen.drive.configure import Configuration
@@ -55,14 +55,24 @@ class _Option(click.Option):
 
 def steering_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
     """Adds the options; the command gets the values on the command line as `given`."""
+    return _with_options(command, PARAMETERS)
 
+
+def needle_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """Adds the options of a simulated needle only, in the same way."""
+    return _with_options(command, [p for p in PARAMETERS if p.field.startswith(f"{NEEDLE}.")])
+
+
+def _with_options(
+    command: Callable[..., int | None], parameters: Sequence[Parameter]
+) -> Callable[..., int | None]:
     @functools.wraps(command)
     def with_given(**values: object) -> int | None:
-        found = [values.pop(_name(parameter)) for parameter in PARAMETERS]
+        found = [values.pop(_name(parameter)) for parameter in parameters]
         return command(given=tuple(one for one in found if isinstance(one, Given)), **values)
 
     decorated: Callable[..., int | None] = with_given
-    for parameter in reversed(PARAMETERS):
+    for parameter in reversed(parameters):
         decorated = _option(parameter)(decorated)
     return decorated
 

@@ -32,6 +32,7 @@ class PseudoTerminal:
         self.lock = threading.Lock()
         self._emulator = emulator
         self._speed = speed
+        self._began_s, self._offset_s = time.monotonic(), emulator.now_s
         self._controller, self._client = pty.openpty()
         tty.setraw(self._client)
         os.set_blocking(self._controller, False)
@@ -40,6 +41,7 @@ class PseudoTerminal:
         self._thread = threading.Thread(target=self._run, name="grbl emulator", daemon=True)
 
     def __enter__(self) -> Self:
+        self._began_s = time.monotonic()
         self._thread.start()
         return self
 
@@ -63,29 +65,31 @@ class PseudoTerminal:
                 os.close(number)
         self._controller = self._client = -1
 
+    def catch_up(self) -> None:
+        """Lets the emulator run until now; for others, who hold `lock`."""
+        time_s = self._offset_s + (time.monotonic() - self._began_s) * self._speed
+        self._emulator.advance(max(time_s, self._emulator.now_s))
+
     def _run(self) -> None:
-        began_s, offset_s = time.monotonic(), self._emulator.now_s
         while True:
-            ready, _, _ = select.select(
-                [self._controller, self._wake_read], [], [], self._wait_s(began_s, offset_s)
-            )
+            ready, _, _ = select.select([self._controller, self._wake_read], [], [], self._wait_s())
             if self._wake_read in ready:
                 return
             try:
                 data = os.read(self._controller, _READ_BYTES) if ready else b""
-                self._turn(data, offset_s + (time.monotonic() - began_s) * self._speed)
+                self._turn(data)
             except OSError:
                 return
 
-    def _wait_s(self, began_s: float, offset_s: float) -> float:
+    def _wait_s(self) -> float:
         """How long nothing will happen."""
         with self.lock:
-            due_s = (self._emulator.next_event_s() - offset_s) / self._speed
-        return min(_LONGEST_WAIT_S, max(0.0, due_s - (time.monotonic() - began_s)))
+            due_s = (self._emulator.next_event_s() - self._offset_s) / self._speed
+        return min(_LONGEST_WAIT_S, max(0.0, due_s - (time.monotonic() - self._began_s)))
 
-    def _turn(self, data: bytes, time_s: float) -> None:
+    def _turn(self, data: bytes) -> None:
         with self.lock:
-            self._emulator.advance(max(time_s, self._emulator.now_s))
+            self.catch_up()
             self._emulator.feed(data)
             answer = self._emulator.take()
         if answer:

@@ -24,7 +24,7 @@ import numpy as np
 from ntagen.needle.kinematics import Arc, push, roll
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.phantom_parameters import PhantomParameters
-from ntagen.needle.phantom_sensor import PhantomSensor, Seen
+from ntagen.needle.phantom_sensor import Frame, PhantomSensor, Seen
 from ntagen.needle.phantom_tissue import CELL_MM, Tissue
 from ntagen.needle.sweep import Sweep
 from ntagen.needle.vectors import add, combine, cross, distance, scale
@@ -93,6 +93,8 @@ class PhantomNeedle:
         seed: The seed of everything random.
         clock: The clock on which time passes.
         parameters: What the phantom is like.
+        reports_pose: Whether its tracker sees heading and bevel. The bevel is that of the tip, as
+            it was turned: the tracker does not see how the tissue turns the bend plane.
     """
 
     def __init__(
@@ -102,6 +104,8 @@ class PhantomNeedle:
         seed: int,
         clock: SimulatedClock,
         parameters: PhantomParameters | None = None,
+        *,
+        reports_pose: bool = False,
     ) -> None:
         self._parameters = parameters or PhantomParameters()
         self._needle = needle
@@ -124,7 +128,9 @@ class PhantomNeedle:
         self._is_back = False
         self._direction = 1.0
         self._sweep = Sweep([o.region for o in obstacles], needle.tip.position_mm)
-        self._sensor = PhantomSensor(self._parameters.sensing, self._tissue, sensor, clock)
+        self._sensor = PhantomSensor(
+            self._parameters.sensing, self._tissue, sensor, clock, reports_pose=reports_pose
+        )
         self._show()
 
     def now_s(self) -> float:
@@ -210,6 +216,10 @@ class PhantomNeedle:
             DeviceError: All readings of `Sensing.patience_s` were lost.
         """
         return self._sensor.measure()
+
+    def frame(self) -> Frame:
+        """The present reading, lost or not; it takes no time on the clock."""
+        return self._sensor.frame()
 
     @property
     def true_tip(self) -> Pose:
@@ -362,10 +372,9 @@ class PhantomNeedle:
 
     def _show(self) -> None:
         """Notes the present state for measurements, which show an earlier one."""
-        position = self._frame().position_mm
-        self._sensor.note(
-            Seen(self._clock.now_s(), position, self._depth_mm, self._force_n(position))
-        )
+        tip = roll(self._frame(), self._tip_rad)
+        force_n = self._force_n(tip.position_mm)
+        self._sensor.note(Seen(self._clock.now_s(), tip, self._depth_mm, force_n))
 
     def _force_n(self, position_mm: Vector) -> float:
         """The total axial force, without noise; a pull has friction the other way."""

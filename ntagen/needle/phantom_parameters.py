@@ -158,6 +158,8 @@ class Sensing:
         lost_ratio: The probability that a reading is lost after one that was not; ours.
         found_ratio: The probability that the next one after a lost reading is not lost; ours.
         patience_s: If all readings of this time are lost, the sensor reports a failure; ours.
+        direction_rad: White noise of a measured direction, about each axis, if the tracker sees
+            directions; ours.
     """
 
     noise_mm: float = 0.08
@@ -170,6 +172,7 @@ class Sensing:
     lost_ratio: float = 0.01
     found_ratio: float = 0.5
     patience_s: float = 1.0
+    direction_rad: float = math.radians(0.3)
 
 
 @dataclass(frozen=True, slots=True)

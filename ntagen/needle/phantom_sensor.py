@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ntagen.errors import DeviceError
+from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.phantom_parameters import Sensing
 from ntagen.needle.phantom_tissue import Tissue
-from ntagen.needle.vectors import combine
+from ntagen.needle.vectors import combine, norm, rotate, scale
 from ntagen.needle.virtual import SimulatedClock
-from ntagen.scene import Vector
+from ntagen.scene import Pose, Vector
 
+_LEAST_NORM = 0.1
 _KEPT = 2
 """States from before the latency that are kept: an interpolation needs one."""
 
@@ -25,15 +27,28 @@ class Seen:
 
     Attributes:
         time_s: The time.
-        position_mm: The true position of the tip.
+        tip: The true position and directions of the tip.
         depth_mm: The true depth.
         force_n: The total axial force, without noise.
     """
 
     time_s: float
-    position_mm: Vector
+    tip: Pose
     depth_mm: float
     force_n: float
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One reading.
+
+    Attributes:
+        measurement: What was measured.
+        is_lost: Whether the tracker did not see the needle. The force is there all the same.
+    """
+
+    measurement: Measurement
+    is_lost: bool
 
 
 class PhantomSensor:
@@ -44,6 +59,7 @@ class PhantomSensor:
         tissue: It has the correlated error of the tracker.
         seed: The seed of noise and losses.
         clock: The clock; a lost reading takes time on it.
+        reports_pose: Whether the tracker sees directions, too.
     """
 
     def __init__(
@@ -52,12 +68,16 @@ class PhantomSensor:
         tissue: Tissue,
         seed: np.random.SeedSequence,
         clock: SimulatedClock,
+        *,
+        reports_pose: bool = False,
     ) -> None:
+        self._reports_pose = reports_pose
         self._sensing = sensing
         self._tissue = tissue
         self._clock = clock
-        noise, losses = seed.spawn(2)
+        noise, losses, directions = seed.spawn(3)
         self._noise = np.random.default_rng(noise)
+        self._direction_noise = np.random.default_rng(directions)
         self._losses = np.random.default_rng(losses)
         self._is_lost = False
         self._states: deque[Seen] = deque()
@@ -88,10 +108,19 @@ class PhantomSensor:
                     f"the tracker gave no reading for {waited_s:.1f} s\n"
                     "hint: is the sensor in its field?"
                 )
+        return self._read()
+
+    def frame(self) -> Frame:
+        """The present reading, lost or not; it takes no time on the clock."""
+        return Frame(self._read(), self._loses())
+
+    def _read(self) -> Measurement:
+        sensing = self._sensing
         state = self._state_at(self._clock.now_s() - sensing.latency_s)
         drawn = self._noise.normal(size=4)
         error = self._tissue.distortion_mm(state.depth_mm) + sensing.noise_mm * drawn[:3]
-        x, y, z = np.array(state.position_mm) + error
+        x, y, z = np.array(state.tip.position_mm) + error
+        seen = self._turned(state.tip) if self._reports_pose else None
         return Measurement(
             time_s=state.time_s,
             position_mm=(
@@ -100,6 +129,24 @@ class PhantomSensor:
                 _rounded(z, sensing.step_mm),
             ),
             force_n=_rounded(state.force_n + sensing.noise_n * drawn[3], sensing.step_n),
+            heading=None if seen is None else seen.heading,
+            bevel=None if seen is None else seen.bevel,
+        )
+
+    def _turned(self, tip: Pose) -> Pose:
+        """The directions with noise."""
+        x, y, z = (
+            float(angle_rad)
+            for angle_rad in self._sensing.direction_rad * self._direction_noise.normal(size=3)
+        )
+        turn_rad = norm((x, y, z))
+        if turn_rad == 0.0:
+            return tip
+        axis = scale(1.0 / turn_rad, (x, y, z))
+        return replace(
+            tip,
+            heading=rotate(tip.heading, axis, turn_rad),
+            bevel=rotate(tip.bevel, axis, turn_rad),
         )
 
     def _loses(self) -> bool:
@@ -120,12 +167,28 @@ class PhantomSensor:
                 share = max(0.0, (time_s - before.time_s) / span_s) if span_s > 0.0 else 0.0
                 return Seen(
                     max(0.0, time_s),
-                    combine(1.0 - share, before.position_mm, share, after.position_mm),
+                    _between(before.tip, after.tip, share),
                     (1.0 - share) * before.depth_mm + share * after.depth_mm,
                     (1.0 - share) * before.force_n + share * after.force_n,
                 )
             before = after
-        return Seen(time_s, before.position_mm, before.depth_mm, before.force_n)
+        return Seen(time_s, before.tip, before.depth_mm, before.force_n)
+
+
+def _between(one: Pose, other: Pose, share: float) -> Pose:
+    """A pose between two that are near to each other."""
+
+    def mixed(a: Vector, b: Vector) -> Vector:
+        return combine(1.0 - share, a, share, b)
+
+    between = Pose(
+        mixed(one.position_mm, other.position_mm),
+        mixed(one.heading, other.heading),
+        mixed(one.bevel, other.bevel),
+    )
+    # Opposite directions have no mean; such a turn in one step is seen at its end.
+    is_turned = min(norm(between.heading), norm(between.bevel)) < _LEAST_NORM
+    return orthonormal(other if is_turned else between)
 
 
 def _rounded(value: float, step: float) -> float:

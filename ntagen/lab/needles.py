@@ -1,0 +1,98 @@
+"""The needles that can stand in the lab, on a clock that the lab sets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from ntagen.drive.knowledge import sensing_margin_mm
+from ntagen.drive.plant import Movable
+from ntagen.errors import InputError
+from ntagen.needle.phantom import PhantomNeedle
+from ntagen.needle.phantom_parameters import PhantomParameters
+from ntagen.needle.phantom_sensor import Frame
+from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
+from ntagen.scene import Pose, Scene
+
+NAMES: Final = ("phantom", "virtual")
+"""The needles by their names."""
+
+
+class LabClock(SimulatedClock):
+    """A clock that somebody else sets: the axes say how long a motion takes, not the needle."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._set_s = 0.0
+
+    def now_s(self) -> float:
+        """The time that was set last."""
+        return self._set_s
+
+    def set(self, now_s: float) -> None:
+        """Sets the time."""
+        self._set_s = now_s
+
+    def advance(self, seconds: float) -> None:
+        """Does nothing: time passes by itself."""
+
+
+class Known(Movable, Protocol):
+    """A simulated needle, which knows the truth."""
+
+    @property
+    def true_tip(self) -> Pose:
+        """The true pose of the tip."""
+
+    def true_clearance_mm(self) -> float:
+        """The smallest distance of all that was cut to any actual critical region."""
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A needle at the entry.
+
+    Attributes:
+        needle: The needle.
+        clock: Its clock.
+        frame: What tracker and force sensor show of it now.
+        latency_s: How old that is, on its clock.
+    """
+
+    needle: Known
+    clock: LabClock
+    frame: Callable[[], Frame]
+    latency_s: float
+
+
+def place(
+    name: str, scene: Scene, seed: int, margin_mm: float, errors: Errors | None = None
+) -> Placed:
+    """A needle at the entry of a scene, in tissue with all of the scene's critical regions.
+
+    Args:
+        name: One of `NAMES`.
+        scene: The actual scene.
+        seed: The seed of all that is random.
+        margin_mm: The distance at which a region without a detection region is felt.
+        errors: The errors of the virtual needle; none by default.
+
+    Raises:
+        InputError: There is no needle of this name.
+    """
+    obstacles = tuple(
+        Obstacle(region, sensing_margin_mm(region, scene.detections, margin_mm))
+        for region in scene.criticals
+    )
+    clock = LabClock()
+    if name == "phantom":
+        parameters = PhantomParameters()
+        phantom = PhantomNeedle(scene.needle, obstacles, seed, clock, parameters, reports_pose=True)
+        return Placed(phantom, clock, phantom.frame, parameters.sensing.latency_s)
+    if name == "virtual":
+        errors = errors or Errors()
+        true = errors.true_needle(scene.needle)
+        virtual = VirtualNeedle(true, obstacles, errors, seed, clock, reports_pose=True)
+        return Placed(virtual, clock, lambda: Frame(virtual.measure(), is_lost=False), 0.0)
+    raise InputError(f"the lab has no needle '{name}'\nhint: choose from {', '.join(NAMES)}")
