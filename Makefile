@@ -55,7 +55,7 @@ quick-rust: $(RUST)
 
 .PHONY: quick-python
 quick-python: $(INSTALLED)
-	$(BIN)/python -m pytest -m 'not slow' --hypothesis-profile=quick
+	$(BIN)/python -m pytest -m 'not slow' --hypothesis-profile=quick --numprocesses=auto --dist=worksteal
 
 .PHONY: lint
 lint: $(INSTALLED) ## Check formats, lints and types

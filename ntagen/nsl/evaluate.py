@@ -23,6 +23,7 @@ from ntagen.nsl.quantity import (
     Dimension,
     Quantity,
     is_unit,
+    quotient,
     scalar,
 )
 from ntagen.nsl.source import Span
@@ -261,8 +262,8 @@ class Evaluator:
 
     def unit(self, unit: tree.Identifier) -> tuple[float, Dimension] | None:
         """The factor of a unit to mm, rad or s, and its dimension; None after a mistake."""
-        factor, dimension = 1.0, NUMBER
-        for index, name in enumerate(part.strip() for part in unit.text.split("/")):
+        names = tuple(part.strip() for part in unit.text.split("/"))
+        for name in names:
             if name not in UNITS:
                 near = ALIASES.get(name.lower())
                 known = ", ".join(UNITS)
@@ -274,11 +275,7 @@ class Evaluator:
                     or f"units are {known}, and speeds such as mm/s",
                 )
                 return None
-            one, its = UNITS[name]
-            factor, dimension = (
-                (factor / one, dimension / its) if index else (factor * one, dimension * its)
-            )
-        return factor, dimension
+        return quotient(names)
 
     def _vector(self, expression: tree.Vector, scope: Scope) -> Quantity | None:
         """Three components of one dimension."""

@@ -6,6 +6,7 @@ it is a plain number in physics: this finds a missing ``deg``.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
@@ -141,6 +142,19 @@ _RESERVED: Final = frozenset({*MM_PER, *RAD_PER, *S_PER})
 def is_unit(name: str) -> bool:
     """Whether a name is reserved because it is a unit."""
     return name in _RESERVED
+
+
+@functools.lru_cache(maxsize=256)
+def quotient(units: tuple[str, ...]) -> tuple[float, Dimension]:
+    """The factor to mm, rad, s and so on of the first unit divided by the others: mm/s.
+
+    A description with thousands of regions asks for the same few quotients again and again.
+    """
+    factor, dimension = UNITS[units[0]]
+    for name in units[1:]:
+        one, its = UNITS[name]
+        factor, dimension = factor / one, dimension / its
+    return factor, dimension
 
 
 @dataclass(frozen=True, slots=True)

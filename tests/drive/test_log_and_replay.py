@@ -134,7 +134,9 @@ def test_each_synthesis_is_attached_with_its_scene_model_and_plans(usual: RunLog
         assert len(plans) == min(200, len(synthesis.candidates))
 
 
-@pytest.mark.parametrize("after", [1, 30, pytest.param(333, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "after", [1, *(pytest.param(count, marks=pytest.mark.slow) for count in (30, 333))]
+)
 def test_a_killed_writer_loses_nothing_that_was_acknowledged(tmp_path: Path, after: int) -> None:
     path = tmp_path / "run.mcap"
     command = [sys.executable, "-m", "tests.drive.victim", str(path)]

@@ -42,7 +42,7 @@ def test_an_earlier_target_that_all_paths_pass_changes_nothing() -> None:
     check_plans(paper(targets=(first, *PAPER.targets), detections=()), 204)
 
 
-@pytest.mark.parametrize("safety", ["sampled", "swept"])
+@pytest.mark.parametrize("safety", ["sampled", pytest.param("swept", marks=pytest.mark.slow)])
 def test_no_plan_enters_an_unexplored_region_and_safe_regions_change_nothing(safety: str) -> None:
     sphere = ((0.0, -25.0, 0.0), 5.0)
     shell = paper(safety=safety)

@@ -137,6 +137,7 @@ def test_ctrl_c_ends_what_is_shown_on_a_terminal(
     assert "interrupted" in terminal.text
 
 
+@pytest.mark.slow
 def test_signal_in_one_call_ends_with_the_counters_so_far(tmp_path: Path) -> None:
     model = tmp_path / "busy.xta"
     model.write_text(BUSY)

@@ -32,6 +32,7 @@ def first_alarm(forces: np.ndarray) -> tuple[float, float] | None:
     return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction_n_per_mm", [0.0, 0.02])
 def test_noise_and_friction_alone_alarm_as_seldom_as_stated(friction_n_per_mm: float) -> None:
     runs = 400

@@ -267,6 +267,7 @@ def test_a_tracker_that_is_gone_is_a_fault() -> None:
     assert needle.now_s() == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.slow
 def test_many_phantoms_spread_as_real_needles_do() -> None:
     """The bounds are three standard errors of 100 insertions around the published figures.
 
@@ -280,6 +281,7 @@ def test_many_phantoms_spread_as_real_needles_do() -> None:
     assert found.residual == pytest.approx(0.16, abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_lag_at_10_cm_is_the_published_one() -> None:
     assert np.median(lags_deg(60, 1)) == pytest.approx(45.0, abs=3.0)
     left = np.abs(lags_deg(60, 1, compensated=True))

@@ -14,6 +14,7 @@ from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import RESERVED, tokenise
 from ntagen.parameters import BY_WORDS
 from ntagen.scene import Scene
+from tests.examples import examples
 
 TESTS = Path(__file__).parents[2]
 SEEDS = [
@@ -71,7 +72,7 @@ BLANKS = st.sampled_from([" ", "\n", "  ", " /* comment */ ", " // comment\n"])
 
 
 @given(SETTINGS, st.data())
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=examples(100))
 def test_settings_keep_their_values_in_the_layout(chosen: list[str], data: st.DataObject) -> None:
     body = "".join(data.draw(BLANKS) + BY_WORDS[words].example for words in chosen)
     text = (
@@ -123,14 +124,14 @@ def mutated(data: st.DataObject) -> str:
 
 
 @given(st.text())
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=examples(100))
 def test_any_text_is_answered(text: str) -> None:
     outcome(text)
     check_layout(text)
 
 
 @given(st.lists(st.sampled_from(VOCABULARY), max_size=60), st.sampled_from(["", " "]))
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=examples(150))
 def test_any_words_are_answered(chosen: list[str], separator: str) -> None:
     text = separator.join(chosen)
     outcome(text)
@@ -143,7 +144,7 @@ def test_any_words_are_answered(chosen: list[str], separator: str) -> None:
 
 @pytest.mark.slow
 @given(st.data())
-@settings(deadline=None, max_examples=250)
+@settings(deadline=None, max_examples=examples(250))
 def test_changed_files_are_answered(data: st.DataObject) -> None:
     text = mutated(data)
     outcome(text)
@@ -161,7 +162,7 @@ LENGTHS = st.floats(0.01, 100.0).map(lambda value: round(value, 6))
     st.integers(0, 100),
     st.integers(100, 2000),
 )
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=examples(100))
 def test_values_written_are_values_read(
     tip: tuple[float, float, float],
     radius_mm: float,

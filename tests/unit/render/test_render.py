@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from ntagen.errors import InputError
 from ntagen.render import render, render_queries
 from ntagen.scene import NamedQuery, Pose, Region, Scene
+from tests.examples import examples
 from tests.oracles.declaration import Instance
 from tests.scenes import PAPER, paper, scenes, with_limits
 
@@ -113,7 +114,7 @@ def test_the_paper_scene_gives_the_published_constants() -> None:
     check_constants(PAPER, Instance())
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(scenes())
 def test_any_scene_gives_the_constants_of_the_oracle(scene: Scene) -> None:
     check_constants(scene, Instance.of_scene(scene))

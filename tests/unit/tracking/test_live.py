@@ -162,15 +162,16 @@ def test_the_force_comes_from_a_sensor_message(server: Server) -> None:
         assert measured(server, live, force, Packet("N", at(1.0))).force_n == pytest.approx(0.25)
 
 
-def test_a_force_without_a_unit_needs_to_be_told(server: Server) -> None:
+@pytest.mark.parametrize("unit", [None, "mN"])
+def test_a_force_without_a_unit_needs_to_be_told(server: Server, unit: str | None) -> None:
     force = Packet("Force", Sensor((2.0,)))
-    with (
-        tracker(server, force="Force") as live,
-        pytest.raises(DeviceError, match="does not say the unit"),
-    ):
-        measured(server, live, force, Packet("N", at(1.0)))
-    with tracker(server, force="Force", force_unit="mN") as live:
-        assert measured(server, live, force, Packet("N", at(1.0))).force_n == pytest.approx(2e-3)
+    with tracker(server, force="Force", force_unit=unit) as live:
+        if unit is None:
+            with pytest.raises(DeviceError, match="does not say the unit"):
+                measured(server, live, force, Packet("N", at(1.0)))
+        else:
+            reading = measured(server, live, force, Packet("N", at(1.0)))
+            assert reading.force_n == pytest.approx(2e-3)
 
 
 @pytest.mark.parametrize(

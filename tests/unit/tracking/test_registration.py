@@ -66,6 +66,7 @@ def test_the_rotation_is_that_of_scipy(count: int, seed: int, noise_mm: float) -
     assert np.linalg.det(np.array(fit.transform.rotation)) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_many_repetitions() -> None:
     # An experiment of 400 calibrations with a known localisation error.
     fle_mm, count = 0.5, 400
