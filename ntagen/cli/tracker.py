@@ -95,6 +95,11 @@ def tracking_of(
         )
     if tracker is None and described is not None and (is_real or registration is not None):
         tracker = _words_for(described)
+    if is_real and tracker is None:
+        raise InputError(
+            "nothing measures the needle\n"
+            "hint: give --tracker openigtlink:HOST:PORT:DEVICE, or let the task describe a tracker"
+        )
     if tracker is None or tracker == SIMULATED:
         if registration is not None:
             raise InputError(
@@ -107,10 +112,29 @@ def tracking_of(
     from ntagen.tracking.transform_file import read_transform
 
     found = parse_tracker(tracker)
+    if is_real:
+        _require_live(tracker, found, registration)
     if registration is None:
         return Tracking(tracker, found)
     is_none = registration == NO_REGISTRATION
     return Tracking(tracker, found, IDENTITY if is_none else read_transform(Path(registration)))
+
+
+def _require_live(text: str, tracker: Tracker, registration: str | None) -> None:
+    """Refuses what cannot measure a real needle, before any device is opened.
+
+    Raises:
+        InputError: It is a recording, or there is no registration.
+    """
+    from ntagen.tracking.spec import Recording, no_registration
+
+    if isinstance(tracker, Recording):
+        raise InputError(
+            f"{text} is a recording, and a real needle must be seen while it moves\n"
+            "hint: give --tracker openigtlink:HOST:PORT:DEVICE"
+        )
+    if registration is None:
+        raise no_registration()
 
 
 def _words_for(described: OpenIGTLinkTracker) -> str:
@@ -178,16 +202,10 @@ def opened_live(
     from ntagen.tracking.spec import open_tracker
 
     if tracking.tracker is None:
-        raise InputError(
-            "nothing measures the needle\n"
-            "hint: give --tracker openigtlink:HOST:PORT:DEVICE, or let the task describe a tracker"
-        )
+        raise AssertionError("a real needle has a tracker (`tracking_of`)")
     with open_tracker(tracking.tracker, tracking.transform, now_s) as sensor:
         if not isinstance(sensor, LiveTracker):
-            raise InputError(
-                f"{tracking.text} is a recording, and a real needle must be seen while it moves\n"
-                "hint: give --tracker openigtlink:HOST:PORT:DEVICE"
-            )
+            raise AssertionError("recordings are refused before (`tracking_of`)")
         _require_force(tracking, sensor.measures_force, watches_force)
         yield LivePlausible(sensor, entry)
 

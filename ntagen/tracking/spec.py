@@ -100,11 +100,7 @@ def open_tracker(
     match tracker:
         case Source():
             if transform is None:
-                raise InputError(
-                    "nothing says where the scene lies for this tracker\n"
-                    "hint: give --registration FILE, which `ntagen calibrate` makes; or "
-                    "--registration none if the scene is written in the tracker's frame"
-                )
+                raise no_registration()
             with LiveTracker(tracker, transform, now_s) as live:
                 yield live
         case Recording("csv", path):
@@ -117,6 +113,15 @@ def open_tracker(
                     "hint: leave out --registration"
                 )
             yield Playback(str(path), samples_of_log(path), now_s)
+
+
+def no_registration() -> InputError:
+    """The error about a tracker without a registration."""
+    return InputError(
+        "nothing says where the scene lies for this tracker\n"
+        "hint: give --registration FILE, which `ntagen calibrate` makes; or "
+        "--registration none if the scene is written in the tracker's frame"
+    )
 
 
 def _source(text: str, rest: str) -> Source:
