@@ -20,6 +20,7 @@ from ntagen.cli.steering import show_settings, steering_options
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import Sense, Tracking, opened, opened_live, tracker_options, tracking_of
 from ntagen.drive.states import State
+from ntagen.errors import ModelError, NtagenError
 from ntagen.files import read_file, require_apart
 
 if TYPE_CHECKING:
@@ -228,6 +229,7 @@ def _real_needle(
             scene.needle.tip,
             actuator.now_s,
             watches_force=settings.force_sensing,
+            force_varies=settings.force_noise_n > 0.0,
         ) as sensor,
     ):
         yield actuator, sensor
@@ -292,11 +294,16 @@ def _around(
     # The log has the strategies; nobody else asks for them.
     synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
     agree = operator.agree if terminal.confirms else _agrees
-    if not terminal.speaks:
-        yield synthesise, Journals(*log), agree
-        return
-    with lines(settings.ranking, moves=not terminal.confirms) as shown:
-        yield synthesise, Journals(*log, shown), agree
+    with contextlib.ExitStack() as stack:
+        shown = []
+        if terminal.speaks:
+            moves = not terminal.confirms
+            shown.append(stack.enter_context(lines(settings.ranking, moves=moves)))
+        try:
+            yield synthesise, Journals(*log, *shown), agree
+        except ModelError as error:
+            # The model is ours: its exit code would say that no strategy holds.
+            raise NtagenError(f"the planner failed, and the needle is stopped: {error}") from error
 
 
 def _agrees(_: str) -> None:

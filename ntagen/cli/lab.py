@@ -197,6 +197,9 @@ def _fitting(fitted: Configuration, task: Task) -> list[str]:
         value = fitted.value(parameter)
         if value != plain.value(parameter):
             options += [parameter.flag, parameter.shown(value).replace(" ", "")]
+    if fitted.needle.parameters is None:
+        # A force without noise would be taken for that of a dead sensor.
+        options += ["--force-noise", "0N"]
     return options
 
 

@@ -183,7 +183,12 @@ def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[
 
 @contextlib.contextmanager
 def opened_live(
-    tracking: Tracking, entry: Pose, now_s: Callable[[], float], *, watches_force: bool
+    tracking: Tracking,
+    entry: Pose,
+    now_s: Callable[[], float],
+    *,
+    watches_force: bool,
+    force_varies: bool,
 ) -> Iterator[LiveSensor]:
     """Connects to the tracker of a real needle until the end of the block.
 
@@ -192,6 +197,7 @@ def opened_live(
         entry: Where the needle is at the start.
         now_s: The clock of the actuator.
         watches_force: Whether the driver relies on a force.
+        force_varies: Whether the force has noise (`Plausible`).
 
     Raises:
         InputError: The tracker cannot be used so.
@@ -207,7 +213,7 @@ def opened_live(
         if not isinstance(sensor, LiveTracker):
             raise AssertionError("recordings are refused before (`tracking_of`)")
         _require_force(tracking, sensor.measures_force, watches_force)
-        yield LivePlausible(sensor, entry)
+        yield LivePlausible(sensor, entry, now_s, force_varies=watches_force and force_varies)
 
 
 def _require_force(tracking: Tracking, measures_force: bool, watches_force: bool) -> None:

@@ -30,6 +30,7 @@ point the run ended.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 from collections import deque
@@ -37,15 +38,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from ntagen.drive.deviation import DeviationMonitor
+from ntagen.drive.deviation import DeviationMonitor, require_explained
 from ntagen.drive.device import Device
 from ntagen.drive.first_push import is_free
 from ntagen.drive.force import ForceMonitor, Rise
 from ntagen.drive.knowledge import Knowledge, position_unsure_mm
 from ntagen.drive.records import (
+    Command,
     Ended,
     Forgotten,
     Journal,
+    JournalError,
     Learned,
     Predicted,
     Record,
@@ -158,15 +161,38 @@ class Controller:
         state = State.ARM
         try:
             while state not in ENDS:
-                event = self._perform(state)
-                following = next_state(state, event)
-                self._note(Transition(self._now_s(), state.value, event.value, following.value))
-                state = following
-        except BaseException:
-            # A bug, or a log that cannot be written: the needle must not move on.
-            self._needle.stop_at_once()
+                state = self._turn(state, self._perform(state))
+        except BaseException as error:
+            # A bug, or the operator's second Ctrl-C: the needle must not move on.
+            try:
+                self._needle.stop_at_once()
+            finally:
+                self._tell_bug(state, error)
             raise
-        self._halt()
+        return self._finish(self._halt(state))
+
+    def _turn(self, state: State, event: Event) -> State:
+        """The next state. A run that cannot be recorded ends with a fault."""
+        try:
+            return self._went_on(state, event)
+        except JournalError as error:
+            self._reason = str(error)
+            return self._went_on(state, Event.FAULT)
+
+    def _went_on(self, state: State, event: Event) -> State:
+        following = next_state(state, event)
+        self._note(Transition(self._now_s(), state.value, event.value, following.value))
+        return following
+
+    def _finish(self, state: State) -> Ended:
+        """Records the end; one that cannot be recorded is a fault."""
+        try:
+            return self._ended(state)
+        except JournalError as error:
+            self._reason = str(error)
+            return self._ended(State.FAULTED)
+
+    def _ended(self, state: State) -> Ended:
         ended = Ended(
             time_s=self._now_s(),
             outcome=state.value,
@@ -177,6 +203,20 @@ class Controller:
         )
         self._note(ended)
         return ended
+
+    def _tell_bug(self, state: State, error: BaseException) -> None:
+        """Records that a mistake of the program ended the run, as far as that is possible.
+
+        A second Ctrl-C is no such mistake: it may have come in the middle of a record.
+        """
+        if isinstance(error, KeyboardInterrupt):
+            return
+        said = " ".join(str(error).split())
+        self._reason = f"internal error: {type(error).__name__}: {said}"
+        with contextlib.suppress(Exception):
+            self._went_on(state, Event.FAULT)
+            self._note(Command(self._now_s(), "stop", 0.0))
+            self._ended(State.FAULTED)
 
     def _perform(self, state: State) -> Event:
         """Does a state's task; returns the event with which it ended. An error is an event too."""
@@ -205,7 +245,9 @@ class Controller:
         return Event.ARMED
 
     def _make_estimate(self) -> Event:
-        tip = self._needle.estimated().tip
+        estimate = self._needle.estimated()
+        require_explained(estimate, self._settings, self._knowledge.a_priori.needle.radius_mm)
+        tip = estimate.tip
         self._visit(tip.position_mm, last_too=True)
         if self._knowledge.visited == len(self._knowledge.a_priori.targets):
             self._reason = "the tip is in the last target"
@@ -488,13 +530,17 @@ class Controller:
             self._is_short = not self._needle.push(length_mm)
         self._short_in_row = self._short_in_row + 1 if self._is_short else 0
 
-    def _halt(self) -> None:
-        """Stops the needle at the end of a run, whatever the reason."""
+    def _halt(self, state: State) -> State:
+        """Stops the needle at the end of a run, whatever the reason; returns how it ends."""
         try:
             self._needle.stop()
+        except JournalError as error:
+            self._reason = str(error)
+            return State.FAULTED
         except DeviceError as error:
             # The run ends anyway, but the report must say that the device did not stop.
             self._reason = f"{self._reason}; it cannot be stopped: {error}"
+        return state
 
     def _require_time(self) -> None:
         if self._now_s() - self._started_s >= self._settings.timeout_s:

@@ -11,11 +11,26 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import Final
 
 from ntagen.drive.settings import Settings
+from ntagen.errors import DeviceError
+from ntagen.needle.estimate import RECENT, Estimate
 from ntagen.needle.noise import squared_length_bound
 from ntagen.needle.vectors import subtract
 from ntagen.scene import Vector
+
+_SIGMAS: Final = 6.0
+"""A mean is farther off by noise alone less than once in 10^8 estimates."""
+
+_CURVATURE_STDS: Final = 20.0
+"""A curvature that is so many standard deviations of its prior off is that of no needle; ours. Half
+and twice the expected one are 14 of the usual 5 %: the driver copes with those."""
+
+_CAUSES: Final = "hint: does an axis jam or lose steps? Is the tracker mirrored, frozen or late?"
+
+_LEAST_MISFIT_MM: Final = 1.0
+"""Less than this is no misfit, whatever deviation is allowed; ours."""
 
 
 def window(settings: Settings, length_mm: float) -> int:
@@ -58,3 +73,37 @@ class DeviationMonitor:
         """The length of the mean of the last differences, in mm."""
         count = max(1, len(self._last))
         return math.sqrt(sum((sum(axis) / count) ** 2 for axis in zip(*self._last, strict=True)))
+
+
+def require_explained(estimate: Estimate, settings: Settings, radius_mm: float) -> None:
+    """Refuses an estimate that does not explain the last measurements.
+
+    The estimator knows all commands, and fits pose, curvature and rolls. If the needle that fits
+    best is still off by more than what is allowed between plan and needle, or bends as no needle
+    of this kind does, the tip was not moved as commanded, or not measured where it is: steps were
+    lost, an axis jams, the tracker is mirrored, frozen or late. A plan from there would be for
+    another needle.
+
+    Args:
+        estimate: The estimate.
+        settings: The noise, and what is allowed.
+        radius_mm: The radius that was expected.
+
+    Raises:
+        DeviceError: It does not.
+    """
+    priors = settings.priors
+    noise_mm = _SIGMAS * (priors.noise_mm / math.sqrt(RECENT) + priors.distortion_mm)
+    allowed_mm = max(_LEAST_MISFIT_MM, settings.deviation_mm) + noise_mm
+    if not estimate.misfit_mm <= allowed_mm:
+        raise DeviceError(
+            f"no needle that was moved as commanded is where the tracker sees this one: the last "
+            f"positions are {estimate.misfit_mm:.1f} mm off, and {allowed_mm:.1f} mm is allowed\n"
+            f"{_CAUSES}"
+        )
+    log_ratio = math.log(estimate.radius_mm) - math.log(radius_mm)
+    if math.isfinite(radius_mm) and abs(log_ratio) > _CURVATURE_STDS * priors.curvature_ratio:
+        raise DeviceError(
+            f"the tip moves as if the needle bent with a radius of {estimate.radius_mm:.1f} mm, "
+            f"and {radius_mm:g} mm was expected\n{_CAUSES}"
+        )

@@ -30,7 +30,7 @@ from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
 from ntagen.drive.messages import KINDS, encode, message_class
-from ntagen.drive.records import Ended, Learned, Record, Transition
+from ntagen.drive.records import Ended, JournalError, Learned, Record, Transition
 from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.drive.states import ABORTS, Event
 from ntagen.drive.viewing import (
@@ -41,6 +41,7 @@ from ntagen.drive.viewing import (
     show_record,
     show_scene,
 )
+from ntagen.errors import InputError
 from ntagen.files import GrowingFile
 from ntagen.plan.document import document
 from ntagen.plan.synthesise import Synthesis
@@ -73,8 +74,7 @@ class Log:
         attachments: Files to store with the run, by name.
 
     Raises:
-        InputError: The file cannot be written (also later, during the run), or another run is
-            writing to it.
+        InputError: The file cannot be written, or another run is writing to it.
     """
 
     def __init__(
@@ -118,7 +118,13 @@ class Log:
         self._acknowledge(to_disk=True)
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
-        """Attaches the scene, the model and the best plans of a synthesis."""
+        """Attaches the scene, the model and the best plans of a synthesis.
+
+        Raises:
+            JournalError: They cannot be written.
+        """
+        if self._file.closed:
+            return
         folder = f"rebuild-{number:04d}"
         best = synthesis.candidates[:_PLANS_LOGGED]
         plans = document(synthesis.scene, best, synthesis.ranking, synthesis.margins)
@@ -131,10 +137,16 @@ class Log:
             self._attach(f"{folder}/{STRATEGY}", packed, "application/gzip")
         for topic, message in show_plan(synthesis, self._time_ns / 1e9):
             self._show(topic, message)
-        self._acknowledge(to_disk=False)
+        self._keep(to_disk=False)
 
     def record(self, record: Record) -> None:
-        """Writes a record; it then survives the death of the process."""
+        """Writes a record; it then survives the death of the process.
+
+        Raises:
+            JournalError: It cannot be written. The file ends with the record before it.
+        """
+        if self._file.closed:
+            return
         self._time_ns = round(record.time_s * 1e9)
         self._add(self._channels[type(record)], encode(record, self._sequence))
         self._sequence += 1
@@ -144,7 +156,7 @@ class Log:
             for topic, message in self._shaft.show(record):
                 self._show(topic, message)
         is_alarm = isinstance(record, Transition) and record.event in _ALARMS
-        self._acknowledge(to_disk=is_alarm or isinstance(record, Learned | Ended))
+        self._keep(to_disk=is_alarm or isinstance(record, Learned | Ended))
 
     def close(self) -> None:
         """Completes the file; without this it is cut off, but readable."""
@@ -178,6 +190,13 @@ class Log:
             media_type=media_type,
             data=data,
         )
+
+    def _keep(self, *, to_disk: bool) -> None:
+        """Acknowledges what a run that goes on has written."""
+        try:
+            self._acknowledge(to_disk=to_disk)
+        except InputError as error:
+            raise JournalError(str(error)) from error
 
     def _acknowledge(self, *, to_disk: bool) -> None:
         self._writer.flush()  # type: ignore[no-untyped-call]

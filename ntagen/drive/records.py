@@ -10,8 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+from ntagen.errors import DeviceError
 from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Pose, Region, Scene, Vector
+
+
+class JournalError(DeviceError):
+    """A record cannot be kept: what nobody can tell afterwards must not be done.
+
+    A journal raises it once, and then takes records without keeping them: so the other journals
+    can tell how the run ends.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +228,11 @@ class Journal(Protocol):
     """Anything that records a run: the log, the terminal, a replay."""
 
     def record(self, record: Record) -> None:
-        """Takes a record; when this returns, the record is acknowledged."""
+        """Takes a record; when this returns, the record is acknowledged.
+
+        Raises:
+            JournalError: It cannot be kept.
+        """
 
     def started(self, scene: Scene) -> None:
         """Gets the a-priori scene before the first record."""

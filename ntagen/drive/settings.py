@@ -45,7 +45,8 @@ class Settings:
         halt_force_n: A push is ended at once when the force is this much more than what is expected
             (`ntagen.drive.supervisor`). Friction in motion is more than friction at rest, so this
             is more than `force_n`; ours.
-        force_noise_n: The standard deviation of a measured force; ours.
+        force_noise_n: The standard deviation of a measured force; ours. 0 says that it has none,
+            so that a force that stays the same is not that of a dead sensor.
         force_rise_n_per_mm: The least rise of the force on the way towards a region, once it rises;
             ours.
         false_alarm: The probability that noise alone stops a run, for the force and for the

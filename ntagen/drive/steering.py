@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Final
 
 from ntagen.drive.device import Device, Halted, require_finite
+from ntagen.drive.reach import Reach
 from ntagen.drive.records import Command, CutShort, Estimated, Journal, Measured
 from ntagen.drive.settings import Settings
 from ntagen.needle.estimate import Estimate, Estimator
@@ -49,6 +50,7 @@ class Steering:
         self._journal = journal
         self._listen = listen
         self._estimator = Estimator(needle.tip, needle.radius_mm, settings.priors)
+        self._reach = Reach(settings)
         self._radius_mm = needle.radius_mm
         self._cut_mm = 0.0
         self._left: tuple[Arc, ...] = ()
@@ -74,6 +76,7 @@ class Steering:
     def push(self, length_mm: float) -> bool:
         """Inserts the needle; returns whether it went all the way (`Halted`)."""
         self._command("push", length_mm)
+        self._reach.moved(length_mm)
         made_mm = length_mm
         try:
             self._device.push(length_mm)
@@ -110,6 +113,7 @@ class Steering:
             self._left += self.path.arcs
             self._has_grown = False
         self._command("pull", length_mm)
+        self._reach.moved(length_mm)
         self._estimator.pull(length_mm)
         self.path = self.path.pull(length_mm)
         self._device.pull(length_mm)
@@ -132,10 +136,11 @@ class Steering:
         """Measures the needle now.
 
         Raises:
-            DeviceError: There is no reading, or it is not a number.
+            DeviceError: There is no reading, or it cannot be true.
         """
         measurement = self._device.measure()
         require_finite(measurement)
+        self._reach.require(measurement)
         self._estimator.measure(measurement)
         self._journal.record(
             Measured(
@@ -174,9 +179,11 @@ class Steering:
         return self._estimator.estimate()
 
     def stop(self) -> None:
-        """Records the stop, and stops the needle."""
-        self._journal.record(Command(self.now_s(), "stop", 0.0))
-        self._device.stop()
+        """Records the stop, and stops the needle even if that cannot be recorded."""
+        try:
+            self._journal.record(Command(self.now_s(), "stop", 0.0))
+        finally:
+            self._device.stop()
 
     def stop_at_once(self) -> None:
         """Stops the needle without a record: for ends in which the journal may fail."""

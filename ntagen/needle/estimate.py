@@ -43,6 +43,10 @@ _Array = NDArray[np.float64]
 _POSE_UNKNOWNS = 7
 """Position (3), rotations (3) and curvature (1) come before all other unknowns."""
 
+RECENT = 8
+"""So many of the last measurements count for `Estimate.misfit_mm`; ours: those of a push of 2 mm in
+pieces of 0.25 mm."""
+
 _DRIFT_LENGTH_MM = 10.0
 """The length for which drifts are given; over another length, a random walk goes with its root."""
 
@@ -69,6 +73,9 @@ class Estimate:
             change of the curvature, only a part stays. Without drift it is that of the whole path.
         radius_std_mm: Its standard deviation.
         rms_mm: Root mean square of the distances between measured and estimated positions.
+        misfit_mm: The length of the mean difference between the last measured positions and the
+            estimated ones (`RECENT` of them): what no needle explains that was moved as commanded.
+            0 while there are fewer.
         covariance: Of the tip, in seven rows: position (x, y, z in mm), rotation vector (about x,
             y, z in rad), logarithm of the expected curvature.
         curvature_drift: `Priors.curvature_drift`, for predictions.
@@ -82,6 +89,7 @@ class Estimate:
     covariance: tuple[tuple[float, ...], ...]
     curvature_drift: float = 0.0
     turn_drift_rad: float = 0.0
+    misfit_mm: float = 0.0
 
     @property
     def tip(self) -> Pose:
@@ -230,7 +238,24 @@ class Estimator:
             covariance=tuple(tuple(float(value) for value in row) for row in covariance),
             curvature_drift=self._priors.curvature_drift,
             turn_drift_rad=self._priors.turn_drift_rad,
+            misfit_mm=self._misfit_mm(begin, placed),
         )
+
+    def _misfit_mm(self, begin: Placed, placed: list[list[Placed]]) -> float:
+        """See `Estimate.misfit_mm`; 0 while there are fewer measurements."""
+        if len(self._readings) < RECENT:
+            return 0.0
+        differences = []
+        for reading in self._readings[-RECENT:]:
+            part, along_mm = begin, reading.offset_mm
+            if reading.channel != ENTRY:
+                channel = self._channels[reading.channel]
+                number = channel.stretch_at(along_mm)
+                part = placed[reading.channel][number]
+                along_mm -= channel.stretches[number].offset_mm
+            expected, _ = part.positions(np.array([along_mm]))
+            differences.append(np.array(reading.measurement.position_mm) - expected[0])
+        return float(np.linalg.norm(np.mean(differences, axis=0)))
 
     def _unknown(self, std: float) -> int:
         """The index of a new unknown with this standard deviation."""

@@ -9,9 +9,10 @@ was taken for another, or of a tracker that has lost its reference.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
-from ntagen.drive.device import LiveSensor, Sensor
+from ntagen.drive.device import LiveSensor, Sensor, require_finite
 from ntagen.errors import DeviceError
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.vectors import distance, dot
@@ -30,6 +31,12 @@ JUMP_MM: Final = 20.0
 FASTEST_MM_PER_S: Final = 50.0
 """A needle is pulled back at most so fast; ours."""
 
+SAME_FORCES: Final = 20
+"""A sensor that gives the same force so often in a row is dead; ours. A living one has noise."""
+
+STALE_S: Final = 0.5
+"""A measurement that is older says nothing about where the needle is; ours."""
+
 
 class Plausible:
     """A sensor whose measurements must be plausible.
@@ -37,11 +44,24 @@ class Plausible:
     Args:
         sensor: The sensor.
         entry: The pose at which the needle is at the start.
+        now_s: The clock of the measurements' times; without it they may be of any age.
+        force_varies: Whether the force has noise, so that one that stays the same is wrong.
     """
 
-    def __init__(self, sensor: Sensor, entry: Pose) -> None:
+    def __init__(
+        self,
+        sensor: Sensor,
+        entry: Pose,
+        now_s: Callable[[], float] | None = None,
+        *,
+        force_varies: bool = False,
+    ) -> None:
         self._sensor = sensor
         self._entry = entry
+        self._now_s = now_s
+        self._most_same = SAME_FORCES if force_varies else math.inf
+        self._force_n = math.nan
+        self._same = 0
         self._last: Measurement | None = None
 
     def measure(self) -> Measurement:
@@ -50,9 +70,24 @@ class Plausible:
         Raises:
             DeviceError: There is no reading, or it cannot be true.
         """
-        return self._require(self._sensor.measure())
+        found = self._require(self._sensor.measure())
+        self._require_alive(found.force_n)
+        return found
+
+    def _require_alive(self, force_n: float) -> None:
+        self._same = self._same + 1 if force_n == self._force_n else 1
+        self._force_n = force_n
+        if self._same >= self._most_same:
+            raise DeviceError(
+                f"the force was exactly {force_n:g} N in {self._same} readings in a row\n"
+                "hint: check the force sensor, its cable and its range; add --force-noise 0 if it "
+                "really has no noise"
+            )
 
     def _require(self, found: Measurement) -> Measurement:
+        require_finite(found)
+        if self._now_s is not None:
+            require_fresh(found, self._now_s())
         if self._last is None:
             require_start(found, self._entry)
         else:
@@ -67,10 +102,19 @@ class LivePlausible(Plausible):
     Args:
         sensor: The sensor.
         entry: The pose at which the needle is at the start.
+        now_s: See `Plausible`.
+        force_varies: See `Plausible`.
     """
 
-    def __init__(self, sensor: LiveSensor, entry: Pose) -> None:
-        super().__init__(sensor, entry)
+    def __init__(
+        self,
+        sensor: LiveSensor,
+        entry: Pose,
+        now_s: Callable[[], float] | None = None,
+        *,
+        force_varies: bool = False,
+    ) -> None:
+        super().__init__(sensor, entry, now_s, force_varies=force_varies)
         self._live = sensor
 
     @property
@@ -85,6 +129,20 @@ class LivePlausible(Plausible):
             DeviceError: There is none, or it cannot be true.
         """
         return self._require(self._live.newest())
+
+
+def require_fresh(found: Measurement, now_s: float) -> None:
+    """Refuses a measurement that is older than `STALE_S`.
+
+    Raises:
+        DeviceError: It is.
+    """
+    age_s = now_s - found.time_s
+    if age_s > STALE_S:
+        raise DeviceError(
+            f"the measurement is {age_s:.2f} s old, and {STALE_S:g} s is allowed\n"
+            "hint: is the tracker, or the network to it, too slow?"
+        )
 
 
 def require_near(found: Measurement, last: Measurement) -> None:

@@ -29,7 +29,7 @@ from ntagen.cli import main
 from ntagen.drive.log import ACTUAL, Log, metadata_of, topic_of
 from ntagen.drive.messages import KINDS, decode, encode
 from ntagen.drive.reading import read_log
-from ntagen.drive.records import Command, Record, Transition
+from ntagen.drive.records import Command, JournalError, Record, Transition
 from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.drive.settings import Settings
 from ntagen.drive.viewing import quaternion
@@ -315,8 +315,10 @@ def test_a_full_disk_ends_the_log_with_a_whole_record(tmp_path: Path) -> None:
             written_s.append(20.0 + len(written_s))
 
     try:
-        with pytest.raises(InputError, match=r"cannot write .*run\.mcap"):
+        with pytest.raises(JournalError, match=r"cannot write .*run\.mcap"):
             go_on()
+        # The run ends with a fault, and others tell it: here nothing is kept any more.
+        log.record(ALARM)
         log.close()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, old)

@@ -12,6 +12,8 @@ from ntagen.scene import Pose, Vector
 from ntagen.tracking.plausible import (
     FASTEST_MM_PER_S,
     JUMP_MM,
+    SAME_FORCES,
+    STALE_S,
     Plausible,
     require_near,
     require_start,
@@ -92,3 +94,56 @@ def test_the_first_measurement_is_compared_with_the_entry_and_others_with_the_la
         plausible.measure()
     with pytest.raises(DeviceError, match="mm from the entry"):
         Plausible(sensor, ENTRY).measure()
+
+
+class Repeats:
+    """A sensor at the entry, whose forces come again and again."""
+
+    def __init__(self, forces_n: list[float], time_s: float = 0.0) -> None:
+        self._forces_n = forces_n
+        self._time_s = time_s
+
+    def measure(self) -> Measurement:
+        self._forces_n.append(self._forces_n.pop(0))
+        return Measurement(self._time_s, ENTRY.position_mm, self._forces_n[-1])
+
+
+@pytest.mark.parametrize("force_n", [0.0, 50.0])
+def test_a_force_that_has_no_noise_is_that_of_a_dead_sensor(force_n: float) -> None:
+    dead = Plausible(Repeats([force_n]), ENTRY, force_varies=True)
+    for _ in range(SAME_FORCES - 1):
+        dead.measure()
+    with pytest.raises(DeviceError, match=f"exactly {force_n:g} N in {SAME_FORCES} readings"):
+        dead.measure()
+
+
+def test_a_force_with_noise_is_alive_and_a_simulated_one_needs_none() -> None:
+    alive = Plausible(Repeats([0.1] * (SAME_FORCES - 1) + [0.2]), ENTRY, force_varies=True)
+    exact = Plausible(Repeats([0.0]), ENTRY)
+    for _ in range(3 * SAME_FORCES):
+        alive.measure()
+        exact.measure()
+
+
+def test_an_old_measurement_is_refused_where_there_is_a_clock() -> None:
+    found = Repeats([0.0], time_s=2.0)
+    Plausible(found, ENTRY, lambda: 2.0 + STALE_S).measure()
+    Plausible(found, ENTRY).measure()
+    with pytest.raises(DeviceError, match=r"is 0\.60 s old, and 0\.5 s is allowed\nhint:"):
+        Plausible(found, ENTRY, lambda: 2.6).measure()
+
+
+@pytest.mark.parametrize("place", ["position", "force", "time"])
+def test_what_is_no_number_is_called_so(place: str) -> None:
+    wrong = Measurement(
+        math.nan if place == "time" else 0.0,
+        (1.0, math.inf if place == "position" else 2.0, 3.0),
+        math.nan if place == "force" else 0.0,
+    )
+
+    class Wrong:
+        def measure(self) -> Measurement:
+            return wrong
+
+    with pytest.raises(DeviceError, match="not a number"):
+        Plausible(Wrong(), ENTRY).measure()
