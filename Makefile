@@ -101,10 +101,9 @@ bench-needle: $(INSTALLED) ## Measure the phantom needle against real ones, what
 	$(BIN)/python tests/benchmarks/drives.py --needle phantom --seeds 20
 
 .PHONY: bench-devices
-bench-devices: $(INSTALLED) ## Measure how fast a stop is on the wire, whether all ways to a needle decide the same, and how runs with faults end
+bench-devices: $(INSTALLED) ## Measure how fast a stop is on the wire, and whether runs with faults at random moments end well
 	$(BIN)/python tests/benchmarks/stop.py
-	$(BIN)/python tests/benchmarks/same_decisions.py
-	$(BIN)/python tests/benchmarks/faults.py
+	$(BIN)/python -m tests.benchmarks.faults
 
 .PHONY: bench-limits
 bench-limits: $(INSTALLED) ## Measure whether the time and memory limits hold: 20 models with up to 250 clocks

@@ -1,22 +1,17 @@
 """Whether the way to the needle changes what the driver decides.
 
-    python tests/benchmarks/same_decisions.py [--task FILE] [--seeds N] [--speeds 10 1]
+    python tests/benchmarks/same_decisions.py [--task FILE] [--seeds N]
 
 The same phantom is driven three times with each seed: directly; with its measurements sent through
 OpenIGTLink on this machine; and also behind an emulated stepper controller. The yardstick is the
 direct run: the printed share of the others has the same end and the same commands. Steps of a motor
 and numbers of 32 bits on the network change lengths a little, so commands may differ by 0.01.
-
-Then a virtual needle without errors is driven in a lab in real time (`ntagen device simulate`): by
-a serial port and a network, at each of the speeds. Its yardstick is the virtual needle without a
-lab. (A phantom draws its noise with each sample, and how many samples come depends on the time.)
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import shlex
 import subprocess
 import sys
 import tempfile
@@ -27,7 +22,6 @@ from ntagen.drive.reading import read_log
 from ntagen.drive.records import Command
 
 ROOT = Path(__file__).parents[2]
-LAB_TASK = ROOT / "examples" / "stepper.nsl"
 WAYS = {
     "through OpenIGTLink": ["--needle", "phantom", "--tracker", "openigtlink+sim"],
     "behind an emulated controller": ["--needle", "grbl+sim"],
@@ -36,13 +30,11 @@ WAYS = {
 SAME = 0.01
 
 
-def drive(task: Path, seed: int | None, options: list[str]) -> tuple[str, list[Command]]:
+def drive(task: Path, seed: int, options: list[str]) -> tuple[str, list[Command]]:
     """The end of a run and its commands."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "run.mcap"
-        command = [sys.executable, "-m", "ntagen", "drive", str(task)]
-        if seed is not None:
-            options = [*options, "--seed", str(seed)]
+        command = [sys.executable, "-m", "ntagen", "drive", str(task), "--seed", str(seed)]
         run = subprocess.run(
             [*command, "--json", "--log", str(log), *options],
             capture_output=True,
@@ -53,27 +45,6 @@ def drive(task: Path, seed: int | None, options: list[str]) -> tuple[str, list[C
         summary: dict[str, Any] = json.loads(run.stdout)
         commands = [record for record in read_log(log).records if isinstance(record, Command)]
     return summary["outcome"], commands
-
-
-def drive_in_lab(task: Path, speed: float) -> tuple[str, list[Command]]:
-    """The end and the commands of a run of a virtual needle in a lab."""
-    lab = subprocess.Popen(
-        [
-            *(sys.executable, "-m", "ntagen", "device", "simulate", str(task), "--json"),
-            *("--needle", "virtual", "--speed", str(speed)),
-        ],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-    )
-    assert lab.stdout is not None
-    try:
-        opened = json.loads(lab.stdout.readline())
-        words = shlex.split(opened["command"])
-        return drive(task, None, words[words.index(str(task)) + 1 :])
-    finally:
-        lab.terminate()
-        lab.wait()
 
 
 def are_same(one: list[Command], other: list[Command]) -> bool:
@@ -88,7 +59,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--task", type=Path, default=ROOT / "examples" / "paper.nsl")
     parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument("--speeds", type=float, nargs="*", default=[10.0, 1.0])
     options = parser.parse_args()
     same_end, same_commands = dict.fromkeys(WAYS, 0), dict.fromkeys(WAYS, 0)
     for seed in range(1, options.seeds + 1):
@@ -102,12 +72,6 @@ def main() -> None:
             f"{way}: {same_end[way]} of {options.seeds} runs end as the direct one, "
             f"{same_commands[way]} of {options.seeds} with the same commands"
         )
-    end, commands = drive(LAB_TASK, 0, ["--needle", "virtual"])
-    for speed in options.speeds:
-        other_end, other = drive_in_lab(LAB_TASK, speed)
-        ends = "ends as" if end == other_end else "does NOT end as"
-        same = "the same" if are_same(commands, other) else "OTHER"
-        print(f"in a lab at {speed:g} times real time: {ends} without it, with {same} commands")
 
 
 if __name__ == "__main__":
