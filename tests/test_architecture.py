@@ -50,14 +50,17 @@ MAY_IMPORT: dict[str, set[str]] = {
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
     "grbl": {"errors", "hardware", "units"},
-    "drive": BASE | {"files", "needle", "nsl", "plan", "render", "checker", "grbl"},
+    "extensions": {"errors"},
+    "drive": BASE | {"extensions", "files", "needle", "nsl", "plan", "render", "checker", "grbl"},
     "openigtlink": {"errors"},
-    "tracking": BASE | {"files", "needle", "drive", "openigtlink"},
+    "tracking": BASE | {"extensions", "files", "needle", "drive", "openigtlink"},
+    "plugins": {"errors", "drive", "needle", "tracking"},
+    "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "drive", "openigtlink", "tracking"},
     "plot": BASE | {"files", "needle", "plan", "drive"},
     "cli": BASE
     | {"files", "needle", "nsl", "plan", "render", "loading", "explanations"}
-    | {"grbl", "drive", "lab", "plot", "tracking"}
+    | {"extensions", "grbl", "drive", "lab", "plot", "testing", "tracking"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "__main__": {"cli"},
 }
@@ -91,8 +94,8 @@ ONLY_IN: dict[str, set[str]] = {
     "selectors": {"openigtlink"},
     "select": {"drive", "grbl"},
     "asyncio": {"drive"},
-    "threading": {"drive", "grbl", "cli", "lab", "openigtlink"},
-    "time": {"drive", "grbl", "cli", "lab", "openigtlink"},
+    "threading": {"drive", "grbl", "cli", "lab", "openigtlink", "plugins", "testing"},
+    "time": {"drive", "grbl", "cli", "lab", "openigtlink", "testing"},
     "datetime": {"drive", "cli"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
     "random": {"needle", "drive", "checker.runs", "checker.play"},

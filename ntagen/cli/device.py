@@ -12,6 +12,8 @@ import click
 
 from ntagen.cli.effects import say_idle
 from ntagen.cli.lab import command as simulate
+from ntagen.cli.plugins import check_plugin, installed, is_plugin
+from ntagen.cli.plugins import command as test
 from ntagen.cli.steppers import axes_for, described
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import look_at
@@ -44,12 +46,13 @@ def command() -> None:
 
 
 command.add_command(simulate)
+command.add_command(test)
 
 
 @command.command(
     "check", epilog="Exit codes: 0 it is ready, 2 the command line is wrong, 5 it is not ready."
 )
-@click.argument("device", metavar="grbl:PORT|grbl+sim|TASK.nsl|openigtlink:HOST:PORT")
+@click.argument("device", metavar="grbl:PORT|grbl+sim|TASK.nsl|openigtlink:HOST:PORT|PLUGIN")
 @click.option("--baud", "baud_rate", default=115_200, show_default=True, help="The port's speed.")
 @click.option(
     "--move",
@@ -86,7 +89,8 @@ def check(
     device that it describes is looked at, and its axes are compared with the description.
 
     Of a tracker, openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, the devices that it sends are
-    printed, with their rates and positions.
+    printed, with their rates and positions. Of a plugin, PLUGIN[:ARGUMENT], what it says about
+    itself, and a measurement if it is a tracker; docs/plugins.md has more.
 
     \b
     Examples:
@@ -97,6 +101,9 @@ def check(
     """  # noqa: D301  click wants the control character
     from ntagen.grbl.check import inspect
 
+    if is_plugin(device):
+        say_idle(_STEPPERS_ONLY | {"listen_s": "--listen"}, "with a plugin")
+        return check_plugin(device, as_json=as_json)
     if device.startswith("openigtlink:"):
         say_idle(_STEPPERS_ONLY, "with a tracker")
         return look_at(device, listen_s, as_json=as_json)
@@ -152,7 +159,7 @@ def _port(device: str, baud_rate: int) -> Iterator[Port]:
             raise InputError(
                 f"there is no device '{device}'\n"
                 "hint: write grbl:PORT, for example grbl:/dev/ttyACM0, or grbl+sim, or "
-                "openigtlink:HOST:PORT"
+                f"openigtlink:HOST:PORT; installed plugins: {installed()}"
             )
         port = SerialPort(name, baud_rate)
         stack.callback(port.close)

@@ -58,7 +58,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="Which needle to steer. Three are simulations: virtual bends exactly as planned, phantom "
     "drifts, lags and is measured as real needles are, and grbl+sim is a phantom behind an "
     "emulated stepper controller. grbl:PORT is a real needle behind a controller with the axes "
-    "that the task describes; grbl alone takes the port from the task, too.",
+    "that the task describes; grbl alone takes the port from the task, too. PLUGIN:ARGUMENT is a "
+    "real needle of another package (docs/plugins.md).",
 )
 @click.option(
     "--baud",
@@ -217,13 +218,19 @@ def _real_needle(
     run: _Run, needle: str, baud_rate: int
 ) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
     """What moves a real needle, and what measures it."""
-    from ntagen.cli.steppers import described, opened_steppers
+    from ntagen.cli.steppers import described, opened_plugin, opened_steppers
+    from ntagen.drive.needles import REAL
 
     settings, scene = run.configuration.settings, run.scene
-    device = described(run.task, run.environment)
-    _, _, port = needle.partition(":")
+    name, _, argument = needle.partition(":")
+    if name == REAL:
+        device = described(run.task, run.environment)
+        opening = opened_steppers(argument, baud_rate, device, scene.needle, settings)
+    else:
+        say_idle({"baud_rate": "--baud"}, "with a plugin")
+        opening = opened_plugin(name, argument, scene.needle, settings)
     with (
-        opened_steppers(port, baud_rate, device, scene.needle, settings) as actuator,
+        opening as actuator,
         opened_live(
             run.tracking,
             scene.needle.tip,

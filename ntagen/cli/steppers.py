@@ -1,4 +1,4 @@
-"""Opens the steppers of a real needle, as the command line and the task describe them."""
+"""Opens what moves a real needle, as the command line and the task describe it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ntagen.drive.device import WatchedActuator
+    from ntagen.drive.plugin import Speeds
     from ntagen.drive.settings import Settings
     from ntagen.grbl.axes import Axes
     from ntagen.hardware import GrblDevice
@@ -77,4 +78,41 @@ def opened_steppers(
         actuator = GrblActuator(wire, axes)
         needs_mm = overrun_mm(needle.speed_mm_per_s, actuator.ramp_mm_per_s2)
         require_overrun(settings, needs_mm)
+        yield actuator
+
+
+def speeds_for(needle: Needle, settings: Settings) -> Speeds:
+    """The speeds of a needle and of the settings."""
+    from ntagen.drive.plugin import Speeds
+
+    return Speeds(
+        push_mm_per_s=needle.speed_mm_per_s,
+        pull_mm_per_s=settings.pull_speed_ratio * needle.speed_mm_per_s,
+        roll_rad_per_s=settings.roll_rad_per_s,
+    )
+
+
+@contextlib.contextmanager
+def opened_plugin(
+    name: str, argument: str, needle: Needle, settings: Settings
+) -> Iterator[WatchedActuator]:
+    """Opens the device of a plugin, until the end of the block.
+
+    Args:
+        name: The name of the plugin.
+        argument: What stands behind it.
+        needle: The needle.
+        settings: How to drive.
+
+    Raises:
+        InputError: The settings do not fit the device.
+        DeviceError: The plugin fails.
+    """
+    from ntagen.drive.plugin import open_device
+    from ntagen.drive.real import overrun_mm, require_overrun
+
+    with open_device(name, argument, speeds_for(needle, settings)) as actuator:
+        ramp_mm_per_s2 = actuator.ramp_mm_per_s2
+        if ramp_mm_per_s2 is not None:
+            require_overrun(settings, overrun_mm(needle.speed_mm_per_s, ramp_mm_per_s2))
         yield actuator

@@ -46,8 +46,8 @@ def tracker_options(command: _Command) -> _Command:
             "--tracker",
             metavar="TRACKER",
             help="What measures the needle, if not the needle itself: "
-            "openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, csv:FILE, mcap:FILE, or "
-            "openigtlink+sim. docs/tracking.md has the options.",
+            "openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, csv:FILE, mcap:FILE, "
+            "openigtlink+sim, or PLUGIN:ARGUMENT. docs/tracking.md has the options.",
         ),
     ):
         command = option(command)
@@ -203,14 +203,14 @@ def opened_live(
         InputError: The tracker cannot be used so.
         DeviceError: It cannot be reached.
     """
-    from ntagen.tracking.live import LiveTracker
     from ntagen.tracking.plausible import LivePlausible
+    from ntagen.tracking.playback import Playback
     from ntagen.tracking.spec import open_tracker
 
     if tracking.tracker is None:
         raise AssertionError("a real needle has a tracker (`tracking_of`)")
     with open_tracker(tracking.tracker, tracking.transform, now_s) as sensor:
-        if not isinstance(sensor, LiveTracker):
+        if isinstance(sensor, Playback):
             raise AssertionError("recordings are refused before (`tracking_of`)")
         _require_force(tracking, sensor.measures_force, watches_force)
         yield LivePlausible(sensor, entry, now_s, force_varies=watches_force and force_varies)

@@ -11,6 +11,7 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import Maker, phantom, settings_for, settings_for_phantom, virtual
 from ntagen.drive.stepped import stepped
 from ntagen.errors import InputError
+from ntagen.extensions import DEVICES, described, names
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.virtual import Errors
 from ntagen.scene import Scene
@@ -77,7 +78,8 @@ def choose(name: str, errors: Errors) -> Chosen:
     """The needle of a name.
 
     Args:
-        name: One of `NAMES`, or a real needle (`REAL`).
+        name: One of `NAMES`, or a real needle: `REAL`, or the name of a plugin, both perhaps with a
+            colon and more.
         errors: The errors of the virtual needle.
 
     Raises:
@@ -87,8 +89,12 @@ def choose(name: str, errors: Errors) -> Chosen:
     if kind == REAL:
         return Chosen(name, None, errors)
     if name not in NAMES:
+        if kind in names(DEVICES):
+            return Chosen(name, None, errors)
         raise InputError(
-            f"there is no needle '{name}'\nhint: choose from {', '.join(sorted(NAMES))}, grbl:PORT"
+            f"there is no needle '{name}'\n"
+            f"hint: choose from {', '.join(sorted(NAMES))}, grbl:PORT; installed plugins: "
+            f"{described(DEVICES)}"
         )
     if name != "virtual":
         parameters = PhantomParameters()

@@ -34,7 +34,7 @@ class Plant(Protocol):
         """Is told that axes have moved, each by so many mm or degrees, in so much time."""
 
 
-class _Nothing:
+class NoPlant:
     """Axes that move nothing."""
 
     def move(self, steps: Mapping[str, float], seconds: float) -> None:
@@ -74,7 +74,7 @@ class Emulator:
         self.faults = Faults()
         self.memory = memory or Memory(dialect)
         self._dialect = dialect
-        self._plant: Plant = plant or _Nothing()
+        self._plant: Plant = plant or NoPlant()
         self._now_s = 0.0
         self._machine = Machine(dialect, self.memory, self)
         self._partial = bytearray()

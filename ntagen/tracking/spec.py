@@ -5,6 +5,7 @@
     openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…
     csv:FILE
     mcap:FILE
+    PLUGIN[:ARGUMENT]
 
 An address of version 6 stands in brackets: ``[::1]``. `OPTIONS` has the options.
 """
@@ -20,11 +21,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from ntagen.errors import InputError
+from ntagen.extensions import TRACKERS, described, names
 from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY, Transform
 from ntagen.tracking.live import N_PER, LiveTracker, Source
 from ntagen.tracking.mount import AXES
 from ntagen.tracking.playback import Playback, samples_of_log, samples_of_table
+from ntagen.tracking.plugin import PluginSource, PluginTracker, open_plugin
 from ntagen.units import S_PER
 
 OPTIONS: Final = {
@@ -62,7 +65,7 @@ class Recording:
     path: Path
 
 
-Tracker = Source | Recording
+Tracker = Source | Recording | PluginSource
 """What ``--tracker`` can name."""
 
 
@@ -79,13 +82,18 @@ def parse_tracker(text: str) -> Tracker:
         if not rest:
             raise InputError(f"--tracker {text}: the file is missing\nhint: write {kind}:FILE")
         return Recording(kind, Path(rest))
-    raise InputError(f"there is no tracker '{text}'\nhint: write {_FORMS}")
+    if kind in names(TRACKERS):
+        return PluginSource(kind, rest)
+    raise InputError(
+        f"there is no tracker '{text}'\n"
+        f"hint: write {_FORMS}; installed plugins: {described(TRACKERS)}"
+    )
 
 
 @contextlib.contextmanager
 def open_tracker(
     tracker: Tracker, transform: Transform | None, now_s: Callable[[], float]
-) -> Iterator[LiveTracker | Playback]:
+) -> Iterator[LiveTracker | Playback | PluginTracker]:
     """The sensor behind a tracker, until the end of the block.
 
     Args:
@@ -98,9 +106,13 @@ def open_tracker(
         DeviceError: A server cannot be reached.
     """
     match tracker:
-        case Source():
+        case Source() | PluginSource():
             if transform is None:
                 raise no_registration()
+            if isinstance(tracker, PluginSource):
+                with open_plugin(tracker, transform, now_s) as plugin:
+                    yield plugin
+                return
             with LiveTracker(tracker, transform, now_s) as live:
                 yield live
         case Recording("csv", path):
