@@ -373,10 +373,10 @@ PARAMETERS: Final = (
         "ranking",
         "ranking",
         "words",
-        "How plans are ranked, the most important criterion first: clearance, rolls, length, "
-        "target.",
+        "How plans are ranked, the most important criterion first: clearance, reserve, rolls, "
+        "length, target.",
         option="--rank",
-        choices=("clearance", "rolls", "length", "target"),
+        choices=("clearance", "reserve", "rolls", "length", "target"),
     ),
     Parameter(
         "pull_speed_ratio",

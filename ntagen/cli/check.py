@@ -172,7 +172,7 @@ class _Outputs:
     metavar="CRITERIA",
     default=None,
     help="How plans of an environment are ranked, the most important criterion first: clearance, "
-    "rolls, length, target.  [default: as drive { … } says, else clearance,rolls,length]",
+    "reserve, rolls, length, target.  [default: as drive { … } says, else clearance,rolls,length]",
 )
 @engine_options
 @overflow_rule()

@@ -47,8 +47,8 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     "ranking",
     metavar="CRITERION,…",
     default=None,
-    help="How plans are ranked, the most important criterion first: clearance, rolls, length, "
-    "target.  [default: as drive { … } says, else clearance,rolls,length]",
+    help="How plans are ranked, the most important criterion first: clearance, reserve, rolls, "
+    "length, target.  [default: as drive { … } says, else clearance,rolls,length]",
 )
 @include_option()
 def command(

@@ -59,6 +59,7 @@ from ntagen.drive.records import (
     Visited,
 )
 from ntagen.drive.reliance import relies_on
+from ntagen.drive.reserve import is_enough, is_surely_in
 from ntagen.drive.settings import Settings
 from ntagen.drive.states import ENDS, Event, State, next_state
 from ntagen.drive.steering import Steering
@@ -71,11 +72,15 @@ from ntagen.needle.path import Path
 from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import certify
+from ntagen.plan.rank import Candidate, reserve_of
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Pose, Scene
 
 _SMALL_MM: Final = 1e-9
 _NO_REGION_MM: Final = 1e9
+
+_ENOUGH_BEHIND_MM: Final = 1.5
+"""With this reserve, a plan from behind the tip is good enough: each mm farther back costs time."""
 
 
 @dataclass(slots=True)
@@ -133,6 +138,7 @@ class Controller:
         self._rise: Rise | None = None
         self._moves: deque[tuple[Push | Roll, Pose]] = deque()
         self._reviewed_mm = 0.0
+        self._rest: Plan | None = None
         self._predicted: Pose = scene.needle.tip
         self._is_short = False
         self._short_in_row = 0
@@ -257,7 +263,8 @@ class Controller:
     def _find_strategy(self) -> Event:
         self._lack = _Lack()
         is_first = self._syntheses == 0
-        here = self._ask(self._estimate().tip, self._needle.depth_mm)
+        rest, self._rest = self._rest, None
+        here = self._ask(self._estimate().tip, self._needle.depth_mm, rest)
         if here.best is not None:
             self._adopt(here)
             return Event.FIRST_STRATEGY if is_first else Event.STRATEGY_FOUND
@@ -273,17 +280,26 @@ class Controller:
         stride_mm = self._settings.pull_mm - self._settings.push_mm
         path = self._needle.path
         depth_mm = path.depth_mm
+        places: list[tuple[float, Candidate]] = []
         while depth_mm > _SMALL_MM:
             self._require_time()
             depth_mm = max(0.0, depth_mm - stride_mm)
             behind = path.pull(path.depth_mm - depth_mm)
             best = self._ask(_unrolled(behind), depth_mm).best
             if best is not None:
-                self._agree(f"pull back to a depth of {depth_mm:.1f} mm, for the plan {best.plan}")
-                self._retreat_mm = depth_mm
-                return Event.STRATEGY_BEHIND
-        event, self._reason = self._lack.event()
-        return event
+                places.append((depth_mm, best))
+                if is_enough(best.certificate, self._estimate(), _ENOUGH_BEHIND_MM):
+                    break
+        if not places:
+            event, self._reason = self._lack.event()
+            return event
+        # The nearest place with enough reserve was found last; without one, the most reserve wins.
+        if not is_enough(places[-1][1].certificate, self._estimate(), _ENOUGH_BEHIND_MM):
+            places.sort(key=lambda place: reserve_of(place[1].certificate))
+        depth_mm, best = places[-1]
+        self._agree(f"pull back to a depth of {depth_mm:.1f} mm, for the plan {best.plan}")
+        self._retreat_mm = depth_mm
+        return Event.STRATEGY_BEHIND
 
     def _initial_push(self) -> Event:
         """Makes the first moves of the plan, or the free push if there is none."""
@@ -329,24 +345,39 @@ class Controller:
             return Event.DEVIATION
         if self._is_short:
             return Event.PLAN_FAILS
-        return Event.AS_PREDICTED if self._holds_still() else Event.PLAN_FAILS
+        return Event.IN_TARGET if self._is_there(measurement) else self._review()
 
-    def _holds_still(self) -> bool:
+    def _is_there(self, measurement: Measurement) -> bool:
+        """Whether the tip is surely in the last target before the plan ends."""
+        targets = self._knowledge.a_priori.targets
+        last = targets[-1]
+        if self._knowledge.visited < len(targets) - 1:
+            return False
+        if distance(measurement.position_mm, last.center_mm) > last.radius_mm:
+            return False
+        return is_surely_in(last, self._needle.glance(), self._settings.margins.depth_mm)
+
+    def _review(self) -> Event:
         """Whether the rest of the plan holds, also for the newest estimate when it is due.
 
-        If it does, the tip is expected where the newest estimate says.
+        If it does, the tip is expected where the newest estimate says. If it has little reserve,
+        a better plan is looked for, and the rest is one of the choices.
         """
         depth_mm = self._needle.depth_mm
         if depth_mm - self._reviewed_mm < self._settings.review_mm - _SMALL_MM or not self._moves:
-            return True
+            return Event.AS_PREDICTED
         self._reviewed_mm = depth_mm
         estimate = self._needle.glance()
         scene = self._knowledge.scene(estimate.tip, estimate.radius_mm, depth_mm)
         rest = Plan.of(action for action, _ in self._moves)
-        if not self._settings.margins.allow(certify(rest, scene)):
-            return False
+        certificate = certify(rest, scene)
+        if not self._settings.margins.allow(certificate):
+            return Event.PLAN_FAILS
+        if not is_enough(certificate, estimate):
+            self._rest = rest
+            return Event.PLAN_IS_THIN
         self._follow(scene, rest)
-        return True
+        return Event.AS_PREDICTED
 
     def _follow(self, scene: Scene, plan: Plan) -> None:
         """Makes this the plan to follow, from the pose in the scene."""
@@ -441,11 +472,19 @@ class Controller:
     def _first_push_is_free(self) -> bool:
         return is_free(self._here(), self._settings.initial_push_mm, self._settings.priors)
 
-    def _ask(self, tip: Pose, depth_mm: float) -> Synthesis:
-        """The synthesis from a pose, with the current knowledge, and in the time left."""
+    def _ask(self, tip: Pose, depth_mm: float, rest: Plan | None = None) -> Synthesis:
+        """The synthesis from a pose, with the current knowledge, and in the time left.
+
+        Args:
+            tip: The pose.
+            depth_mm: Its depth.
+            rest: The rest of a plan, which is a choice too.
+        """
         scene = self._knowledge.scene(tip, self._estimate().radius_mm, depth_mm)
         self._listen()
         whole = self._synthesise(scene)
+        if rest is not None:
+            whole = whole.with_plan(rest)
         synthesis = self._in_time(whole, self._needle.depth_mm - depth_mm)
         self._lack.found |= whole.found > 0
         self._lack.held |= bool(whole.candidates)

@@ -14,6 +14,7 @@ from ntagen.errors import InputError
 from ntagen.extensions import DEVICES, described, names
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.virtual import Errors
+from ntagen.plan.rank import ROBUST_RANKING
 from ntagen.scene import Scene
 
 NAMES: Final = ("virtual", "phantom", "grbl+sim")
@@ -24,6 +25,9 @@ REAL: Final = "grbl"
 
 _REAL_ROLL_RAD_PER_S: Final = 0.5 * math.pi
 """A real needle is rolled at half the speed of simulated ones; ours."""
+
+_LAYER_SIGMAS: Final = 3.0
+"""Differences of layers are no alarm up to this many standard deviations; ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +55,22 @@ class Chosen:
         """The settings with which this needle is driven if nobody says otherwise."""
         if self.is_real:
             way_mm = overrun_mm(scene.needle.speed_mm_per_s)
-            return replace(settings, overrun_mm=way_mm, roll_rad_per_s=_REAL_ROLL_RAD_PER_S)
+            return replace(
+                settings,
+                overrun_mm=way_mm,
+                roll_rad_per_s=_REAL_ROLL_RAD_PER_S,
+                ranking=ROBUST_RANKING,
+            )
         if self.parameters is None:
             return settings
-        return replace(settings, compensated_lag_rad=self.parameters.torsion.lag_rad)
+        # Half of the rise to be detected is slack: layers never add to the sum of the test.
+        layers_n = self.parameters.forces.layers_n(_LAYER_SIGMAS)
+        return replace(
+            settings,
+            compensated_lag_rad=self.parameters.torsion.lag_rad,
+            force_n=max(settings.force_n, 2.0 * layers_n),
+            ranking=ROBUST_RANKING,
+        )
 
     def fitting(self, settings: Settings, scene: Scene, known: str) -> Settings:
         """The settings that fit this needle and the scene, as after a calibration.

@@ -11,7 +11,7 @@
                         └── push ◀── pull back ◀─────────────────── stop
 
 From `monitor` the way leads back to `estimate` too, when the rest of the plan no longer holds for
-the newest estimate: then a new plan is made where the needle is.
+the newest estimate, or has little reserve: then a new plan is made where the needle is.
 
 The initial push belongs to a plan: the first synthesis is made before anything moves. Only if it
 finds no plan, and the push is proven to be free of known regions, it is made without one: what it
@@ -73,6 +73,7 @@ class Event(Enum):
     AS_PREDICTED = "as predicted"
     DEVIATION = "deviation"
     PLAN_FAILS = "the plan no longer holds"
+    PLAN_IS_THIN = "the plan has little reserve"
     FORCE = "force"
     STOPPED = "stopped"
     PULLED = "pulled"
@@ -121,6 +122,8 @@ _WORKFLOW: Final = {
     (State.MONITOR, Event.DEVIATION): State.STOP,
     (State.MONITOR, Event.FORCE): State.STOP,
     (State.MONITOR, Event.PLAN_FAILS): State.ESTIMATE,
+    (State.MONITOR, Event.PLAN_IS_THIN): State.ESTIMATE,
+    (State.MONITOR, Event.IN_TARGET): State.ESTIMATE,
     (State.STOP, Event.STOPPED): State.PULL_BACK,
     (State.PULL_BACK, Event.PULLED): State.PUSH,
     (State.PUSH, Event.PUSHED): State.ESTIMATE,

@@ -140,6 +140,15 @@ class Forces:
     puncture_mm: float = 1.0
     region_n_per_mm: float = 1.0
 
+    def layers_n(self, sigmas: float) -> float:
+        """The greatest rise of the force that layers cause: a boundary, and a stronger layer.
+
+        Args:
+            sigmas: The difference of two layers counts up to this many standard deviations.
+        """
+        difference_n = math.sqrt(2.0) * self.layer_ratio * self.cutting_n
+        return self.puncture_n + sigmas * difference_n
+
 
 @dataclass(frozen=True, slots=True)
 class Sensing:

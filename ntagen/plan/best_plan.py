@@ -9,6 +9,9 @@ single plan, several times, each time for more than the best plan so far has:
    there is none, less is asked for: half of what is between;
 3. with that clearance, and fewer rolls.
 
+If the ranking begins with the reserve, all regions to avoid are larger and the target is smaller.
+Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less.
+
 Every plan that is found is certified in the scene itself. "No plan" for larger regions or fewer
 rolls is a proof, and bounds what any plan can have. The number of questions is fixed, so that equal
 scenes have equal answers. Where few plans can exist, all are listed, which is sooner done.
@@ -23,7 +26,7 @@ from typing import Final
 
 from ntagen.plan.actions import Plan
 from ntagen.plan.extract import step_length_mm
-from ntagen.plan.rank import USEFUL_CLEARANCE_MM, Candidate, rank
+from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM, Candidate, rank, reserve_of
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
 from ntagen.scene import Scene
 
@@ -41,6 +44,12 @@ _MOST_WHEN_NARROW: Final = 20_000
 
 _CLEARANCE_QUESTIONS: Final = 4
 """Questions for more clearance."""
+
+_FIRST_RESERVE_MM: Final = 3.0
+"""The reserve that is asked for first: a needle in a phantom errs about that much in 30 mm."""
+
+_LESS_RESERVE_MM: Final = 1.5
+"""The reserve that is asked for if the first one cannot be had."""
 
 _RESOLUTION_MM: Final = 0.2
 """Less additional clearance than this is not asked for."""
@@ -62,12 +71,13 @@ class BestPlanSynthesiser:
         Raises:
             InputError, LimitError, ModelError, KeyboardInterrupt: See `EngineSynthesiser`.
         """
-        if sequences(scene) <= _MOST_LISTED or self.engine.ranking[0] != "clearance":
+        asks = self.engine.ranking[0] in ("clearance", "reserve")
+        if sequences(scene) <= _MOST_LISTED or not asks:
             return self.engine(scene)
         first = self.one(scene, keeps_strategy=self.engine.keeps_strategy)
         known = _Known(self, scene, first)
         if first.plans:
-            known.raise_clearance()
+            known.raise_worth()
             known.lower_rolls()
             if not known.candidates or (known.is_narrow and sequences(scene) <= _MOST_WHEN_NARROW):
                 # Every plan that was found fails its certificate, or comes near a region: the list
@@ -110,22 +120,35 @@ class _Known:
     @property
     def is_narrow(self) -> bool:
         """Whether the best plan is so near to a region that a better one is worth waiting for."""
-        return self._clearance_mm() < _NARROW_MM
+        best = self._best()
+        return best is None or best.certificate.critical_clearance_mm < _NARROW_MM
 
-    def raise_clearance(self) -> None:
-        """Asks for more clearance than the best plan has, as far as it is useful."""
+    def raise_worth(self) -> None:
+        """Asks for more than the best plan has, as far as it is useful."""
+        if self._counts_reserve:
+            self._raise_reserve()
+            return
         if not self._scene.criticals and self.candidates:
             return
         wanted_mm = most_mm = USEFUL_CLEARANCE_MM
         for _ in range(_CLEARANCE_QUESTIONS):
-            least_mm = max(0.0, self._clearance_mm())
+            least_mm = max(0.0, self._worth_mm())
             if most_mm - least_mm < _RESOLUTION_MM:
                 return
             self._ask(self._scene, wanted_mm)
-            if self._clearance_mm() < wanted_mm:
+            if self._worth_mm() < wanted_mm:
                 # There is none, or one that comes nearer between its steps.
                 most_mm = wanted_mm
-            wanted_mm = 0.5 * (max(0.0, self._clearance_mm()) + most_mm)
+            wanted_mm = 0.5 * (max(0.0, self._worth_mm()) + most_mm)
+
+    def _raise_reserve(self) -> None:
+        if self._worth_mm() < _FIRST_RESERVE_MM:
+            self._ask(self._scene, _FIRST_RESERVE_MM)
+        if self._worth_mm() >= _FIRST_RESERVE_MM:
+            if self._worth_mm() < USEFUL_RESERVE_MM:
+                self._ask(self._scene, USEFUL_RESERVE_MM)
+        elif self._worth_mm() < _LESS_RESERVE_MM:
+            self._ask(self._scene, _LESS_RESERVE_MM)
 
     def lower_rolls(self) -> None:
         """Asks for fewer rolls at the clearance of the best plan."""
@@ -135,13 +158,23 @@ class _Known:
         if best.certificate.roll_count == 0:
             return
         fewer = replace(self._scene.limits, max_rolls=best.certificate.roll_count - 1)
-        useful_mm = min(USEFUL_CLEARANCE_MM, self._clearance_mm())
+        most_mm = USEFUL_RESERVE_MM if self._counts_reserve else USEFUL_CLEARANCE_MM
+        useful_mm = min(most_mm, self._worth_mm())
         self._ask(replace(self._scene, limits=fewer), useful_mm)
 
-    def _ask(self, scene: Scene, clearance_mm: float) -> None:
-        """Asks for a plan of a scene that has this clearance."""
+    @property
+    def _counts_reserve(self) -> bool:
+        return self._asker.engine.ranking[0] == "reserve"
+
+    def _ask(self, scene: Scene, worth_mm: float) -> None:
+        """Asks for a plan of a scene that has this clearance or reserve."""
         depth_mm = self._asker.engine.margins.depth_mm
-        self._note(self._asker.one(_stricter(scene, clearance_mm, depth_mm)))
+        shells_mm = min(worth_mm, _BETWEEN_STEPS_MM)
+        if self._counts_reserve:
+            depth_mm = max(depth_mm, worth_mm)
+            # Half way, half of the distance is the same reserve.
+            worth_mm = shells_mm = 0.5 * worth_mm
+        self._note(self._asker.one(_stricter(scene, worth_mm, shells_mm, depth_mm)))
 
     def _note(self, listing: Listing) -> None:
         """Certifies what was found in the scene itself."""
@@ -155,9 +188,14 @@ class _Known:
         ranked = rank(self.candidates, self._asker.engine.ranking)
         return ranked[0] if ranked else None
 
-    def _clearance_mm(self) -> float:
+    def _worth_mm(self) -> float:
+        """What the best plan has of what comes first in the ranking."""
         best = self._best()
-        return best.certificate.critical_clearance_mm if best else 0.0
+        if best is None:
+            return 0.0
+        if self._counts_reserve:
+            return reserve_of(best.certificate)
+        return best.certificate.critical_clearance_mm
 
 
 def sequences(scene: Scene) -> float:
@@ -173,18 +211,18 @@ def sequences(scene: Scene) -> float:
     return (steps * max(1, len(scene.limits.roll_angles_rad))) ** scene.limits.max_rolls
 
 
-def _stricter(scene: Scene, by_mm: float, depth_mm: float) -> Scene:
+def _stricter(scene: Scene, by_mm: float, shells_mm: float, depth_mm: float) -> Scene:
     """The scene with larger critical regions, and shells and target that plans do not graze.
 
     Args:
         scene: The scene.
         by_mm: By how much the critical regions are larger.
+        shells_mm: By how much the other regions to avoid are larger.
         depth_mm: How deep a plan must lead into the last target.
     """
     *before, last = scene.targets
     shallow_mm = max(0.5 * last.radius_mm, last.radius_mm - depth_mm - _BETWEEN_STEPS_MM)
     scene = scene.with_targets([*before, replace(last, radius_mm=shallow_mm)])
-    shells_mm = min(by_mm, _BETWEEN_STEPS_MM)
     return replace(
         scene,
         criticals=tuple(

@@ -3,6 +3,11 @@
 Criteria are compared one after the other, in the order that the user gives. Clearances above
 `USEFUL_CLEARANCE_MM` count as equal: among plans that are far enough from all critical regions, the
 simpler one is better.
+
+The reserve of a plan is how far the needle may be off it without harm: the least of its depth in
+its targets and of its distances to regions, which count more the sooner it passes them. A plan with
+much clearance and no depth in the target fails when the needle bends a little less than expected,
+and then it is often too late for another one.
 """
 
 from __future__ import annotations
@@ -19,10 +24,22 @@ from ntagen.scene import Scene
 USEFUL_CLEARANCE_MM: Final = 5.0
 """More clearance is not better: this is twice the error of a needle in a phantom (2 to 3 mm)."""
 
+USEFUL_RESERVE_MM: Final = 4.0
+"""More reserve is not better: a needle in a phantom errs about so much in 30 mm."""
+
+_MOST_RATIO: Final = 3.0
+"""Distances to regions that are near the start count at most this much more."""
+
 _CLEARANCE_STEP_MM: Final = 0.1
 """Clearances are compared in steps of this size: no sensor sees a smaller difference."""
 
+_RESERVE_STEP_MM: Final = 0.25
+"""Reserves are compared in steps of this size: a roll more costs about as much."""
+
 DEFAULT_RANKING: Final = ("clearance", "rolls", "length")
+
+ROBUST_RANKING: Final = ("reserve", "rolls", "length")
+"""The usual ranking for needles that do not bend exactly as planned."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +55,27 @@ def _by_clearance(candidate: Candidate) -> float:
     return -round(clipped_mm / _CLEARANCE_STEP_MM)
 
 
+def reserve_of(certificate: Certificate) -> float:
+    """How far the needle may be off a plan without harm, in mm at its end; negative if it fails.
+
+    What is off by 1 mm at the end of a path is off by less before: an error of the direction grows
+    with the length. So a distance to a region counts by the length of the path divided by the
+    length up to there, at most `_MOST_RATIO` times.
+
+    More than `USEFUL_RESERVE_MM` counts as that, and so much less too.
+    """
+    least_mm = certificate.target_depth_mm
+    for one in certificate.clearances:
+        nearer = certificate.length_mm / one.at_mm if one.at_mm > 0.0 else _MOST_RATIO
+        ratio = min(_MOST_RATIO, nearer) if one.distance_mm > 0.0 else 1.0
+        least_mm = min(least_mm, ratio * one.distance_mm)
+    return max(-USEFUL_RESERVE_MM, min(USEFUL_RESERVE_MM, least_mm))
+
+
+def _by_reserve(candidate: Candidate) -> float:
+    return -round(reserve_of(candidate.certificate) / _RESERVE_STEP_MM)
+
+
 def _by_target(candidate: Candidate) -> float:
     return candidate.certificate.end_distance_mm
 
@@ -47,6 +85,7 @@ CRITERIA: Final[dict[str, Callable[[Candidate], float]]] = {
     "rolls": lambda candidate: candidate.certificate.roll_count,
     "length": lambda candidate: candidate.certificate.length_mm,
     "target": _by_target,
+    "reserve": _by_reserve,
 }
 """The criteria; smaller is better. ``target`` is the distance of the end to the target's centre."""
 

@@ -8,14 +8,14 @@ its steps, and with integers. Such a plan is refused; if no plan is left, there 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from ntagen.errors import LimitError, ModelError
 from ntagen.plan.actions import Plan
 from ntagen.plan.certify import Certificate
 from ntagen.plan.extract import extract
-from ntagen.plan.rank import DEFAULT_RANKING, Candidate, certified
+from ntagen.plan.rank import DEFAULT_RANKING, Candidate, certified, rank
 from ntagen.scene import Scene
 
 STRATEGY_QUERY: Final = "control: A<> Checker.Final_TR_Reached"
@@ -75,6 +75,11 @@ class Synthesis:
     def best(self) -> Candidate | None:
         """The plan to be driven, or None if there is no strategy."""
         return self.candidates[0] if self.candidates else None
+
+    def with_plan(self, plan: Plan) -> Synthesis:
+        """The same with a plan from elsewhere among the candidates, if it holds."""
+        more = select([plan], self.scene, self.margins, self.ranking)
+        return replace(self, candidates=rank((*more, *self.candidates), self.ranking))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from typing import Final
 
 from ntagen.plan.certify import Certificate
-from ntagen.plan.rank import USEFUL_CLEARANCE_MM
+from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM
 from ntagen.plan.synthesise import Margins
 
 _CRITERIA: Final = {
     "clearance": f"clearance (up to {USEFUL_CLEARANCE_MM:g} mm counts)",
     "rolls": "rolls",
     "length": "length",
+    "reserve": f"reserve (up to {USEFUL_RESERVE_MM:g} mm counts)",
     "target": "distance of the end to the target's centre",
 }
 """The criteria of a ranking in words."""

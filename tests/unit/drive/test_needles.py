@@ -11,8 +11,10 @@ from ntagen.drive.needles import NAMES, choose
 from ntagen.drive.records import Measured
 from ntagen.drive.simulate import simulate
 from ntagen.errors import InputError
+from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.virtual import Errors
 from ntagen.parameters import BY_FIELD, Given
+from ntagen.plan.rank import ROBUST_RANKING
 from tests.drive.runs import Diary
 from tests.oracles.synthesiser import oracle_synthesis
 from tests.steering import scene, sphere
@@ -47,6 +49,10 @@ def test_the_phantom_is_driven_with_settings_for_its_errors() -> None:
     assert settings.priors.curvature_drift > 0.0
     assert settings.priors.turn_drift_rad > 0.0
     off = Given(BY_FIELD["compensated_lag_rad"], 0.0, "command line")
+    # Tissue has layers, and bends a needle less well than a plan says.
+    layers_n = PhantomParameters().forces.layers_n(3.0)
+    assert 0.1 < layers_n == pytest.approx(0.5 * configuration.settings.force_n)
+    assert configuration.settings.ranking == ROBUST_RANKING
     uncompensated = configure([off], OPEN, needle="phantom").settings
     assert uncompensated.compensated_lag_rad == 0.0
     assert 0.0 < settings.priors.lag_rad < 0.5 * uncompensated.priors.lag_rad

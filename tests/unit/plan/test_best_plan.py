@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from ntagen.plan.best_plan import BestPlanSynthesiser, sequences
-from ntagen.plan.rank import USEFUL_CLEARANCE_MM
+from ntagen.plan.rank import ROBUST_RANKING, USEFUL_CLEARANCE_MM, reserve_of
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis
 from ntagen.scene import Scene
 from tests.steering import CRITICAL, PAPER, scene, sphere
@@ -36,6 +36,17 @@ def test_its_best_plan_is_about_as_good_as_the_best_of_all(where: Scene) -> None
     assert set(within_budget.candidates) <= set(all_listed.candidates)
     assert within_budget.found < all_listed.found
     assert (within_budget.is_complete, all_listed.is_complete) == (False, True)
+
+
+@pytest.mark.parametrize("where", [PAPER, BESIDE], ids=lambda one: one.name)
+def test_its_best_plan_has_about_as_much_reserve_as_the_best_of_all(where: Scene) -> None:
+    engine = EngineSynthesiser(ranking=ROBUST_RANKING)
+    within_budget, all_listed = BestPlanSynthesiser(engine)(where), engine(where)
+    assert within_budget.best is not None
+    assert all_listed.best is not None
+    best_mm = reserve_of(all_listed.best.certificate)
+    assert reserve_of(within_budget.best.certificate) >= best_mm - 1.0
+    assert within_budget.found <= 5 < all_listed.found
 
 
 def test_that_there_is_no_plan_is_said_by_one_question() -> None:

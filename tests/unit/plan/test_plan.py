@@ -14,10 +14,17 @@ from hypothesis import strategies as st
 from ntagen.errors import InputError, NtagenError
 from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Action, Plan, Push, Roll
-from ntagen.plan.certify import certify
+from ntagen.plan.certify import Arrival, Certificate, Clearance, certify
 from ntagen.plan.document import document, plan_from_json, plan_to_json
 from ntagen.plan.extract import extract
-from ntagen.plan.rank import CRITERIA, Candidate, parse_ranking, rank
+from ntagen.plan.rank import (
+    CRITERIA,
+    USEFUL_RESERVE_MM,
+    Candidate,
+    parse_ranking,
+    rank,
+    reserve_of,
+)
 from ntagen.plan.synthesise import Margins
 from ntagen.plan.wording import counted, ranked_by
 from ntagen.scene import Scene
@@ -182,6 +189,32 @@ def test_the_ranking_is_the_users_choice() -> None:
     nearest = rank(found, parse_ranking("target"))[0]
     distances = [c.certificate.end_distance_mm for c in found]
     assert nearest.certificate.end_distance_mm == min(distances)
+
+
+def reserve_mm(distance_mm: float, at_mm: float, depth_mm: float) -> float:
+    """The reserve of a path of 40 mm past one region, with this depth in its target."""
+    return reserve_of(
+        Certificate(
+            clearances=(Clearance("C", "detection", distance_mm, at_mm),),
+            arrivals=(Arrival("T", 36.0, depth_mm),),
+            end_mm=(0.0, -40.0, 0.0),
+            end_distance_mm=5.0,
+            length_mm=40.0,
+            roll_count=0,
+        )
+    )
+
+
+def test_the_reserve_is_what_a_needle_may_be_off_at_the_end_without_harm() -> None:
+    assert reserve_mm(2.0, at_mm=40.0, depth_mm=3.0) == 2.0
+    assert reserve_mm(2.0, at_mm=40.0, depth_mm=1.0) == 1.0
+    assert reserve_mm(1.0, at_mm=20.0, depth_mm=3.0) == 2.0
+    # Near the start nothing is known so well that the distance would not count.
+    assert (
+        reserve_mm(1.0, at_mm=0.0, depth_mm=9.0) == reserve_mm(1.0, at_mm=4.0, depth_mm=9.0) == 3.0
+    )
+    assert reserve_mm(9.0, at_mm=20.0, depth_mm=9.0) == USEFUL_RESERVE_MM
+    assert reserve_mm(-1.0, at_mm=20.0, depth_mm=9.0) == -1.0
 
 
 @pytest.mark.parametrize("text", ["", "clearance,beauty", "rolls,rolls"])
