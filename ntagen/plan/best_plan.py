@@ -5,16 +5,17 @@ The driver needs one plan, soon, and a better one if there is time. So the engin
 single plan, several times, each time for more than the best plan so far has:
 
 1. one plan of the scene: the answer if nothing better is found;
-2. with critical regions made larger, so that it has more clearance, as far as more is useful. Where
-   there is none, less is asked for: half of what is between;
+2. with critical regions made larger, so that it has more clearance, as far as more is useful, and
+   not much longer than the first. Where there is none, less is asked for: half of what is between.
+   Where there is one, but its exact path comes nearer than the model's, small changes make it
+   better (`ntagen.plan.neighbours`);
 3. with that clearance, and fewer rolls.
 
 If the ranking begins with the reserve, all regions to avoid are larger and the target is smaller.
 Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less.
 
-Every plan that is found is certified in the scene itself. "No plan" for larger regions or fewer
-rolls is a proof, and bounds what any plan can have. The number of questions is fixed, so that equal
-scenes have equal answers. Where few plans can exist, all are listed, which is sooner done.
+Every plan that is found is certified in the scene itself. The number of questions is fixed, so that
+equal scenes have equal answers. Where few plans can exist, all are listed, which is sooner done.
 
 Cost: about 15 ms for a question about the paper's needle.
 """
@@ -26,6 +27,7 @@ from typing import Final
 
 from ntagen.plan.actions import Plan
 from ntagen.plan.extract import step_length_mm
+from ntagen.plan.neighbours import improved
 from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM, Candidate, rank, reserve_of
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
 from ntagen.scene import Scene
@@ -44,6 +46,10 @@ _MOST_WHEN_NARROW: Final = 20_000
 
 _CLEARANCE_QUESTIONS: Final = 4
 """Questions for more clearance."""
+
+_MORE_STEPS: Final = 2
+"""A plan with more clearance may be so many steps longer than the first one that was found. Without
+this limit, the longest questions take twice as long, and their plans are not better."""
 
 _FIRST_RESERVE_MM: Final = 3.0
 """The reserve that is asked for first: a needle in a phantom errs about that much in 30 mm."""
@@ -107,6 +113,7 @@ class _Known:
     def __init__(self, asker: BestPlanSynthesiser, scene: Scene, first: Listing) -> None:
         self._asker = asker
         self._scene = scene
+        self._first = first
         self._plans: dict[Plan, None] = {}
         self.candidates: list[Candidate] = []
         self.seconds = 0.0
@@ -130,14 +137,20 @@ class _Known:
             return
         if not self._scene.criticals and self.candidates:
             return
+        longest_mm = self._first.plans[0].length_mm + _MORE_STEPS * step_length_mm(self._scene)
+        no_longer = _shorter(self._scene, longest_mm)
         wanted_mm = most_mm = USEFUL_CLEARANCE_MM
         for _ in range(_CLEARANCE_QUESTIONS):
             least_mm = max(0.0, self._worth_mm())
             if most_mm - least_mm < _RESOLUTION_MM:
                 return
-            self._ask(self._scene, wanted_mm)
+            found = self._ask(no_longer, wanted_mm)
             if self._worth_mm() < wanted_mm:
-                # There is none, or one that comes nearer between its steps.
+                if found:
+                    # The model has a plan with what is wanted. Other questions would lose as much.
+                    self._change(found)
+                    return
+                # There is none, or one that fails its certificate.
                 most_mm = wanted_mm
             wanted_mm = 0.5 * (max(0.0, self._worth_mm()) + most_mm)
 
@@ -149,6 +162,16 @@ class _Known:
                 self._ask(self._scene, USEFUL_RESERVE_MM)
         elif self._worth_mm() < _LESS_RESERVE_MM:
             self._ask(self._scene, _LESS_RESERVE_MM)
+
+    def _change(self, found: Candidate) -> None:
+        """Adds the best plan that small changes of a plan lead to, if the model has it."""
+        engine = self._asker.engine
+        better = improved(found, self._scene, engine.margins.allow, engine.ranking)
+        if better.plan in self._plans:
+            return
+        if self._first.has(better.plan, self._scene):
+            self._plans[better.plan] = None
+            self.candidates.append(better)
 
     def lower_rolls(self) -> None:
         """Asks for fewer rolls at the clearance of the best plan."""
@@ -166,23 +189,24 @@ class _Known:
     def _counts_reserve(self) -> bool:
         return self._asker.engine.ranking[0] == "reserve"
 
-    def _ask(self, scene: Scene, worth_mm: float) -> None:
-        """Asks for a plan of a scene that has this clearance or reserve."""
+    def _ask(self, scene: Scene, worth_mm: float) -> Candidate | None:
+        """Asks for a plan that has this clearance or reserve; gives one that holds, or None."""
         depth_mm = self._asker.engine.margins.depth_mm
         shells_mm = min(worth_mm, _BETWEEN_STEPS_MM)
         if self._counts_reserve:
             depth_mm = max(depth_mm, worth_mm)
             # Half way, half of the distance is the same reserve.
             worth_mm = shells_mm = 0.5 * worth_mm
-        self._note(self._asker.one(_stricter(scene, worth_mm, shells_mm, depth_mm)))
+        return self._note(self._asker.one(_stricter(scene, worth_mm, shells_mm, depth_mm)))
 
-    def _note(self, listing: Listing) -> None:
-        """Certifies what was found in the scene itself."""
+    def _note(self, listing: Listing) -> Candidate | None:
+        """Certifies what was found in the scene itself; one that holds, or None."""
         self.seconds += listing.seconds
-        new = [plan for plan in listing.plans if plan not in self._plans]
-        self._plans.update(dict.fromkeys(new))
         engine = self._asker.engine
-        self.candidates += select(new, self._scene, engine.margins, engine.ranking)
+        holding = select(listing.plans, self._scene, engine.margins, engine.ranking)
+        self.candidates += [one for one in holding if one.plan not in self._plans]
+        self._plans.update(dict.fromkeys(listing.plans))
+        return holding[0] if holding else None
 
     def _best(self) -> Candidate | None:
         ranked = rank(self.candidates, self._asker.engine.ranking)
@@ -209,6 +233,12 @@ def sequences(scene: Scene) -> float:
     )
     steps = max(1.0, reach_mm / step_length_mm(scene))
     return (steps * max(1, len(scene.limits.roll_angles_rad))) ** scene.limits.max_rolls
+
+
+def _shorter(scene: Scene, length_mm: float) -> Scene:
+    """The scene with plans of at most this length."""
+    shortest_mm = min(scene.needle.length_mm, length_mm)
+    return replace(scene, needle=replace(scene.needle, length_mm=shortest_mm))
 
 
 def _stricter(scene: Scene, by_mm: float, shells_mm: float, depth_mm: float) -> Scene:

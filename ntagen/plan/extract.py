@@ -1,5 +1,7 @@
 """Makes plans from the engine's runs: the only module that knows the generated model's actions.
 
+It also asks the model whether it can make a plan that was not found by the engine.
+
 In the model, the User's edge with ``do_push!`` is a push of one model step. Its edge with
 ``do_rotate!`` is a roll by the angle whose index the edge selects. All other edges (checks, the
 tissue's answers) are not actions of the needle.
@@ -17,6 +19,8 @@ from ntagen.scene import Scene
 _PUSH: Final = "do_push!"
 _ROLL: Final = "do_rotate!"
 _ANGLE_INDEX: Final = "angle_index"
+_CHECKER: Final = "Checker"
+_REACHED: Final = "Final_TR_Reached"
 
 
 class Edge(Protocol):
@@ -47,6 +51,20 @@ class Run(Protocol):
         """The moves in order."""
 
 
+class Walk(Protocol):
+    """A walk through a model, from its initial state."""
+
+    @property
+    def locations(self) -> dict[str, str]:
+        """The location of each process."""
+
+    def moves(self) -> Sequence[Step]:
+        """The moves of the state."""
+
+    def take(self, index: int) -> None:
+        """Takes a move."""
+
+
 def extract(runs: Iterable[Run], scene: Scene) -> tuple[Plan, ...]:
     """The different plans of the runs, in the order of the runs.
 
@@ -55,6 +73,55 @@ def extract(runs: Iterable[Run], scene: Scene) -> tuple[Plan, ...]:
             of the scene.
     """
     return tuple(dict.fromkeys(_plan(run, scene) for run in runs))
+
+
+def leads_to_target(walk: Walk, plan: Plan, scene: Scene) -> bool:
+    """Whether the model of the scene can make a plan, and reaches its last target.
+
+    The model ends with the first step that ends in the last target. The plan may push deeper into
+    it, as those plans do that the engine found for a smaller target.
+
+    Args:
+        walk: A walk through the model, at its beginning. It ends where the model does, or where it
+            does not follow the plan.
+        plan: Pushes of whole steps, and rolls that the scene allows.
+        scene: The scene.
+    """
+    wanted = _moves_of(plan, scene)
+    while steps := walk.moves():
+        decisions = [_decision(step) for step in steps]
+        if not any(decisions):
+            # Checks, and the tissue's answer, which is determined.
+            if len(steps) > 1:
+                return False
+            walk.take(0)
+            continue
+        if not wanted or wanted[-1] not in decisions:
+            return False
+        walk.take(decisions.index(wanted.pop()))
+    is_left_for_pushes = all(sent == _PUSH for sent, _ in wanted)
+    return is_left_for_pushes and walk.locations[_CHECKER] == _REACHED
+
+
+def _moves_of(plan: Plan, scene: Scene) -> list[tuple[str, int]]:
+    """The User's edges, last first: what they send, and the index of the angle or -1."""
+    moves: list[tuple[str, int]] = []
+    for action in plan.actions:
+        if isinstance(action, Push):
+            moves += [(_PUSH, -1)] * round(action.length_mm / step_length_mm(scene))
+        else:
+            moves.append((_ROLL, scene.limits.roll_angles_rad.index(action.angle_rad)))
+    return moves[::-1]
+
+
+def _decision(step: Step) -> tuple[str, int] | None:
+    """What the User's edge of a move sends, with the index of the angle or -1."""
+    for edge in step.edges:
+        if edge.sync == _PUSH:
+            return _PUSH, -1
+        if edge.sync == _ROLL:
+            return _ROLL, edge.select.get(_ANGLE_INDEX, -1)
+    return None
 
 
 def step_length_mm(scene: Scene) -> float:
