@@ -13,12 +13,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final, Literal, cast
 
-from ntagen import hardware, rules
-from ntagen.hardware import Axis, GrblDevice, OpenIGTLinkTracker
-from ntagen.nsl.diagnostics import Reporter, did_you_mean
-from ntagen.nsl.draft import Draft, DraftDevice, DraftRegion, Placed
-from ntagen.nsl.resolve import article
+from ntagen import rules
+from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
+from ntagen.nsl import build_devices
+from ntagen.nsl.build_regions import Regions, Sphere
+from ntagen.nsl.diagnostics import Reporter
+from ntagen.nsl.draft import Draft, Placed
 from ntagen.nsl.source import Span
+from ntagen.nsl.vectors import dot, minus, times, unit
 from ntagen.parameters import Given
 from ntagen.scene import (
     DEFAULT_LENGTH_MM,
@@ -66,18 +68,10 @@ class Built:
 
 def build(draft: Draft, reporter: Reporter) -> Built | None:
     """What the draft describes, or None after an error, which is reported."""
-    builder = _Builder(draft, reporter)
-    device, tracker = builder.device(), builder.tracker()
-    scene = builder.scene()
+    device = build_devices.grbl_device(draft, reporter)
+    tracker = build_devices.tracker(draft, reporter)
+    scene = _Builder(draft, reporter).scene()
     return None if scene is None else Built(scene, tuple(draft.given), device, tracker)
-
-
-@dataclass(frozen=True, slots=True)
-class _Sphere:
-    """A region without mistakes, with its places in the file."""
-
-    region: Region
-    draft: DraftRegion
 
 
 class _Builder:
@@ -87,49 +81,7 @@ class _Builder:
         self._draft = draft
         self._reporter = reporter
         self._report = reporter.report
-
-    def device(self) -> GrblDevice | None:
-        """The device that the file describes, or None without one or after an error."""
-        draft = self._draft.devices.get("device")
-        if draft is None or draft.address.value is None:
-            return None
-        axes = {}
-        for word in ("insert", "roll"):
-            axis = self._axis(word, draft)
-            if axis is not None:
-                axes[word] = axis
-        if len(axes) < 2:
-            return None
-        return GrblDevice(draft.address.value, axes["insert"], axes["roll"])
-
-    def _axis(self, word: str, draft: DraftDevice) -> Axis | None:
-        """An axis of a device, or None after an error."""
-        if word not in draft.axes:
-            if f"axis {word}" not in self._draft.seen and not self._draft.has_gaps:
-                form = "insert X 80 steps/mm" if word == "insert" else "roll A 8.89 steps/deg"
-                self._report(
-                    "axis-missing",
-                    draft.address.span,
-                    f"the device has no axis to {word}",
-                    hint=f"add for example `{form}`",
-                )
-            return None
-        letter, steps = draft.axes[word]
-        if letter.value is None or steps.value is None:
-            return None
-        is_right = self._obeys(hardware.axis_letter(letter.value), letter.span)
-        if not self._obeys(hardware.axis_steps(steps.value), steps.span) or not is_right:
-            return None
-        return Axis(letter.value, steps.value)
-
-    def tracker(self) -> OpenIGTLinkTracker | None:
-        """The tracker that the file describes, or None without one or after an error."""
-        draft = self._draft.devices.get("tracker")
-        if draft is None or draft.address.value is None:
-            return None
-        if not self._obeys(hardware.address(draft.address.value), draft.address.span):
-            return None
-        return OpenIGTLinkTracker(*hardware.host_and_port(draft.address.value), draft.name)
+        self._regions = Regions(draft, reporter)
 
     def scene(self) -> Scene | None:
         """The scene, or None after an error."""
@@ -139,13 +91,13 @@ class _Builder:
         needle = self._needle(tip)
         limits = self._limits()
         for name, query in draft.queries.items():
-            self._obeys(rules.query(name, query.value or ""), query.span)
+            self._reporter.obeys(rules.query(name, query.value or ""), query.span)
         resolution = self._resolution()
-        spheres = self._spheres()
+        spheres = self._regions.spheres()
         # The next rules compute squares, which are infinite for absurdly large values.
         if self._check_range(resolution or 1, tip, needle, limits, spheres):
             if tip is not None:
-                self._check_regions(tip, spheres)
+                self._regions.check(tip, spheres)
             if needle is not None and limits is not None and resolution is not None:
                 self._check_step(needle, limits, resolution, spheres)
         if self._reporter.has_errors or needle is None or limits is None or resolution is None:
@@ -209,13 +161,13 @@ class _Builder:
         bevel = self._direction("bevel", DEFAULT_BEVEL)
         if position is None or heading is None or bevel is None:
             return None
-        cosine = _dot(heading, bevel)
+        cosine = dot(heading, bevel)
         breach = rules.right_angle(heading, bevel)
         if breach is not None:
             self._report_skew(heading, bevel, breach)
             return None
         # The rest of the skew, below the tolerance, goes into the bevel.
-        bevel = _unit(_minus(bevel, _times(cosine, heading)))
+        bevel = unit(minus(bevel, times(cosine, heading)))
         return Pose(position, heading, bevel)
 
     def _direction(self, keyword: str, default: Vector) -> Vector | None:
@@ -233,25 +185,19 @@ class _Builder:
                 hint=f"write for example `{keyword} {'-y' if keyword == 'heading' else '+z'}`",
             )
             return None
-        return _unit(placed.value)
-
-    def _obeys(self, breach: rules.Breach | None, span: Span) -> bool:
-        """Whether a value obeys a rule; if not, reports it."""
-        if breach is not None:
-            self._report(breach.rule, span, breach.message, hint=breach.hint)
-        return breach is None
+        return unit(placed.value)
 
     def _report_skew(self, heading: Vector, bevel: Vector, breach: rules.Breach) -> None:
         """Reports a bevel that is not at right angles to the heading, and proposes the nearest."""
         placed = self._draft.vectors.get("bevel") or self._draft.vectors["heading"]
-        rest = _minus(bevel, _times(_dot(heading, bevel), heading))
+        rest = minus(bevel, times(dot(heading, bevel), heading))
         if math.hypot(*rest) < 1e-3:
             axes = ("x", "y", "z")
             smallest = min(range(3), key=lambda axis: abs(heading[axis]))
             hint = f"write for example `bevel +{axes[smallest]}`" if 0.0 in heading else None
         else:
-            hint = f"write `bevel ({', '.join(f'{_rounded(c):g}' for c in _unit(rest))})`"
-        self._obeys(replace(breach, hint=hint), placed.span)
+            hint = f"write `bevel ({', '.join(f'{_rounded(c):g}' for c in unit(rest))})`"
+        self._reporter.obeys(replace(breach, hint=hint), placed.span)
 
     def _positive(self, keyword: str, kind: str, role: str) -> float | None:
         """A property of the needle or its motion that is greater than 0."""
@@ -260,7 +206,7 @@ class _Builder:
             return None
         return (
             placed.value
-            if self._obeys(rules.positive(placed.value, role, kind), placed.span)
+            if self._reporter.obeys(rules.positive(placed.value, role, kind), placed.span)
             else None
         )
 
@@ -293,13 +239,13 @@ class _Builder:
         if (
             draft.max_rolls is not None
             and count is not None
-            and not self._obeys(rules.roll_count(count), draft.max_rolls.span)
+            and not self._reporter.obeys(rules.roll_count(count), draft.max_rolls.span)
         ):
             count = None
         if (
             draft.roll_distance is not None
             and distance is not None
-            and not self._obeys(
+            and not self._reporter.obeys(
                 rules.not_negative(distance, "the distance between rolls"), draft.roll_distance.span
             )
         ):
@@ -328,7 +274,7 @@ class _Builder:
         """A roll in degrees."""
         if placed.value is None:
             return None
-        if not self._obeys(rules.roll(placed.value), placed.span):
+        if not self._reporter.obeys(rules.roll(placed.value), placed.span):
             return None
         return round(deg_from_rad(placed.value))
 
@@ -339,189 +285,27 @@ class _Builder:
             return None if "resolution" in self._draft.seen else DEFAULT_RESOLUTION_PER_MM
         if placed.value is None:
             return None
-        if not self._obeys(rules.resolution(placed.value), placed.span):
+        if not self._reporter.obeys(rules.resolution(placed.value), placed.span):
             return None
         return round(placed.value)
 
-    # ------------------------------------------------------------------------------------ regions
-
-    def _spheres(self) -> list[_Sphere]:
-        """All regions without mistakes, in the order written."""
-        spheres = []
-        for draft in self._draft.regions.values():
-            region = self._around(draft) if draft.around is not None else self._sphere(draft)
-            if region is not None:
-                spheres.append(_Sphere(region, draft))
-        return spheres
-
-    def _sphere(self, draft: DraftRegion) -> Region | None:
-        """A region with its own geometry."""
-        radius = draft.radius.value
-        if radius is not None and not self._obeys(
-            rules.positive(radius, f"the radius of `{draft.name}`"), draft.radius.span
-        ):
-            return None
-        if radius is None or draft.center is None or draft.center.value is None:
-            return None
-        return Region(draft.name, draft.kind, draft.center.value, radius)
-
-    def _around(self, draft: DraftRegion) -> Region | None:
-        """A detection region around a critical one."""
-        margin = draft.margin.value
-        if margin is not None and not self._obeys(
-            rules.not_negative(margin, f"the margin of `{draft.name}`", "margin-negative"),
-            draft.margin.span,
-        ):
-            margin = None
-        elif margin == 0.0:
-            self._report(
-                "margin-zero",
-                draft.margin.span,
-                f"the margin of `{draft.name}` is 0: nearness is never noticed before contact",
-                hint="write for example `margin 3 mm`",
-            )
-        inner = self._critical_inside(draft)
-        if inner is None or inner.center is None or inner.center.value is None or margin is None:
-            return None
-        radius = inner.radius.value
-        if radius is None or radius <= 0.0:
-            return None
-        radius += margin
-        if not self._obeys(
-            rules.finite([radius], f"the radius of `{draft.name}`"), draft.margin.span
-        ):
-            return None
-        return Region(draft.name, draft.kind, inner.center.value, radius, inner.name)
-
-    def _critical_inside(self, draft: DraftRegion) -> DraftRegion | None:
-        """The critical region that a detection region is written around."""
-        around = draft.around
-        if around is None or around.value is None:
-            return None
-        name = around.value
-        inner = self._draft.regions.get(name)
-        if inner is None:
-            if name.split("[")[0] not in self._draft.broken_names:
-                criticals = [r.name for r in self._draft.regions.values() if r.kind == "critical"]
-                self._report(
-                    "unknown-region",
-                    around.span,
-                    f"there is no critical region `{name}`",
-                    hint=did_you_mean(name, criticals)
-                    or "give the detection region a sphere of its own",
-                )
-            return None
-        if inner.kind != "critical":
-            self._report(
-                "region-not-critical",
-                around.span,
-                f"`{name}` is {article(inner.kind)} {inner.kind} region, not a critical one",
-                hint="detection regions lie around critical regions",
-            )
-            return None
-        return inner
-
     # -------------------------------------------------------------------------------------- rules
 
-    def _check_regions(self, tip: Pose, spheres: list[_Sphere]) -> None:
-        """Checks the positions of regions relative to the tip and to each other."""
-        targets = [sphere for sphere in spheres if sphere.region.kind == "target"]
-        others = [s for s in spheres if s.region.kind not in ("target", "safe")]
-        for target in targets:
-            self._check_reachable(tip, target)
-            for other in others:
-                self._check_overlap(target, other)
-        for other in others:
-            self._check_start(tip, other)
-        for safe in (sphere for sphere in spheres if sphere.region.kind == "safe"):
-            for other in others:
-                self._check_safe(safe, other)
-
-    def _check_safe(self, safe: _Sphere, other: _Sphere) -> None:
-        """A safe region should not reach into what plans avoid; a shell around it is no matter."""
-        one, two = safe.region, other.region
-        distance = math.dist(one.center_mm, two.center_mm)
-        if two.kind == "detection" or distance >= one.radius_mm + two.radius_mm:
-            return
-        self._report(
-            "safe-overlaps",
-            _place_of(safe),
-            f"the safe region `{one.name}` reaches into the {two.kind} region `{two.name}`",
-            hint=f"move one of the two; plans avoid `{two.name}` all the same",
-            notes=(f"the {two.kind} region is at {_place_of(other).place}",),
-        )
-
-    def _check_reachable(self, tip: Pose, target: _Sphere) -> None:
-        """A target must not lie behind the tip, and should not contain it."""
-        region, span = target.region, _place_of(target)
-        offset = _minus(region.center_mm, tip.position_mm)
-        ahead = _dot(offset, tip.heading)
-        if ahead + region.radius_mm < 0.0:
-            self._report(
-                "target-behind-needle",
-                span,
-                f"`{region.name}` lies {-ahead - region.radius_mm:.3g} mm behind the needle's tip",
-                hint="move it along the heading, or turn the heading round",
-            )
-        elif math.hypot(*offset) <= region.radius_mm:
-            self._report(
-                "tip-in-target",
-                span,
-                f"the tip lies in `{region.name}` already: there is nothing to steer",
-            )
-
-    def _check_overlap(self, target: _Sphere, other: _Sphere) -> None:
-        """A target must not lie in a critical region, and its centre should not.
-
-        A region may reach into a target, as a vessel at the surface of a tumour does.
-        """
-        inner, outer = target.region, other.region
-        distance = math.dist(inner.center_mm, outer.center_mm)
-        if distance >= inner.radius_mm + outer.radius_mm:
-            return
-        notes = (f"the {outer.kind} region is at {_place_of(other).place}",)
-        if distance + inner.radius_mm <= outer.radius_mm:
-            self._report(
-                "target-in-critical",
-                _place_of(target),
-                f"`{inner.name}` lies inside the {outer.kind} region `{outer.name}`",
-                hint="move one of the two, or make the target larger",
-                notes=notes,
-            )
-        elif distance <= outer.radius_mm:
-            self._report(
-                "target-overlaps",
-                _place_of(target),
-                f"the centre of `{inner.name}` lies in the {outer.kind} region `{outer.name}`",
-                hint="only the rest of the target can be reached",
-                notes=notes,
-            )
-
-    def _check_start(self, tip: Pose, other: _Sphere) -> None:
-        """The tip must not start in a critical region, and should not in a detection region."""
-        region = other.region
-        if math.dist(tip.position_mm, region.center_mm) > region.radius_mm:
-            return
-        self._report(
-            "tip-in-critical" if region.kind == "critical" else "tip-in-detection",
-            _place_of(other),
-            f"the needle's tip lies in the {region.kind} region `{region.name}`",
-            hint="move the tip or the region",
-        )
-
     def _check_step(
-        self, needle: Needle, limits: Limits, resolution: int, spheres: list[_Sphere]
+        self, needle: Needle, limits: Limits, resolution: int, spheres: list[Sphere]
     ) -> None:
         """Lengths must fit the model; a push must bend the needle and not jump over a region."""
         placed = self._draft.numbers.get("step")
         span = self._draft.span if placed is None else placed.span
         advance = needle.speed_mm_per_s * limits.step_s
         circle = rules.visible(needle.radius_mm, resolution, "the radius of the motion circle")
-        if self._obeys(circle, self._draft.numbers["radius"].span):
+        if self._reporter.obeys(circle, self._draft.numbers["radius"].span):
             swept = self._draft.choices.get("safety") == "swept"
             speed, radius = needle.speed_mm_per_s, needle.radius_mm
-            self._obeys(rules.motion(limits.step_s, speed, radius, resolution, swept=swept), span)
-        seen = [sphere for sphere in spheres if self._is_visible(sphere, resolution)]
+            self._reporter.obeys(
+                rules.motion(limits.step_s, speed, radius, resolution, swept=swept), span
+            )
+        seen = [sphere for sphere in spheres if self._regions.is_visible(sphere, resolution)]
         checked = (sphere for sphere in seen if sphere.region.kind != "safe")
         smallest = min(checked, key=lambda s: s.region.radius_mm, default=None)
         if smallest is not None and advance > 2.0 * smallest.region.radius_mm:
@@ -534,23 +318,13 @@ class _Builder:
                 notes=("regions are checked at the ends of pushes only",),
             )
 
-    def _is_visible(self, sphere: _Sphere, resolution: int) -> bool:
-        """Whether the model can represent a region; if not, reports it."""
-        breach = rules.visible(
-            sphere.region.radius_mm, resolution, f"the radius of `{sphere.region.name}`"
-        )
-        # The critical region inside is even smaller.
-        if sphere.draft.around is not None:
-            return breach is None
-        return self._obeys(breach, sphere.draft.radius.span)
-
     def _check_range(
         self,
         resolution: int,
         tip: Pose | None,
         needle: Needle | None,
         limits: Limits | None,
-        spheres: list[_Sphere],
+        spheres: list[Sphere],
     ) -> bool:
         """Reports every length that does not fit into the model's numbers.
 
@@ -559,7 +333,7 @@ class _Builder:
         """
         largest_mm = 0.0
         for what, length_mm, span in self._lengths(tip, needle, limits, spheres):
-            self._obeys(rules.fits(length_mm, resolution, what), span)
+            self._reporter.obeys(rules.fits(length_mm, resolution, what), span)
             largest_mm = max(largest_mm, length_mm)
         return largest_mm < _ABSURD_MM
 
@@ -568,7 +342,7 @@ class _Builder:
         tip: Pose | None,
         needle: Needle | None,
         limits: Limits | None,
-        spheres: list[_Sphere],
+        spheres: list[Sphere],
     ) -> Iterator[tuple[str, float, Span]]:
         """The lengths in the model, with their names and their places in the file."""
         draft = self._draft
@@ -598,43 +372,12 @@ class _Builder:
             region = sphere.region
             # The model also contains the distance from the tip to the centre.
             reach = max(math.dist(start, region.center_mm), math.hypot(*region.center_mm))
-            yield f"`{region.name}`", reach + region.radius_mm, _place_of(sphere)
+            yield f"`{region.name}`", reach + region.radius_mm, sphere.place
 
 
-def _of_kind(spheres: list[_Sphere], kind: RegionKind) -> tuple[Region, ...]:
+def _of_kind(spheres: list[Sphere], kind: RegionKind) -> tuple[Region, ...]:
     """The regions of one kind, in their order."""
     return tuple(sphere.region for sphere in spheres if sphere.region.kind == kind)
-
-
-def _place_of(sphere: _Sphere) -> Span:
-    """The place in the file of a region's position."""
-    center = sphere.draft.center
-    return sphere.draft.name_span if center is None else center.span
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    """The scalar product."""
-    return math.fsum(p * q for p, q in zip(a, b, strict=True))
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    """The difference."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _times(factor: float, a: Vector) -> Vector:
-    """The multiple."""
-    return factor * a[0], factor * a[1], factor * a[2]
-
-
-def _unit(a: Vector) -> Vector:
-    """The vector of length 1 in the same direction; exact for directions along an axis."""
-    # Scaling first keeps the squares of very large and very small components in range.
-    largest = max(map(abs, a))
-    scaled = (a[0] / largest, a[1] / largest, a[2] / largest)
-    length = math.hypot(*scaled)
-    # Adding 0.0 turns a negative zero into a positive one.
-    return scaled[0] / length + 0.0, scaled[1] / length + 0.0, scaled[2] / length + 0.0
 
 
 def _rounded(component: float) -> float:

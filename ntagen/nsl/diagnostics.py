@@ -17,6 +17,7 @@ from typing import Final, Literal
 
 from ntagen.errors import InputError
 from ntagen.nsl.source import Span
+from ntagen.rules import Breach
 
 Severity = Literal["error", "warning"]
 
@@ -268,6 +269,12 @@ class Reporter:
             hint,
         )
         self._add(diagnostic)
+
+    def obeys(self, breach: Breach | None, span: Span) -> bool:
+        """Whether a value at a place obeys a rule; if not, reports it."""
+        if breach is not None:
+            self.report(breach.rule, span, breach.message, hint=breach.hint)
+        return breach is None
 
     def report_file(self, name: str, path: str, message: str, *, hint: str | None = None) -> None:
         """Adds a diagnostic about a file as a whole."""

@@ -1,0 +1,212 @@
+"""Makes the regions of a draft, and checks how they lie to the tip and to each other.
+
+Touching a region counts as being in it, as in the model's declaration (paper, appendix).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ntagen import rules
+from ntagen.nsl.diagnostics import Reporter, did_you_mean
+from ntagen.nsl.draft import Draft, DraftRegion
+from ntagen.nsl.resolve import article
+from ntagen.nsl.source import Span
+from ntagen.nsl.vectors import dot, minus
+from ntagen.scene import Pose, Region
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """A region without mistakes, with its places in the file."""
+
+    region: Region
+    draft: DraftRegion
+
+    @property
+    def place(self) -> Span:
+        """The place in the file of the region's position."""
+        center = self.draft.center
+        return self.draft.name_span if center is None else center.span
+
+
+class Regions:
+    """Applies the rules to the regions of one draft."""
+
+    def __init__(self, draft: Draft, reporter: Reporter) -> None:
+        self._draft = draft
+        self._reporter = reporter
+        self._report = reporter.report
+
+    def spheres(self) -> list[Sphere]:
+        """All regions without mistakes, in the order written."""
+        spheres = []
+        for draft in self._draft.regions.values():
+            region = self._around(draft) if draft.around is not None else self._sphere(draft)
+            if region is not None:
+                spheres.append(Sphere(region, draft))
+        return spheres
+
+    def _sphere(self, draft: DraftRegion) -> Region | None:
+        """A region with its own geometry."""
+        radius = draft.radius.value
+        if radius is not None and not self._reporter.obeys(
+            rules.positive(radius, f"the radius of `{draft.name}`"), draft.radius.span
+        ):
+            return None
+        if radius is None or draft.center is None or draft.center.value is None:
+            return None
+        return Region(draft.name, draft.kind, draft.center.value, radius)
+
+    def _around(self, draft: DraftRegion) -> Region | None:
+        """A detection region around a critical one."""
+        margin = draft.margin.value
+        if margin is not None and not self._reporter.obeys(
+            rules.not_negative(margin, f"the margin of `{draft.name}`", "margin-negative"),
+            draft.margin.span,
+        ):
+            margin = None
+        elif margin == 0.0:
+            self._report(
+                "margin-zero",
+                draft.margin.span,
+                f"the margin of `{draft.name}` is 0: nearness is never noticed before contact",
+                hint="write for example `margin 3 mm`",
+            )
+        inner = self._critical_inside(draft)
+        if inner is None or inner.center is None or inner.center.value is None or margin is None:
+            return None
+        radius = inner.radius.value
+        if radius is None or radius <= 0.0:
+            return None
+        radius += margin
+        if not self._reporter.obeys(
+            rules.finite([radius], f"the radius of `{draft.name}`"), draft.margin.span
+        ):
+            return None
+        return Region(draft.name, draft.kind, inner.center.value, radius, inner.name)
+
+    def _critical_inside(self, draft: DraftRegion) -> DraftRegion | None:
+        """The critical region that a detection region is written around."""
+        around = draft.around
+        if around is None or around.value is None:
+            return None
+        name = around.value
+        inner = self._draft.regions.get(name)
+        if inner is None:
+            if name.split("[")[0] not in self._draft.broken_names:
+                criticals = [r.name for r in self._draft.regions.values() if r.kind == "critical"]
+                self._report(
+                    "unknown-region",
+                    around.span,
+                    f"there is no critical region `{name}`",
+                    hint=did_you_mean(name, criticals)
+                    or "give the detection region a sphere of its own",
+                )
+            return None
+        if inner.kind != "critical":
+            self._report(
+                "region-not-critical",
+                around.span,
+                f"`{name}` is {article(inner.kind)} {inner.kind} region, not a critical one",
+                hint="detection regions lie around critical regions",
+            )
+            return None
+        return inner
+
+    def is_visible(self, sphere: Sphere, resolution: int) -> bool:
+        """Whether the model can represent a region; if not, reports it."""
+        breach = rules.visible(
+            sphere.region.radius_mm, resolution, f"the radius of `{sphere.region.name}`"
+        )
+        # The critical region inside is even smaller.
+        if sphere.draft.around is not None:
+            return breach is None
+        return self._reporter.obeys(breach, sphere.draft.radius.span)
+
+    def check(self, tip: Pose, spheres: list[Sphere]) -> None:
+        """Checks the positions of regions relative to the tip and to each other."""
+        targets = [sphere for sphere in spheres if sphere.region.kind == "target"]
+        others = [s for s in spheres if s.region.kind not in ("target", "safe")]
+        for target in targets:
+            self._check_reachable(tip, target)
+            for other in others:
+                self._check_overlap(target, other)
+        for other in others:
+            self._check_start(tip, other)
+        for safe in (sphere for sphere in spheres if sphere.region.kind == "safe"):
+            for other in others:
+                self._check_safe(safe, other)
+
+    def _check_safe(self, safe: Sphere, other: Sphere) -> None:
+        """A safe region should not reach into what plans avoid; a shell around it is no matter."""
+        one, two = safe.region, other.region
+        distance = math.dist(one.center_mm, two.center_mm)
+        if two.kind == "detection" or distance >= one.radius_mm + two.radius_mm:
+            return
+        self._report(
+            "safe-overlaps",
+            safe.place,
+            f"the safe region `{one.name}` reaches into the {two.kind} region `{two.name}`",
+            hint=f"move one of the two; plans avoid `{two.name}` all the same",
+            notes=(f"the {two.kind} region is at {other.place.place}",),
+        )
+
+    def _check_reachable(self, tip: Pose, target: Sphere) -> None:
+        """A target must not lie behind the tip, and should not contain it."""
+        region, span = target.region, target.place
+        offset = minus(region.center_mm, tip.position_mm)
+        ahead = dot(offset, tip.heading)
+        if ahead + region.radius_mm < 0.0:
+            self._report(
+                "target-behind-needle",
+                span,
+                f"`{region.name}` lies {-ahead - region.radius_mm:.3g} mm behind the needle's tip",
+                hint="move it along the heading, or turn the heading round",
+            )
+        elif math.hypot(*offset) <= region.radius_mm:
+            self._report(
+                "tip-in-target",
+                span,
+                f"the tip lies in `{region.name}` already: there is nothing to steer",
+            )
+
+    def _check_overlap(self, target: Sphere, other: Sphere) -> None:
+        """A target must not lie in a critical region, and its centre should not.
+
+        A region may reach into a target, as a vessel at the surface of a tumour does.
+        """
+        inner, outer = target.region, other.region
+        distance = math.dist(inner.center_mm, outer.center_mm)
+        if distance >= inner.radius_mm + outer.radius_mm:
+            return
+        notes = (f"the {outer.kind} region is at {other.place.place}",)
+        if distance + inner.radius_mm <= outer.radius_mm:
+            self._report(
+                "target-in-critical",
+                target.place,
+                f"`{inner.name}` lies inside the {outer.kind} region `{outer.name}`",
+                hint="move one of the two, or make the target larger",
+                notes=notes,
+            )
+        elif distance <= outer.radius_mm:
+            self._report(
+                "target-overlaps",
+                target.place,
+                f"the centre of `{inner.name}` lies in the {outer.kind} region `{outer.name}`",
+                hint="only the rest of the target can be reached",
+                notes=notes,
+            )
+
+    def _check_start(self, tip: Pose, other: Sphere) -> None:
+        """The tip must not start in a critical region, and should not in a detection region."""
+        region = other.region
+        if math.dist(tip.position_mm, region.center_mm) > region.radius_mm:
+            return
+        self._report(
+            "tip-in-critical" if region.kind == "critical" else "tip-in-detection",
+            other.place,
+            f"the needle's tip lies in the {region.kind} region `{region.name}`",
+            hint="move the tip or the region",
+        )
