@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,6 +21,10 @@ ANY_FRAME: Final = "tracker"
 
 N_PER: Final = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
 """Newtons in one unit of force."""
+
+LATER_S: Final = 1.0
+"""By its time stamps, a sample may come so much later than the soonest one. Some senders have wrong
+fractions of seconds, which is up to one second."""
 
 _DEVICE_IN_FRAME: Final = re.compile(r".+To(?P<frame>[A-Z].*)")
 """Servers often name a transform after the frames that it leads from and to."""
@@ -74,6 +79,7 @@ class LiveTracker:
         self._source = source
         self._transform = transform
         self._now_s = now_s
+        self._least_delay_s = math.inf
         self.client = Client(source.host, source.port, source.policy)
 
     def __enter__(self) -> LiveTracker:
@@ -115,6 +121,7 @@ class LiveTracker:
     def _measurement(self, after_s: float | None, waits: bool) -> Measurement:
         source = self._source
         sample = self._visible(after_s, waits)
+        self._require_in_time(sample)
         tip = tip_of(sample.content, source.mount, sample.device)
         force_n = self._force_n(waits)
         age_s = self.client.now_s() - sample.received_s + source.latency_s
@@ -136,6 +143,26 @@ class LiveTracker:
                     f"the tracker does not see '{sample.device}': its status is {hidden}"
                 )
             after_s = sample.received_s
+
+    def _require_in_time(self, sample: Sample[Pose]) -> None:
+        """Refuses a sample that was under way for longer than others, by its time stamp.
+
+        The clocks of the sender and of this machine need not agree: only changes count.
+
+        Raises:
+            DeviceError: It is late.
+        """
+        if sample.stamp_s is None:
+            return
+        delay_s = sample.received_s - sample.stamp_s
+        self._least_delay_s = min(self._least_delay_s, delay_s)
+        later_s = delay_s - self._least_delay_s
+        if later_s > LATER_S:
+            raise DeviceError(
+                f"by its time stamp, the position of '{sample.device}' came {later_s:.1f} s later "
+                f"than others; {LATER_S:g} s is allowed\n"
+                "hint: is the tracker or the network too slow, or was the tracker's clock set?"
+            )
 
     def _force_n(self, waits: bool) -> float:
         source = self._source

@@ -271,3 +271,30 @@ def test_a_registration_from_another_frame_is_refused() -> None:
 def test_a_registration_from_lps_is_refused() -> None:
     with pytest.raises(InputError, match="--from RAS"):
         require_frame(Source("localhost", 1), replace(TURN, source="LPS"))
+
+
+def stamped(stamp_s: float) -> Packet:
+    return Packet("N", at(1.0), stamp_s=stamp_s)
+
+
+def test_samples_that_come_later_and_later_by_their_stamps_are_refused(server: Server) -> None:
+    """The clock of the sender is another one: it may be years off, and be set forward."""
+    with tracker(server) as live:
+        began_s = live.client.now_s()
+
+        def measured_at(ahead_s: float) -> Measurement:
+            passed_s = live.client.now_s() - began_s
+            return measured(server, live, stamped(5e6 + passed_s + ahead_s))
+
+        measured_at(0.0)
+        measured_at(-0.9)
+        measured_at(100.0)
+        with pytest.raises(DeviceError, match=r"'N' came 1\.[5-9] s later than others") as caught:
+            measured_at(98.4)
+        assert "hint:" in str(caught.value)
+
+
+def test_a_sample_without_a_stamp_is_not_late(server: Server) -> None:
+    with tracker(server) as live:
+        measured(server, live, stamped(5e6))
+        measured(server, live, Packet("N", at(1.0)))
