@@ -15,12 +15,16 @@ from typing import Final
 from ntagen.drive.device import LiveSensor, Sensor, require_finite
 from ntagen.errors import DeviceError
 from ntagen.needle.measurement import Measurement
-from ntagen.needle.vectors import distance, dot
+from ntagen.needle.vectors import distance, dot, subtract
 from ntagen.scene import Pose
 from ntagen.units import deg_from_rad
 
 FARTHEST_MM: Final = 10.0
 """At the start, the tip may be measured so far from the entry."""
+
+DEEPEST_MM: Final = 3.0
+"""At the start, the tip may be measured so far beyond the entry, along the heading; ours. Farther
+in, it is in the tissue already: a run before this one was cut off."""
 
 WIDEST_DEG: Final = 45.0
 """At the start, the measured directions may differ so much from those of the scene."""
@@ -175,6 +179,13 @@ def require_start(found: Measurement, entry: Pose) -> None:
             f"the entry at {_words(entry.position_mm)} mm; {FARTHEST_MM:g} mm is allowed\n"
             "hint: is the needle at the entry, is the registration that of this tracker, and are "
             "both in mm?"
+        )
+    depth_mm = dot(subtract(found.position_mm, entry.position_mm), entry.heading)
+    if depth_mm > DEEPEST_MM:
+        raise DeviceError(
+            f"the tracker sees the tip {depth_mm:.1f} mm beyond the entry, at "
+            f"{_words(found.position_mm)} mm; {DEEPEST_MM:g} mm is allowed\n"
+            "hint: was a run before this one cut off? Pull the needle back to the entry first"
         )
     for name, option, seen, expected in (
         ("heading", "axis", found.heading, entry.heading),

@@ -30,6 +30,8 @@ def seen(
 
 def test_a_needle_at_the_entry_is_accepted() -> None:
     require_start(seen((1.0, 2.0, 12.0)), ENTRY)
+    require_start(seen((1.0, -0.9, 3.0)), ENTRY)
+    require_start(seen((1.0, 11.0, 3.0)), ENTRY)
     turned = (math.sin(0.7), -math.cos(0.7), 0.0)
     require_start(seen(ENTRY.position_mm, turned, ENTRY.bevel), ENTRY)
 
@@ -40,6 +42,7 @@ def test_a_needle_at_the_entry_is_accepted() -> None:
         (seen((1.0, 2.0, 13.1)), r"at \(1.0, 2.0, 13.1\) mm, 10.1 mm from the entry"),
         (seen((-1000.0, 2.0, 3.0)), "1001.0 mm from the entry"),
         (seen((math.nan, 2.0, 3.0)), "nan mm from the entry"),
+        (seen((1.0, -2.0, 3.0)), r"4.0 mm beyond the entry, at \(1.0, -2.0, 3.0\) mm; 3 mm"),
         (seen(ENTRY.position_mm, (0.0, 1.0, 0.0)), "heading that is 180 deg"),
         (seen(ENTRY.position_mm, (0.0, 0.0, 1.0)), "heading that is 90 deg"),
         (seen(ENTRY.position_mm, ENTRY.heading, (1.0, 0.0, 0.0)), "bevel direction that is 90 deg"),
