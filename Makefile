@@ -104,6 +104,7 @@ bench-needle: $(INSTALLED) ## Measure the phantom needle against real ones, what
 bench-devices: $(INSTALLED) ## Measure how fast a stop is on the wire, and whether runs with faults at random moments end well
 	$(BIN)/python tests/benchmarks/stop.py
 	$(BIN)/python -m tests.benchmarks.faults
+	$(BIN)/python -m tests.benchmarks.lab_faults
 
 .PHONY: bench-limits
 bench-limits: $(INSTALLED) ## Measure whether the time and memory limits hold: 20 models with up to 250 clocks

@@ -19,6 +19,7 @@ from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
 from tests.drive.runs import Diary
 from tests.faults.catalogue import FAULTS, Fault
+from tests.faults.live import LIVE, run_live
 from tests.faults.rig import Rig
 from tests.faults.runs import EXAMPLES, NEEDLES, Finding, run
 from tests.oracles.synthesiser import oracle_synthesis
@@ -46,6 +47,14 @@ def test_a_run_with_a_fault_ends_well(fault: Fault) -> None:
 def test_runs_with_a_fault_end_well(fault: Fault, needle: str) -> None:
     outcomes = {one.outcome for one in check(fault, needle, range(1, 1 + SEEDS))}
     assert outcomes != {"over before the fault"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL", "suspended", "cable pulled", "disk full"])
+def test_a_driver_in_a_lab_ends_well(name: str, tmp_path: Path) -> None:
+    """`tests/benchmarks/lab_faults.py` has more of them."""
+    fault = next(one for one in LIVE if one.name == name)
+    assert run_live(fault, "virtual", 0, tmp_path).wrong == []
 
 
 def test_a_run_without_a_fault_reaches_the_target() -> None:
