@@ -276,7 +276,15 @@ def _part(bench: _Bench) -> None:
 
 def _stop_in_motion(bench: _Bench) -> None:
     began_s = time.monotonic()
-    stopping = threading.Timer(0.4 * bench.seconds, bench.device.stop)
+    failures: list[str] = []
+
+    def stop() -> None:
+        try:
+            bench.device.stop()
+        except Exception as error:
+            failures.append(f"stop() raises {error!r} in a motion")
+
+    stopping = threading.Timer(0.4 * bench.seconds, stop)
     stopping.start()
     problem = ""
     try:
@@ -292,6 +300,7 @@ def _stop_in_motion(bench: _Bench) -> None:
         took_s <= 0.4 * bench.seconds + _STOP_S,
         f"the push goes on for {took_s - 0.4 * bench.seconds:.2f} s after stop()",
     )
+    need(not failures, "".join(failures))
     need(not problem, problem)
 
 

@@ -93,6 +93,36 @@ def test_measuring_does_not_change_the_motion() -> None:
     assert quiet.pierced == watched.pierced
 
 
+def test_a_tracker_that_sees_directions_changes_neither_motion_nor_positions() -> None:
+    plain = phantom()
+    seeing = PhantomNeedle(Needle(ENTRY, 30.0, 1.0), (), 1, SimulatedClock(), reports_pose=True)
+    for needle in (plain, seeing):
+        moved(needle, WINDING)
+    measured, seen = plain.measure(), seeing.measure()
+    assert (measured.heading, measured.bevel) == (None, None)
+    assert replace(seen, heading=None, bevel=None) == measured
+    assert seen.heading is not None
+    assert seen.bevel is not None
+    heading, bevel = seeing.true_tip.heading, seeing.true_tip.bevel
+    assert 0.999 < dot(seen.heading, heading) < 1.0
+    assert abs(dot(seen.heading, seen.bevel)) < 1e-9
+    # The tissue turns the bend plane away from the bevel that is seen.
+    assert 0.5 < dot(seen.bevel, bevel) < 0.999
+
+
+def test_frames_show_the_needle_lost_or_not_and_take_no_time() -> None:
+    needle = phantom()
+    needle.push(5.0)
+    before_s = needle.now_s()
+    frames = [needle.frame() for _ in range(3000)]
+    assert needle.now_s() == before_s
+    lost = sum(frame.is_lost for frame in frames) / len(frames)
+    # A share of 1 % begins a loss, which goes on with a probability of one half.
+    assert lost == pytest.approx(0.02, abs=0.012)
+    positions = np.array([frame.measurement.position_mm for frame in frames])
+    assert positions.std(axis=0) == pytest.approx([0.08] * 3, rel=0.1)
+
+
 def test_without_errors_it_is_the_virtual_needle() -> None:
     ideal = phantom(replace(IDEAL, reinsertion=replace(IDEAL.reinsertion, bite_ratio=1.0)))
     virtual = VirtualNeedle(Needle(ENTRY, 30.0, 1.0), (), Errors(), 1, SimulatedClock())
