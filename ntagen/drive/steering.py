@@ -69,6 +69,13 @@ class Steering:
         """Whether the tip is at the end of its channel, so that the next push cuts."""
         return self.path.depth_mm >= self._cut_mm - 1e-9
 
+    @property
+    def known(self) -> Estimate:
+        """The last estimate, which comes before anything else needs it."""
+        if self.estimate is None:
+            raise AssertionError("the estimate comes before this")
+        return self.estimate
+
     def now_s(self) -> float:
         """The time on the device's clock."""
         return self._device.now_s()

@@ -1,0 +1,106 @@
+"""What the driver learns from measurements: where the force rises, and what targets are reached."""
+
+from __future__ import annotations
+
+from ntagen.drive.force import ForceMonitor, Rise
+from ntagen.drive.knowledge import Knowledge, position_unsure_mm
+from ntagen.drive.records import Forgotten, Journal, Learned, Visited
+from ntagen.drive.settings import Settings
+from ntagen.drive.steering import Steering
+from ntagen.needle.kinematics import orthonormal
+from ntagen.needle.measurement import Measurement
+from ntagen.needle.vectors import distance
+from ntagen.scene import Scene, Vector
+
+
+class Learner:
+    """The knowledge of a run, and what adds to it.
+
+    Args:
+        scene: The a-priori scene.
+        settings: How to drive.
+        needle: The needle.
+        journal: Records what is learned.
+
+    Attributes:
+        knowledge: What is known.
+    """
+
+    def __init__(
+        self, scene: Scene, settings: Settings, needle: Steering, journal: Journal
+    ) -> None:
+        self.knowledge = Knowledge(scene)
+        self._settings = settings
+        self._needle = needle
+        self._journal = journal
+        self._force = ForceMonitor(settings, scene.needle.length_mm)
+        self._rise: Rise | None = None
+
+    @property
+    def a_priori(self) -> Scene:
+        """What was known at the start."""
+        return self.knowledge.a_priori
+
+    @property
+    def has_visited_all(self) -> bool:
+        """Whether all targets were reached."""
+        return self.knowledge.visited == len(self.a_priori.targets)
+
+    def arm(self, measurement: Measurement) -> None:
+        """Takes the measurement before anything moves."""
+        if self._settings.force_sensing:
+            tip_mm = self.a_priori.needle.tip.position_mm
+            self._force.note(0.0, measurement.force_n, self._explained_n(tip_mm))
+
+    def expected_force_n(self, depth_mm: float, tip_mm: Vector) -> float:
+        """The force that insertion and known regions explain, when the tip is there."""
+        return self._force.expected_n(depth_mm) + self._explained_n(tip_mm)
+
+    def _explained_n(self, tip_mm: Vector) -> float:
+        return self.knowledge.expected_force_n(tip_mm, self._settings)
+
+    def feels(self, measurement: Measurement) -> bool:
+        """Whether the force rises more than plain insertion and known regions explain."""
+        if not self._settings.force_sensing or not self._needle.cuts:
+            return False
+        tip_mm = self._needle.path.tip.position_mm
+        allowed_n = self._explained_n(tip_mm)
+        self._rise = self._force.note(self._needle.depth_mm, measurement.force_n, allowed_n)
+        return self._rise is not None
+
+    def learn(self) -> None:
+        """Turns a rise that was felt into a region, ahead of the place where it began."""
+        rise, self._rise = self._rise, None
+        if rise is None:
+            return
+        self._force.forget_rise()
+        path = self._needle.glance().path
+        began = path.pull(rise.felt_mm - rise.began_mm)
+        before = self.knowledge.learned
+        self.knowledge = self.knowledge.with_contact(
+            orthonormal(began.tip),
+            self._settings.sensing_margin_mm,
+            self._settings.learned_radius_mm,
+            self._needle.channels,
+            position_unsure_mm(self._settings),
+        )
+        for region in self.knowledge.learned:
+            if region not in before:
+                self._journal.record(Learned.of(self._needle.now_s(), region))
+        kept = {(region.kind, region.name) for region in self.knowledge.learned}
+        for region in before:
+            if (region.kind, region.name) not in kept:
+                self._journal.record(Forgotten(self._needle.now_s(), region.name, region.kind))
+
+    def visit(self, position_mm: Vector, *, last_too: bool) -> None:
+        """Counts targets that the tip has reached; the last one only with `last_too`."""
+        targets = self.a_priori.targets
+        while self.knowledge.visited < len(targets):
+            target = targets[self.knowledge.visited]
+            is_last = self.knowledge.visited == len(targets) - 1
+            if is_last and not last_too:
+                return
+            if distance(position_mm, target.center_mm) > target.radius_mm:
+                return
+            self.knowledge = self.knowledge.visiting()
+            self._journal.record(Visited(self._needle.now_s(), target.name))

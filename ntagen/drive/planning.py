@@ -1,0 +1,150 @@
+"""Looking for plans in a run: each synthesis is recorded, and plans must end in the time left."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from ntagen.drive.learning import Learner
+from ntagen.drive.records import Journal, Synthesised, Timed
+from ntagen.drive.settings import Settings
+from ntagen.drive.states import Event
+from ntagen.drive.steering import Steering
+from ntagen.errors import LimitError
+from ntagen.plan.actions import Plan, Roll
+from ntagen.plan.synthesise import Synthesis, Synthesiser
+from ntagen.scene import Pose
+
+_NO_REGION_MM: Final = 1e9
+
+
+@dataclass(slots=True)
+class Lack:
+    """Why no plan is left, over all places from which one was looked for."""
+
+    found: bool = False
+    held: bool = False
+
+    def event(self) -> tuple[Event, str]:
+        """The event, and the reason in words."""
+        if self.held:
+            return Event.NO_TIME_LEFT, "no plan can end within the time limit"
+        if self.found:
+            return Event.NONE_HOLDS, "no plan of the model holds in exact kinematics"
+        return Event.NO_STRATEGY, "no plan is left, even from the entry"
+
+
+class Planner:
+    """What looks for plans, and knows the time that is left.
+
+    Args:
+        synthesise: Finds plans.
+        settings: How to drive.
+        needle: The needle.
+        learner: What the driver knows.
+        journal: Records each synthesis.
+        listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
+
+    Attributes:
+        count: The number of syntheses.
+        lack: Why no plan is left.
+    """
+
+    def __init__(
+        self,
+        synthesise: Synthesiser,
+        settings: Settings,
+        needle: Steering,
+        learner: Learner,
+        journal: Journal,
+        listen: Callable[[], None],
+    ) -> None:
+        self._synthesise = synthesise
+        self._settings = settings
+        self._needle = needle
+        self._learner = learner
+        self._journal = journal
+        self._listen = listen
+        self._started_s = 0.0
+        self.count = 0
+        self.lack = Lack()
+
+    def start(self) -> None:
+        """The time of the run begins now."""
+        self._started_s = self._needle.now_s()
+
+    def require_time(self) -> None:
+        """Does nothing while there is time left.
+
+        Raises:
+            LimitError: The time limit is over.
+        """
+        if self._needle.now_s() - self._started_s >= self._settings.timeout_s:
+            raise LimitError(f"the limit of {self._settings.timeout_s:g} s is over")
+
+    def ask(self, tip: Pose, depth_mm: float, rest: Plan | None = None) -> Synthesis:
+        """The synthesis from a pose, with the current knowledge, and in the time left.
+
+        Args:
+            tip: The pose.
+            depth_mm: Its depth.
+            rest: The rest of a plan, which is a choice too.
+        """
+        scene = self._learner.knowledge.scene(tip, self._needle.known.radius_mm, depth_mm)
+        self._listen()
+        whole = self._synthesise(scene)
+        if rest is not None:
+            whole = whole.with_plan(rest)
+        synthesis = self._in_time(whole, self._needle.depth_mm - depth_mm)
+        self.lack.found |= whole.found > 0
+        self.lack.held |= bool(whole.candidates)
+        number, best = self.count + 1, synthesis.best
+        self._journal.synthesised(number, synthesis)
+        clearance_mm = best.certificate.critical_clearance_mm if best else -1.0
+        self._journal.record(
+            Synthesised(
+                time_s=self._needle.now_s(),
+                number=number,
+                depth_mm=depth_mm,
+                found=synthesis.found,
+                accepted=len(synthesis.candidates),
+                plan=str(best.plan) if best else "",
+                clearance_mm=min(clearance_mm, _NO_REGION_MM),
+                model_sha256=hashlib.sha256(synthesis.model_xml.encode()).hexdigest(),
+                partial=not synthesis.is_complete,
+            )
+        )
+        # If the run ended during the synthesis, the synthesis does not count.
+        self.count = number
+        self._journal.record(
+            Timed(self._needle.now_s(), number, synthesis.seconds, synthesis.loop_seconds)
+        )
+        return synthesis
+
+    def _in_time(self, synthesis: Synthesis, back_mm: float) -> Synthesis:
+        """The synthesis without the plans that cannot end within the time limit.
+
+        Args:
+            synthesis: The synthesis.
+            back_mm: How far the needle must be pulled back before.
+        """
+        left_s = self._settings.timeout_s - (self._needle.now_s() - self._started_s)
+        speed_mm_per_s = synthesis.scene.needle.speed_mm_per_s
+        if back_mm > 0.0:
+            # Beyond the place, and again up to it, in the open channel.
+            again_mm = self._settings.push_mm
+            left_s -= (back_mm + again_mm) / (self._settings.pull_speed_ratio * speed_mm_per_s)
+            left_s -= again_mm / speed_mm_per_s
+        kept = tuple(
+            candidate
+            for candidate in synthesis.candidates
+            if self._seconds(candidate.plan, speed_mm_per_s) <= left_s
+        )
+        return replace(synthesis, candidates=kept)
+
+    def _seconds(self, plan: Plan, speed_mm_per_s: float) -> float:
+        """How long a plan takes: its pushes and its rolls."""
+        rolls_rad = sum(abs(one.angle_rad) for one in plan.actions if isinstance(one, Roll))
+        return plan.length_mm / speed_mm_per_s + rolls_rad / self._settings.roll_rad_per_s
