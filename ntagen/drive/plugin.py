@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import math
+import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NoReturn
@@ -11,6 +13,9 @@ from typing import Any, Final, NoReturn
 from ntagen.drive.device import Halted, Watch
 from ntagen.errors import DeviceError
 from ntagen.extensions import DEVICES, guarded, load, opened
+
+_DEAF_S: Final = 1.0
+"""A device that has not called its watch for so long in a motion is stopped."""
 
 _NEEDS: Final = ("now_s", "push", "roll", "pull", "stop")
 
@@ -30,10 +35,50 @@ class Speeds:
     roll_rad_per_s: float = math.pi / 2.0
 
 
+class _Attention:
+    """Stops a device that does not call its watch, in a thread of its own, until the block ends.
+
+    Args:
+        stop: Stops it.
+
+    Attributes:
+        is_deaf: Whether that was necessary.
+    """
+
+    def __init__(self, stop: Callable[[], object]) -> None:
+        self.is_deaf = False
+        self._stop = stop
+        self._heard_s = time.monotonic()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="plugin attention", daemon=True)
+
+    def __enter__(self) -> _Attention:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join(_DEAF_S)
+
+    def note(self) -> None:
+        """Its watch was called."""
+        self._heard_s = time.monotonic()
+
+    def _work(self) -> None:
+        while not self._over.wait(max(0.0, self._heard_s + _DEAF_S - time.monotonic())):
+            if time.monotonic() >= self._heard_s + _DEAF_S:
+                self.is_deaf = True
+                # Its failure shows in the motion, which goes on.
+                with contextlib.suppress(BaseException):
+                    self._stop()
+                return
+
+
 class PluginActuator:
     """A `WatchedActuator` of a plugin, with all that a plugin may do wrong caught.
 
-    Impossible commands never reach it. If it goes on although its watch raised, it is stopped.
+    Impossible commands never reach it. If it goes on although its watch raised, or does not call
+    its watch, it is stopped.
 
     Args:
         name: The name of the plugin.
@@ -45,6 +90,7 @@ class PluginActuator:
         self._name = name
         self._inner = inner
         self._raised: BaseException | None = None
+        self._attention = _Attention(inner.stop)
         self._last_s = -math.inf
         with guarded(name, "take a watch"):
             inner.watch = self._watch
@@ -103,6 +149,7 @@ class PluginActuator:
 
     def _watch(self) -> None:
         """What the plugin calls; once it has raised, it raises until the motion is over."""
+        self._attention.note()
         if self._raised is not None:
             raise self._raised
         try:
@@ -116,8 +163,9 @@ class PluginActuator:
             raise DeviceError(f"the device refuses to {does} by {value}")
         self._raised = None
         failure: BaseException | None = None
+        self._attention = _Attention(self._inner.stop)
         try:
-            with guarded(self._name, does):
+            with self._attention, guarded(self._name, does):
                 command(value)
         except BaseException as error:
             failure = error
@@ -126,6 +174,12 @@ class PluginActuator:
     def _end(self, failure: BaseException | None) -> None:
         """Raises what ended a motion early, if anything did."""
         told = self._raised
+        if told is None and self._attention.is_deaf and not isinstance(failure, KeyboardInterrupt):
+            raise DeviceError(
+                f"the plugin '{self._name}' did not call its watch for {_DEAF_S:g} s of a motion, "
+                "and was told to stop\n"
+                "hint: `ntagen device test` checks a plugin; tell its author what it says"
+            ) from failure
         if told is None:
             if failure is not None:
                 raise failure

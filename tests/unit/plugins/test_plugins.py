@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -345,6 +346,29 @@ def test_a_halted_motion_without_a_part_is_a_fault() -> None:
         device.push(1.0)
 
 
+@pytest.mark.parametrize("error", [None, OSError("stopped")])
+def test_a_device_that_does_not_call_its_watch_is_stopped(error: Exception | None) -> None:
+    class Deaf(Inner):
+        stopped = threading.Event()
+
+        def stop(self) -> None:
+            super().stop()
+            self.stopped.set()
+
+    def push(inner: Inner) -> None:
+        assert isinstance(inner, Deaf)
+        assert inner.stopped.wait(20.0)
+        if error is not None:
+            raise error
+
+    inner = Deaf(push)
+    inner.stopped.clear()
+    device = PluginActuator("it", inner)
+    with pytest.raises(DeviceError, match="did not call its watch for 1 s"):
+        device.push(1.0)
+    assert inner.stops == 1
+
+
 def test_impossible_commands_never_reach_a_plugin() -> None:
     device, _ = around(lambda _: pytest.fail("it was pushed"))
     for value in (-1.0, math.nan, math.inf):
@@ -384,8 +408,6 @@ def test_a_tracker_that_gives_no_measurement_is_a_fault(gives: object) -> None:
 
 
 def test_a_blocking_call_is_watched_and_stopped() -> None:
-    import threading
-
     stopped = threading.Event()
     calls: list[int] = []
 
