@@ -206,7 +206,7 @@ def test_the_lab_closes_when_nothing_has_moved_for_some_time(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     words = ["device", "simulate", str(EXAMPLE), "--needle", "virtual", "--speed", "50"]
-    command = threading.Thread(target=main, args=([*words, "--until-idle", "0.2"],))
+    command = threading.Thread(target=main, args=([*words, "--until-idle", "1.2"],))
     command.start()
     said = ""
     while "Ctrl-C" not in said:
