@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from ntagen import rules
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.draft import Draft, DraftRegion
-from ntagen.nsl.resolve import article
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import dot, minus
+from ntagen.nsl.wording import article
 from ntagen.scene import Pose, Region
 
 

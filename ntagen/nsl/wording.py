@@ -1,4 +1,4 @@
-"""The words for syntax errors: what was expected, what was found, what to write."""
+"""The words of messages: what was expected, what was found, what to write."""
 
 from __future__ import annotations
 
@@ -124,3 +124,8 @@ def visible(text: str) -> str:
     if len(text) > 1:
         return f"characters `{text[:20]}`"
     return f"character `{text}`" if text.isprintable() else f"character U+{ord(text):04X}"
+
+
+def article(word: str) -> str:
+    """The article of a word."""
+    return "an" if word[0] in "aeiou" else "a"

@@ -1,0 +1,235 @@
+"""Resolves the statements about the environment itself: regions, needle, motion, queries, choices.
+
+`ntagen.nsl.resolve` goes through a file and gives each of them to a `ContentResolver`, which adds
+it to the draft.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from ntagen.nsl import tree
+from ntagen.nsl.diagnostics import Reporter
+from ntagen.nsl.draft import Draft, DraftRegion, Placed
+from ntagen.nsl.driving import DriverResolver, is_choice
+from ntagen.nsl.evaluate import Evaluator, Scope
+from ntagen.nsl.quantity import ANGLE, LENGTH, NUMBER, SPEED, TIME
+from ntagen.nsl.wording import article
+
+MAX_REGIONS: Final = 10_000
+"""An environment has at most this many regions."""
+
+MAX_TARGETS: Final = 100
+"""An environment has at most this many targets."""
+
+NUMBERS: Final = {
+    "radius": (LENGTH, "the radius of the motion circle"),
+    "speed": (SPEED, "the insertion speed"),
+    "length": (LENGTH, "the needle's length"),
+    "step": (TIME, "the step"),
+}
+VECTORS: Final = {
+    "tip": (LENGTH, "the tip's position"),
+    "heading": (NUMBER, "the heading"),
+    "bevel": (NUMBER, "the bevel"),
+}
+"""The settings of needle and motion: their dimension, and what they are."""
+
+
+class ContentResolver:
+    """Adds single statements to a draft."""
+
+    def __init__(self, reporter: Reporter, evaluator: Evaluator, driver: DriverResolver) -> None:
+        self._reporter = reporter
+        self._evaluator = evaluator
+        self._driver = driver
+
+    def add(
+        self, statement: tree.Statement, scope: Scope, draft: Draft, *, is_in_loop: bool
+    ) -> None:
+        """Resolves a statement about the environment itself."""
+        match statement:
+            case tree.Region():
+                self._region(statement, scope, draft, is_in_loop=is_in_loop)
+            case tree.Query():
+                self._query(statement, draft)
+            case tree.Setting():
+                self._setting(statement, scope, draft)
+            case tree.Roll():
+                self._roll(statement, scope, draft)
+            case tree.Choice():
+                self._choice(statement, draft)
+            case tree.Parameter():
+                self._driver.parameter(statement, scope, draft)
+            case tree.Axis():
+                self._driver.axis(statement, scope, draft)
+            case tree.Tracker():
+                self._driver.tracker(statement, draft)
+            case tree.Resolution():
+                self._resolution(statement, scope, draft)
+
+    def _region(
+        self, statement: tree.Region, scope: Scope, draft: Draft, *, is_in_loop: bool
+    ) -> None:
+        """Adds a region to the draft, even if it has mistakes."""
+        name = self._region_name(statement.name, scope)
+        region = self._shape(statement, name or statement.name.identifier.text, scope)
+        draft.seen.setdefault(statement.keyword, statement.span)
+        if name is None or region is None:
+            draft.has_gaps = True
+            draft.broken_names.add(statement.name.identifier.text)
+            return
+        if is_in_loop and not statement.name.indices:
+            self._reporter.report(
+                "name-without-index",
+                statement.name.span,
+                f"`{name}` is made once for each round of the loop and needs an index",
+                hint=f"write for example `{name}[i]`, with the variable of your loop",
+            )
+            return
+        if self._is_full(statement, draft):
+            return
+        first = draft.regions.setdefault(name, region)
+        if first is not region:
+            self._reporter.report(
+                "duplicate-name",
+                statement.name.span,
+                f"there is a region `{name}` already",
+                hint="choose another name"
+                + (" or another index" if statement.name.indices else ""),
+                notes=(f"the first is at {first.name_span.place}",),
+            )
+
+    def _is_full(self, statement: tree.Region, draft: Draft) -> bool:
+        """Whether the environment has the maximum number of regions; if so, reports it."""
+        is_last_target = statement.keyword == "target" and draft.target_count == MAX_TARGETS
+        if len(draft.regions) < MAX_REGIONS and not is_last_target:
+            draft.target_count += statement.keyword == "target"
+            return False
+        limit = f"{MAX_TARGETS} targets" if is_last_target else f"{MAX_REGIONS:,} regions"
+        self._reporter.report(
+            "too-many-regions",
+            statement.name.span,
+            f"an environment can have at most {limit}",
+            hint="describe fewer and larger ones",
+        )
+        return True
+
+    def _shape(self, statement: tree.Region, name: str, scope: Scope) -> DraftRegion | None:
+        """A region with its sphere, or with the region that it lies around."""
+        keyword, span, shape = statement.keyword, statement.name.span, statement.shape
+        if isinstance(shape, tree.Sphere):
+            role = f"the radius of `{name}`"
+            center = self._evaluator.vector(shape.center, scope, LENGTH, f"the centre of `{name}`")
+            radius = self._evaluator.number(shape.radius, scope, LENGTH, role)
+            return DraftRegion(
+                keyword,
+                name,
+                span,
+                Placed(center, shape.center.span),
+                Placed(radius, shape.radius.span),
+            )
+        around = self._region_name(shape.region, scope)
+        margin = self._evaluator.number(shape.margin, scope, LENGTH, f"the margin of `{name}`")
+        if keyword != "detection":
+            self._reporter.report(
+                "around-misused",
+                shape.span,
+                f"{article(keyword)} {keyword} region is not written with `around`",
+                hint="give it a sphere, or make it a `detection` region",
+            )
+            return None
+        return DraftRegion(
+            keyword,
+            name,
+            span,
+            None,
+            Placed(margin, shape.margin.span),
+            Placed(around, shape.region.span),
+        )
+
+    def _region_name(self, name: tree.RegionName, scope: Scope) -> str | None:
+        """A region's name with the values of its indices: ``Ring[3]``."""
+        text = name.identifier.text
+        for index in name.indices:
+            number = self._evaluator.whole(index, scope, "an index")
+            if number is None:
+                return None
+            text += f"[{number}]"
+        return text
+
+    def _query(self, statement: tree.Query, draft: Draft) -> None:
+        """A named query; the engine checks its text later."""
+        name = statement.name
+        first = draft.queries.setdefault(name.text, Placed(statement.text, name.span))
+        if first.span is not name.span:
+            self._reporter.report(
+                "duplicate-name",
+                name.span,
+                f"there is a query `{name.text}` already",
+                hint="choose another name",
+                notes=(f"the first is at {first.span.place}",),
+            )
+
+    def _setting(self, statement: tree.Setting, scope: Scope, draft: Draft) -> None:
+        """A property of the needle or of its motion."""
+        span = statement.value.span
+        if statement.keyword in VECTORS:
+            dimension, role = VECTORS[statement.keyword]
+            vector = self._evaluator.vector(statement.value, scope, dimension, role)
+            draft.vectors[statement.keyword] = Placed(vector, span)
+        else:
+            dimension, role = NUMBERS[statement.keyword]
+            number = self._evaluator.number(statement.value, scope, dimension, role)
+            draft.numbers[statement.keyword] = Placed(number, span)
+
+    def _roll(self, statement: tree.Roll, scope: Scope, draft: Draft) -> None:
+        """The rolls that may be chosen, and their limits."""
+        angles = self._evaluator.list_of(statement.angles, scope, ANGLE, "a roll")
+        draft.angles = [
+            Placed(angle, expression.span)
+            for angle, expression in zip(angles, statement.angles, strict=True)
+        ]
+        for limits, words in ((statement.at_most, "at most"), (statement.at_least, "at least")):
+            for repeated in limits[1:]:
+                self._reporter.report(
+                    "statement-repeated",
+                    repeated.span,
+                    f"`{words}` is written a second time",
+                    hint="remove one of the two",
+                )
+        for limit in statement.at_most[:1]:
+            count = self._evaluator.whole(limit, scope, "the number of rolls")
+            draft.max_rolls = Placed(count, limit.span)
+        for limit in statement.at_least[:1]:
+            distance = self._evaluator.number(limit, scope, LENGTH, "the distance between rolls")
+            draft.roll_distance = Placed(distance, limit.span)
+
+    def _choice(self, statement: tree.Choice, draft: Draft) -> None:
+        """A property that is one of a few words."""
+        if is_choice(statement.word, statement.keyword, self._reporter):
+            draft.choices[statement.keyword] = statement.word.text
+        else:
+            draft.has_gaps = True
+
+    def _resolution(self, statement: tree.Resolution, scope: Scope, draft: Draft) -> None:
+        """The fixed-point scale, as units per mm."""
+        count = self._evaluator.number(statement.count, scope, NUMBER, "the resolution")
+        unit = self._evaluator.unit(statement.unit)
+        value: float | None = None
+        if unit is not None and unit[1] != LENGTH:
+            self._reporter.report(
+                "wrong-dimension",
+                statement.unit.span,
+                f"the resolution is per length, but this is {unit[1]}",
+                hint="write for example `resolution 1000 per mm`",
+            )
+        elif unit is not None and count is not None:
+            value = count / unit[0]
+            if not math.isfinite(value):
+                self._reporter.report(
+                    "not-a-number", statement.count.span, "the result is too large for a number"
+                )
+                value = None
+        draft.resolution = Placed(value, statement.count.span.to(statement.unit.span))
