@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from ntagen.cli import INTERNAL_ERROR
+from ntagen.cli.asked import Asked, is_used_by, queries_of
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
+from ntagen.cli.evidence import Outputs, write_evidence
 from ntagen.cli.models import (
     include_option,
     load_model,
@@ -25,12 +26,10 @@ from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import overflow_rule
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
-from ntagen.files import require_apart, write_files
+from ntagen.files import require_apart
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, QueryForm
-    from ntagen.checker.facts import Query
-    from ntagen.nsl import Task
 
 STOPPED: Final = 3
 """Exit code after a limit or a ``maybe``."""
@@ -49,43 +48,6 @@ _MARK: Final = {
 
 REJECTED_MARK: Final = ("refused", "red")
 """The mark of a query that is rejected while others are answered."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """A query to be answered."""
-
-    name: str | None
-    text: str
-    form: QueryForm | None
-    """What it asks for; ``None`` if the text is no query."""
-
-    folder: Path | None = None
-    """The folder of files that the query names; ``None`` is that of the model."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Outputs:
-    """Where evidence is written; ``None`` is nowhere."""
-
-    trace: str | None
-    certificate: Path | None
-    strategy: str | None
-    controller: Path | None
-    plans: str | None
-    ranking: tuple[str, ...]
-    written: set[str] = field(default_factory=set)
-    """The options whose output has been written."""
-
-    def wanted(self) -> dict[str, str | Path | None]:
-        """Where the output of each option is written."""
-        return {
-            "--trace": self.trace,
-            "--certificate": self.certificate,
-            "--strategy": self.strategy,
-            "--controller": self.controller,
-            "--plans": self.plans,
-        }
 
 
 @click.command(
@@ -232,7 +194,7 @@ def command(
     if second_path and query_file:
         raise click.UsageError(f"two files of queries: {query_file} and {second_path}; give one")
     criteria = _criteria(ranking)
-    outputs = _Outputs(trace, certificate, strategy, controller, plans, criteria)
+    outputs = Outputs(trace, certificate, strategy, controller, plans, criteria)
     query_path = query_file or second_path
     inputs = {"model": model_path} | ({"queries": query_path} if query_path else {})
     require_apart(outputs.wanted(), inputs)
@@ -248,7 +210,7 @@ def command(
     with pointing_to_explanations(not as_json):
         loaded = load_model(model_path, include, overflow)
         shown_already = len(loaded.model.warnings)
-        todo = _queries(loaded.model, asked, query_path)
+        todo = queries_of(loaded.model, asked, query_path)
         show_warnings(loaded.model.warnings[shown_already:])
         _say_idle_options(
             [query.form for query in todo if query.form], is_environment=loaded.task is not None
@@ -256,7 +218,7 @@ def command(
         if not as_json:
             _header(model_path, loaded.model)
         for number, query in enumerate(todo):
-            is_used = _is_used(query, todo[number + 1 :])
+            is_used = is_used_by(query, todo[number + 1 :])
             try:
                 with shown_progress(query.text, quiet=as_json) as report:
                     answer = loaded.model.answer(
@@ -282,7 +244,7 @@ def command(
                 return INTERNAL_ERROR
             show_warnings(answer.warnings)
             covered = answer.verification if verify else ()
-            notes = [*covered, *_write_evidence(answer, query, outputs, loaded.task)]
+            notes = [*covered, *write_evidence(answer, query, outputs, loaded.task)]
             if as_json:
                 echo(json.dumps(_record(answer, query)))
             else:
@@ -314,53 +276,7 @@ def _severity(answer: Answer) -> int:
     return codes.get(answer.verdict, MODEL_ERROR)
 
 
-def _queries(model: Model, asked: Sequence[str], file: Path | None) -> list[_Asked]:
-    """The queries to answer: those asked for, else those of the file, else those of the model."""
-    known = [_asked(query) for query in model.queries]
-    from_file = [_asked(one, file.parent) for one in model.read_queries(file)] if file else []
-    if file and not from_file:
-        raise InputError(f"{file} has no queries")
-    if asked:
-        named = {query.name: query for query in [*known, *from_file] if query.name}
-        return [_find(text, named) for text in asked]
-    if not (from_file or known):
-        raise InputError("the model has no queries\nhint: give one with --query or --queries")
-    return from_file or known
-
-
-def _is_used(query: _Asked, later: Sequence[_Asked]) -> bool:
-    """Whether the strategy that a query defines is used by those after it."""
-    name = query.form and query.form.defines
-    return name is not None and any(other.form and other.form.uses == name for other in later)
-
-
-def _asked(query: Query, folder: Path | None = None) -> _Asked:
-    """A query of a file, named by the first line of its comment or by its strategy."""
-    from ntagen.checker import form_of
-
-    first_line = query.comment.strip().splitlines()[0].strip() if query.comment.strip() else ""
-    form = form_of(query.text)
-    if re.fullmatch(r"[A-Za-z_]\w*", first_line):
-        return _Asked(first_line, query.text, form, folder)
-    return _Asked(form.defines if form else None, query.text, form, folder)
-
-
-def _find(text: str, named: dict[str, _Asked]) -> _Asked:
-    """The query with this name, or the text itself as a query."""
-    from ntagen.checker import form_of
-
-    stripped = text.strip()
-    if stripped in named:
-        return named[stripped]
-    if re.fullmatch(r"[A-Za-z_]\w*", stripped):
-        names = ", ".join(sorted(named)) or "none"
-        raise InputError(
-            f"there is no query with the name {stripped}\nhint: queries with a name: {names}"
-        )
-    return _Asked(None, stripped, form_of(stripped))
-
-
-def _record(answer: Answer, query: _Asked) -> dict[str, object]:
+def _record(answer: Answer, query: Asked) -> dict[str, object]:
     """The answer as the JSON object that the command line promises."""
     return {
         "query": query.text,
@@ -383,13 +299,13 @@ def _header(path: Path, model: Model) -> None:
     echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
 
 
-def _line(mark: tuple[str, str], query: _Asked) -> None:
+def _line(mark: tuple[str, str], query: Asked) -> None:
     """Prints the first line of a query's row: the verdict in its colour, and the query."""
     label = f"{query.name}: {query.text}" if query.name else query.text
     echo("  ", Styled(f"{mark[0]:<8}", fg=mark[1], bold=True), label)
 
 
-def _row(answer: Answer, query: _Asked, notes: Sequence[str], *, trace_is_written: bool) -> None:
+def _row(answer: Answer, query: Asked, notes: Sequence[str], *, trace_is_written: bool) -> None:
     _line(_MARK[answer.verdict], query)
     facts = [f"{answer.explored} states explored", f"{answer.stored} stored"]
     facts.append(f"{1000 * answer.seconds:.1f} ms")
@@ -451,98 +367,3 @@ def _edge(edge: dict[str, Any]) -> str:
     )
     arrow = f"{edge['process']}.{edge['source']} -> {edge['target']}"
     return f"{arrow}  {{ {labels} }}" if labels else arrow
-
-
-def _write_evidence(
-    answer: Answer, query: _Asked, outputs: _Outputs, task: Task | None
-) -> list[str]:
-    """Writes what was asked for; returns a line for the user about each output."""
-    notes: list[str] = []
-    if outputs.trace and (text := answer.trace_text()) is not None:
-        outputs.written.add("--trace")
-        notes += _write_trace(answer, query, outputs.trace, text)
-    certificate = answer.certificate_text() if outputs.certificate else None
-    if outputs.certificate and certificate is not None:
-        write_files({outputs.certificate: certificate})
-        outputs.written.add("--certificate")
-        states = certificate.count("\n") - 1
-        notes.append(f"certificate of {states} states written to {outputs.certificate}")
-    if outputs.strategy and (text := _strategy_text(answer, query, outputs.strategy)) is not None:
-        outputs.written.add("--strategy")
-        notes += _write_strategy(answer, outputs.strategy, text)
-    controller = answer.controller_c() if outputs.controller else None
-    if outputs.controller and controller is not None:
-        write_files({outputs.controller: controller})
-        outputs.written.add("--controller")
-        notes.append(f"controller written to {outputs.controller}")
-    if outputs.plans and answer.plan_count is not None:
-        outputs.written.add("--plans")
-        notes += _write_plans(answer, outputs.plans, outputs.ranking, task)
-    return notes
-
-
-def _write_trace(answer: Answer, query: _Asked, target: str, text: str) -> list[str]:
-    if target == "-":
-        echo(text)
-        return []
-    path = Path(target)
-    as_json = answer.trace_json() if path.suffix == ".json" else None
-    write_files({path: f"{as_json}\n" if as_json else f"{query.text}\n\n{text}"})
-    return [f"trace written to {path}"]
-
-
-def _strategy_text(answer: Answer, query: _Asked, target: str) -> str | None:
-    """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
-    is_json = Path(target).suffix == ".json"
-    text = answer.strategy_json() if is_json else answer.strategy_text()
-    if text is None or target == "-":
-        return text
-    return f"{text}\n" if is_json else f"{query.text}\n\n{text}"
-
-
-def _write_strategy(answer: Answer, target: str, text: str) -> list[str]:
-    if target == "-":
-        echo(text, nl=False)
-        return []
-    write_files({Path(target): text})
-    whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
-    return [f"{whose} written to {target}"]
-
-
-def _write_plans(
-    answer: Answer, target: str, ranking: tuple[str, ...], task: Task | None
-) -> list[str]:
-    if task is None:
-        if target == "-":
-            echo(answer.plans_json() or "")
-            return []
-        write_files({Path(target): f"{answer.plans_json()}\n"})
-        return [f"{answer.plan_count} plans written to {target}"]
-    from ntagen.drive.configure import configure
-    from ntagen.plan.document import document
-    from ntagen.plan.extract import extract
-    from ntagen.plan.rank import certified
-    from ntagen.plan.wording import counted, judged, ranked_by, required
-
-    scene, settings = task.scene, configure(task.given, task.scene).settings
-    criteria, margins = ranking or settings.ranking, settings.margins
-    ranked = certified(extract(answer.plans, scene), scene, criteria)
-    holding = [candidate for candidate in ranked if margins.allow(candidate.certificate)]
-    notes = [counted(len(ranked), len(holding)), required(margins)]
-    if target == "-":
-        shown = list(enumerate(ranked, start=1))
-    else:
-        plans = document(scene, ranked, criteria, margins)
-        write_files({Path(target): json.dumps(plans, indent=1) + "\n"})
-        notes.insert(0, f"plans written to {target}")
-        shown = [one for one in enumerate(ranked, start=1) if one[1] in holding[:BEST_SHOWN]]
-    if shown:
-        notes.append(f"{ranked_by(criteria)}:")
-    for place, candidate in shown:
-        verdict = judged(candidate.certificate, margins)
-        notes.append(f"  {place:>3}. {verdict}  {candidate.plan}")
-    return notes
-
-
-BEST_SHOWN: Final = 3
-"""Plans that the table shows."""

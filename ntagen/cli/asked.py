@@ -1,0 +1,74 @@
+"""The queries that a command answers: those of the command line, of a file, or of the model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from ntagen.checker import Model, QueryForm
+    from ntagen.checker.facts import Query
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A query to be answered."""
+
+    name: str | None
+    text: str
+    form: QueryForm | None
+    """What it asks for; ``None`` if the text is no query."""
+
+    folder: Path | None = None
+    """The folder of files that the query names; ``None`` is that of the model."""
+
+
+def queries_of(model: Model, asked: Sequence[str], file: Path | None) -> list[Asked]:
+    """The queries to answer: those asked for, else those of the file, else those of the model."""
+    known = [_asked(query) for query in model.queries]
+    from_file = [_asked(one, file.parent) for one in model.read_queries(file)] if file else []
+    if file and not from_file:
+        raise InputError(f"{file} has no queries")
+    if asked:
+        named = {query.name: query for query in [*known, *from_file] if query.name}
+        return [_find(text, named) for text in asked]
+    if not (from_file or known):
+        raise InputError("the model has no queries\nhint: give one with --query or --queries")
+    return from_file or known
+
+
+def is_used_by(query: Asked, later: Sequence[Asked]) -> bool:
+    """Whether the strategy that a query defines is used by those after it."""
+    name = query.form and query.form.defines
+    return name is not None and any(other.form and other.form.uses == name for other in later)
+
+
+def _asked(query: Query, folder: Path | None = None) -> Asked:
+    """A query of a file, named by the first line of its comment or by its strategy."""
+    from ntagen.checker import form_of
+
+    first_line = query.comment.strip().splitlines()[0].strip() if query.comment.strip() else ""
+    form = form_of(query.text)
+    if re.fullmatch(r"[A-Za-z_]\w*", first_line):
+        return Asked(first_line, query.text, form, folder)
+    return Asked(form.defines if form else None, query.text, form, folder)
+
+
+def _find(text: str, named: dict[str, Asked]) -> Asked:
+    """The query with this name, or the text itself as a query."""
+    from ntagen.checker import form_of
+
+    stripped = text.strip()
+    if stripped in named:
+        return named[stripped]
+    if re.fullmatch(r"[A-Za-z_]\w*", stripped):
+        names = ", ".join(sorted(named)) or "none"
+        raise InputError(
+            f"there is no query with the name {stripped}\nhint: queries with a name: {names}"
+        )
+    return Asked(None, stripped, form_of(stripped))

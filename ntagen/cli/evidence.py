@@ -1,0 +1,132 @@
+"""Writes the evidence for an answer: traces, certificates, strategies, controllers and plans."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from ntagen.cli.asked import Asked
+from ntagen.cli.terminal import echo
+from ntagen.files import write_files
+
+if TYPE_CHECKING:
+    from ntagen.checker import Answer
+    from ntagen.nsl import Task
+
+BEST_SHOWN: Final = 3
+"""Plans that the table shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Where evidence is written; ``None`` is nowhere."""
+
+    trace: str | None
+    certificate: Path | None
+    strategy: str | None
+    controller: Path | None
+    plans: str | None
+    ranking: tuple[str, ...]
+    written: set[str] = field(default_factory=set)
+    """The options whose output has been written."""
+
+    def wanted(self) -> dict[str, str | Path | None]:
+        """Where the output of each option is written."""
+        return {
+            "--trace": self.trace,
+            "--certificate": self.certificate,
+            "--strategy": self.strategy,
+            "--controller": self.controller,
+            "--plans": self.plans,
+        }
+
+
+def write_evidence(answer: Answer, query: Asked, outputs: Outputs, task: Task | None) -> list[str]:
+    """Writes what was asked for; returns a line for the user about each output."""
+    notes: list[str] = []
+    if outputs.trace and (text := answer.trace_text()) is not None:
+        outputs.written.add("--trace")
+        notes += _write_trace(answer, query, outputs.trace, text)
+    certificate = answer.certificate_text() if outputs.certificate else None
+    if outputs.certificate and certificate is not None:
+        write_files({outputs.certificate: certificate})
+        outputs.written.add("--certificate")
+        states = certificate.count("\n") - 1
+        notes.append(f"certificate of {states} states written to {outputs.certificate}")
+    if outputs.strategy and (text := _strategy_text(answer, query, outputs.strategy)) is not None:
+        outputs.written.add("--strategy")
+        notes += _write_strategy(answer, outputs.strategy, text)
+    controller = answer.controller_c() if outputs.controller else None
+    if outputs.controller and controller is not None:
+        write_files({outputs.controller: controller})
+        outputs.written.add("--controller")
+        notes.append(f"controller written to {outputs.controller}")
+    if outputs.plans and answer.plan_count is not None:
+        outputs.written.add("--plans")
+        notes += _write_plans(answer, outputs.plans, outputs.ranking, task)
+    return notes
+
+
+def _write_trace(answer: Answer, query: Asked, target: str, text: str) -> list[str]:
+    if target == "-":
+        echo(text)
+        return []
+    path = Path(target)
+    as_json = answer.trace_json() if path.suffix == ".json" else None
+    write_files({path: f"{as_json}\n" if as_json else f"{query.text}\n\n{text}"})
+    return [f"trace written to {path}"]
+
+
+def _strategy_text(answer: Answer, query: Asked, target: str) -> str | None:
+    """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
+    is_json = Path(target).suffix == ".json"
+    text = answer.strategy_json() if is_json else answer.strategy_text()
+    if text is None or target == "-":
+        return text
+    return f"{text}\n" if is_json else f"{query.text}\n\n{text}"
+
+
+def _write_strategy(answer: Answer, target: str, text: str) -> list[str]:
+    if target == "-":
+        echo(text, nl=False)
+        return []
+    write_files({Path(target): text})
+    whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
+    return [f"{whose} written to {target}"]
+
+
+def _write_plans(
+    answer: Answer, target: str, ranking: tuple[str, ...], task: Task | None
+) -> list[str]:
+    if task is None:
+        if target == "-":
+            echo(answer.plans_json() or "")
+            return []
+        write_files({Path(target): f"{answer.plans_json()}\n"})
+        return [f"{answer.plan_count} plans written to {target}"]
+    from ntagen.drive.configure import configure
+    from ntagen.plan.document import document
+    from ntagen.plan.extract import extract
+    from ntagen.plan.rank import certified
+    from ntagen.plan.wording import counted, judged, ranked_by, required
+
+    scene, settings = task.scene, configure(task.given, task.scene).settings
+    criteria, margins = ranking or settings.ranking, settings.margins
+    ranked = certified(extract(answer.plans, scene), scene, criteria)
+    holding = [candidate for candidate in ranked if margins.allow(candidate.certificate)]
+    notes = [counted(len(ranked), len(holding)), required(margins)]
+    if target == "-":
+        shown = list(enumerate(ranked, start=1))
+    else:
+        plans = document(scene, ranked, criteria, margins)
+        write_files({Path(target): json.dumps(plans, indent=1) + "\n"})
+        notes.insert(0, f"plans written to {target}")
+        shown = [one for one in enumerate(ranked, start=1) if one[1] in holding[:BEST_SHOWN]]
+    if shown:
+        notes.append(f"{ranked_by(criteria)}:")
+    for place, candidate in shown:
+        verdict = judged(candidate.certificate, margins)
+        notes.append(f"  {place:>3}. {verdict}  {candidate.plan}")
+    return notes
