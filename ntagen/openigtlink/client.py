@@ -22,10 +22,10 @@ import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 from ntagen.errors import DeviceError
+from ntagen.openigtlink.closing import Closing
 from ntagen.openigtlink.messages import (
     Position,
     Sensor,
@@ -49,7 +49,7 @@ _RATED: Final = 64
 _JOIN_S: Final = 5.0
 
 
-class Client:
+class Client(Closing):
     """A connection to an OpenIGTLink server; use it as a context manager.
 
     Args:
@@ -83,17 +83,6 @@ class Client:
         self._connect()
         self._thread = threading.Thread(target=self._work, name="igtl-client", daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def now_s(self) -> float:
         """The clock of all times of receipt: monotonic, of this machine."""
