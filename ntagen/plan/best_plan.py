@@ -13,6 +13,8 @@ single plan, several times, each time for more than the best plan so far has:
 
 If the ranking begins with the reserve, all regions to avoid are larger and the target is smaller.
 Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less.
+If nothing known is in the straight way to the target, a last question is for a plan along it: there
+a region that nobody told of is least likely, since it is the way that the operator looked at.
 
 Every plan that is found is certified in the scene itself. The number of questions is fixed, so that
 equal scenes have equal answers. Where few plans can exist, all are listed, which is sooner done.
@@ -25,12 +27,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
+from ntagen.needle.vectors import combine, distance, dot, subtract
 from ntagen.plan.actions import Plan
 from ntagen.plan.extract import step_length_mm
 from ntagen.plan.neighbours import improved
 from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM, Candidate, rank, reserve_of
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
-from ntagen.scene import Scene
+from ntagen.scene import Region, Scene
 
 _MOST_LISTED: Final = 2_000
 """All plans are listed if so few sequences of rolls can begin at so few places."""
@@ -56,6 +59,12 @@ _FIRST_RESERVE_MM: Final = 3.0
 
 _LESS_RESERVE_MM: Final = 1.5
 """The reserve that is asked for if the first one cannot be had."""
+
+_GATE_RATIO: Final = 0.3
+"""The radius of a place on the straight way, relative to that of the target."""
+
+_GATE_FROM_RATIO: Final = 2.0
+"""From nearer than this many radii of the target, the way to it is what it is."""
 
 _RESOLUTION_MM: Final = 0.2
 """Less additional clearance than this is not asked for."""
@@ -85,6 +94,7 @@ class BestPlanSynthesiser:
         if first.plans:
             known.raise_worth()
             known.lower_rolls()
+            known.straighten()
             if not known.candidates or (known.is_narrow and sequences(scene) <= _MOST_WHEN_NARROW):
                 # Every plan that was found fails its certificate, or comes near a region: the list
                 # tells whether all do.
@@ -185,6 +195,14 @@ class _Known:
         useful_mm = min(most_mm, self._worth_mm())
         self._ask(replace(self._scene, limits=fewer), useful_mm)
 
+    def straighten(self) -> None:
+        """Asks for a plan along the straight way to the target, if that is free."""
+        gates = _gates(self._scene)
+        if not self._counts_reserve or not gates:
+            return
+        gated = self._scene.with_targets([*gates, *self._scene.targets])
+        self._ask(gated, min(USEFUL_RESERVE_MM, self._worth_mm()))
+
     @property
     def _counts_reserve(self) -> bool:
         return self._asker.engine.ranking[0] == "reserve"
@@ -239,6 +257,32 @@ def _shorter(scene: Scene, length_mm: float) -> Scene:
     """The scene with plans of at most this length."""
     shortest_mm = min(scene.needle.length_mm, length_mm)
     return replace(scene, needle=replace(scene.needle, length_mm=shortest_mm))
+
+
+def _gates(scene: Scene) -> list[Region]:
+    """Places to visit on the straight way to the only target; none if it is blocked or short."""
+    target, tip_mm = scene.targets[-1], scene.needle.tip.position_mm
+    away_mm = distance(tip_mm, target.center_mm)
+    if len(scene.targets) > 1 or away_mm < _GATE_FROM_RATIO * target.radius_mm:
+        return []
+    way = subtract(target.center_mm, tip_mm)
+    for region in scene.avoided:
+        along = min(1.0, max(0.0, dot(subtract(region.center_mm, tip_mm), way) / away_mm**2))
+        nearest_mm = combine(1.0 - along, tip_mm, along, target.center_mm)
+        if distance(nearest_mm, region.center_mm) <= region.radius_mm:
+            return []
+    shares = [target.radius_mm / away_mm]
+    if away_mm > 2.0 * _GATE_FROM_RATIO * target.radius_mm:
+        shares.insert(0, 0.5)
+    return [
+        Region(
+            f"gate {number}",
+            "target",
+            combine(1.0 - share, target.center_mm, share, tip_mm),
+            _GATE_RATIO * target.radius_mm,
+        )
+        for number, share in enumerate(shares)
+    ]
 
 
 def _stricter(scene: Scene, by_mm: float, shells_mm: float, depth_mm: float) -> Scene:

@@ -38,7 +38,7 @@ _RESERVE_STEP_MM: Final = 0.25
 
 DEFAULT_RANKING: Final = ("clearance", "rolls", "length")
 
-ROBUST_RANKING: Final = ("reserve", "rolls", "length")
+ROBUST_RANKING: Final = ("reserve", "length", "rolls")
 """The usual ranking for needles that do not bend exactly as planned."""
 
 
