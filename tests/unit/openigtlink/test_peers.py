@@ -147,7 +147,8 @@ while True:
                 second.kill()
             assert isinstance(after.content, Transform)
             assert after.content.columns[3] == (2.0, 0.0, 0.0)
-            assert client.statistics().connections == 2
+            # On a busy machine the new one may take a connection and drop it once more.
+            assert client.statistics().connections >= 2
 
 
 # The reference library.
