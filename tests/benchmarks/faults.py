@@ -22,7 +22,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from tests.faults.catalogue import FAULTS, Fault
-from tests.faults.runs import NEEDLES, Finding, run
+from tests.faults.runs import NEEDLES, OVER, Finding, run
 
 
 def made(job: tuple[str, str, int]) -> Finding:
@@ -55,7 +55,7 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=os.cpu_count())
     asked = parser.parse_args()
     chosen = [fault for fault in FAULTS if any(words in fault.name for words in asked.fault)]
-    wrong = total = 0
+    wrong = total = struck = 0
     print(f"{'fault':32} needle     deeper  lasted  ends")
     with multiprocessing.Pool(asked.workers) as pool:
         for fault in chosen:
@@ -64,7 +64,8 @@ def main() -> int:
                 findings = pool.map(made, [(fault.name, needle, seed) for seed in seeds], 1)
                 wrong += tell(fault, needle, asked.first, findings)
                 total += len(findings)
-    print(f"{total} runs, {wrong} wrong (yardstick: 0)")
+                struck += sum(one.outcome != OVER for one in findings)
+    print(f"{total} runs, {struck} with the fault before the end, {wrong} wrong (yardstick: 0)")
     return 1 if wrong else 0
 
 

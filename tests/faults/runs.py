@@ -23,8 +23,11 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SCENES = ("paper", "scenarios/small_mid_cr", "scenarios/surface_crs", "scenarios/tunnel_crs")
 NEEDLES = ("virtual", "phantom")
 
-LATEST_S = 60.0
-"""A fault strikes before this time; most runs take 50 s."""
+OVER = "over before the fault"
+"""The outcome of a run that had ended when the fault came."""
+
+LATEST_S = 50.0
+"""A fault strikes before this time; most runs take as long."""
 
 STEP_MM = 2.0
 """A step of the model: the needle must not go deeper by more after a fault."""
@@ -113,7 +116,7 @@ class _Examined:
 
     def _outcome(self, result: Driven | None, error: BaseException | None) -> str:
         if not self._rig.is_struck:
-            return "over before the fault"
+            return OVER
         return result.ended.outcome if result else type(error).__name__
 
     def _require_end(self, result: Driven | None, error: BaseException | None) -> None:
