@@ -118,6 +118,7 @@ class Controller:
         self._retreat_mm: float | None = None
         self._adjustments = 0
         self._reason = ""
+        self._turned_s = 0.0
         self._tasks: dict[State, Callable[[], Event]] = {
             State.ARM: self._arm,
             State.INITIAL_PUSH: self._initial_push,
@@ -157,7 +158,8 @@ class Controller:
 
     def _went_on(self, state: State, event: Event) -> State:
         following = next_state(state, event)
-        self._note(Transition(self._now_s(), state.value, event.value, following.value))
+        self._turned_s = self._now_s()
+        self._note(Transition(self._turned_s, state.value, event.value, following.value))
         return following
 
     def _finish(self, state: State) -> Ended:
@@ -197,7 +199,7 @@ class Controller:
     def _perform(self, state: State) -> Event:
         """Does a state's task; returns the event with which it ended. An error is an event too."""
         try:
-            self._planner.require_time()
+            self._planner.require_time(self._turned_s)
             return self._tasks[state]()
         except DeviceError as error:
             self._reason = str(error)
@@ -248,7 +250,7 @@ class Controller:
         depth_mm = path.depth_mm
         places: list[tuple[float, Candidate]] = []
         while depth_mm > _SMALL_MM:
-            self._planner.require_time()
+            self._planner.require_time(self._planner.asked_s)
             depth_mm = max(0.0, depth_mm - stride_mm)
             behind = path.pull(path.depth_mm - depth_mm)
             best = self._planner.ask(_unrolled(behind), depth_mm).best

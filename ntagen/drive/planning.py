@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -49,6 +50,7 @@ class Planner:
 
     Attributes:
         count: The number of syntheses.
+        asked_s: When the last one was over.
         lack: Why no plan is left.
     """
 
@@ -67,21 +69,28 @@ class Planner:
         self._learner = learner
         self._journal = journal
         self._listen = listen
-        self._started_s = 0.0
+        # The clock of a device may begin anywhere.
+        self._started_s = math.inf
         self.count = 0
+        self.asked_s = 0.0
         self.lack = Lack()
 
     def start(self) -> None:
         """The time of the run begins now."""
         self._started_s = self._needle.now_s()
 
-    def require_time(self) -> None:
+    def require_time(self, at_s: float | None = None) -> None:
         """Does nothing while there is time left.
+
+        Args:
+            at_s: The time that counts; now by default. Before something that may take long, it must
+                be that of the last record: a replay has no other clock than the next record.
 
         Raises:
             LimitError: The time limit is over.
         """
-        if self._needle.now_s() - self._started_s >= self._settings.timeout_s:
+        now_s = self._needle.now_s() if at_s is None else at_s
+        if now_s - self._started_s >= self._settings.timeout_s:
             raise LimitError(f"the limit of {self._settings.timeout_s:g} s is over")
 
     def ask(self, tip: Pose, depth_mm: float, rest: Plan | None = None) -> Synthesis:
@@ -118,9 +127,8 @@ class Planner:
         )
         # If the run ended during the synthesis, the synthesis does not count.
         self.count = number
-        self._journal.record(
-            Timed(self._needle.now_s(), number, synthesis.seconds, synthesis.loop_seconds)
-        )
+        self.asked_s = self._needle.now_s()
+        self._journal.record(Timed(self.asked_s, number, synthesis.seconds, synthesis.loop_seconds))
         return synthesis
 
     def _in_time(self, synthesis: Synthesis, back_mm: float) -> Synthesis:

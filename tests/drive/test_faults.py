@@ -9,14 +9,15 @@ import pytest
 
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import Command, Ended, JournalError, Measured, Record, Transition
+from ntagen.drive.replay import replay
 from ntagen.drive.settings import Settings
-from ntagen.drive.simulate import simulate
+from ntagen.drive.simulate import simulate, synthesiser_for
 from ntagen.drive.states import State
 from ntagen.errors import ModelError
-from ntagen.needle.virtual import VirtualNeedle
+from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.nsl import load
 from ntagen.plan.synthesise import Synthesis
-from ntagen.scene import Scene
+from ntagen.scene import Needle, Scene
 from tests.drive.runs import Diary
 from tests.faults.catalogue import FAULTS, Fault
 from tests.faults.live import LIVE, run_live
@@ -158,3 +159,30 @@ def test_an_interruption_between_two_tasks_writes_nothing_more() -> None:
     with pytest.raises(KeyboardInterrupt):
         simulate(PAPER, oracle_synthesis, Settings(), diary)
     assert not diary.of(Ended)
+
+
+@pytest.mark.parametrize("delay_s", [30.0, 200.0])
+def test_a_run_with_a_late_synthesis_is_decided_again(tmp_path: Path, delay_s: float) -> None:
+    rig = Rig(load(EXAMPLES / "paper.nsl"), "phantom", "all", 1, folder=tmp_path)
+
+    def wait() -> None:
+        if rig.syntheses == 2:
+            rig.emulator.advance(rig.emulator.now_s + delay_s)
+
+    rig.before_synthesis = wait
+    ended = rig.drive(lambda _: None).ended
+    assert (ended.outcome == State.TARGET_REACHED.value) == (delay_s < 100.0)
+    log = read_log(tmp_path / "run.mcap")
+    again = replay(log, synthesiser_for(rig.configuration.settings))
+    assert again.is_same
+    assert again.complete
+
+
+def test_the_clock_of_a_device_may_begin_anywhere() -> None:
+    def make(needle: Needle, obstacles: tuple[Obstacle, ...], seed: int) -> VirtualNeedle:
+        clock = SimulatedClock()
+        clock.advance(1e6)
+        return VirtualNeedle(needle, obstacles, Errors(), seed, clock)
+
+    ended = simulate(PAPER, oracle_synthesis, Settings(), Diary(), make=make).ended
+    assert ended.outcome == State.TARGET_REACHED.value

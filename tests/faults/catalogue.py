@@ -37,6 +37,7 @@ class Fault:
         in_synthesis: Whether it strikes in a synthesis, and not at a moment.
         needs_log: Whether the run must have a log.
         hides_motion: Whether the fault moves the axes or their position itself.
+        changes_clock: Whether the clock is wrong after it.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Fault:
     in_synthesis: bool = False
     needs_log: bool = False
     hides_motion: bool = False
+    changes_clock: bool = False
 
 
 def _controller(act: Callable[[Rig], object]) -> Strike:
@@ -276,7 +278,7 @@ FAULTS: Final = (
         "SIGTERM",
     ),
     Fault("process suspended", _suspend),
-    Fault("clock jumps on", _jump(0.0, 300.0)),
-    Fault("clock jumps back", _jump(-5.0, -0.1)),
+    Fault("clock jumps on", _jump(0.0, 300.0), changes_clock=True),
+    Fault("clock jumps back", _jump(-5.0, -0.1), changes_clock=True),
 )
 """All of them, in the order of the issue that they come from."""

@@ -35,7 +35,9 @@ LATEST_S = 4.5
 
 STEP_MM = 2.0
 PULLED_MM = 5.01
-_PATIENCE_S = 90.0
+_PATIENCE_S = 170.0
+"""A run ends by itself after 120 s."""
+
 _SETTLE_S = 0.7
 _STILL_MM = 1e-6
 
@@ -105,7 +107,7 @@ class Bench:
             stderr=subprocess.PIPE,
             text=True,
             env={**os.environ, "PYTHONPATH": str(ROOT)},
-            preexec_fn=self._limit if self._limit_bytes is not None else None,
+            preexec_fn=self._begin,
         )
 
     def wait_for_log(self) -> None:
@@ -143,8 +145,12 @@ class Bench:
         task = load_task(TASK)
         return _fitting(configure(task.given, task.scene, "all", self._needle), task)
 
-    def _limit(self) -> None:
-        assert self._limit_bytes is not None
+    def _begin(self) -> None:
+        """Makes the new process hear signals, also if this one is in the background."""
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_DFL)
+        if self._limit_bytes is None:
+            return
         resource.setrlimit(resource.RLIMIT_FSIZE, (self._limit_bytes, self._limit_bytes))
 
 

@@ -13,6 +13,8 @@ from ntagen.drive.knowledge import told
 from ntagen.drive.outcome import Driven
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import Command, Ended, Transition
+from ntagen.drive.replay import replay
+from ntagen.drive.simulate import synthesiser_for
 from ntagen.needle.kinematics import Arc
 from ntagen.nsl import load
 from ntagen.scene import Region, Vector
@@ -28,6 +30,9 @@ OVER = "over before the fault"
 
 LATEST_S = 50.0
 """A fault strikes before this time; most runs take as long."""
+
+LOGGED = 0.1
+"""This share of the runs is logged and decided again; the others keep their records in memory."""
 
 STEP_MM = 2.0
 """A step of the model: the needle must not go deeper by more after a fault."""
@@ -64,8 +69,8 @@ def run(fault: Fault, needle: str, seed: int) -> Finding:
     scene = load(EXAMPLES / f"{draw.choice(SCENES)}.nsl")
     known = draw.choice(["all", "all", "none"])
     with tempfile.TemporaryDirectory() as folder:
-        its_folder = Path(folder) if fault.needs_log else None
-        watched = draw.random() < 0.5
+        watched, is_logged = draw.random() < 0.5, draw.random() < LOGGED
+        its_folder = Path(folder) if fault.needs_log or is_logged else None
         rig = Rig(scene, needle, known, seed, watched=watched, folder=its_folder)
         return _Examined(fault, rig, draw).finding
 
@@ -189,6 +194,12 @@ class _Examined:
         expected = told_too[: len(logged)] if is_cut_off else told_too
         if not logged or logged != expected:
             self._wrong(f"the log has {len(logged)} records of {len(told_too)}")
+        # The clock of a replay is that of the log, so what a changed clock ends is not decided so.
+        if self._fault.changes_clock:
+            return
+        again = replay(read_log(path), synthesiser_for(self._rig.configuration.settings))
+        if not again.is_same or again.complete == is_cut_off:
+            self._wrong(f"decided again, it is another run: {again}")
 
     def _require_stillness(self) -> None:
         """Waits, and presses the resume button, after the fault is over."""
