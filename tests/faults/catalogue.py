@@ -229,7 +229,12 @@ FAULTS: Final = (
         _FAULTED,
         "stuck|too slow|ended too early",
     ),
-    Fault("door", _controller(lambda r: r.emulator.feed(b"\x84")), _FAULTED, "Door|door"),
+    Fault(
+        "door",
+        _controller(lambda r: r.emulator.feed(b"\x84")),
+        _FAULTED,
+        "Door|door|did not answer",
+    ),
     Fault("hold button", _controller(lambda r: r.emulator.feed(b"!"))),
     Fault("slow axes", _controller(lambda r: setattr(r.emulator.faults, "pace", 0.2))),
     Fault("lost steps", _controller(lambda r: r.emulator.faults.lost.update(X=0.1))),
