@@ -9,8 +9,8 @@ known or hidden. Printed are the runs that reached the target, those that hit a 
 least true clearance, how the others ended, and the times of whole syntheses (render, load, solve,
 certify, rank): the median and the 99th percentile. With `--runs`, each run that failed has a line:
 its end, what cost it time, and what it learned. The yardstick: no region is hit, and where there is
-a plan for the true scene, at least 95 % of the runs (`--least`) reach the target. Default: the
-paper's scene and the scenarios.
+a plan from the entry of the true scene, at least 95 % of the runs (`--least`) reach the target.
+Default: the paper's scene and the scenarios.
 
 The truth is computed here: the arcs that were really cut are sampled, with code that shares nothing
 with the driver or the needles. Ends with 1 if a region was hit, with 2 if too few runs reached the
@@ -196,7 +196,7 @@ def shown(drive: Drive, ends: list[End], exists: bool, least: float) -> tuple[bo
     is_enough = not exists or reached >= least * len(ends)
     # A needle with its own errors has no noise that could be chosen.
     noise = f"noise {drive.noise_mm:4g} mm" if drive.needle == "virtual" else drive.needle
-    wanted = f"at least {least:.0%}" if exists else "there is no path"
+    wanted = f"at least {least:.0%}" if exists else "no plan from the entry"
     print(
         f"{drive.path.stem:14} known {drive.known:4} {noise}: {reached:3} of {len(ends)} reach the "
         f"target ({wanted}: {'met' if is_enough else 'MISSED'}), {hit} hit (0: "
