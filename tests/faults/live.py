@@ -259,7 +259,9 @@ def run_live(fault: LiveFault, needle: str, seed: int, folder: Path) -> LiveFind
 
 def _examine(fault: LiveFault, finding: LiveFinding, bench: Bench, log: Path) -> None:
     wrong = finding.wrong
-    if finding.code not in fault.codes:
+    # A log that cannot be begun is a mistake on the command line: then nothing has moved.
+    is_refused = finding.code == 2 and bool(fault.limit_bytes) and not bench.lab.truth().has_moved
+    if finding.code not in fault.codes and not is_refused:
         wrong.append(f"exit code {finding.code}: {finding.reason}")
     if finding.code == 5 and fault.words and not any(w in finding.reason for w in fault.words):
         wrong.append(f"the reason has other words: {finding.reason}")
