@@ -159,11 +159,18 @@ class Log:
         self._keep(to_disk=is_alarm or isinstance(record, Learned | Ended))
 
     def close(self) -> None:
-        """Completes the file; without this it is cut off, but readable."""
+        """Completes the file; without this it is cut off, but readable.
+
+        Raises:
+            JournalError: It cannot be completed. All records are in it.
+        """
         if self._file.closed:
             return
         self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.acknowledge(to_disk=True)
+        try:
+            self._file.acknowledge(to_disk=True)
+        except InputError as error:
+            raise JournalError(f"the run is over, and its log has no index: {error}") from error
         self._file.close()
 
     def _channel(self, topic: str, kind: type[Message]) -> int:

@@ -302,6 +302,20 @@ def test_a_second_run_into_the_same_log_is_refused(
     assert read_log(path).records == (*MANY, ALARM)
 
 
+def test_a_log_that_cannot_be_completed_has_all_records(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    log = filled(path)
+    records = read_log(path).records
+    old = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, old[1]))
+    try:
+        with pytest.raises(JournalError, match="the run is over, and its log has no index"):
+            log.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, old)
+    assert read_log(path).records == records != ()
+
+
 def test_a_full_disk_ends_the_log_with_a_whole_record(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     old = resource.getrlimit(resource.RLIMIT_FSIZE)
