@@ -188,7 +188,7 @@ class EngineSynthesiser:
         from ntagen import checker
         from ntagen.render import render
 
-        model_xml = render(scene)
+        model_xml = render(scene, only_plans=True)
         model = checker.load(model_xml)
         # The model computes distances: if one wrapped round, the answer would be wrong.
         model.overflow = "error"

@@ -22,12 +22,15 @@ from ntagen.scene import Scene
 __all__ = ["render", "render_queries"]
 
 
-def render(scene: Scene, source: str | None = None) -> str:
+def render(scene: Scene, source: str | None = None, *, only_plans: bool = False) -> str:
     """The timed-game model of a scene as UPPAAL's XML.
 
     Args:
         scene: The scene.
         source: The file of the scene, for the comment at the top of the declaration.
+        only_plans: Whether the model gives up paths on a circle that passes by the target with no
+            roll left. Whether there is a strategy, and all plans, are the same, and are found in
+            half the time; what else may be asked about the model is not.
 
     Returns:
         The XML document; its queries are those of `render_queries`.
@@ -35,7 +38,7 @@ def render(scene: Scene, source: str | None = None) -> str:
     Raises:
         InputError: A value of the scene does not fit the model's numbers.
     """
-    values = model_values(scene)
+    values = model_values(scene, only_plans=only_plans)
     templates = environment()
     declaration = templates.get_template("uppaal/declarations.c.jinja").render(
         model=values, source=None if source is None else " ".join(source.split())

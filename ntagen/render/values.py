@@ -69,6 +69,7 @@ class ModelValues:
     safe: Spheres
     swept: bool
     sweep_margin: int
+    only_plans: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +108,12 @@ class _Writer:
         return Spheres(len(regions), centers, radii)
 
 
-def model_values(scene: Scene) -> ModelValues:
+def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
     """The values of a scene for the templates.
+
+    Args:
+        scene: The scene.
+        only_plans: As in `ntagen.render.render`.
 
     Raises:
         InputError: A value does not fit the model's numbers, or the model would not move.
@@ -148,6 +153,7 @@ def model_values(scene: Scene) -> ModelValues:
         safe=writer.spheres(scene.safe),
         swept=scene.safety == "swept",
         sweep_margin=_sweep_margin(scale, needle.radius_mm),
+        only_plans=only_plans,
     )
 
 

@@ -23,6 +23,6 @@ system Checker;
 
 
 def test_a_model_that_wraps_round_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ntagen.render, "render", lambda _: WRAPPING)
+    monkeypatch.setattr(ntagen.render, "render", lambda _, **__: WRAPPING)
     with pytest.raises(ModelError, match="does not fit into 32 bits"):
         EngineSynthesiser()(PAPER)
