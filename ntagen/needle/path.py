@@ -11,10 +11,22 @@ in mm.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from ntagen.needle.kinematics import Arc, Nearest, roll
+from ntagen.needle.kinematics import Arc, Nearest, circle_center, roll
 from ntagen.scene import Pose, Vector
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    _Array = NDArray[np.float64]
+
+_MANY = 8
+"""For fewer points, one after the other is faster."""
 
 _NOTHING_MM = 1e-12
 """Arcs shorter than this are rounding errors of sums of lengths."""
@@ -107,6 +119,58 @@ def nearest_on(arcs: tuple[Arc, ...], entry_mm: Vector, point_mm: Vector) -> Nea
             best = Nearest(nearest.distance_mm, start_mm + nearest.at_mm)
         start_mm += arc.length_mm
     return best
+
+
+def nearest_on_all(
+    arcs: tuple[Arc, ...], entry_mm: Vector, points_mm: Sequence[Vector]
+) -> list[Nearest]:
+    """`nearest_on` for each of many points, by one computation for all of them."""
+    if len(points_mm) < _MANY:
+        return [nearest_on(arcs, entry_mm, point_mm) for point_mm in points_mm]
+    import numpy as np
+
+    points = np.array(points_mm)
+    best_mm = np.linalg.norm(points - np.array(entry_mm), axis=1)
+    best_at_mm = np.zeros(len(points))
+    start_mm = 0.0
+    for arc in arcs:
+        for distance_mm, at_mm in _near_places(arc, points):
+            is_nearer = distance_mm < best_mm
+            best_mm = np.where(is_nearer, distance_mm, best_mm)
+            best_at_mm = np.where(is_nearer, start_mm + at_mm, best_at_mm)
+        start_mm += arc.length_mm
+    return [Nearest(float(d), float(a)) for d, a in zip(best_mm, best_at_mm, strict=True)]
+
+
+def _near_places(arc: Arc, points: _Array) -> Iterator[tuple[_Array, _Array]]:
+    """The places of an arc of which one is nearest: both ends, and the foot if it is on the arc.
+
+    Yields:
+        The distance from each point, and the arc length; see `Arc.nearest_to`.
+    """
+    import numpy as np
+
+    ends = ((arc.start, 0.0), (arc.end, arc.length_mm))
+    for pose, at_mm in ends:
+        away_mm = np.linalg.norm(points - np.array(pose.position_mm), axis=1)
+        yield away_mm, np.full(len(points), at_mm)
+    start, heading, bevel = (
+        np.array(vector) for vector in (arc.start.position_mm, arc.start.heading, arc.start.bevel)
+    )
+    if math.isinf(arc.radius_mm):
+        foot_mm = (points - start) @ heading
+        places = start + np.outer(foot_mm, heading)
+        is_on = (foot_mm >= 0.0) & (foot_mm < arc.length_mm)
+    else:
+        center = np.array(circle_center(arc.start, arc.radius_mm))
+        from_center = points - center
+        turn_rad = np.arctan2(from_center @ heading, from_center @ bevel) % (2.0 * math.pi)
+        foot_mm = turn_rad * arc.radius_mm
+        aside = np.outer(np.cos(turn_rad), bevel) + np.outer(np.sin(turn_rad), heading)
+        places = center + arc.radius_mm * aside
+        is_on = foot_mm < arc.length_mm
+    away_mm = np.linalg.norm(points - places, axis=1)
+    yield np.where(is_on, away_mm, math.inf), foot_mm
 
 
 def sample_poses(arcs: tuple[Arc, ...], spacing_mm: float) -> list[Pose]:
