@@ -13,7 +13,7 @@ single plan, several times, each time for more than the best plan so far has:
 
 If the ranking begins with the reserve, all regions to avoid are larger and the target is smaller.
 Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less.
-If nothing known is in the straight way to the target, a last question is for a plan along it: there
+If nothing known is in the straight way to the target, the plans along it are listed last: there
 a region that nobody told of is least likely, since it is the way that the operator looked at.
 
 Every plan that is found is certified in the scene itself. The number of questions is fixed, so that
@@ -35,7 +35,7 @@ from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM, Candidate, 
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
 from ntagen.scene import Region, Scene
 
-_MOST_LISTED: Final = 2_000
+_MOST_LISTED: Final = 600
 """All plans are listed if so few sequences of rolls can begin at so few places."""
 
 _BETWEEN_STEPS_MM: Final = 0.3
@@ -65,6 +65,9 @@ _GATE_RATIO: Final = 0.3
 
 _GATE_FROM_RATIO: Final = 2.0
 """From nearer than this many radii of the target, the way to it is what it is."""
+
+_MOST_STRAIGHT: Final = 12
+"""At most so many plans along the straight way are compared; they are much alike."""
 
 _RESOLUTION_MM: Final = 0.2
 """Less additional clearance than this is not asked for."""
@@ -196,12 +199,14 @@ class _Known:
         self._ask(replace(self._scene, limits=fewer), useful_mm)
 
     def straighten(self) -> None:
-        """Asks for a plan along the straight way to the target, if that is free."""
+        """Lists plans along the straight way to the target, if that is free."""
         gates = _gates(self._scene)
         if not self._counts_reserve or not gates:
             return
         gated = self._scene.with_targets([*gates, *self._scene.targets])
-        self._ask(gated, min(USEFUL_RESERVE_MM, self._worth_mm()))
+        wanted = self._strict(gated, min(USEFUL_RESERVE_MM, self._worth_mm()))
+        few = replace(self._asker.engine, max_plans=_MOST_STRAIGHT, keeps_strategy=False)
+        self._note(few.listed(wanted))
 
     @property
     def _counts_reserve(self) -> bool:
@@ -209,13 +214,17 @@ class _Known:
 
     def _ask(self, scene: Scene, worth_mm: float) -> Candidate | None:
         """Asks for a plan that has this clearance or reserve; gives one that holds, or None."""
+        return self._note(self._asker.one(self._strict(scene, worth_mm)))
+
+    def _strict(self, scene: Scene, worth_mm: float) -> Scene:
+        """The scene whose plans have this clearance or reserve."""
         depth_mm = self._asker.engine.margins.depth_mm
         shells_mm = min(worth_mm, _BETWEEN_STEPS_MM)
         if self._counts_reserve:
             depth_mm = max(depth_mm, worth_mm)
             # Half way, half of the distance is the same reserve.
             worth_mm = shells_mm = 0.5 * worth_mm
-        return self._note(self._asker.one(_stricter(scene, worth_mm, shells_mm, depth_mm)))
+        return _stricter(scene, worth_mm, shells_mm, depth_mm)
 
     def _note(self, listing: Listing) -> Candidate | None:
         """Certifies what was found in the scene itself; one that holds, or None."""

@@ -247,7 +247,7 @@ def main() -> int:
                     ends = pool.map(made, runs, chunksize=1)
                     is_unhurt, is_enough = shown(drive, ends, exists, arguments.least)
                     unhurt, enough = unhurt and is_unhurt, enough and is_enough
-                    for end in ends if arguments.runs else ():
+                    for end in ends if arguments.runs and exists else ():
                         if not end.is_reached:
                             said = "; ".join(end.story)
                             print(f"    seed {end.seed}: {end.outcome}, {end.time_s:.0f} s: {said}")
