@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import gc
 import importlib
 import math
 from collections.abc import Callable
@@ -219,9 +221,7 @@ def synthesiser_for(
     keeps_strategy: bool = False,
 ) -> TimedSynthesiser:
     """The synthesiser with the margins, the ranking and the budgets of the settings."""
-    # What the first synthesis needs is loaded before the needle waits for it.
-    importlib.import_module("ntagen.checker")
-    importlib.import_module("ntagen.render")
+    _load()
     engine = EngineSynthesiser(
         margins=settings.margins,
         ranking=settings.ranking,
@@ -232,6 +232,17 @@ def synthesiser_for(
         listen=listen,
     )
     return TimedSynthesiser(BestPlanSynthesiser(engine))
+
+
+@functools.cache
+def _load() -> None:
+    """Loads what the first synthesis needs, before the needle waits for it."""
+    for name in ("ntagen.checker", "ntagen.render"):
+        importlib.import_module(name)
+    # The collector would look at all of it again and again, which takes 20 ms: as long as the
+    # engine needs for a synthesis.
+    gc.collect()
+    gc.freeze()
 
 
 class _Witness:
