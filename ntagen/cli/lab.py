@@ -53,7 +53,7 @@ _FASTEST: Final = 100.0
     default=1.0,
     show_default=True,
     type=click.FloatRange(min=0.01, max=_FASTEST),
-    help="Time in the lab runs so many times as fast: axes, needle and tracker.",
+    help="How many times as fast time passes in the lab, for axes, needle and tracker.",
 )
 @click.option(
     "--rate",

@@ -44,11 +44,12 @@ def axes_for(device: GrblDevice, needle: Needle, settings: Settings) -> Axes:
     from ntagen.grbl.axes import axes_of
     from ntagen.units import deg_from_rad
 
+    speeds = speeds_for(needle, settings)
     return axes_of(
         device,
-        push_mm_per_s=needle.speed_mm_per_s,
-        pull_mm_per_s=settings.pull_speed_ratio * needle.speed_mm_per_s,
-        roll_deg_per_s=deg_from_rad(settings.roll_rad_per_s),
+        push_mm_per_s=speeds.push_mm_per_s,
+        pull_mm_per_s=speeds.pull_mm_per_s,
+        roll_deg_per_s=deg_from_rad(speeds.roll_rad_per_s),
     )
 
 

@@ -25,6 +25,7 @@ from ntagen.needle.contact import Contact, ball_of
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.path import sample_poses
 from ntagen.needle.vectors import add, combine, distance, scale
+from ntagen.needle.virtual import Obstacle
 from ntagen.scene import Pose, Region, Scene, Vector
 
 _EXPLAINED_MM = 1.0
@@ -67,6 +68,19 @@ def sensing_margin_mm(critical: Region, detections: Iterable[Region], otherwise_
             for shell in shells_of(critical, detections)
         ),
         default=otherwise_mm,
+    )
+
+
+def obstacles_of(scene: Scene, otherwise_mm: float) -> tuple[Obstacle, ...]:
+    """The critical regions for a simulated needle, with the distances at which it feels them.
+
+    Args:
+        scene: The actual scene.
+        otherwise_mm: The distance for a region without a shell.
+    """
+    return tuple(
+        Obstacle(region, sensing_margin_mm(region, scene.detections, otherwise_mm))
+        for region in scene.criticals
     )
 
 

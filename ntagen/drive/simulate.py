@@ -13,7 +13,7 @@ from typing import Final, Protocol
 from ntagen.drive.controller import Controller
 from ntagen.drive.device import Actuator, Assembly, Device, Sensor
 from ntagen.drive.force import fitting_spacing_mm
-from ntagen.drive.knowledge import sensing_margin_mm, told
+from ntagen.drive.knowledge import obstacles_of, sensing_margin_mm, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
 from ntagen.drive.settings import Settings
@@ -120,13 +120,7 @@ def simulate(
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
         agree: As in `Controller`.
     """
-    obstacles = tuple(
-        Obstacle(
-            region,
-            sensing_margin_mm(region, scene.detections, settings.sensing_margin_mm),
-        )
-        for region in scene.criticals
-    )
+    obstacles = obstacles_of(scene, settings.sensing_margin_mm)
     errors = errors or Errors()
     true_needle = errors.true_needle(scene.needle)
     needle = (make or virtual(errors))(true_needle, obstacles, seed)

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from ntagen.drive.knowledge import sensing_margin_mm
+from ntagen.drive.knowledge import obstacles_of
 from ntagen.drive.plant import Movable
 from ntagen.errors import InputError
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.phantom_sensor import Frame
-from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
+from ntagen.needle.virtual import Errors, SimulatedClock, VirtualNeedle
 from ntagen.scene import Pose, Scene
 
 NAMES: Final = ("phantom", "virtual")
@@ -81,10 +81,7 @@ def place(
     Raises:
         InputError: There is no needle of this name.
     """
-    obstacles = tuple(
-        Obstacle(region, sensing_margin_mm(region, scene.detections, margin_mm))
-        for region in scene.criticals
-    )
+    obstacles = obstacles_of(scene, margin_mm)
     clock = LabClock()
     if name == "phantom":
         parameters = PhantomParameters()
