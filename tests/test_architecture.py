@@ -15,13 +15,14 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "ntagen"
 
-BASE = {"errors", "hardware", "parameters", "rules", "scene", "units"}
+BASE = {"errors", "hardware", "parameters", "rules", "scene", "shapes", "units"}
 MAY_IMPORT: dict[str, set[str]] = {
     "cache": set(),
     "errors": set(),
     "units": set(),
     "rules": {"units"},
-    "scene": {"errors", "rules"},
+    "scene": {"errors", "rules", "shapes"},
+    "shapes": set(),
     "parameters": {"rules", "units"},
     "hardware": {"errors", "rules"},
     "nsl": BASE | {"cache", "files"},

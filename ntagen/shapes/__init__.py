@@ -1,0 +1,22 @@
+"""Solid shapes: distances, bounds and volumes, in mm. Pure geometry; it knows nothing of scenes."""
+
+from ntagen.shapes.ellipsoid import Ellipsoid
+from ntagen.shapes.round import Capsule, HalfSpace, Sphere
+from ntagen.shapes.shape import UPRIGHT, Axes, Bounds, Points, Shape, Vector, turning
+from ntagen.shapes.straight import Box, Cylinder
+
+__all__ = [
+    "UPRIGHT",
+    "Axes",
+    "Bounds",
+    "Box",
+    "Capsule",
+    "Cylinder",
+    "Ellipsoid",
+    "HalfSpace",
+    "Points",
+    "Shape",
+    "Sphere",
+    "Vector",
+    "turning",
+]
